@@ -1,0 +1,48 @@
+# Sourced by demo.sh and test.sh: installs what the build needs and the machine lacks, on Debian and the like.
+# shellcheck shell=bash
+
+dpr_packages=(
+  g++ cmake ninja-build pkg-config
+  pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
+  libglm-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
+  doctest-dev gnuplot-nox clinfo oclgrind clang
+)
+
+# Prints the packages of the list that are not installed.
+missing_packages() {
+  local package
+  for package in "${dpr_packages[@]}"; do
+    dpkg-query -W -f '${db:Status-Abbrev}' "$package" 2>/dev/null | grep -q '^ii' || echo "$package"
+  done
+}
+
+install_packages() {
+  if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+    # Elsewhere the packages have other names: their installation is left to the user.
+    local tool
+    for tool in c++ cmake ninja; do
+      if ! command -v "$tool" >/dev/null; then
+        echo "$tool is missing. Needed are, under the names this system gives them:" >&2
+        echo "  ${dpr_packages[*]}" >&2
+        exit 1
+      fi
+    done
+    return
+  fi
+
+  local missing
+  mapfile -t missing < <(missing_packages)
+  if ((${#missing[@]} == 0)); then return; fi
+  local sudo=()
+  if (($(id -u) != 0)); then
+    if ! command -v sudo >/dev/null; then
+      echo "Missing packages, and neither root nor sudo to install them: ${missing[*]}" >&2
+      exit 1
+    fi
+    sudo=(sudo)
+  fi
+  echo "Installing ${missing[*]}"
+  "${sudo[@]}" apt-get update -q
+  "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -q -y --no-install-recommends "${missing[@]}"
+}

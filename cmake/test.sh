@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Installs what is missing, then builds and tests each preset named as an argument; without any: the release,
+# under the sanitizers, and under oclgrind.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source cmake/packages.sh
+install_packages
+
+presets=("$@")
+if ((${#presets[@]} == 0)); then presets=(release asan-ubsan oclgrind); fi
+
+summary=()
+status=0
+for preset in "${presets[@]}"; do
+  echo "== $preset"
+  start=$SECONDS
+  if cmake --preset "$preset" && cmake --build --preset "$preset" &&
+    ctest --preset "$preset" -j2 --output-on-failure; then
+    result=passed
+  else
+    result=FAILED
+    status=1
+  fi
+  summary+=("$(printf '%-12s %s in %d s' "$preset" "$result" $((SECONDS - start)))")
+done
+
+echo "== summary"
+printf '%s\n' "${summary[@]}"
+exit "$status"

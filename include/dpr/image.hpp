@@ -1,0 +1,47 @@
+// Images in memory and on disk.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <vector>
+
+namespace dpr {
+
+/// Linear RGBA in floats, row 0 on top; the alpha channel is the silhouette, not premultiplied.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<glm::vec4> pixels;  ///< [height * width], row-major
+
+  Image() = default;
+  Image(int width_, int height_, glm::vec4 fill = glm::vec4(0))
+      : width(width_),
+        height(height_),
+        pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), fill) {}
+
+  glm::vec4& at(int column, int row) { return pixels[index(column, row)]; }
+  const glm::vec4& at(int column, int row) const { return pixels[index(column, row)]; }
+
+ private:
+  std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
+  }
+};
+
+/// Reads any format OpenImageIO knows, up to 16384 pixels a side. One and two channels are grey (and alpha),
+/// three get alpha 1. 8- and 16-bit formats are scaled to [0, 1] without a colour transform; EXR is taken as
+/// stored. `has_alpha`, if given, tells what the file had. Throws IoError, also for a pixel that is not
+/// finite.
+Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr);
+
+/// Writes by extension: .exr keeps the floats (32 bit, RGBA); .png, .tif, .tiff and .tga clamp to [0, 1] and
+/// round to 8 bits; .bmp, .jpg, .jpeg and .ppm do so without alpha. Written to a temporary file that is
+/// renamed at the end, so that no half-written file stays behind. Throws IoError, and InvalidArgument for an
+/// image without pixels.
+void write_image(const std::filesystem::path& file, const Image& image);
+
+/// Images side by side, with a gap between them, for strips. All must have the same height. Empty in, empty
+/// out.
+Image hstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));
+
+}  // namespace dpr

@@ -1,0 +1,111 @@
+// The differentiable renderer: a scene in, images out; gradients of the images in, gradients of the scene out.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dpr/device.hpp"
+#include "dpr/image.hpp"
+#include "dpr/scene.hpp"
+
+namespace dpr {
+
+/// One view of a batch: a camera and where every mesh stands in it.
+struct View {
+  Camera camera;
+  std::vector<glm::mat4> transforms;  ///< [mesh] object to world
+};
+
+/// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r = 0 (radians,
+/// the translation column left alone), and for the translation column.
+struct PoseGradient {
+  glm::dvec3 rotation{0.0}, translation{0.0};
+};
+
+struct CameraGradient {
+  PoseGradient view;         ///< of the world-to-camera matrix
+  double fov_y_degrees = 0;  ///< 0 where the camera has intrinsics
+  std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy; 0 where the camera has a field of view
+};
+
+struct ViewGradient {
+  CameraGradient camera;
+  std::vector<PoseGradient> transforms;  ///< [mesh]
+};
+
+struct MeshGradient {
+  std::vector<glm::vec3> positions;  ///< [vertex] object space; empty if not requested
+  std::vector<glm::vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
+};
+
+struct PointLightGradient {
+  glm::dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
+};
+
+/// What GradientRequest asked for; the rest is zero or empty. Bitwise the same from run to run on one device.
+struct SceneGradient {
+  std::vector<MeshGradient> meshes;  ///< summed over the views
+  std::vector<ViewGradient> views;
+  glm::dvec3 ambient{0.0};
+  std::vector<PointLightGradient> lights;  ///< summed over the views
+  double sigma = 0, gamma = 0, alpha = 0;
+  glm::dvec3 background{0.0};
+};
+
+struct RenderStatistics {
+  std::size_t faces = 0;            ///< triangles times views
+  std::size_t faces_dropped = 0;    ///< of those: nearer than znear, beyond zfar, without area, or outside the image
+  std::size_t pairs = 0;            ///< (8x8 tile, triangle) pairs
+  std::size_t fragments = 0;        ///< (pixel, triangle) pairs within the blur radius
+  std::size_t device_bytes = 0;     ///< held by this renderer
+};
+
+class ImageLoss;
+
+/// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
+class Renderer {
+ public:
+  explicit Renderer(Device device);
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+
+  /// Validates and uploads a scene; its camera and transforms become the only view. Throws InvalidArgument.
+  void set_scene(const Scene& scene);
+  /// Replaces the views (at least one); geometry stays on the device. The same launches render all of them.
+  void set_views(std::span<const View> views);
+  void set_smoothing(const Smoothing& smoothing);
+  /// New positions, object space, for a mesh of the scene: [vertex], as many as it has.
+  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
+  /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
+  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+
+  const Scene& scene() const;
+  std::span<const View> views() const;
+
+  /// Renders every view. Blocks only to read the two sizes it needs to allocate.
+  void forward();
+  /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
+  Image image(std::size_t view = 0) const;
+
+  /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the background).
+  /// One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise again.
+  SceneGradient backward(std::span<const Image> grad_images);
+  /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
+  SceneGradient backward(const ImageLoss& loss);
+
+  RenderStatistics statistics() const;
+  const Device& device() const;
+
+  struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dpr

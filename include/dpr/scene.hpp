@@ -1,0 +1,53 @@
+// A scene as it is described in a file: everything a render needs.
+#pragma once
+
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dpr/camera.hpp"
+#include "dpr/light.hpp"
+#include "dpr/mesh.hpp"
+#include "dpr/smoothing.hpp"
+
+namespace dpr {
+
+/// A mesh and where it stands.
+struct Instance {
+  Mesh mesh;
+  glm::mat4 transform{1.0F};  ///< object to world; affine, may hold a scale
+};
+
+/// Which gradients the backward pass computes. Nothing is computed that is not asked for.
+struct GradientRequest {
+  bool positions = true;   ///< vertex positions, object space
+  bool colors = true;      ///< vertex or face colours
+  bool transform = true;   ///< rotation and translation of every mesh
+  bool camera = true;      ///< rotation and translation of the view, field of view or intrinsics
+  bool lights = false;     ///< positions and colours of the lights
+  bool smoothing = true;   ///< sigma, gamma, alpha
+  bool background = true;  ///< background colour
+};
+
+struct Scene {
+  int width = 128, height = 128;
+  Camera camera;
+  glm::vec3 background{0.0F};
+  std::vector<Instance> meshes;
+  std::optional<Lights> lights;  ///< none: colours as they are
+  Smoothing smoothing;
+  bool perspective_correct = true;
+  GradientRequest gradients;
+};
+
+/// Throws InvalidArgument where the scene cannot be rendered: size, camera, meshes, transforms, lights, smoothing.
+void validate(const Scene& scene);
+
+/// Reads the scene format of the README. Mesh files are relative to the scene file. An unknown key is an error that
+/// names it. Throws IoError where the file cannot be read or is not JSON (with the line), InvalidArgument else.
+Scene read_scene(const std::filesystem::path& file);
+
+}  // namespace dpr

@@ -1,0 +1,30 @@
+// Gradients of the corners of pairs, gathered at what the corners refer to: each target adds its corners in order, each
+// corner its pairs. No atomics, so the sum is the same from run to run.
+#include "shared_types.h"
+
+/// One work-item per (view, target), or per target where the views are summed.
+/// in   pair_starts    uint[view * face + 1]  pairs of a face of a view
+/// in   corner_starts  uint[target + 1]
+/// in   corners        uint[corner]           face * 3 + corner, by target
+/// in   partial        float[pair][9]         gradients of the three corners
+/// in   sum_views      0: out is per view; else the views are added up
+/// out  grad           float4[view][target] or float4[target]; w = 0
+kernel void gather_corners(const FrameParams p, const uint targets, const uint sum_views,
+                           global const uint* restrict pair_starts, global const uint* restrict corner_starts,
+                           global const uint* restrict corners, global const float* restrict partial,
+                           global float4* restrict grad) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= (sum_views ? targets : p.views * targets)) return;
+  const uint target = i % targets;
+  const uint first_view = sum_views ? 0 : i / targets, last_view = sum_views ? p.views : first_view + 1;
+  float3 sum = (float3)(0.0f);
+  for (uint view = first_view; view < last_view; ++view) {
+    for (uint k = corner_starts[target]; k < corner_starts[target + 1]; ++k) {
+      const uint face = view * p.faces + corners[k] / 3, corner = corners[k] % 3;
+      for (uint pair = pair_starts[face]; pair < pair_starts[face + 1]; ++pair) {
+        sum += vload3(0, partial + 9 * pair + 3 * corner);
+      }
+    }
+  }
+  grad[i] = (float4)(sum, 0.0f);
+}

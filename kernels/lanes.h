@@ -1,0 +1,85 @@
+// Vectors of DPR_WIDTH floats under one name. A kernel file that works on lanes defines DPR_WIDTH before it includes
+// this: 1 where the device's lanes are its work-items (GPUs), 8 or 16 where they are vector registers (CPUs),
+// 4 where they are the four numbers of one Philox call.
+#ifndef DPR_LANES_H
+#define DPR_LANES_H
+
+#ifndef DPR_LANES
+#define DPR_LANES 8 /* the device's width; the host chooses it */
+#endif
+#ifndef DPR_WIDTH
+#define DPR_WIDTH DPR_LANES /* the width of this file's vectors */
+#endif
+
+#define DPR_CONCAT_(a, b) a##b
+#define DPR_CONCAT(a, b) DPR_CONCAT_(a, b)
+
+#if DPR_WIDTH == 1
+typedef float realn;
+typedef int intn;
+typedef uint uintn;
+#define load_n(index, pointer) ((pointer)[index])
+#define store_n(value, index, pointer) ((pointer)[index] = (value))
+#define as_intn as_int
+#define as_realn as_float
+#define convert_intn convert_int
+#define convert_realn convert_float
+#define convert_uintn convert_uint
+#define DPR_LANE_INDEX 0
+static inline float sum_lanes(float v) { return v; }
+#else
+typedef DPR_CONCAT(float, DPR_WIDTH) realn;
+typedef DPR_CONCAT(int, DPR_WIDTH) intn;
+typedef DPR_CONCAT(uint, DPR_WIDTH) uintn;
+#define load_n(index, pointer) DPR_CONCAT(vload, DPR_WIDTH)(0, (pointer) + (index))
+#define store_n(value, index, pointer) DPR_CONCAT(vstore, DPR_WIDTH)(value, 0, (pointer) + (index))
+#define as_intn DPR_CONCAT(as_int, DPR_WIDTH)
+#define as_realn DPR_CONCAT(as_float, DPR_WIDTH)
+#define convert_intn DPR_CONCAT(convert_int, DPR_WIDTH)
+#define convert_realn DPR_CONCAT(convert_float, DPR_WIDTH)
+#define convert_uintn DPR_CONCAT(convert_uint, DPR_WIDTH)
+static inline float sum_lanes8(float8 v) {
+  const float4 a = v.lo + v.hi;
+  const float2 b = a.lo + a.hi;
+  return b.x + b.y;
+}
+#if DPR_WIDTH == 4
+#define DPR_LANE_INDEX ((intn)(0, 1, 2, 3))
+static inline float sum_lanes(float4 v) { return (v.x + v.z) + (v.y + v.w); }
+#elif DPR_WIDTH == 8
+#define DPR_LANE_INDEX ((intn)(0, 1, 2, 3, 4, 5, 6, 7))
+static inline float sum_lanes(float8 v) { return sum_lanes8(v); }
+#else
+#define DPR_LANE_INDEX ((intn)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+static inline float sum_lanes(float16 v) { return sum_lanes8(v.lo + v.hi); }
+#endif
+#endif
+
+static inline realn square(realn x) { return x * x; }
+
+/// `a` where the comparison holds, else `b`: select() with its arguments in the order of the ?: operator.
+static inline realn choose(intn condition, realn a, realn b) { return select(b, a, condition); }
+
+/// Natural exponential. Relative error below 2e-7 for -87 < x < 88, 0 below. On a vector CPU OpenCL's own exp() is a
+/// library call a lane; a polynomial (least maximum error on |f| <= ln 2 / 2) stays in the registers.
+static inline realn exp_n(realn x) {
+#if DPR_WIDTH == 1
+  return exp(x);
+#else
+  const realn clamped = clamp(x, -87.0f, 88.0f);
+  const realn n = rint(clamped * M_LOG2E_F);
+  // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
+  const realn f = mad(n, -1.42860677e-6f, mad(n, -0.693145752f, clamped));
+  realn p = 0.00138368784f;
+  p = mad(p, f, 0.00837481394f);
+  p = mad(p, f, 0.0416682251f);
+  p = mad(p, f, 0.166664198f);
+  p = mad(p, f, 0.499999911f);
+  p = mad(p, f, 1.0f);
+  p = mad(p, f, 1.0f);
+  const realn scale = as_realn((convert_intn(n) + 127) << 23);
+  return choose(x < -87.0f, (realn)(0.0f), p * scale);
+#endif
+}
+
+#endif

@@ -1,0 +1,51 @@
+// A pixel's run of the fragment lists, and what aggregation reads of a fragment.
+#ifndef DPR_PIXEL_H
+#define DPR_PIXEL_H
+
+#include "shared_types.h"
+
+/// 1 - p is kept above this, so that products without one factor are quotients.
+#define DPR_MIN_TRANSPARENCY 1e-9f
+
+/// Fragments by way of the pixels' lists.
+typedef struct {
+  global const uint* list;  // uint[...]        fragments, by pixel
+  global const float *depth, *log_occupancy, *occupancy, *red, *green, *blue;  // float[fragment]
+} Fragments;
+
+static inline Fragments make_fragments(global const uint* list, global const float* depth,
+                                       global const float* log_occupancy, global const float* occupancy,
+                                       global const float* red, global const float* green,
+                                       global const float* blue) {
+  Fragments f;
+  f.list = list;
+  f.depth = depth;
+  f.log_occupancy = log_occupancy;
+  f.occupancy = occupancy;
+  f.red = red;
+  f.green = green;
+  f.blue = blue;
+  return f;
+}
+
+static inline float3 fragment_color(const Fragments f, uint fragment) {
+  return (float3)(f.red[fragment], f.green[fragment], f.blue[fragment]);
+}
+
+static inline float fragment_transparency(const Fragments f, uint fragment) {
+  return max(1.0f - f.occupancy[fragment], DPR_MIN_TRANSPARENCY);
+}
+
+/// prod (1 - p) over a run: what the pixel's alpha leaves.
+static inline float run_transparency(const Fragments f, uint first, uint last) {
+  float product = 1.0f;
+  for (uint i = first; i < last; ++i) product *= fragment_transparency(f, f.list[i]);
+  return product;
+}
+
+/// d alpha / d ln p of one fragment: p prod of the others' transparencies.
+static inline float alpha_sensitivity(const Fragments f, uint fragment, float transparency) {
+  return f.occupancy[fragment] * transparency / fragment_transparency(f, fragment);
+}
+
+#endif

@@ -1,0 +1,275 @@
+// Triangles to fragments. A pair's coverage of its tile is a 64-bit mask; fragments are listed by pair (so that a
+// triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel has the list of
+// its own. A pair's run of fragments is padded to whole vectors; the padding repeats the last fragment, no pixel lists
+// it, and backward passes take its gradients as zero.
+#ifdef DPR_LANES
+#if DPR_LANES == 16
+#define DPR_WIDTH 8 /* a row of a tile */
+#endif
+#endif
+#include "geometry.h"
+
+#define DPR_ROW_MASK 0xffu
+
+/// A row of a mask: bit k is column k of the tile.
+static inline uint mask_row(uint2 mask, uint row) { return ((row < 4 ? mask.x : mask.y) >> (8 * (row & 3))) & DPR_ROW_MASK; }
+
+/// Lanes of truth as bits.
+static inline uint lane_bits(intn condition) {
+#if DPR_WIDTH == 1
+  return condition ? 1u : 0u;
+#else
+  const uint8 bits = as_uint8(condition) & (uint8)(1, 2, 4, 8, 16, 32, 64, 128);
+  const uint4 a = bits.lo | bits.hi;
+  const uint2 b = a.lo | a.hi;
+  return b.x | b.y;
+#endif
+}
+
+/// Which pixels of its tile a triangle's blurred area covers: centre inside, or closer than the blur distance.
+/// One work-item per pair.
+/// out  masks   uint2[pair]  bit 8 * row + column
+/// out  counts  uint[pair]   covered pixels, rounded up to whole vectors
+kernel void rasterize_cover(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+                            global const uint* restrict pair_face, global const uint* restrict pair_tile,
+                            global uint2* restrict masks, global uint* restrict counts) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  const Triangle t = triangles[pair_face[pair]];
+  const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
+  const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
+  const float limit = p.blur_distance * p.blur_distance;
+  uint halves[2] = {0, 0};
+  for (uint row = 0; row < DPR_TILE && first_row + row < p.height; ++row) {
+    const realn y = pixel_y(p, (realn)((float)(first_row + row)));
+    for (uint part = 0; part < DPR_TILE; part += DPR_WIDTH) {
+      const intn column = (int)(first_column + part) + DPR_LANE_INDEX;
+      const View3 v = view_triangle(t, pixel_x(p, convert_realn(column)), y);
+      const intn covered = inside_triangle(v, t.orientation) || triangle_distance2(v) < limit;
+      halves[row / 4] |= lane_bits(covered && column < (int)p.width) << (8 * (row & 3) + part);
+    }
+  }
+  masks[pair] = (uint2)(halves[0], halves[1]);
+  const uint count = popcount(halves[0]) + popcount(halves[1]);
+  counts[pair] = (count + DPR_WIDTH - 1) / DPR_WIDTH * DPR_WIDTH;
+}
+
+/// Counts the fragments of every pixel. One work-item per vector of pixels of a tile's row.
+/// in   tile_starts  uint[view * tile + 1]  runs of `order`
+/// in   order        uint[pair]             pairs by tile, then by face
+/// out  counts       uint[view][height][width]
+kernel void rasterize_count(const FrameParams p, global const uint* restrict tile_starts,
+                            global const uint* restrict order, global const uint2* restrict masks,
+                            global uint* restrict counts) {
+  const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
+  const uint tiles = p.tiles_x * p.tiles_y;
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * tiles * parts) return;
+  const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
+  const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
+  const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
+  if (row >= p.height) return;
+
+  uintn sum = 0;
+  for (uint k = tile_starts[tile]; k < tile_starts[tile + 1]; ++k) {
+    const uint bits = mask_row(masks[order[k]], part / DPR_TILE) >> (part % DPR_TILE);
+    sum += ((uintn)(bits) >> convert_uintn(DPR_LANE_INDEX)) & 1u;
+  }
+  uint lanes[DPR_WIDTH];
+  store_n(sum, 0, lanes);
+  const uint pixel = (tile / tiles * p.height + row) * p.width + column;
+  for (uint lane = 0; lane < DPR_WIDTH && column + lane < p.width; ++lane) counts[pixel + lane] = lanes[lane];
+}
+
+/// Lists the fragments of every pixel, in the order of the faces. One work-item per vector of pixels of a tile's row.
+/// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
+/// in   pixel_starts     uint[pixel + 1]  exclusive scan of the counts
+/// out  lists            uint[...]        fragments, by pixel
+kernel void rasterize_list(const FrameParams p, global const uint* restrict tile_starts,
+                           global const uint* restrict order, global const uint2* restrict masks,
+                           global const uint* restrict fragment_starts, global const uint* restrict pixel_starts,
+                           global uint* restrict lists) {
+  const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
+  const uint tiles = p.tiles_x * p.tiles_y;
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * tiles * parts) return;
+  const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
+  const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
+  const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
+  if (row >= p.height) return;
+
+  const uint pixel = (tile / tiles * p.height + row) * p.width + column;
+  uint next[DPR_WIDTH];
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane) next[lane] = column + lane < p.width ? pixel_starts[pixel + lane] : 0;
+  // The pixels of the tile before this vector: their bits say how many of a pair's fragments come first.
+  const uint2 before = (uint2)(part < 32 ? (1u << part) - 1u : 0xffffffffu, part < 32 ? 0u : (1u << (part - 32)) - 1u);
+  for (uint k = tile_starts[tile]; k < tile_starts[tile + 1]; ++k) {
+    const uint pair = order[k];
+    const uint2 mask = masks[pair];
+    uint fragment = fragment_starts[pair] + popcount(mask.x & before.x) + popcount(mask.y & before.y);
+    const uint bits = mask_row(mask, part / DPR_TILE) >> (part % DPR_TILE);
+    for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
+      if ((bits >> lane & 1u) != 0) lists[next[lane]++] = fragment++;
+    }
+  }
+}
+
+/// Writes the pixels of a pair's fragments, x | y << 16, row by row; the padding repeats the last.
+static inline void list_pixels(uint2 mask, uint first_column, uint first_row, uint first, uint last,
+                               global uint* restrict pixels) {
+  uint fragment = first, packed = 0;
+  for (uint row = 0; row < DPR_TILE; ++row) {
+    for (uint bits = mask_row(mask, row); bits != 0; bits &= bits - 1) {
+      const uint column = 31 - clz(bits & -bits);
+      packed = (first_column + column) | (first_row + row) << 16;
+      pixels[fragment++] = packed;
+    }
+  }
+  while (fragment < last) pixels[fragment++] = packed;
+}
+
+/// What a fragment is: distance, depth, barycentrics. One work-item per pair.
+/// out  fragment_pair  uint[fragment]
+/// out  pixels    uint[fragment]   x | y << 16
+/// out  distance  float[fragment]  signed, positive inside; NDC^2, or NDC if the metric is Euclidean
+/// out  depth     float[fragment]  view depth by the clipped barycentrics
+/// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
+kernel void rasterize_forward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+                              global const uint* restrict pair_face, global const uint* restrict pair_tile,
+                              global const uint2* restrict masks, global const uint* restrict fragment_starts,
+                              global uint* restrict fragment_pair, global uint* restrict pixels,
+                              global float* restrict distance, global float* restrict depth,
+                              global float* restrict bary1, global float* restrict bary2) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  if (first == last) return;
+  const Triangle t = triangles[pair_face[pair]];
+  const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
+  list_pixels(masks[pair], tile % p.tiles_x * DPR_TILE, tile / p.tiles_x * DPR_TILE, first, last, pixels);
+
+  const float scale = inverse_area(t);
+  for (uint i = first; i < last; i += DPR_WIDTH) {
+    store_n((uintn)(pair), i, fragment_pair);
+    const uintn packed = load_n(i, pixels);
+    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+    const View3 v = view_triangle(t, x, y);
+    const realn distance2 = triangle_distance2(v);
+    const realn s = p.euclidean ? sqrt(distance2) : distance2;
+    store_n(choose(inside_triangle(v, t.orientation), s, -s), i, distance);
+
+    realn n[3];
+    raw_barycentrics(v, t, scale, p.perspective_correct, n);
+    const realn m0 = max(n[0], 0.0f), m1 = max(n[1], 0.0f), m2 = max(n[2], 0.0f);
+    const realn inverse_sum = 1.0f / (m0 + m1 + m2);
+    const realn c1 = m1 * inverse_sum, c2 = m2 * inverse_sum;
+    store_n(c1, i, bary1);
+    store_n(c2, i, bary2);
+    // Around z0, so that the difference of the depths keeps its digits.
+    store_n(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, depth);
+  }
+}
+
+/// The gradients of a triangle's corners, as sums over lanes of fragments.
+typedef struct {
+  realn x[3], y[3], z[3];
+} CornerGradients;
+
+/// Adds the gradient of the signed distance. With q from the closest point of the triangle to the pixel, and u the
+/// barycentrics of that point, d|q|^2 / d vertex_k = -2 u_k q: the point's own motion along the edge does not count
+/// (the distance is stationary there).
+static inline void add_distance_gradient(const View3 v, intn inside, uint euclidean, realn grad, CornerGradients* g) {
+  realn best = INFINITY, best_x = 0.0f, best_y = 0.0f;
+  realn u[3] = {(realn)(0.0f), (realn)(0.0f), (realn)(0.0f)};
+  for (int k = 0; k < 3; ++k) {
+    const realn along = closest_on_edge(v.edge[k]);
+    realn qx, qy;
+    offset_from_edge(v.edge[k], along, &qx, &qy);
+    const realn distance2 = qx * qx + qy * qy;
+    const intn closer = distance2 < best;
+    best = choose(closer, distance2, best);
+    best_x = choose(closer, qx, best_x);
+    best_y = choose(closer, qy, best_y);
+    u[k] = choose(closer, (realn)(0.0f), u[k]);
+    u[(k + 1) % 3] = choose(closer, 1.0f - along, u[(k + 1) % 3]);
+    u[(k + 2) % 3] = choose(closer, along, u[(k + 2) % 3]);
+  }
+  // d|q| = d|q|^2 / (2 |q|); at |q| = 0 the Euclidean distance has no derivative, and zero is one of its subgradients'
+  // averages.
+  const realn chain = euclidean ? choose(best > 0.0f, 0.5f * rsqrt(best), (realn)(0.0f)) : (realn)(1.0f);
+  const realn factor = choose(inside, (realn)(-2.0f), (realn)(2.0f)) * chain * grad;
+  for (int k = 0; k < 3; ++k) {
+    g->x[k] += factor * u[k] * best_x;
+    g->y[k] += factor * u[k] * best_y;
+  }
+}
+
+/// Adds the gradients that come by the clipped barycentrics c_i = max(n_i, 0) / sum_j max(n_j, 0): those of depth and
+/// of the shaded colour. `grad_bary` are relative to vertex 0's, which changes nothing since the c_i sum to 1.
+static inline void add_barycentric_gradient(const View3 v, const Triangle t, float scale, uint perspective,
+                                            realn grad_depth, realn grad_bary1, realn grad_bary2, CornerGradients* g) {
+  realn n[3], c[3];
+  const realn side_scale = raw_barycentrics(v, t, scale, perspective, n);
+  const realn inverse_sum = 1.0f / (max(n[0], 0.0f) + max(n[1], 0.0f) + max(n[2], 0.0f));
+  for (int k = 0; k < 3; ++k) {
+    c[k] = max(n[k], 0.0f) * inverse_sum;
+    g->z[k] += grad_depth * c[k];
+  }
+  const realn h1 = grad_depth * (t.z1 - t.z0) + grad_bary1, h2 = grad_depth * (t.z2 - t.z0) + grad_bary2;
+  const realn mean = c[1] * h1 + c[2] * h2;
+  const realn h[3] = {-mean, h1 - mean, h2 - mean};
+  const float z[3] = {t.z0, t.z1, t.z2};
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;  // the ends of the edge opposite to vertex k
+    const realn grad_n = choose(n[k] > 0.0f, h[k] * inverse_sum, (realn)(0.0f)) * side_scale;
+    const realn side = v.edge[k].side;
+    if (perspective) {
+      g->z[i] += grad_n * side * z[j];
+      g->z[j] += grad_n * side * z[i];
+    }
+    // The edge function is cross(a, b) of the edge's ends a, b relative to the pixel.
+    const realn grad_side = grad_n * (perspective ? z[i] * z[j] : 1.0f);
+    const Edge from_i = v.edge[k], from_j = v.edge[i];  // edge i begins at vertex j
+    g->x[i] -= grad_side * from_j.dy;
+    g->y[i] += grad_side * from_j.dx;
+    g->x[j] += grad_side * from_i.dy;
+    g->y[j] -= grad_side * from_i.dx;
+  }
+}
+
+/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair.
+/// in   masks          uint2[pair]      says which fragments are padding
+/// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
+/// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
+kernel void rasterize_backward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+                               global const uint* restrict pair_face, global const uint2* restrict masks,
+                               global const uint* restrict fragment_starts, global const uint* restrict pixels,
+                               global const float* restrict grad_distance, global const float* restrict grad_depth,
+                               global const float* restrict grad_bary1, global const float* restrict grad_bary2,
+                               global float* restrict grad_corners) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  CornerGradients g;
+  for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
+  const Triangle t = triangles[pair_face[pair]];
+  const float scale = inverse_area(t);
+  const uint first = fragment_starts[pair];
+  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
+  for (uint i = first; i < last; i += DPR_WIDTH) {
+    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
+    const realn zero = 0.0f;
+    const uintn packed = load_n(i, pixels);
+    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+    const View3 v = view_triangle(t, x, y);
+    add_distance_gradient(v, inside_triangle(v, t.orientation), p.euclidean,
+                          choose(real_fragment, load_n(i, grad_distance), zero), &g);
+    add_barycentric_gradient(v, t, scale, p.perspective_correct, choose(real_fragment, load_n(i, grad_depth), zero),
+                             choose(real_fragment, load_n(i, grad_bary1), zero),
+                             choose(real_fragment, load_n(i, grad_bary2), zero), &g);
+  }
+  for (int k = 0; k < 3; ++k) {
+    grad_corners[9 * pair + 3 * k] = sum_lanes(g.x[k]);
+    grad_corners[9 * pair + 3 * k + 1] = sum_lanes(g.y[k]);
+    grad_corners[9 * pair + 3 * k + 2] = sum_lanes(g.z[k]);
+  }
+}

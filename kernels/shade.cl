@@ -1,0 +1,71 @@
+// Fragment colours without lights: the corners' colours, interpolated. A face colour is three equal corners.
+#ifdef DPR_LANES
+#if DPR_LANES == 16
+#define DPR_WIDTH 8 /* runs of fragments are padded to the width of the rasterizer's vectors */
+#endif
+#endif
+#include "lanes.h"
+#include "shared_types.h"
+
+/// One work-item per pair.
+/// in   face_colors  uint4[face]         indices into colors, by corner
+/// in   colors       float4[color]       linear RGB; w unused
+/// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
+/// out  red, green, blue  float[fragment]
+kernel void shade_forward(const FrameParams p, const uint pairs, global const uint* restrict pair_face,
+                          global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
+                          global const float4* restrict colors, global const float* restrict bary1,
+                          global const float* restrict bary2, global float* restrict red,
+                          global float* restrict green, global float* restrict blue) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  const uint4 corners = face_colors[pair_face[pair] % p.faces];
+  const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
+  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; i += DPR_WIDTH) {
+    const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
+    store_n(base.x + c1 * along1.x + c2 * along2.x, i, red);
+    store_n(base.y + c1 * along1.y + c2 * along2.y, i, green);
+    store_n(base.z + c1 * along1.z + c2 * along2.z, i, blue);
+  }
+}
+
+/// One work-item per pair.
+/// in   grad_red, grad_green, grad_blue  float[fragment]
+/// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
+/// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's fragments
+kernel void shade_backward(const FrameParams p, const uint pairs, global const uint* restrict pair_face,
+                           global const uint2* restrict masks, global const uint* restrict fragment_starts,
+                           global const uint4* restrict face_colors, global const float4* restrict colors,
+                           global const float* restrict bary1, global const float* restrict bary2,
+                           global const float* restrict grad_red, global const float* restrict grad_green,
+                           global const float* restrict grad_blue, global float* restrict grad_bary1,
+                           global float* restrict grad_bary2, global float* restrict grad_colors) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  const uint4 corners = face_colors[pair_face[pair] % p.faces];
+  const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
+  const uint first = fragment_starts[pair];
+  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
+  const realn zero = 0.0f;
+  realn sum[9];
+  for (int k = 0; k < 9; ++k) sum[k] = zero;
+  for (uint i = first; i < last; i += DPR_WIDTH) {
+    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
+    const realn r = choose(real_fragment, load_n(i, grad_red), zero);
+    const realn g = choose(real_fragment, load_n(i, grad_green), zero);
+    const realn b = choose(real_fragment, load_n(i, grad_blue), zero);
+    const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2), c0 = 1.0f - c1 - c2;
+    store_n(r * along1.x + g * along1.y + b * along1.z, i, grad_bary1);
+    store_n(r * along2.x + g * along2.y + b * along2.z, i, grad_bary2);
+    sum[0] += c0 * r;
+    sum[1] += c0 * g;
+    sum[2] += c0 * b;
+    sum[3] += c1 * r;
+    sum[4] += c1 * g;
+    sum[5] += c1 * b;
+    sum[6] += c2 * r;
+    sum[7] += c2 * g;
+    sum[8] += c2 * b;
+  }
+  for (int k = 0; k < 9; ++k) grad_colors[9 * pair + k] = sum_lanes(sum[k]);
+}

@@ -1,0 +1,145 @@
+// Every struct, enum and limit that host and kernels share. 32-bit scalars and their vectors of two and four only, so
+// that the layout is the same on every compiler; tests/device/layout_test.cpp compares sizes and offsets.
+#ifndef DPR_SHARED_TYPES_H
+#define DPR_SHARED_TYPES_H
+
+#ifndef __OPENCL_C_VERSION__
+#include <CL/cl_platform.h>
+
+#include <string_view>
+
+namespace dpr::shared {
+using uint = cl_uint;
+using float4 = cl_float4;
+/// What the kernel's argument info calls the struct.
+#define DPR_SHARED_NAME(name) static constexpr std::string_view k_cl_name = #name;
+#else
+#define DPR_SHARED_NAME(name)
+#endif
+
+/// Tiles are 8x8 pixels: a tile's coverage by a triangle is one 64-bit mask.
+#define DPR_TILE 8
+
+/// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
+#define DPR_LOG_ZERO (-1e30f)
+
+/// Triangles whose doubled projected area is at most this, NDC^2, have no usable barycentrics and are dropped: a few
+/// millionths of a pixel at 4096x4096.
+#define DPR_MIN_AREA 1e-12f
+
+/// Priors, in the order of dpr::Prior.
+#define DPR_GAUSSIAN 0
+#define DPR_CAUCHY 1
+#define DPR_LOGISTIC 2
+#define DPR_GUMBEL 3
+#define DPR_UNIFORM 4
+
+/// Shading models, in the order of dpr::Shading after the unlit one.
+#define DPR_UNLIT 0
+#define DPR_FLAT 1
+#define DPR_PHONG 2
+#define DPR_GOURAUD 3
+
+/// Channels that the transform's backward pass leaves per vertex, to be summed over a view's meshes.
+#define DPR_CHANNEL_MODEL 0       /* rotation vector, translation of the model matrix: 6 */
+#define DPR_CHANNEL_VIEW 6        /* rotation vector, translation of the view matrix: 6 */
+#define DPR_CHANNEL_PROJECTION 12 /* scale x, y, offset x, y of the projection: 4 */
+#define DPR_POSE_CHANNELS 16
+
+/// Channels that aggregation's backward pass leaves per pixel.
+#define DPR_CHANNEL_GAMMA 0
+#define DPR_CHANNEL_ALPHA 1
+#define DPR_CHANNEL_BACKGROUND 2 /* 3 */
+#define DPR_PIXEL_CHANNELS 5
+
+/// Sums of a loss over the pixels of a view: squared error, absolute error, intersection and union of the alphas.
+#define DPR_LOSS_SUMS 4
+
+/// Sizes and settings of a frame that the geometry stages need.
+typedef struct FrameParams {
+  DPR_SHARED_NAME(FrameParams)
+  uint views, meshes, vertices, faces;
+  uint width, height;    /* pixels */
+  uint tiles_x, tiles_y; /* tiles of one view */
+  float pixel_size;      /* NDC: 2 / min(width, height) */
+  float blur_distance;   /* NDC: triangles further than this from a pixel are not in its list */
+  uint euclidean;        /* distances are NDC, not NDC^2 */
+  uint perspective_correct;
+} FrameParams;
+
+/// A camera, ready for the kernels.
+typedef struct ViewParams {
+  DPR_SHARED_NAME(ViewParams)
+  float4 row[3];     /* world to camera, affine */
+  float4 projection; /* NDC = (x, y) * projection.xy / depth + projection.zw */
+  float4 eye;        /* camera centre, world */
+  float znear, zfar;
+  float inverse_range; /* 1 / (zfar - znear) */
+  float unused;
+} ViewParams;
+
+/// A triangle of a view after projection.
+typedef struct Triangle {
+  DPR_SHARED_NAME(Triangle)
+  float x0, y0, x1, y1, x2, y2; /* NDC */
+  float z0, z1, z2;             /* view depth, positive in front */
+  float orientation;            /* +1 counter-clockwise, -1 clockwise, 0: dropped */
+  uint first_tile, last_tile;   /* x | y << 16, inclusive; of the blurred bounding box */
+} Triangle;
+
+/// The light that all shading models share.
+typedef struct LightingParams {
+  DPR_SHARED_NAME(LightingParams)
+  float4 ambient;
+  uint lights;
+  float shininess;
+  uint unused0, unused1;
+} LightingParams;
+
+/// A point light.
+typedef struct Light {
+  DPR_SHARED_NAME(Light)
+  float4 position; /* world */
+  float4 diffuse, specular;
+} Light;
+
+/// The perturbation of distances.
+typedef struct OccupancyParams {
+  DPR_SHARED_NAME(OccupancyParams)
+  float sigma;
+  uint samples;
+  float baseline; /* 1: the rigid solution is subtracted from every sample (14); 0: it is not */
+  uint seed_low, seed_high;
+  uint width;           /* pixels, to name a pixel's noise */
+  uint faces;           /* of one view */
+  uint pixels_per_view; /* width * height */
+} OccupancyParams;
+
+/// The perturbation of depths, and what a pixel's colour is made of.
+typedef struct AggregateParams {
+  DPR_SHARED_NAME(AggregateParams)
+  float4 background;
+  float gamma, alpha, background_depth;
+  uint samples;
+  float baseline;
+  uint seed_low, seed_high;
+  uint pixels_per_view;
+  uint pixels; /* of all views */
+  uint faces;  /* of one view */
+  uint unused0, unused1;
+} AggregateParams;
+
+/// Weights of the losses, and the sizes to average over.
+typedef struct LossParams {
+  DPR_SHARED_NAME(LossParams)
+  float mse, l1, silhouette;
+  uint views, pixels_per_view;
+  uint unused0, unused1, unused2;
+} LossParams;
+
+#ifndef __OPENCL_C_VERSION__
+#undef DPR_SHARED_NAME
+}  // namespace dpr::shared
+#endif
+
+#endif

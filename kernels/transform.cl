@@ -1,0 +1,93 @@
+// Vertices: object space -> world -> camera -> NDC and view depth; and back.
+#include "shared_types.h"
+
+static inline float3 apply_affine(float4 row0, float4 row1, float4 row2, float3 v) {
+  return (float3)(dot(row0.xyz, v) + row0.w, dot(row1.xyz, v) + row1.w, dot(row2.xyz, v) + row2.w);
+}
+
+/// The transpose of the linear part: how gradients travel back through an affine map.
+static inline float3 apply_transposed(float4 row0, float4 row1, float4 row2, float3 g) {
+  return row0.xyz * g.x + row1.xyz * g.y + row2.xyz * g.z;
+}
+
+/// Projects vertices. One work-item per (view, vertex).
+/// in   models       float4[view][mesh][3]  rows of object to world
+/// in   positions    float4[vertex]         object space; w unused
+/// in   vertex_mesh  uint[vertex]
+/// out  world        float4[view][vertex]   world space; w = 1
+/// out  ndc          float4[view][vertex]   x, y in NDC, z = view depth, positive in front; w = 0
+kernel void transform_forward(const FrameParams p, global const ViewParams* restrict views,
+                              global const float4* restrict models, global const float4* restrict positions,
+                              global const uint* restrict vertex_mesh, global float4* restrict world,
+                              global float4* restrict ndc) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
+  global const ViewParams* camera = views + view;
+
+  const float3 w = apply_affine(model[0], model[1], model[2], positions[vertex].xyz);
+  const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
+  const float depth = -c.z;
+  world[i] = (float4)(w, 1.0f);
+  ndc[i] = (float4)(c.xy * camera->projection.xy / depth + camera->projection.zw, depth, 0.0f);
+}
+
+/// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that no kept
+/// triangle uses has zero gradient, whatever its projection. One work-item per (view, vertex).
+/// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
+/// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
+/// out     channels    float[DPR_POSE_CHANNELS][view][vertex]
+kernel void transform_backward(const FrameParams p, global const ViewParams* restrict views,
+                               global const float4* restrict models, global const uint* restrict vertex_mesh,
+                               global const float4* restrict world, global const float4* restrict grad_ndc,
+                               global float4* restrict grad_world, global float* restrict channels) {
+  const uint i = (uint)get_global_id(0);
+  const uint count = p.views * p.vertices;
+  if (i >= count) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
+  global const ViewParams* camera = views + view;
+
+  const float3 w = world[i].xyz;
+  const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
+  const float3 g = grad_ndc[i].xyz;
+  const int used = any(g != 0.0f);
+  const float inverse_depth = used ? -1.0f / c.z : 0.0f;
+  const float2 tangent = c.xy * inverse_depth;
+  const float2 g_tangent = g.xy * camera->projection.xy;
+  const float g_depth = g.z - dot(g_tangent, tangent) * inverse_depth;
+  const float3 g_camera = (float3)(g_tangent * inverse_depth, -g_depth);
+  const float3 g_world =
+      grad_world[i].xyz + apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera);
+  grad_world[i] = (float4)(g_world, 0.0f);
+
+  const float3 turned_in_world = w - (float3)(model[0].w, model[1].w, model[2].w);
+  const float3 turned_in_camera = c - (float3)(camera->row[0].w, camera->row[1].w, camera->row[2].w);
+  const float3 model_rotation = cross(turned_in_world, g_world);
+  const float3 view_rotation = cross(turned_in_camera, g_camera);
+  const float values[DPR_POSE_CHANNELS] = {model_rotation.x, model_rotation.y, model_rotation.z,
+                                           g_world.x,        g_world.y,        g_world.z,
+                                           view_rotation.x,  view_rotation.y,  view_rotation.z,
+                                           g_camera.x,       g_camera.y,       g_camera.z,
+                                           g.x * tangent.x,  g.y * tangent.y,  g.x,
+                                           g.y};
+  for (int k = 0; k < DPR_POSE_CHANNELS; ++k) channels[(uint)k * count + i] = values[k];
+}
+
+/// Gradients of the object-space positions: the views' contributions in order. One work-item per vertex.
+/// in   grad_world      float4[view][vertex]
+/// out  grad_positions  float4[vertex]
+kernel void transform_backward_positions(const FrameParams p, global const float4* restrict models,
+                                         global const uint* restrict vertex_mesh,
+                                         global const float4* restrict grad_world,
+                                         global float4* restrict grad_positions) {
+  const uint vertex = (uint)get_global_id(0);
+  if (vertex >= p.vertices) return;
+  float3 sum = (float3)(0.0f);
+  for (uint view = 0; view < p.views; ++view) {
+    global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
+    sum += apply_transposed(model[0], model[1], model[2], grad_world[view * p.vertices + vertex].xyz);
+  }
+  grad_positions[vertex] = (float4)(sum, 0.0f);
+}

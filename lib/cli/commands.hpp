@@ -1,0 +1,16 @@
+// The commands: each adds itself to the application and runs when it was chosen.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "cli/common_options.hpp"
+
+namespace dpr::cli {
+
+void add_devices_command(CLI::App& application, CommonOptions& common);
+void add_render_command(CLI::App& application, CommonOptions& common);
+void add_gradient_command(CLI::App& application, CommonOptions& common);
+void add_pose_command(CLI::App& application, CommonOptions& common);
+void add_demo_command(CLI::App& application, CommonOptions& common);
+
+}  // namespace dpr::cli

@@ -1,0 +1,126 @@
+// The options that the commands share, and how they change a scene.
+#include "cli/common_options.hpp"
+
+#include <cstdio>
+
+#include "cli/text.hpp"
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
+  const std::string group = "Smoothing (each replaces the scene's value)";
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    command.add_option(name, value, description)->group(group)->type_name(type);
+  };
+  const char* const priors = "gaussian|cauchy|logistic|gumbel|uniform";
+  const char* const estimators = "exact|monte_carlo";
+  add("--preset", s.preset, "Take all values from a named member of the family",
+      "softras|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
+  add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
+  add("--depth-prior", s.depth_prior, "Noise of the depth", priors);
+  add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");
+  add("--gamma", s.gamma, "Scale of the depth noise; depth is 1 at znear, 0 at zfar", "FLOAT");
+  add("--alpha", s.alpha, "Weight of the barrier", "FLOAT");
+  add("--composition", s.composition, "How occupancy and depth combine", "barrier|joint");
+  add("--estimator", s.estimator, "How both expectations are computed", estimators);
+  add("--occupancy-estimator", s.occupancy_estimator, "Overrides --estimator for the occupancy", estimators);
+  add("--aggregation-estimator", s.aggregation_estimator, "Overrides --estimator for the aggregation",
+      estimators);
+  add("--samples", s.samples, "Draws of Monte Carlo", "N");
+  add("--variance-reduction", s.variance_reduction, "Control variate of sampled gradients", "none|rigid");
+  add("--occupancy-threshold", s.occupancy_threshold, "Sets the blur radius where none is given", "FLOAT");
+  add("--blur-radius", s.blur_radius, "Triangles further from a pixel are not there", "FLOAT");
+  add("--background-depth", s.background_depth, "Normalised depth of the background", "FLOAT");
+  add("--distance", s.distance, "Unit of the distance: NDC^2 or NDC", "squared|euclidean");
+}
+
+template <typename Value, typename Parse>
+void apply_word(const std::optional<std::string>& word, Value& value, Parse parse, const char* flag) {
+  if (word) value = parse(*word, flag);
+}
+
+template <typename Value>
+void apply_value(const std::optional<Value>& given, Value& value) {
+  if (given) value = *given;
+}
+
+void apply(const SmoothingOptions& options, Smoothing& smoothing) {
+  if (options.preset) {
+    const std::uint64_t seed = smoothing.seed;
+    smoothing = smoothing_preset(*options.preset);
+    smoothing.seed = seed;
+  }
+  apply_word(options.occupancy_prior, smoothing.occupancy_prior, parse_prior, "--occupancy-prior");
+  apply_word(options.depth_prior, smoothing.depth_prior, parse_prior, "--depth-prior");
+  apply_word(options.composition, smoothing.composition, parse_composition, "--composition");
+  apply_word(options.estimator, smoothing.occupancy_estimator, parse_estimator, "--estimator");
+  apply_word(options.estimator, smoothing.aggregation_estimator, parse_estimator, "--estimator");
+  apply_word(options.occupancy_estimator, smoothing.occupancy_estimator, parse_estimator,
+             "--occupancy-estimator");
+  apply_word(options.aggregation_estimator, smoothing.aggregation_estimator, parse_estimator,
+             "--aggregation-estimator");
+  apply_word(options.variance_reduction, smoothing.variance_reduction, parse_variance_reduction,
+             "--variance-reduction");
+  apply_word(options.distance, smoothing.distance, parse_distance_metric, "--distance");
+  apply_value(options.sigma, smoothing.sigma);
+  apply_value(options.gamma, smoothing.gamma);
+  apply_value(options.alpha, smoothing.alpha);
+  apply_value(options.samples, smoothing.samples);
+  apply_value(options.occupancy_threshold, smoothing.occupancy_threshold);
+  apply_value(options.background_depth, smoothing.background_depth);
+  if (options.blur_radius) smoothing.blur_radius = options.blur_radius;
+}
+
+/// The same picture with other pixels: intrinsics, which are in pixels, follow.
+void resize(Scene& scene, glm::ivec2 size) {
+  if (auto& k = scene.camera.intrinsics) {
+    const glm::vec2 factor = glm::vec2(size) / glm::vec2(scene.width, scene.height);
+    *k = {k->fx * factor.x, k->fy * factor.y, k->cx * factor.x, k->cy * factor.y};
+  }
+  scene.width = size.x;
+  scene.height = size.y;
+}
+
+}  // namespace
+
+void add_output_options(CLI::App& command, CommonOptions& options) {
+  auto* quiet = command.add_flag("--quiet", options.quiet, "Print errors only");
+  command.add_flag("--verbose", options.verbose, "Print details; build logs in case of errors")
+      ->excludes(quiet);
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  add_output_options(command, options);
+  command
+      .add_option("--device", options.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
+      ->type_name("cpu|gpu|INDEX|SUBSTRING");
+  command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
+  command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N");
+  add_smoothing_options(command, options.smoothing);
+}
+
+Device open_device(const CommonOptions& options) {
+  Device device = dpr::open_device(options.device);
+  if (options.verbose) {
+    const DeviceInfo& info = device.info();
+    std::printf("device %zu: %s, %s, %u lanes\n", info.index, info.platform.c_str(), info.name.c_str(),
+                info.lanes);
+  }
+  return device;
+}
+
+void apply(const CommonOptions& options, Scene& scene) {
+  apply(options.smoothing, scene.smoothing);
+  apply_value(options.seed, scene.smoothing.seed);
+  if (options.size) resize(scene, parse_size(*options.size));
+}
+
+Scene read_scene(const std::string& file, const CommonOptions& options) {
+  Scene scene = dpr::read_scene(file);
+  apply(options, scene);
+  return scene;
+}
+
+}  // namespace dpr::cli

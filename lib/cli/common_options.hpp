@@ -1,0 +1,42 @@
+// The options that the commands share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "dpr/device.hpp"
+#include "dpr/scene.hpp"
+
+namespace dpr::cli {
+
+/// What the command line says of a Smoothing; what it does not mention stays as the scene has it.
+struct SmoothingOptions {
+  std::optional<std::string> preset, occupancy_prior, depth_prior, composition, estimator,
+      occupancy_estimator, aggregation_estimator, variance_reduction, distance;
+  std::optional<float> sigma, gamma, alpha, occupancy_threshold, blur_radius, background_depth;
+  std::optional<std::uint32_t> samples;
+};
+
+struct CommonOptions {
+  std::string device;
+  std::optional<std::string> size;
+  std::optional<std::uint64_t> seed;
+  SmoothingOptions smoothing;
+  bool verbose = false, quiet = false;
+};
+
+/// --verbose and --quiet.
+void add_output_options(CLI::App& command, CommonOptions& options);
+/// Those, and all that a command that renders understands.
+void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// The device of --device. Says which one it is if asked to be verbose.
+Device open_device(const CommonOptions& options);
+/// Puts --size, --seed and the smoothing flags into the scene. Throws InvalidArgument.
+void apply(const CommonOptions& options, Scene& scene);
+/// read_scene() and apply().
+Scene read_scene(const std::string& file, const CommonOptions& options);
+
+}  // namespace dpr::cli

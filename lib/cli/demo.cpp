@@ -1,0 +1,83 @@
+// dpr demo: the pose of the coloured cube, found from 50 degrees away.
+#include <cstdio>
+#include <memory>
+#include <random>
+
+#include "cli/commands.hpp"
+#include "cli/pose_report.hpp"
+#include "dpr/renderer.hpp"
+
+namespace dpr::cli {
+namespace {
+
+constexpr double k_start_degrees = 50;
+constexpr std::uint64_t k_axis_seed = 1;
+
+/// The scene of the paper's pose experiments.
+Scene cube_scene() {
+  Scene scene;
+  scene.camera = orbit_camera(6.7F, 30, 120);
+  scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
+  Lights lights;
+  lights.point = {{.position = {0, 2, -2}}};
+  scene.lights = lights;
+  return scene;
+}
+
+Image render_rigidly(const Device& device, Scene scene) {
+  scene.smoothing = rigid_smoothing();
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  return renderer.image();
+}
+
+/// Uniform on the sphere, by rejection; the distributions of the standard library differ from one to the
+/// other.
+glm::dvec3 random_axis(std::uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  const auto uniform = [&] { return std::ldexp(static_cast<double>(generator() >> 11), -52) - 1; };
+  for (;;) {
+    const glm::dvec3 v(uniform(), uniform(), uniform());
+    const double length = glm::length(v);
+    if (length > 0.1 && length <= 1) return v / length;
+  }
+}
+
+void run(const std::string& folder, const CommonOptions& common) {
+  make_folder(folder);
+  Scene scene = cube_scene();
+  apply(common, scene);
+  const Device device = open_device(common);
+  const Image target = render_rigidly(device, scene);
+  const PoseOptions options;
+  const PoseSolver solver(device, scene, target, options);
+  const Pose truth = solver.scene_pose();
+
+  const glm::dvec3 turn = glm::radians(k_start_degrees) * random_axis(common.seed.value_or(k_axis_seed));
+  const Pose start{rotation_from_vector(turn) * truth.rotation, truth.translation};
+  const PoseResult result = solver.solve(start, progress_callback(options.iterations, common.quiet));
+  write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(result, truth.rotation));
+  write_pose_report(folder, device, scene, target, result, common.quiet, truth.rotation);
+  if (!common.quiet) {
+    std::printf("%s: from %.1f to %.2f degrees from the truth in %u iterations, %.1f s\n", folder.c_str(),
+                angle_degrees(start.rotation, truth.rotation),
+                angle_degrees(result.pose.rotation, truth.rotation), result.iterations, result.seconds);
+  }
+}
+
+}  // namespace
+
+void add_demo_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand(
+      "demo", "Finds the pose of a built-in cube from 50 degrees away, with pictures");
+  const auto folder = std::make_shared<std::string>();
+  command->add_option("-o,--output", *folder, "Folder for the pictures and pose.json")
+      ->required()
+      ->type_name("DIR");
+  add_common_options(*command, common);
+  command->footer("Example: dpr demo -o demo-output");
+  command->callback([folder, &common] { run(*folder, common); });
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,78 @@
+// JSON files as the commands write them.
+#include "cli/json.hpp"
+
+#include <charconv>
+#include <fstream>
+
+#include "dpr/error.hpp"
+#include "scene/temporary_file.hpp"
+
+namespace dpr::cli {
+namespace {
+
+bool is_flat(const Json& json) {
+  for (const Json& element : json) {
+    if (element.is_structured()) return false;
+  }
+  return true;
+}
+
+void append(std::string& out, const Json& json, std::size_t indent) {
+  if (!json.is_structured() || is_flat(json)) {
+    out += json.dump();
+    return;
+  }
+  const std::string newline = "\n" + std::string(indent + 2, ' ');
+  const bool is_object = json.is_object();
+  out += is_object ? '{' : '[';
+  for (auto it = json.begin(); it != json.end(); ++it) {
+    if (it != json.begin()) out += ',';
+    out += newline;
+    if (is_object) out += Json(it.key()).dump() + ": ";
+    append(out, *it, indent + 2);
+  }
+  out += "\n" + std::string(indent, ' ') + (is_object ? '}' : ']');
+}
+
+}  // namespace
+
+double number(float value) {
+  char text[64];
+  const char* end = std::to_chars(text, text + sizeof text, value).ptr;
+  double result = static_cast<double>(value);
+  std::from_chars(text, end, result);
+  return result;
+}
+
+Json to_json(const glm::dvec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+Json to_json(const std::vector<glm::vec3>& vectors) {
+  Json list = Json::array();
+  for (const glm::vec3& v : vectors) list.push_back(Json::array({number(v.x), number(v.y), number(v.z)}));
+  return list;
+}
+
+Json rows_to_json(const glm::dmat3& matrix) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back(Json::array({matrix[0][row], matrix[1][row], matrix[2][row]}));
+  }
+  return rows;
+}
+
+std::string to_text(const Json& json) {
+  std::string text;
+  append(text, json, 0);
+  return text + "\n";
+}
+
+void write_json(const std::filesystem::path& file, const Json& json) {
+  TemporaryFile temporary(file);
+  std::ofstream stream(temporary.path(), std::ios::binary);
+  stream << to_text(json);
+  stream.close();
+  if (!stream) throw IoError(file, "cannot be written");
+  temporary.commit();
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,27 @@
+// JSON files as the commands write them.
+#pragma once
+
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace dpr::cli {
+
+/// Keys in the order in which they were added.
+using Json = nlohmann::ordered_json;
+
+/// The number whose shortest decimal form is that of the float: 0.001, not 0.0010000000474974513.
+double number(float value);
+
+Json to_json(const glm::dvec3& v);
+Json to_json(const std::vector<glm::vec3>& vectors);
+/// A list of rows.
+Json rows_to_json(const glm::dmat3& matrix);
+
+/// Objects and lists of lists over several lines, lists of numbers on one.
+std::string to_text(const Json& json);
+/// Writes all or nothing. Throws IoError.
+void write_json(const std::filesystem::path& file, const Json& json);
+
+}  // namespace dpr::cli

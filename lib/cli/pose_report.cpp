@@ -1,0 +1,151 @@
+// What the pose solver did, as numbers, pictures and plots.
+#include "cli/pose_report.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include "cli/plot.hpp"
+#include "cli/progress.hpp"
+#include "dpr/error.hpp"
+#include "dpr/renderer.hpp"
+#include "solve/polar.hpp"
+
+namespace dpr::cli {
+namespace {
+
+constexpr std::size_t k_strip_length = 8;
+
+/// Renders the scene's mesh in any pose.
+class PoseCamera {
+ public:
+  PoseCamera(const Device& device, Scene scene)
+      : renderer_(device),
+        stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+        view_{scene.camera, {glm::mat4(1.0F)}} {
+    renderer_.set_scene(scene);
+  }
+
+  Image render(const Pose& pose, const Smoothing& smoothing) {
+    view_.transforms.front() = affine(pose.rotation * stretch_, pose.translation);
+    renderer_.set_views({&view_, 1});
+    renderer_.set_smoothing(smoothing);
+    renderer_.forward();
+    return renderer_.image();
+  }
+
+ private:
+  Renderer renderer_;
+  glm::dmat3 stretch_;
+  View view_;
+};
+
+/// On the background's colour: the silhouette in the alpha channel would make the picture transparent.
+Image opaque(Image image) {
+  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
+  return image;
+}
+
+Image difference(const Image& a, const Image& b) {
+  Image result = a;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) result.pixels[i] = glm::abs(a.pixels[i] - b.pixels[i]);
+  return result;
+}
+
+/// Iterations at equal distances, first and last among them.
+Image strip(PoseCamera& camera, const Smoothing& base, const std::vector<PoseIteration>& history) {
+  std::vector<Image> images;
+  const std::size_t count = std::min(k_strip_length, history.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t last = history.size() - 1;
+    const PoseIteration& step = history[count > 1 ? i * last / (count - 1) : last];
+    Smoothing smoothing = base;
+    if (smoothing.blur_radius) *smoothing.blur_radius *= step.sigma / base.sigma;
+    smoothing.sigma = step.sigma;
+    smoothing.gamma = step.gamma;
+    smoothing.samples = step.samples;
+    images.push_back(opaque(camera.render(step.pose, smoothing)));
+  }
+  return hstack(images);
+}
+
+bool plot_history(const std::filesystem::path& file, const std::vector<PoseIteration>& history,
+                  const std::optional<glm::dmat3>& truth) {
+  constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
+  std::vector<double> x;
+  Curve loss{"loss", {}}, angle{"angle", {}}, sigma{"sigma", {}}, gamma{"gamma", {}};
+  for (const PoseIteration& step : history) {
+    x.push_back(step.iteration);
+    loss.y.push_back(std::max(step.loss, k_smallest));
+    sigma.y.push_back(number(step.sigma));
+    gamma.y.push_back(number(step.gamma));
+    angle.y.push_back(truth ? angle_degrees(step.pose.rotation, *truth)
+                            : angle_degrees(step.pose.rotation, history.front().pose.rotation));
+  }
+  const char* const angle_label = truth ? "degrees from the truth" : "degrees from the start";
+  return plot(file, "iteration", x,
+              {{"loss", true, {loss}}, {angle_label, false, {angle}}, {"smoothing", true, {sigma, gamma}}});
+}
+
+}  // namespace
+
+PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
+  const auto progress = std::make_shared<Progress>(iterations, quiet);
+  return [progress](const PoseIteration& step) {
+    char text[96];
+    std::snprintf(text, sizeof text, "loss %.4e  sigma %.1e  gamma %.1e", step.loss, number(step.sigma),
+                  number(step.gamma));
+    progress->update(step.iteration + 1, text);
+    return true;
+  };
+}
+
+Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth) {
+  Json json;
+  json["rotation_matrix"] = rows_to_json(result.pose.rotation);
+  json["translation"] = to_json(result.pose.translation);
+  json["loss"] = result.loss;
+  json["iterations"] = result.iterations;
+  json["seconds"] = result.seconds;
+  if (truth) {
+    json["angle_error_degrees"] = {{"start", angle_degrees(result.history.front().pose.rotation, *truth)},
+                                   {"end", angle_degrees(result.pose.rotation, *truth)}};
+  }
+  Json& history = json["history"] = Json::array();
+  for (const PoseIteration& step : result.history) {
+    Json entry{{"iteration", step.iteration},
+               {"loss", step.loss},
+               {"sigma", number(step.sigma)},
+               {"gamma", number(step.gamma)},
+               {"samples", step.samples}};
+    if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
+    history.push_back(entry);
+  }
+  return json;
+}
+
+void write_pose_report(const std::filesystem::path& folder, const Device& device, const Scene& scene,
+                       const Image& target, const PoseResult& result, bool quiet,
+                       const std::optional<glm::dmat3>& truth) {
+  make_folder(folder);
+  PoseCamera camera(device, scene);
+  const Image end = camera.render(result.pose, rigid_smoothing());
+  write_image(folder / "target.png", opaque(target));
+  write_image(folder / "start.png", opaque(camera.render(result.history.front().pose, rigid_smoothing())));
+  write_image(folder / "end.png", opaque(end));
+  write_image(folder / "difference.png", opaque(difference(end, target)));
+  write_image(folder / "iterations.png", strip(camera, scene.smoothing, result.history));
+  if (!plot_history(folder / "plot.png", result.history, truth) && !quiet) {
+    std::printf("plot.png is left out: gnuplot is not installed\n");
+  }
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw IoError(folder, "the folder cannot be made: " + (error ? error.message() : "a file has its name"));
+  }
+}
+
+}  // namespace dpr::cli

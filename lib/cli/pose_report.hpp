@@ -1,0 +1,28 @@
+// What the pose solver did, as numbers, pictures and plots.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "cli/common_options.hpp"
+#include "cli/json.hpp"
+#include "dpr/pose.hpp"
+
+namespace dpr::cli {
+
+/// A callback for the solver that shows how far it is. It must not outlive the returned object's copies.
+PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
+
+/// pose.json. With the true rotation, the angle errors too.
+Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
+
+/// Writes target, start, end, difference, iterations and plot (all PNG) into a folder, which is made if need
+/// be. Start and end are rendered rigidly, the iterations as the solver saw them. Throws IoError.
+void write_pose_report(const std::filesystem::path& folder, const Device& device, const Scene& scene,
+                       const Image& target, const PoseResult& result, bool quiet,
+                       const std::optional<glm::dmat3>& truth = {});
+
+/// Makes the folder where it is missing. Throws IoError.
+void make_folder(const std::filesystem::path& folder);
+
+}  // namespace dpr::cli

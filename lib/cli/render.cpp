@@ -1,0 +1,131 @@
+// dpr render: a mesh or a scene to an image.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "cli/commands.hpp"
+#include "dpr/image.hpp"
+#include "dpr/renderer.hpp"
+
+namespace dpr::cli {
+namespace {
+
+struct RenderOptions {
+  std::string mesh, scene, output;
+  bool rigid = false;
+  float elevation = 25, azimuth = 35;  // degrees: three sides of a box are in sight
+};
+
+struct Sphere {
+  glm::vec3 center{0.0F};
+  float radius = 0;
+};
+
+/// About the centre of the bounding box: not the smallest sphere, but never much larger.
+Sphere bounding_sphere(const Mesh& mesh) {
+  glm::vec3 lowest = mesh.positions.front(), highest = lowest;
+  for (const glm::vec3& p : mesh.positions) {
+    lowest = glm::min(lowest, p);
+    highest = glm::max(highest, p);
+  }
+  Sphere sphere{0.5F * (lowest + highest), 0};
+  for (const glm::vec3& p : mesh.positions) {
+    sphere.radius = std::max(sphere.radius, glm::distance(p, sphere.center));
+  }
+  return sphere;
+}
+
+/// A camera from which the sphere fills the image but for a margin.
+Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width, int height) {
+  constexpr float k_margin = 1.05F;
+  constexpr float k_fov_y_degrees = 40.0F;
+  const float aspect = static_cast<float>(width) / static_cast<float>(height);
+  const float half_tangent = std::tan(glm::radians(k_fov_y_degrees / 2)) * std::min(1.0F, aspect);
+  const float radius = k_margin * std::max(sphere.radius, 1e-6F);
+  const float distance = radius / std::sin(std::atan(half_tangent));
+  Camera camera = orbit_camera(distance, options.elevation, options.azimuth, sphere.center);
+  camera.fov_y_degrees = k_fov_y_degrees;
+  camera.znear = distance - radius;
+  camera.zfar = distance + radius;
+  return camera;
+}
+
+/// A soft light from above the camera's left shoulder.
+Lights fit_lights(const Camera& camera, const Sphere& sphere) {
+  const glm::mat4 to_world = glm::inverse(camera.view);
+  const glm::vec3 shoulder(-2 * sphere.radius, 3 * sphere.radius, 0);
+  PointLight light;
+  light.position = glm::vec3(to_world * glm::vec4(shoulder, 1));
+  light.diffuse = glm::vec3(0.55F);
+  light.specular = glm::vec3(0.1F);
+  Lights lights;
+  lights.ambient = glm::vec3(0.45F);
+  lights.point = {light};
+  return lights;
+}
+
+Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
+  constexpr int k_size = 256;
+  Scene scene;
+  scene.width = scene.height = k_size;
+  scene.meshes.push_back({read_mesh(options.mesh), glm::mat4(1.0F)});
+  apply(common, scene);
+  const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
+  scene.camera = fit_camera(sphere, options, scene.width, scene.height);
+  scene.lights = fit_lights(scene.camera, sphere);
+  return scene;
+}
+
+void run(const RenderOptions& options, CommonOptions& common) {
+  if (options.rigid) common.smoothing.preset = "rigid";
+  const Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  Renderer renderer(open_device(common));
+  renderer.set_scene(scene);
+  renderer.forward();
+  write_image(options.output, renderer.image());
+  const RenderStatistics statistics = renderer.statistics();
+  if (!common.quiet) {
+    std::printf("%s: %dx%d, %zu triangles\n", options.output.c_str(), scene.width, scene.height,
+                statistics.faces);
+  }
+  if (common.verbose) {
+    std::printf("%zu triangles dropped, %zu tile pairs, %zu fragments, %zu bytes on the device\n",
+                statistics.faces_dropped, statistics.pairs, statistics.fragments, statistics.device_bytes);
+  }
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand("render", "Renders a mesh or a scene");
+  const auto options = std::make_shared<RenderOptions>();
+  auto* mesh = command->add_option("MESH", options->mesh,
+                                   "Mesh file (OBJ, PLY, OFF, STL); camera and light are fitted to it");
+  mesh->type_name("");
+  command->add_option("--scene", options->scene, "Scene file, instead of MESH")
+      ->type_name("S.json")
+      ->excludes(mesh);
+  command->add_option("-o,--output", options->output, "Image to write; .exr keeps float RGBA")
+      ->required()
+      ->type_name("OUT.png");
+  command->add_flag("--rigid", options->rigid,
+                    "The nearest triangle wins, without any smoothing: --preset rigid");
+  command
+      ->add_option("--elevation", options->elevation,
+                   "Of the camera fitted to MESH, in degrees above the horizon")
+      ->type_name("FLOAT");
+  command
+      ->add_option("--azimuth", options->azimuth,
+                   "Of the camera fitted to MESH, in degrees from +z towards +x")
+      ->type_name("FLOAT");
+  add_common_options(*command, common);
+  command->get_option("--rigid")->excludes(command->get_option("--preset"));
+  command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");
+  command->callback([options, &common] {
+    if (options->mesh.empty() && options->scene.empty()) throw CLI::RequiredError("MESH or --scene");
+    run(*options, common);
+  });
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,41 @@
+// Sizes and vectors from text, independent of the locale.
+#include "cli/text.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+/// Reads a number and what must follow it (0: the end), and moves on. False if the text is not of that form.
+template <typename Number>
+bool take(const char*& at, const char* end, Number& number, char follower) {
+  const auto [stop, error] = std::from_chars(at, end, number);
+  if (error != std::errc()) return false;
+  if (follower == 0) return stop == end;
+  if (stop == end || *stop != follower) return false;
+  at = stop + 1;
+  return true;
+}
+
+}  // namespace
+
+glm::ivec2 parse_size(const std::string& text) {
+  const char *at = text.data(), *end = at + text.size();
+  glm::ivec2 size(0);
+  if (take(at, end, size.x, 'x') && take(at, end, size.y, 0) && size.x > 0 && size.y > 0) return size;
+  throw InvalidArgument("--size (command line)", "\"" + text + "\"", "WIDTHxHEIGHT, e.g. 640x480");
+}
+
+glm::dvec3 parse_vector(const std::string& text, const std::string& argument) {
+  const char *at = text.data(), *end = at + text.size();
+  glm::dvec3 v(0.0);
+  const bool complete = take(at, end, v.x, ',') && take(at, end, v.y, ',') && take(at, end, v.z, 0);
+  if (complete && std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z)) return v;
+  throw InvalidArgument(argument, "\"" + text + "\"",
+                        "three finite numbers separated by commas, e.g. 0.1,0,-0.5");
+}
+
+}  // namespace dpr::cli

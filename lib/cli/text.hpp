@@ -1,0 +1,15 @@
+// Values that are written as text on the command line.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+
+namespace dpr::cli {
+
+/// "640x480". Throws InvalidArgument.
+glm::ivec2 parse_size(const std::string& text);
+
+/// Three numbers separated by commas. Throws InvalidArgument; `argument` says which one in the message.
+glm::dvec3 parse_vector(const std::string& text, const std::string& argument);
+
+}  // namespace dpr::cli

@@ -1,0 +1,49 @@
+// What a Device holds: its OpenCL context and queue, the programs built for it, and the count of its memory.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CL/opencl.hpp>
+
+#include "dpr/device.hpp"
+#include "dpr/error.hpp"
+
+namespace dpr {
+
+/// Throws DeviceError unless `code` is CL_SUCCESS. `where` is the call, or the kernel with its sizes.
+inline void check_cl(int code, std::string_view where) {
+  if (code != CL_SUCCESS) throw DeviceError(code, std::string(where));
+}
+
+struct Device::Impl {
+  cl::Device device;
+  cl::Context context;
+  cl::CommandQueue queue;
+  DeviceInfo info;
+
+  /// The program of one kernel file, built once for each set of options. Throws BuildError.
+  const cl::Program& program(std::string_view kernel_file, const std::string& options);
+
+  /// Work-items of a work-group, for kernels without barriers. Constant, because PoCL compiles a kernel anew for each
+  /// work-group size.
+  std::size_t local_size() const { return info.type == "cpu" ? 32 : 128; }
+
+  std::size_t allocated_bytes = 0, peak_allocated_bytes = 0;
+
+ private:
+  std::mutex mutex_;
+  std::map<std::string, cl::Program> programs_;
+};
+
+/// Describes a device of a platform; index, default and lanes are filled in by list_devices().
+DeviceInfo describe(const cl::Platform& platform, const cl::Device& device);
+
+/// A Device around the caller's own objects, see dpr/opencl.hpp.
+Device make_device(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& queue);
+
+}  // namespace dpr

@@ -1,0 +1,51 @@
+// Checks kernel signatures against the compiled source.
+#include "device/kernel.hpp"
+
+#include <stdexcept>
+
+namespace dpr {
+
+std::string build_options(const Device::Impl& device, const std::string& more) {
+  return "-cl-std=CL1.2 -cl-kernel-arg-info -DDPR_LANES=" + std::to_string(device.info.lanes) + more;
+}
+
+namespace detail {
+namespace {
+
+std::string argument_text(const ArgumentType& type) { return (type.is_const ? "const " : "") + type.name; }
+
+ArgumentType argument_in_source(const cl::Kernel& kernel, unsigned index) {
+  ArgumentType found;
+  // Compilers differ in spacing ("float *", "float*") and in the tag of a struct.
+  for (const char c : kernel.getArgInfo<CL_KERNEL_ARG_TYPE_NAME>(index)) {
+    if (c == '\0') break;
+    if (c != ' ') found.name += c;
+  }
+  if (found.name.starts_with("struct")) found.name.erase(0, std::string_view("struct").size());
+  found.is_pointer = found.name.ends_with('*');
+  const auto qualifiers = kernel.getArgInfo<CL_KERNEL_ARG_TYPE_QUALIFIER>(index);
+  found.is_const = found.is_pointer && (qualifiers & CL_KERNEL_ARG_TYPE_CONST) != 0;
+  return found;
+}
+
+}  // namespace
+
+void check_signature(const cl::Kernel& kernel, const std::string& name, std::span<const ArgumentType> expected) {
+  const auto count = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+  if (count != expected.size()) {
+    throw std::logic_error("kernel " + name + " has " + std::to_string(count) + " arguments, its signature " +
+                           std::to_string(expected.size()));
+  }
+  for (unsigned index = 0; index < count; ++index) {
+    const ArgumentType found = argument_in_source(kernel, index);
+    if (found.name.empty()) return;  // arg info is optional for a program that was not built from source
+    const ArgumentType& wanted = expected[index];
+    if (found.name != wanted.name || found.is_const != wanted.is_const) {
+      throw std::logic_error("kernel " + name + ", argument " + std::to_string(index) + ": the source says " +
+                             argument_text(found) + ", the signature " + argument_text(wanted));
+    }
+  }
+}
+
+}  // namespace detail
+}  // namespace dpr

@@ -1,0 +1,116 @@
+// Typed kernel launches: a wrong number, order or type of arguments does not compile; a signature that differs from the
+// kernel's source fails by name when the kernel is made, before its first launch.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "device/buffer.hpp"
+#include "shared_types.h"
+
+namespace dpr {
+
+/// Argument kinds of a kernel signature: `const global T*`, `global T*`; anything else is passed by value.
+template <class T>
+struct In {};
+template <class T>
+struct Out {};
+
+/// The OpenCL C name of a type that host and kernels share.
+template <class T>
+inline constexpr std::string_view k_cl_type_name = T::k_cl_name;
+template <>
+inline constexpr std::string_view k_cl_type_name<float> = "float";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_uint> = "uint";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_ulong> = "ulong";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_float2> = "float2";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_uint2> = "uint2";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_float4> = "float4";
+template <>
+inline constexpr std::string_view k_cl_type_name<cl_uint4> = "uint4";
+
+/// What a kernel's source must say of an argument.
+struct ArgumentType {
+  std::string name;
+  bool is_pointer, is_const;
+};
+
+namespace detail {
+
+template <class T>
+struct Argument {
+  using Value = T;
+  static ArgumentType type() { return {std::string(k_cl_type_name<T>), false, false}; }
+  static int set(cl::Kernel& kernel, unsigned index, const T& value) {
+    return kernel.setArg(index, sizeof(T), &value);
+  }
+};
+
+template <class T>
+struct BufferArgument {
+  using Value = Buffer<T>;
+  static int set(cl::Kernel& kernel, unsigned index, const Buffer<T>& buffer) {
+    return kernel.setArg(index, buffer.cl_buffer());
+  }
+};
+
+template <class T>
+struct Argument<In<T>> : BufferArgument<T> {
+  static ArgumentType type() { return {std::string(k_cl_type_name<T>) + "*", true, true}; }
+};
+
+template <class T>
+struct Argument<Out<T>> : BufferArgument<T> {
+  static ArgumentType type() { return {std::string(k_cl_type_name<T>) + "*", true, false}; }
+};
+
+/// Throws std::logic_error naming kernel and argument where the source differs from the signature.
+void check_signature(const cl::Kernel& kernel, const std::string& name, std::span<const ArgumentType> expected);
+
+}  // namespace detail
+
+/// The options every kernel of a device is built with.
+std::string build_options(const Device::Impl& device, const std::string& more = "");
+
+/// One kernel of one program. `Args` are In<T>, Out<T> or value types, in the order of the source.
+template <class... Args>
+class Kernel {
+ public:
+  Kernel(Device::Impl& device, std::string_view file, const char* name, const std::string& options = "")
+      : device_(&device), name_(name) {
+    int error = CL_SUCCESS;
+    kernel_ = cl::Kernel(device.program(file, build_options(device, options)), name, &error);
+    check_cl(error, "clCreateKernel " + name_);
+    const std::array<ArgumentType, sizeof...(Args)> expected{detail::Argument<Args>::type()...};
+    detail::check_signature(kernel_, name_, expected);
+  }
+
+  /// Enqueues `items` work-items, rounded up to whole work-groups: kernels guard their range. Nothing for 0 items.
+  void operator()(std::size_t items, const typename detail::Argument<Args>::Value&... args) {
+    if (items == 0) return;
+    unsigned index = 0;
+    (check_cl(detail::Argument<Args>::set(kernel_, index++, args), "clSetKernelArg " + name_), ...);
+    const std::size_t local = device_->local_size();
+    const std::size_t global = (items + local - 1) / local * local;
+    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(global), cl::NDRange(local));
+    if (error != CL_SUCCESS) {
+      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) + " work-items in groups of " +
+                                   std::to_string(local));
+    }
+  }
+
+ private:
+  Device::Impl* device_;
+  std::string name_;
+  cl::Kernel kernel_;
+};
+
+}  // namespace dpr

@@ -1,0 +1,131 @@
+// Losses on the device.
+#include "dpr/loss.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "loss/image_loss_impl.hpp"
+#include "renderer_impl.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::array<std::string_view, 3> k_names{"mse", "l1", "silhouette"};
+
+void check_weights(const LossWeights& weights) {
+  for (const float weight : {weights.mse, weights.l1, weights.silhouette}) {
+    if (!(weight >= 0) || !std::isfinite(weight)) {
+      throw InvalidArgument("weight (loss)", std::to_string(weight), "a finite number, at least 0");
+    }
+  }
+  if (weights.mse + weights.l1 + weights.silhouette <= 0) {
+    throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
+  }
+}
+
+std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
+
+void check_targets(std::span<const Image> targets) {
+  if (targets.empty()) throw InvalidArgument("targets (loss)", "none", "one image a view");
+  for (const Image& image : targets) {
+    if (image.width < 1 || image.height < 1 || image.width != targets[0].width || image.height != targets[0].height) {
+      throw InvalidArgument("target size (loss)", size_text(image.width, image.height),
+                            "images of one size, " + size_text(targets[0].width, targets[0].height));
+    }
+    for (const glm::vec4& pixel : image.pixels) {
+      if (!std::isfinite(pixel.x + pixel.y + pixel.z + pixel.w)) {
+        throw InvalidArgument("target (loss)", "a pixel that is not finite", "finite values");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(LossKind kind) { return k_names[static_cast<std::size_t>(kind)]; }
+
+LossKind parse_loss(std::string_view word, std::string_view where) {
+  for (std::size_t i = 0; i < k_names.size(); ++i) {
+    if (k_names[i] == word) return static_cast<LossKind>(i);
+  }
+  throw InvalidArgument(std::string(where), "'" + std::string(word) + "'", "mse, l1 or silhouette");
+}
+
+LossWeights LossWeights::only(LossKind kind) {
+  LossWeights weights;
+  (kind == LossKind::mse ? weights.mse : kind == LossKind::l1 ? weights.l1 : weights.silhouette) = 1;
+  return weights;
+}
+
+ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<const Image> targets)
+    : device(device_),
+      weights(weights_),
+      width(targets[0].width),
+      height(targets[0].height),
+      views(targets.size()),
+      per_view(targets.size()),
+      forward(device.impl(), "loss.cl", "loss_forward"),
+      backward(device.impl(), "loss.cl", "loss_backward"),
+      reduce(device.impl()) {
+  const std::size_t pixels = targets[0].pixels.size();
+  std::vector<cl_float4> values;
+  std::vector<cl_uint> starts{0};
+  for (const Image& image : targets) {
+    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
+    starts.push_back(static_cast<cl_uint>(values.size()));
+  }
+  target.upload(device.impl(), values);
+  view_starts.upload(device.impl(), starts);
+  channels.resize(device.impl(), DPR_LOSS_SUMS * pixels * views);
+  grad_image.resize(device.impl(), pixels * views);
+}
+
+ImageLoss::ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets) {
+  check_weights(weights);
+  check_targets(targets);
+  impl_ = std::make_unique<Impl>(device, weights, targets);
+}
+
+ImageLoss::~ImageLoss() = default;
+ImageLoss::ImageLoss(ImageLoss&&) noexcept = default;
+ImageLoss& ImageLoss::operator=(ImageLoss&&) noexcept = default;
+
+double ImageLoss::evaluate(const Renderer& renderer) {
+  Impl& m = *impl_;
+  const Renderer::Impl& r = renderer.impl();
+  r.require_forward("ImageLoss::evaluate");
+  if (r.frame.views != m.views) {
+    throw InvalidArgument("targets (loss)", std::to_string(m.views) + " images",
+                          "one for each of the " + std::to_string(r.frame.views) + " views");
+  }
+  if (r.scene.width != m.width || r.scene.height != m.height) {
+    throw InvalidArgument("target size (loss)", size_text(m.width, m.height),
+                          "the size of the render, " + size_text(r.scene.width, r.scene.height));
+  }
+  const std::size_t pixels_per_view = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
+  const std::size_t pixels = pixels_per_view * m.views;
+  shared::LossParams p{};
+  p.mse = m.weights.mse;
+  p.l1 = m.weights.l1;
+  p.silhouette = m.weights.silhouette;
+  p.views = static_cast<cl_uint>(m.views);
+  p.pixels_per_view = static_cast<cl_uint>(pixels_per_view);
+  m.forward(pixels, p, r.aggregate.image, m.target, m.channels);
+  m.reduce(pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels, m.sums);
+  m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.grad_image);
+
+  const std::vector<float> sums = m.sums.download();
+  double total = 0;
+  for (std::size_t view = 0; view < m.views; ++view) {
+    const auto sum = [&](std::size_t channel) { return static_cast<double>(sums[channel * m.views + view]); };
+    const double count = 3.0 * static_cast<double>(pixels_per_view);
+    const double iou = sum(3) > 0 ? sum(2) / sum(3) : 1.0;  // two empty images agree
+    m.per_view[view] = m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count + m.weights.silhouette * (1 - iou);
+    total += m.per_view[view] / static_cast<double>(m.views);
+  }
+  return total;
+}
+
+std::span<const double> ImageLoss::per_view() const { return impl_->per_view; }
+
+}  // namespace dpr

@@ -1,0 +1,28 @@
+// What an ImageLoss holds on its device.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "dpr/loss.hpp"
+#include "stages/reduce.hpp"
+
+namespace dpr {
+
+struct ImageLoss::Impl {
+  Impl(const Device& device, LossWeights weights, std::span<const Image> targets);
+
+  Device device;
+  LossWeights weights;
+  int width, height;
+  std::size_t views;
+  std::vector<double> per_view;
+
+  Kernel<shared::LossParams, In<cl_float4>, In<cl_float4>, Out<float>> forward;
+  Kernel<shared::LossParams, In<cl_float4>, In<cl_float4>, In<float>, Out<cl_float4>> backward;
+  Reduce reduce;
+  Buffer<cl_float4> target;      // [view][height][width]
+  Buffer<cl_uint> view_starts;   // [view + 1] pixels
+  Buffer<float> channels, sums;  // [DPR_LOSS_SUMS][view][pixel], [DPR_LOSS_SUMS][view]
+  Buffer<cl_float4> grad_image;  // [view][height][width]
+};
+
+}  // namespace dpr

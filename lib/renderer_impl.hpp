@@ -1,0 +1,69 @@
+// What a Renderer holds: the scene, its geometry on the device, and the stages with their buffers.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "stages/aggregate.hpp"
+#include "stages/bin.hpp"
+#include "stages/gather.hpp"
+#include "stages/geometry.hpp"
+#include "stages/occupancy.hpp"
+#include "stages/rasterize.hpp"
+#include "stages/reduce.hpp"
+#include "stages/setup.hpp"
+#include "stages/shade.hpp"
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+struct Renderer::Impl {
+  explicit Impl(Device device);
+
+  void set_views(std::span<const View> views);
+  void set_smoothing(const Smoothing& smoothing);
+  void forward();
+  SceneGradient backward(const Buffer<cl_float4>& grad_images);
+
+  /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it.
+  void require_scene(const char* caller) const;
+  void require_forward(const char* caller) const;
+
+  Device device;
+  Scene scene;
+  std::vector<View> views;
+  bool rendered = false;  // the stages hold the frame of the current scene
+
+  std::optional<Geometry> geometry;
+  DeviceViews device_views;
+  Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
+  Buffer<cl_uint> all_pixels;          // [2]: one segment
+  shared::FrameParams frame{};
+
+  Transform transform;
+  Setup setup;
+  Bin bin;
+  Rasterize rasterize;
+  Shade shade;
+  Occupancy occupancy;
+  Aggregate aggregate;
+  Gather gather;
+  Reduce reduce;
+
+  Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
+  Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
+
+ private:
+  ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
+  AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
+
+  void read_smoothing_gradients(SceneGradient& gradient);
+  void read_mesh_gradients(SceneGradient& gradient);
+  void read_pose_gradients(SceneGradient& gradient);
+  void add_eye_gradients(SceneGradient& gradient);
+  void read_light_gradients(SceneGradient& gradient);
+};
+
+}  // namespace dpr

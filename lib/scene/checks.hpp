@@ -1,0 +1,81 @@
+// What the checks of the scene's parts share: how a value reads in a message, and the conditions they have in
+// common.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <string>
+
+#include "dpr/error.hpp"
+
+namespace dpr::checks {
+
+/// The shortest text that reads back as the same number; independent of the locale.
+template <typename Number>
+std::string text(Number value) {
+  char buffer[64];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return {buffer, end};
+}
+
+inline std::string text(const glm::vec3& v) {
+  return "(" + text(v.x) + ", " + text(v.y) + ", " + text(v.z) + ")";
+}
+
+inline bool is_finite(const glm::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// "positions[7]"
+inline std::string element(const std::string& list, std::size_t index) {
+  return list + "[" + std::to_string(index) + "]";
+}
+
+/// "sigma (smoothing)": what, and where it stands.
+inline std::string in(const std::string& what, const std::string& where) { return what + " (" + where + ")"; }
+
+inline void require_finite(const glm::vec3& value, const std::string& argument) {
+  if (!is_finite(value)) throw InvalidArgument(argument, text(value), "finite numbers");
+}
+
+inline void require_finite(float value, const std::string& argument) {
+  if (!std::isfinite(value)) throw InvalidArgument(argument, text(value), "a finite number");
+}
+
+inline void require_positive(float value, const std::string& argument) {
+  if (value > 0 && std::isfinite(value)) return;
+  throw InvalidArgument(argument, text(value), "a finite number > 0");
+}
+
+/// Throws unless the matrix is finite, affine and far enough from singular that its inverse means something.
+inline void require_affine(const glm::mat4& matrix, const std::string& argument) {
+  constexpr float k_last_row_tolerance = 1e-5F;  // a product of single-precision inverses leaves that much
+  constexpr double k_smallest_volume = 1e-6;     // of the columns, each scaled to length one
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      if (std::isfinite(matrix[column][row])) continue;
+      throw InvalidArgument(
+          argument,
+          text(matrix[column][row]) + " in row " + std::to_string(row) + ", column " + std::to_string(column),
+          "finite numbers");
+    }
+  }
+  const glm::vec4 last_row(matrix[0][3], matrix[1][3], matrix[2][3], matrix[3][3]);
+  if (glm::length(last_row - glm::vec4(0, 0, 0, 1)) > k_last_row_tolerance) {
+    throw InvalidArgument(argument,
+                          "the last row (" + text(last_row.x) + ", " + text(last_row.y) + ", " +
+                              text(last_row.z) + ", " + text(last_row.w) + ")",
+                          "an affine matrix, whose last row is (0, 0, 0, 1)");
+  }
+  const glm::dmat3 linear(matrix);
+  const double volume = std::abs(glm::determinant(linear));
+  const double box = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
+  if (!(volume > k_smallest_volume * box)) {
+    throw InvalidArgument(argument, "a singular matrix of determinant " + text(glm::determinant(linear)),
+                          "an invertible matrix");
+  }
+}
+
+}  // namespace dpr::checks

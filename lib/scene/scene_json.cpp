@@ -1,0 +1,254 @@
+// The scene format: strict reading, so that a misspelt key is an error and not a default.
+#include "scene/scene_json.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+
+#include "dpr/scene.hpp"
+#include "scene/checks.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr int k_largest_side = 16384;
+
+template <typename Value, typename Parse>
+void take(const JsonNode& node, std::string_view key, Value& value, Parse parse) {
+  if (const auto member = node.find(key)) value = parse(*member);
+}
+
+void take_number(const JsonNode& node, std::string_view key, float& value) {
+  take(node, key, value, [](const JsonNode& n) { return n.number(); });
+}
+
+void take_vec3(const JsonNode& node, std::string_view key, glm::vec3& value) {
+  take(node, key, value, [](const JsonNode& n) { return n.vec3(); });
+}
+
+void take_size(const JsonNode& node, std::string_view key, int& value) {
+  constexpr std::uint64_t k_most = std::numeric_limits<int>::max();
+  take(node, key, value, [](const JsonNode& n) { return static_cast<int>(n.whole_number(k_most)); });
+}
+
+// A word of an enumeration: `parse` is one of the parse_... functions of smoothing.hpp.
+template <typename Enum>
+void take_word(const JsonNode& node, std::string_view key, Enum& value,
+               Enum (*parse)(std::string_view, std::string_view)) {
+  take(node, key, value, [parse](const JsonNode& n) { return parse(n.string(), n.name()); });
+}
+
+std::vector<glm::vec3> vec3_list(const JsonNode& node) {
+  std::vector<glm::vec3> list;
+  for (const JsonNode& element : node.elements()) list.push_back(element.vec3());
+  return list;
+}
+
+std::vector<glm::uvec3> parse_faces(const JsonNode& node) {
+  constexpr std::uint64_t k_most = std::numeric_limits<std::uint32_t>::max();
+  std::vector<glm::uvec3> faces;
+  for (const JsonNode& element : node.elements()) {
+    const std::vector<JsonNode> corners = element.elements(3);
+    glm::uvec3& face = faces.emplace_back();
+    for (int i = 0; i < 3; ++i) {
+      face[i] = static_cast<std::uint32_t>(corners[static_cast<std::size_t>(i)].whole_number(k_most));
+    }
+  }
+  return faces;
+}
+
+// Colours beside a file take the place of the file's. A single colour stands for all.
+void take_colors(const JsonNode& node, Mesh& mesh) {
+  const auto of_vertices = node.find("vertex_colors"), of_faces = node.find("face_colors");
+  if (of_vertices && of_faces) node.fail("vertex_colors and face_colors", "one of the two");
+  if (!of_vertices && !of_faces) return;
+  mesh.vertex_colors.clear();
+  mesh.face_colors.clear();
+  std::vector<glm::vec3>& colors = of_vertices ? mesh.vertex_colors : mesh.face_colors;
+  const std::size_t count = of_vertices ? mesh.positions.size() : mesh.faces.size();
+  const JsonNode& given = of_vertices ? *of_vertices : *of_faces;
+  colors = vec3_list(given);
+  if (colors.size() == 1) colors.assign(count, glm::vec3(colors[0]));
+  if (colors.size() != count) {
+    given.fail(std::to_string(colors.size()) + " colours", "one, or " + std::to_string(count));
+  }
+}
+
+Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder) {
+  node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors"});
+  Instance instance;
+  const auto file = node.find("file");
+  if (file && (node.find("positions") || node.find("faces"))) {
+    node.fail("file beside positions or faces", "a file, or positions and faces");
+  }
+  if (file) {
+    instance.mesh = read_mesh(folder / file->string());
+  } else if (node.find("positions") || node.find("faces")) {
+    instance.mesh.positions = vec3_list(node.at("positions"));
+    instance.mesh.faces = parse_faces(node.at("faces"));
+  } else {
+    node.fail("no mesh", "a file, or positions and faces");
+  }
+  take_colors(node, instance.mesh);
+  take(node, "transform", instance.transform, [](const JsonNode& n) { return n.mat4(); });
+  return instance;
+}
+
+Shading parse_shading(const JsonNode& node) {
+  const std::string word = node.string();
+  if (word == "flat") return Shading::flat;
+  if (word == "phong") return Shading::phong;
+  if (word == "gouraud") return Shading::gouraud;
+  node.fail("\"" + word + "\"", "flat, phong or gouraud");
+}
+
+Lights parse_lights(const JsonNode& node) {
+  node.require_keys({"ambient", "point", "shininess", "shading"});
+  Lights lights;
+  take_vec3(node, "ambient", lights.ambient);
+  take_number(node, "shininess", lights.shininess);
+  take(node, "shading", lights.shading, parse_shading);
+  if (const auto list = node.find("point")) {
+    for (const JsonNode& element : list->elements()) {
+      element.require_keys({"position", "diffuse", "specular"});
+      PointLight& light = lights.point.emplace_back();
+      take_vec3(element, "position", light.position);
+      take_vec3(element, "diffuse", light.diffuse);
+      take_vec3(element, "specular", light.specular);
+    }
+  }
+  return lights;
+}
+
+GradientRequest parse_gradients(const JsonNode& node) {
+  GradientRequest request{false, false, false, false, false, false, false};
+  const std::array<std::pair<std::string_view, bool*>, 7> names{{{"positions", &request.positions},
+                                                                 {"colors", &request.colors},
+                                                                 {"transform", &request.transform},
+                                                                 {"camera", &request.camera},
+                                                                 {"lights", &request.lights},
+                                                                 {"smoothing", &request.smoothing},
+                                                                 {"background", &request.background}}};
+  for (const JsonNode& element : node.elements()) {
+    const std::string word = element.string();
+    const auto* found =
+        std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == word; });
+    if (found == names.end()) {
+      element.fail("\"" + word + "\"",
+                   "positions, colors, transform, camera, lights, smoothing or background");
+    }
+    if (*found->second) element.fail("\"" + word + "\" twice", "it once");
+    *found->second = true;
+  }
+  return request;
+}
+
+// The estimator of both stages, then that of one.
+void take_estimators(const JsonNode& node, Smoothing& smoothing) {
+  if (node.find("estimator")) {
+    take_word(node, "estimator", smoothing.occupancy_estimator, parse_estimator);
+    smoothing.aggregation_estimator = smoothing.occupancy_estimator;
+  }
+  take_word(node, "occupancy_estimator", smoothing.occupancy_estimator, parse_estimator);
+  take_word(node, "aggregation_estimator", smoothing.aggregation_estimator, parse_estimator);
+}
+
+// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius.
+void take_reach(const JsonNode& node, Smoothing& smoothing) {
+  const float preset_sigma = smoothing.sigma;
+  take_number(node, "sigma", smoothing.sigma);
+  if (smoothing.blur_radius) *smoothing.blur_radius *= smoothing.sigma / preset_sigma;
+  take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
+}
+
+Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder) {
+  node.require_keys({"width", "height", "camera", "background", "meshes", "lights", "smoothing",
+                     "perspective_correct", "gradients"});
+  Scene scene;
+  take_size(node, "width", scene.width);
+  take_size(node, "height", scene.height);
+  take(node, "camera", scene.camera, parse_camera);
+  take_vec3(node, "background", scene.background);
+  for (const JsonNode& mesh : node.at("meshes").elements())
+    scene.meshes.push_back(parse_instance(mesh, folder));
+  take(node, "lights", scene.lights, parse_lights);
+  take(node, "smoothing", scene.smoothing, parse_smoothing);
+  take(node, "perspective_correct", scene.perspective_correct, [](const JsonNode& n) { return n.boolean(); });
+  take(node, "gradients", scene.gradients, parse_gradients);
+  return scene;
+}
+
+void validate_side(int value, const std::string& argument) {
+  if (value >= 1 && value <= k_largest_side) return;
+  throw InvalidArgument(argument, std::to_string(value),
+                        "1 to " + std::to_string(k_largest_side) + " pixels");
+}
+
+}  // namespace
+
+Camera parse_camera(const JsonNode& node) {
+  node.require_keys({"view", "fov_y_degrees", "intrinsics", "znear", "zfar"});
+  Camera camera;
+  take(node, "view", camera.view, [](const JsonNode& n) { return n.mat4(); });
+  take_number(node, "fov_y_degrees", camera.fov_y_degrees);
+  take_number(node, "znear", camera.znear);
+  take_number(node, "zfar", camera.zfar);
+  const auto intrinsics = node.find("intrinsics");
+  if (!intrinsics) return camera;
+  if (node.find("fov_y_degrees")) node.fail("fov_y_degrees and intrinsics", "one of the two");
+  intrinsics->require_keys({"fx", "fy", "cx", "cy"});
+  camera.intrinsics = Intrinsics{intrinsics->at("fx").number(), intrinsics->at("fy").number(),
+                                 intrinsics->at("cx").number(), intrinsics->at("cy").number()};
+  return camera;
+}
+
+Smoothing parse_smoothing(const JsonNode& node) {
+  node.require_keys({"preset", "occupancy_prior", "depth_prior", "sigma", "gamma", "alpha", "composition",
+                     "estimator", "occupancy_estimator", "aggregation_estimator", "samples",
+                     "variance_reduction", "seed", "occupancy_threshold", "blur_radius", "background_depth",
+                     "distance"});
+  Smoothing smoothing;
+  take(node, "preset", smoothing, [](const JsonNode& n) { return smoothing_preset(n.string()); });
+  take_word(node, "occupancy_prior", smoothing.occupancy_prior, parse_prior);
+  take_word(node, "depth_prior", smoothing.depth_prior, parse_prior);
+  take_reach(node, smoothing);
+  take_number(node, "gamma", smoothing.gamma);
+  take_number(node, "alpha", smoothing.alpha);
+  take_word(node, "composition", smoothing.composition, parse_composition);
+  take_estimators(node, smoothing);
+  constexpr std::uint64_t k_most_samples = std::numeric_limits<std::uint32_t>::max();
+  take(node, "samples", smoothing.samples,
+       [](const JsonNode& n) { return static_cast<std::uint32_t>(n.whole_number(k_most_samples)); });
+  take_word(node, "variance_reduction", smoothing.variance_reduction, parse_variance_reduction);
+  constexpr std::uint64_t k_most_seed = std::numeric_limits<std::uint64_t>::max();
+  take(node, "seed", smoothing.seed, [](const JsonNode& n) { return n.whole_number(k_most_seed); });
+  take_number(node, "occupancy_threshold", smoothing.occupancy_threshold);
+  take_number(node, "background_depth", smoothing.background_depth);
+  take_word(node, "distance", smoothing.distance, parse_distance_metric);
+  return smoothing;
+}
+
+void validate(const Scene& scene) {
+  validate_side(scene.width, "width (scene)");
+  validate_side(scene.height, "height (scene)");
+  validate(scene.camera);
+  checks::require_finite(scene.background, "background (scene)");
+  if (scene.meshes.empty()) throw InvalidArgument("meshes (scene)", "none", "at least one");
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const std::string name = checks::element("meshes", i);
+    validate(scene.meshes[i].mesh, name);
+    checks::require_affine(scene.meshes[i].transform, checks::in("transform", name));
+  }
+  if (scene.lights) validate(*scene.lights);
+  validate(scene.smoothing);
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  const nlohmann::json document = read_json(file);
+  Scene scene = parse_scene(JsonNode(document, file), file.parent_path());
+  validate(scene);
+  return scene;
+}
+
+}  // namespace dpr

@@ -1,0 +1,16 @@
+// The parts of the scene format that other files share with it.
+#pragma once
+
+#include "dpr/camera.hpp"
+#include "dpr/smoothing.hpp"
+#include "scene/json_node.hpp"
+
+namespace dpr {
+
+/// The "camera" object of a scene. What is not given takes its default. Not validated.
+Camera parse_camera(const JsonNode& node);
+
+/// The "smoothing" object of a scene: the preset first, if there is one, then what is given. Not validated.
+Smoothing parse_smoothing(const JsonNode& node);
+
+}  // namespace dpr

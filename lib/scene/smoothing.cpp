@@ -1,0 +1,238 @@
+// The smoothing: its words, its named members, its checks, and how far it reaches.
+#include "dpr/smoothing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <string>
+
+#include "scene/checks.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::uint32_t k_most_samples = 1U << 20U;
+/// Where the Cauchy prior's radius ends, in sigmas: its tail would reach 3,183 of them at a threshold of
+/// 1e-4.
+constexpr double k_cauchy_reach = 100;
+
+template <typename Enum>
+struct Word {
+  Enum value;
+  std::string_view name;
+};
+
+constexpr std::array<Word<Prior>, 5> k_priors{{{Prior::gaussian, "gaussian"},
+                                               {Prior::cauchy, "cauchy"},
+                                               {Prior::logistic, "logistic"},
+                                               {Prior::gumbel, "gumbel"},
+                                               {Prior::uniform, "uniform"}}};
+constexpr std::array<Word<Composition>, 2> k_compositions{
+    {{Composition::barrier, "barrier"}, {Composition::joint, "joint"}}};
+constexpr std::array<Word<Estimator>, 2> k_estimators{
+    {{Estimator::exact, "exact"}, {Estimator::monte_carlo, "monte_carlo"}}};
+constexpr std::array<Word<VarianceReduction>, 2> k_variance_reductions{
+    {{VarianceReduction::none, "none"}, {VarianceReduction::rigid, "rigid"}}};
+constexpr std::array<Word<DistanceMetric>, 2> k_distance_metrics{
+    {{DistanceMetric::squared, "squared"}, {DistanceMetric::euclidean, "euclidean"}}};
+
+template <typename Enum>
+std::string choices(std::span<const Word<Enum>> words) {
+  std::string list;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) list += i + 1 < words.size() ? ", " : " or ";
+    list += words[i].name;
+  }
+  return list;
+}
+
+template <typename Enum>
+std::string_view find_name(std::span<const Word<Enum>> words, Enum value) {
+  for (const Word<Enum>& word : words) {
+    if (word.value == value) return word.name;
+  }
+  return {};
+}
+
+template <typename Enum>
+Enum find_value(std::span<const Word<Enum>> words, std::string_view name, std::string_view where) {
+  for (const Word<Enum>& word : words) {
+    if (word.name == name) return word.value;
+  }
+  throw InvalidArgument(std::string(where), "\"" + std::string(name) + "\"", choices(words));
+}
+
+template <typename Enum>
+void require_known(std::span<const Word<Enum>> words, Enum value, const std::string& argument) {
+  if (find_name(words, value).empty()) {
+    throw InvalidArgument(argument, std::to_string(static_cast<int>(value)), choices(words));
+  }
+}
+
+void validate_words(const Smoothing& s) {
+  require_known<Prior>(k_priors, s.occupancy_prior, "occupancy_prior (smoothing)");
+  require_known<Prior>(k_priors, s.depth_prior, "depth_prior (smoothing)");
+  require_known<Composition>(k_compositions, s.composition, "composition (smoothing)");
+  require_known<Estimator>(k_estimators, s.occupancy_estimator, "occupancy_estimator (smoothing)");
+  require_known<Estimator>(k_estimators, s.aggregation_estimator, "aggregation_estimator (smoothing)");
+  require_known<VarianceReduction>(k_variance_reductions, s.variance_reduction,
+                                   "variance_reduction (smoothing)");
+  require_known<DistanceMetric>(k_distance_metrics, s.distance, "distance (smoothing)");
+}
+
+void validate_stage(Estimator estimator, const std::string& stage, Prior prior, Composition composition) {
+  if (estimator == Estimator::exact) return;
+  const std::string argument = stage + "_estimator (smoothing)";
+  if (composition == Composition::joint) {
+    throw InvalidArgument(argument, "monte_carlo with the joint composition",
+                          "exact: the joint composition is not sampled");
+  }
+  if (prior == Prior::uniform) {
+    throw InvalidArgument(argument, "monte_carlo with the uniform prior",
+                          "exact: the uniform density has no score, so its gradient cannot be sampled");
+  }
+}
+
+// x > 0 with 1 - Phi(x) = tail < 1/2. Newton's method on ln(1 - Phi), which is concave and falls: from the
+// right of the solution it converges monotonically. It starts there, because 1 - Phi(x) <= exp(-x^2 / 2) / 2.
+double gaussian_reach(double tail) {
+  constexpr int k_most_steps = 100;
+  double x = std::sqrt(-2 * std::log(2 * tail));
+  for (int step = 0; step < k_most_steps; ++step) {
+    const double q = 0.5 * std::erfc(x / std::numbers::sqrt2);
+    const double density = std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi);
+    const double change = (std::log(q) - std::log(tail)) * q / density;
+    x += change;
+    if (std::abs(change) <= 1e-14 * x) break;
+  }
+  return x;
+}
+
+// x with P(X > x) = tail, in units of sigma: there the occupancy of a pixel outside by x has fallen to
+// `tail`.
+double reach(Prior prior, double tail) {
+  switch (prior) {
+    case Prior::gaussian:
+      return gaussian_reach(tail);
+    case Prior::cauchy:
+      return std::min(1 / std::tan(std::numbers::pi * tail), k_cauchy_reach);
+    case Prior::logistic:
+      return std::log1p(-tail) - std::log(tail);
+    case Prior::gumbel:
+      return -std::log(-std::log1p(-tail));
+    case Prior::uniform:
+      return 0.5 - tail;
+  }
+  return 0;
+}
+
+// The blur radius of SoftRas, of PyTorch3D and of the published program: where the logistic occupancy is
+// 1e-4.
+float published_blur_radius(float sigma) {
+  return static_cast<float>(reach(Prior::logistic, 1e-4) * static_cast<double>(sigma));  // 9.21 sigma
+}
+
+Smoothing softras() {
+  Smoothing smoothing;
+  smoothing.occupancy_prior = Prior::logistic;
+  smoothing.depth_prior = Prior::gumbel;
+  smoothing.blur_radius = published_blur_radius(smoothing.sigma);
+  return smoothing;
+}
+
+Smoothing published(Prior prior) {
+  Smoothing smoothing;
+  smoothing.occupancy_prior = smoothing.depth_prior = prior;
+  smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
+  smoothing.samples = 8;
+  smoothing.variance_reduction = VarianceReduction::rigid;
+  smoothing.blur_radius = published_blur_radius(smoothing.sigma);
+  return smoothing;
+}
+
+Smoothing joint_gaussian() {
+  Smoothing smoothing;
+  smoothing.composition = Composition::joint;
+  return smoothing;
+}
+
+}  // namespace
+
+void validate(const Smoothing& smoothing) {
+  validate_words(smoothing);
+  checks::require_positive(smoothing.sigma, "sigma (smoothing)");
+  checks::require_positive(smoothing.gamma, "gamma (smoothing)");
+  checks::require_positive(smoothing.alpha, "alpha (smoothing)");
+  if (smoothing.samples < 1 || smoothing.samples > k_most_samples) {
+    throw InvalidArgument("samples (smoothing)", checks::text(smoothing.samples),
+                          "a whole number from 1 to " + checks::text(k_most_samples));
+  }
+  if (!(smoothing.occupancy_threshold > 0 && smoothing.occupancy_threshold < 0.5F)) {
+    throw InvalidArgument("occupancy_threshold (smoothing)", checks::text(smoothing.occupancy_threshold),
+                          "a number between 0 and 0.5, both excluded");
+  }
+  if (smoothing.blur_radius && !(*smoothing.blur_radius >= 0 && std::isfinite(*smoothing.blur_radius))) {
+    throw InvalidArgument("blur_radius (smoothing)", checks::text(*smoothing.blur_radius),
+                          "a finite number >= 0");
+  }
+  checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
+  validate_stage(smoothing.occupancy_estimator, "occupancy", smoothing.occupancy_prior,
+                 smoothing.composition);
+  validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
+                 smoothing.composition);
+}
+
+float blur_radius(const Smoothing& smoothing) {
+  if (smoothing.blur_radius) return *smoothing.blur_radius;
+  const double tail = static_cast<double>(smoothing.occupancy_threshold);
+  return static_cast<float>(reach(smoothing.occupancy_prior, tail) * static_cast<double>(smoothing.sigma));
+}
+
+Smoothing rigid_smoothing() {
+  Smoothing smoothing;
+  smoothing.composition = Composition::joint;
+  smoothing.sigma = 1e-12F;  // far below the square of a pixel's width: p is 0 or 1
+  smoothing.gamma = 1e-9F;   // far below the spacing of single-precision depths: the nearest triangle wins
+  smoothing.blur_radius = 0.0F;
+  return smoothing;
+}
+
+Smoothing smoothing_preset(std::string_view name) {
+  if (name == "softras") return softras();
+  if (name == "paper_gaussian") return published(Prior::gaussian);
+  if (name == "paper_cauchy") return published(Prior::cauchy);
+  if (name == "joint_gaussian") return joint_gaussian();
+  if (name == "rigid") return rigid_smoothing();
+  throw InvalidArgument("preset (smoothing)", "\"" + std::string(name) + "\"",
+                        "softras, paper_gaussian, paper_cauchy, joint_gaussian or rigid");
+}
+
+std::string_view to_string(Prior value) { return find_name<Prior>(k_priors, value); }
+std::string_view to_string(Composition value) { return find_name<Composition>(k_compositions, value); }
+std::string_view to_string(Estimator value) { return find_name<Estimator>(k_estimators, value); }
+std::string_view to_string(VarianceReduction value) {
+  return find_name<VarianceReduction>(k_variance_reductions, value);
+}
+std::string_view to_string(DistanceMetric value) {
+  return find_name<DistanceMetric>(k_distance_metrics, value);
+}
+
+Prior parse_prior(std::string_view word, std::string_view where) {
+  return find_value<Prior>(k_priors, word, where);
+}
+Composition parse_composition(std::string_view word, std::string_view where) {
+  return find_value<Composition>(k_compositions, word, where);
+}
+Estimator parse_estimator(std::string_view word, std::string_view where) {
+  return find_value<Estimator>(k_estimators, word, where);
+}
+VarianceReduction parse_variance_reduction(std::string_view word, std::string_view where) {
+  return find_value<VarianceReduction>(k_variance_reductions, word, where);
+}
+DistanceMetric parse_distance_metric(std::string_view word, std::string_view where) {
+  return find_value<DistanceMetric>(k_distance_metrics, word, where);
+}
+
+}  // namespace dpr

@@ -1,0 +1,28 @@
+// Files that appear whole or not at all.
+#pragma once
+
+#include <filesystem>
+
+namespace dpr {
+
+/// A name beside `target`, with the same extension, for a file that becomes `target` by commit() and is
+/// removed otherwise. Owns the file, not a handle to it: close what is written before commit().
+class TemporaryFile {
+ public:
+  /// Throws IoError where the folder of `target` does not exist.
+  explicit TemporaryFile(std::filesystem::path target);
+  ~TemporaryFile();
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+
+  /// Renames the file to the target, which is replaced. Throws IoError.
+  void commit();
+
+ private:
+  std::filesystem::path target_, path_;
+  bool committed_ = false;
+};
+
+}  // namespace dpr

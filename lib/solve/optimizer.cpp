@@ -1,0 +1,63 @@
+// Adam and SGD with momentum.
+#include "dpr/optimizer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "solve/require.hpp"
+
+namespace dpr {
+namespace {
+
+void require_learning_rate(double learning_rate) {
+  require(learning_rate > 0 && std::isfinite(learning_rate), "learning_rate (optimizer)", learning_rate,
+          "a finite number above 0");
+}
+
+}  // namespace
+
+Optimizer::Optimizer(const OptimizerOptions& options) : options_(options) {
+  require_learning_rate(options.learning_rate);
+  require(options.beta1 >= 0 && options.beta1 < 1, "beta1 (optimizer)", options.beta1, "a number in [0, 1)");
+  require(options.beta2 >= 0 && options.beta2 < 1, "beta2 (optimizer)", options.beta2, "a number in [0, 1)");
+  require(options.epsilon > 0 && std::isfinite(options.epsilon), "epsilon (optimizer)", options.epsilon,
+          "a finite number above 0");
+}
+
+std::span<const double> Optimizer::step(std::span<const double> gradient) {
+  if (iteration_ == 0) {
+    for (auto* state : {&first_moment_, &second_moment_, &step_}) state->assign(gradient.size(), 0.0);
+  }
+  require(gradient.size() == step_.size(), "length of the gradient (optimizer)", gradient.size(),
+          "the same length in every step");
+  const auto wrong = std::ranges::find_if(gradient, [](double g) { return !std::isfinite(g); });
+  require(wrong == gradient.end(), "gradient (optimizer)", wrong == gradient.end() ? 0.0 : *wrong,
+          "finite numbers");
+
+  ++iteration_;
+  // Kingma & Ba 2015, Algorithm 1; the corrections undo the bias of moments that start at zero.
+  const double correction1 = 1 - std::pow(options_.beta1, iteration_);
+  const double correction2 = 1 - std::pow(options_.beta2, iteration_);
+  for (std::size_t i = 0; i < gradient.size(); ++i) {
+    const double g = gradient[i];
+    if (options_.kind == OptimizerKind::sgd) {
+      first_moment_[i] = options_.beta1 * first_moment_[i] + g;
+      step_[i] = -options_.learning_rate * first_moment_[i];
+    } else {
+      first_moment_[i] = options_.beta1 * first_moment_[i] + (1 - options_.beta1) * g;
+      second_moment_[i] = options_.beta2 * second_moment_[i] + (1 - options_.beta2) * g * g;
+      const double scale = std::sqrt(second_moment_[i] / correction2) + options_.epsilon;
+      step_[i] = -options_.learning_rate * (first_moment_[i] / correction1) / scale;
+    }
+  }
+  return step_;
+}
+
+void Optimizer::set_learning_rate(double learning_rate) {
+  require_learning_rate(learning_rate);
+  options_.learning_rate = learning_rate;
+}
+
+void Optimizer::restart() { iteration_ = 0; }
+
+}  // namespace dpr

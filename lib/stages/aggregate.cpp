@@ -1,0 +1,100 @@
+#include "stages/aggregate.hpp"
+
+namespace dpr {
+namespace {
+
+const char* file_of(Composition composition) {
+  return composition == Composition::joint ? "aggregate_joint.cl" : "aggregate.cl";
+}
+
+}  // namespace
+
+Aggregate::Exact::Exact(Device::Impl& device, Composition composition, const std::string& options)
+    : forward(device, file_of(composition),
+              composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
+      backward(device, file_of(composition),
+               composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward", options) {
+  if (composition == Composition::joint) sort.emplace(device, file_of(composition), "aggregate_joint_sort", options);
+}
+
+Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
+    : forward(device, "aggregate_sampled.cl", "aggregate_sampled_forward", options),
+      backward(device, "aggregate_sampled.cl", "aggregate_sampled_backward", options) {}
+
+void Aggregate::set_smoothing(const Smoothing& smoothing) {
+  smoothing_ = smoothing;
+  const std::string options = prior_option(smoothing.depth_prior);
+  const std::string wanted = std::string(to_string(smoothing.composition)) +
+                             std::string(to_string(smoothing.aggregation_estimator)) + options;
+  if (wanted == built_) return;
+  exact_.reset();
+  sampled_.reset();
+  if (smoothing.aggregation_estimator == Estimator::exact) {
+    exact_.emplace(device_, smoothing.composition, options);
+  } else {
+    sampled_.emplace(device_, options);
+  }
+  built_ = wanted;
+}
+
+shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {
+  shared::AggregateParams a{};
+  a.background = to_cl(background);
+  a.gamma = smoothing_.gamma;
+  a.alpha = smoothing_.alpha;
+  a.background_depth = smoothing_.background_depth;
+  a.samples = smoothing_.samples;
+  a.baseline = smoothing_.variance_reduction == VarianceReduction::rigid ? 1.0F : 0.0F;
+  a.seed_low = static_cast<cl_uint>(smoothing_.seed);
+  a.seed_high = static_cast<cl_uint>(smoothing_.seed >> 32U);
+  a.pixels_per_view = p.width * p.height;
+  a.pixels = p.views * a.pixels_per_view;
+  a.faces = p.faces;
+  return a;
+}
+
+void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
+  const shared::AggregateParams a = params(in.p, background);
+  image.resize(device_, a.pixels);
+  Rasterize& r = in.rasterize;
+  if (exact_) {
+    if (exact_->sort) (*exact_->sort)(a.pixels, a.pixels, r.pixel_starts, r.depth, r.list);
+    exact_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, image);
+  } else {
+    sampled_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                      in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair,
+                      in.bin.pair_face, image);
+  }
+}
+
+void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image) {
+  const shared::AggregateParams a = params(in.p, background);
+  for (Buffer<float>* buffer :
+       {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
+    buffer->resize(device_, in.rasterize.fragments);
+  }
+  channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
+  const Rasterize& r = in.rasterize;
+  if (exact_) {
+    exact_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, grad_image, grad_depth,
+                     grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
+  } else {
+    sampled_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                       in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair,
+                       in.bin.pair_face, grad_image, grad_depth, grad_log_occupancy, grad_color.red, grad_color.green,
+                       grad_color.blue, channels);
+  }
+}
+
+std::size_t Aggregate::bytes() const {
+  std::size_t bytes = image.capacity_bytes();
+  for (const Buffer<float>* buffer :
+       {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue, &channels}) {
+    bytes += buffer->capacity_bytes();
+  }
+  return bytes;
+}
+
+}  // namespace dpr

@@ -1,0 +1,77 @@
+// The perturbed arg-max of every pixel: the image, and the gradients of what it is made of.
+#pragma once
+
+#include <optional>
+
+#include "device/kernel.hpp"
+#include "dpr/smoothing.hpp"
+#include "stages/occupancy.hpp"
+#include "stages/rasterize.hpp"
+#include "stages/shade.hpp"
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+/// Everything of a frame that aggregation reads; the joint composition sorts the rasterizer's lists by depth.
+struct AggregateInputs {
+  const shared::FrameParams& p;
+  const DeviceViews& views;
+  const Bin& bin;
+  Rasterize& rasterize;
+  const Occupancy& occupancy;
+  const Shade& shade;
+};
+
+class Aggregate {
+ public:
+  explicit Aggregate(Device::Impl& device) : device_(device) {}
+
+  /// Builds what the smoothing needs; cheap where that is there already.
+  void set_smoothing(const Smoothing& smoothing);
+
+  void forward(const AggregateInputs& in, const glm::vec3& background);
+  /// `grad_image` is [view][height][width].
+  void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
+
+  Buffer<cl_float4> image;  ///< [view][height][width] RGBA
+  Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
+  ColorGradients grad_color;                     ///< [fragment]
+  Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
+
+  std::size_t bytes() const;
+
+ private:
+  using ForwardKernel = Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>,
+                               In<float>, In<float>, In<float>, In<float>, In<float>, Out<cl_float4>>;
+  using BackwardKernel =
+      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
+             In<float>, In<float>, In<float>, In<cl_float4>, Out<float>, Out<float>, Out<float>, Out<float>,
+             Out<float>, Out<float>>;
+  /// Exact kernels of either composition; the joint one sorts first.
+  struct Exact {
+    Exact(Device::Impl& device, Composition composition, const std::string& options);
+    std::optional<Kernel<cl_uint, In<cl_uint>, In<float>, Out<cl_uint>>> sort;
+    ForwardKernel forward;
+    BackwardKernel backward;
+  };
+  struct Sampled {
+    Sampled(Device::Impl& device, const std::string& options);
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
+        forward;
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>, Out<float>, Out<float>,
+           Out<float>, Out<float>, Out<float>>
+        backward;
+  };
+
+  shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
+
+  Device::Impl& device_;
+  Smoothing smoothing_;
+  std::string built_;
+  std::optional<Exact> exact_;
+  std::optional<Sampled> sampled_;
+};
+
+}  // namespace dpr

@@ -1,0 +1,27 @@
+// Gradients of pairs' corners, gathered at vertices and colours.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "stages/bin.hpp"
+#include "stages/geometry.hpp"
+
+namespace dpr {
+
+class Gather {
+ public:
+  explicit Gather(Device::Impl& device);
+
+  /// grad[view][target] from partial[pair][9].
+  void per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
+                const Buffer<float>& partial, Buffer<cl_float4>& grad);
+  /// grad[target], the views added up.
+  void over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
+                  const Buffer<float>& partial, Buffer<cl_float4>& grad);
+
+ private:
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<cl_float4>>
+      corners_;
+};
+
+}  // namespace dpr

@@ -1,0 +1,82 @@
+#include "stages/geometry.hpp"
+
+#include <limits>
+
+namespace dpr {
+namespace {
+
+cl_uint index(std::size_t value) { return static_cast<cl_uint>(value); }
+
+Incidence make_incidence(Device::Impl& device, const std::vector<cl_uint4>& faces, std::size_t targets) {
+  std::vector<cl_uint> starts(targets + 1, 0), corners(faces.size() * 3);
+  for (const cl_uint4& face : faces) {
+    for (int corner = 0; corner < 3; ++corner) ++starts[face.s[corner] + 1];
+  }
+  for (std::size_t target = 0; target < targets; ++target) starts[target + 1] += starts[target];
+  std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
+  for (std::size_t face = 0; face < faces.size(); ++face) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      corners[next[faces[face].s[corner]]++] = index(face * 3 + corner);
+    }
+  }
+  Incidence incidence;
+  incidence.starts.upload(device, starts);
+  incidence.corners.upload(device, corners);
+  return incidence;
+}
+
+/// The colours of a mesh: per vertex, per face, or one white.
+std::vector<glm::vec3> mesh_colors(const Mesh& mesh) {
+  if (!mesh.vertex_colors.empty()) return mesh.vertex_colors;
+  if (!mesh.face_colors.empty()) return mesh.face_colors;
+  return {glm::vec3(1.0F)};
+}
+
+cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_color) {
+  const cl_uint base = index(first_color);
+  if (!mesh.vertex_colors.empty()) {
+    const glm::uvec3& f = mesh.faces[face];
+    return {{base + f.x, base + f.y, base + f.z, 0}};
+  }
+  const cl_uint color = mesh.face_colors.empty() ? base : index(first_color + face);
+  return {{color, color, color, 0}};
+}
+
+}  // namespace
+
+cl_float4 to_cl(const glm::vec3& v) { return {{v.x, v.y, v.z, 0.0F}}; }
+
+Geometry::Geometry(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_float4> all_positions, all_colors;
+  std::vector<cl_uint> all_mesh;
+  std::vector<cl_uint4> all_faces, all_face_colors;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = scene.meshes[m].mesh;
+    const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
+    const cl_uint base = index(all_positions.size());
+    meshes.push_back({all_positions.size(), mesh.positions.size(), all_colors.size(), mesh_color.size()});
+    for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
+      const glm::uvec3& f = mesh.faces[face];
+      all_faces.push_back({{base + f.x, base + f.y, base + f.z, index(m)}});
+      all_face_colors.push_back(corner_colors(mesh, face, all_colors.size()));
+    }
+    for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
+    for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
+    all_mesh.resize(all_positions.size(), index(m));
+  }
+  vertices = all_positions.size();
+  faces = all_faces.size();
+  colors = all_colors.size();
+  if (faces > std::numeric_limits<cl_uint>::max() / 3) {
+    throw InvalidArgument("faces (scene)", std::to_string(faces), "at most 2^32 / 3");
+  }
+  positions.upload(device, all_positions);
+  vertex_mesh.upload(device, all_mesh);
+  face_vertices.upload(device, all_faces);
+  face_colors.upload(device, all_face_colors);
+  color_values.upload(device, all_colors);
+  vertex_corners = make_incidence(device, all_faces, vertices);
+  color_corners = make_incidence(device, all_face_colors, colors);
+}
+
+}  // namespace dpr

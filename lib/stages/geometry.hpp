@@ -1,0 +1,40 @@
+// The scene's geometry on the device: all meshes in one set of buffers, with what gathers gradients without atomics.
+#pragma once
+
+#include <vector>
+
+#include "device/buffer.hpp"
+#include "dpr/scene.hpp"
+#include "shared_types.h"
+
+namespace dpr {
+
+/// Corners (face * 3 + corner) by what they refer to, in order: a compressed sparse row.
+struct Incidence {
+  Buffer<cl_uint> starts;   ///< [target + 1]
+  Buffer<cl_uint> corners;  ///< [face * 3]
+};
+
+/// Where a mesh lies in the joined buffers.
+struct MeshRange {
+  std::size_t first_vertex, vertices, first_color, colors;
+};
+
+struct Geometry {
+  Geometry(Device::Impl& device, const Scene& scene);
+
+  std::size_t vertices = 0, faces = 0, colors = 0;
+  std::vector<MeshRange> meshes;
+
+  Buffer<cl_float4> positions;   ///< [vertex] object space
+  Buffer<cl_uint> vertex_mesh;   ///< [vertex]
+  Buffer<cl_uint4> face_vertices;  ///< [face] vertex indices; w = mesh
+  Buffer<cl_uint4> face_colors;    ///< [face] colour of each corner
+  Buffer<cl_float4> color_values;  ///< [color]
+  Incidence vertex_corners, color_corners;
+};
+
+/// A vector of three in the first components; w = 0.
+cl_float4 to_cl(const glm::vec3& v);
+
+}  // namespace dpr

@@ -1,0 +1,77 @@
+#include "stages/occupancy.hpp"
+
+namespace dpr {
+
+std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior)); }
+
+Occupancy::Exact::Exact(Device::Impl& device, const std::string& options)
+    : forward(device, "occupancy.cl", "occupancy_forward", options),
+      backward(device, "occupancy.cl", "occupancy_backward", options) {}
+
+Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
+    : forward(device, "occupancy_sampled.cl", "occupancy_sampled_forward", options),
+      backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
+
+void Occupancy::set_smoothing(const Smoothing& smoothing) {
+  smoothing_ = smoothing;
+  const std::string options = prior_option(smoothing.occupancy_prior);
+  const bool exact = smoothing.occupancy_estimator == Estimator::exact;
+  if (options == built_ && (exact ? exact_.has_value() : sampled_.has_value())) return;
+  exact_.reset();
+  sampled_.reset();
+  if (exact) {
+    exact_.emplace(device_, options);
+  } else {
+    sampled_.emplace(device_, options);
+  }
+  built_ = options;
+}
+
+shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
+  shared::OccupancyParams o{};
+  o.sigma = smoothing_.sigma;
+  o.samples = smoothing_.samples;
+  o.baseline = smoothing_.variance_reduction == VarianceReduction::rigid ? 1.0F : 0.0F;
+  o.seed_low = static_cast<cl_uint>(smoothing_.seed);
+  o.seed_high = static_cast<cl_uint>(smoothing_.seed >> 32U);
+  o.width = p.width;
+  o.faces = p.faces;
+  o.pixels_per_view = p.width * p.height;
+  return o;
+}
+
+void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize) {
+  log_occupancy.resize(device_, rasterize.fragments);
+  occupancy.resize(device_, rasterize.fragments);
+  const auto pairs = static_cast<cl_uint>(bin.pairs);
+  if (exact_) {
+    const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
+    exact_->forward((rasterize.fragments + width - 1) / width, params(p), static_cast<cl_uint>(rasterize.fragments),
+                    rasterize.distance, log_occupancy, occupancy);
+  } else {
+    sampled_->forward(pairs, params(p), pairs, bin.pair_face, rasterize.fragment_starts, rasterize.fragment_pixel,
+                      rasterize.distance, log_occupancy, occupancy);
+  }
+}
+
+void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
+                         const Buffer<float>& grad_log_occupancy) {
+  const auto pairs = static_cast<cl_uint>(bin.pairs);
+  grad_distance.resize(device_, rasterize.fragments);
+  grad_sigma.resize(device_, pairs);
+  if (exact_) {
+    exact_->backward(pairs, params(p), pairs, rasterize.masks, rasterize.fragment_starts, rasterize.distance,
+                     grad_log_occupancy, grad_distance, grad_sigma);
+  } else {
+    sampled_->backward(pairs, params(p), pairs, bin.pair_face, rasterize.masks, rasterize.fragment_starts,
+                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, grad_log_occupancy, grad_distance,
+                       grad_sigma);
+  }
+}
+
+std::size_t Occupancy::bytes() const {
+  return log_occupancy.capacity_bytes() + occupancy.capacity_bytes() + grad_distance.capacity_bytes() +
+         grad_sigma.capacity_bytes();
+}
+
+}  // namespace dpr

@@ -1,0 +1,59 @@
+// The perturbed Heaviside of every fragment, exact or sampled.
+#pragma once
+
+#include <optional>
+
+#include "device/kernel.hpp"
+#include "dpr/smoothing.hpp"
+#include "stages/bin.hpp"
+#include "stages/rasterize.hpp"
+
+namespace dpr {
+
+class Occupancy {
+ public:
+  explicit Occupancy(Device::Impl& device) : device_(device) {}
+
+  /// Builds what the smoothing needs; cheap where that is there already.
+  void set_smoothing(const Smoothing& smoothing);
+
+  void forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize);
+  void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
+                const Buffer<float>& grad_log_occupancy);
+
+  Buffer<float> log_occupancy, occupancy;  ///< [fragment]
+  Buffer<float> grad_distance;             ///< [fragment]
+  Buffer<float> grad_sigma;                ///< [pair]
+
+  std::size_t bytes() const;
+
+ private:
+  /// Kernels of the exact and of the sampled estimator, for one prior.
+  struct Exact {
+    Exact(Device::Impl& device, const std::string& options);
+    Kernel<shared::OccupancyParams, cl_uint, In<float>, Out<float>, Out<float>> forward;
+    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, Out<float>, Out<float>>
+        backward;
+  };
+  struct Sampled {
+    Sampled(Device::Impl& device, const std::string& options);
+    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>, Out<float>>
+        forward;
+    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, Out<float>, Out<float>>
+        backward;
+  };
+
+  shared::OccupancyParams params(const shared::FrameParams& p) const;
+
+  Device::Impl& device_;
+  Smoothing smoothing_;
+  std::string built_;
+  std::optional<Exact> exact_;
+  std::optional<Sampled> sampled_;
+};
+
+/// The build option that chooses a prior.
+std::string prior_option(Prior prior);
+
+}  // namespace dpr

@@ -1,0 +1,57 @@
+#include "stages/scan.hpp"
+
+#include <limits>
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_chunk = 256;  // DPR_SCAN_CHUNK
+
+}  // namespace
+
+Scan::Scan(Device::Impl& device)
+    : device_(device),
+      sum_(device, "scan.cl", "scan_sum", " -DDPR_SCAN_CHUNK=" + std::to_string(k_chunk)),
+      apply_(device, "scan.cl", "scan_apply", " -DDPR_SCAN_CHUNK=" + std::to_string(k_chunk)) {
+  const cl_uint zero = 0;
+  zero_.upload(device, std::span(&zero, 1));
+  levels_.resize(4);  // 256^4 = 2^32 counts
+}
+
+void Scan::operator()(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets) {
+  offsets.resize(device_, count + 1);
+  scan_level(count, values, offsets, 0);
+}
+
+void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
+                      std::size_t level) {
+  const std::size_t chunks = std::max<std::size_t>((count + k_chunk - 1) / k_chunk, 1);
+  const auto n = static_cast<cl_uint>(count);
+  if (chunks == 1) {
+    apply_(1, n, values, zero_, offsets);
+    return;
+  }
+  Level& next = levels_[level];
+  next.sums.resize(device_, chunks);
+  next.bases.resize(device_, chunks + 1);
+  sum_(chunks, n, values, next.sums);
+  scan_level(chunks, next.sums, next.bases, level + 1);
+  apply_(chunks, n, values, next.bases, offsets);
+}
+
+std::size_t Scan::bytes() const {
+  std::size_t bytes = zero_.capacity_bytes();
+  for (const Level& level : levels_) bytes += level.sums.capacity_bytes() + level.bases.capacity_bytes();
+  return bytes;
+}
+
+std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what) {
+  cl_uint total = 0;
+  offsets.download(std::span(&total, 1), count);
+  if (total == std::numeric_limits<cl_uint>::max()) {
+    throw InvalidArgument(what, "more than 4294967294", "a smaller image, blur radius or mesh");
+  }
+  return total;
+}
+
+}  // namespace dpr

@@ -1,0 +1,115 @@
+#include "stages/shade.hpp"
+
+namespace dpr {
+namespace {
+
+std::string shading_option(Shading shading) {
+  return " -DDPR_SHADING=" + std::to_string(static_cast<int>(shading) + DPR_FLAT);
+}
+
+}  // namespace
+
+LitShading::LitShading(Device::Impl& device, Shading model)
+    : shading(model),
+      normals_forward(device, "normals.cl", "normals_forward"),
+      normals_backward_normalize(device, "normals.cl", "normals_backward_normalize"),
+      normals_backward(device, "normals.cl", "normals_backward"),
+      forward(device, "shade_lit.cl", "shade_lit_forward", shading_option(model)),
+      backward(device, "shade_lit.cl", "shade_lit_backward", shading_option(model)),
+      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_option(model)) {}
+
+Shade::Shade(Device::Impl& device)
+    : device_(device), forward_(device, "shade.cl", "shade_forward"), backward_(device, "shade.cl", "shade_backward") {}
+
+void Shade::set_lights(const std::optional<Lights>& lights) {
+  if (!lights) {
+    lit_.reset();
+    lighting_ = {};
+    return;
+  }
+  if (!lit_ || lit_->shading != lights->shading) lit_.emplace(device_, lights->shading);
+  lighting_.ambient = to_cl(lights->ambient);
+  lighting_.lights = static_cast<cl_uint>(lights->point.size());
+  lighting_.shininess = lights->shininess;
+  std::vector<shared::Light> values;
+  for (const PointLight& light : lights->point) {
+    values.push_back({to_cl(light.position), to_cl(light.diffuse), to_cl(light.specular)});
+  }
+  if (values.empty()) values.emplace_back();  // never read, but an argument all the same
+  lights_.upload(device_, values);
+}
+
+void Shade::forward(const ShadeInputs& in) {
+  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
+  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragments);
+  if (!lit_) {
+    forward_(pairs, in.p, pairs, in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors,
+             in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
+    return;
+  }
+  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
+  normals_.resize(device_, vertices);
+  if (lit_->shading != Shading::flat) {
+    lit_->normals_forward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
+                          in.geometry.vertex_corners.corners, in.transform.world, normals_);
+  }
+  lit_->forward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
+                in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_, in.bin.pair_face,
+                in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
+}
+
+void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
+  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
+  for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
+  grad_corner_colors.resize(device_, std::size_t{9} * pairs);
+  if (!lit_) {
+    backward_(pairs, in.p, pairs, in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
+              in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, grad.red,
+              grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
+    return;
+  }
+  grad_corner_positions_.resize(device_, std::size_t{9} * pairs);
+  grad_corner_normals_.resize(device_, std::size_t{9} * pairs);
+  grad_eye.resize(device_, std::size_t{3} * pairs);
+  lit_->backward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
+                 in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_, in.bin.pair_face,
+                 in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
+                 grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors, grad_corner_positions_,
+                 grad_corner_normals_, grad_eye);
+}
+
+void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
+  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
+  if (!lit_) {
+    grad_world.resize(device_, vertices);
+    grad_world.fill(cl_float4{});
+    return;
+  }
+  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_, grad_world);
+  if (lit_->shading == Shading::flat) return;
+  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_, grad_normals_);
+  lit_->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
+  lit_->normals_backward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
+                         in.geometry.vertex_corners.corners, in.transform.world, grad_normals_, grad_world);
+}
+
+void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light) {
+  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
+  light_channels.resize(device_, k_light_channels * pairs);
+  lit_->backward_lights(pairs, in.p, lighting_, pairs, static_cast<cl_uint>(light), in.views.cameras, lights_,
+                        in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
+                        in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
+                        in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green,
+                        grad.blue, light_channels);
+}
+
+std::size_t Shade::bytes() const {
+  std::size_t bytes = lights_.capacity_bytes() + normals_.capacity_bytes() + grad_normals_.capacity_bytes();
+  for (const Buffer<float>* buffer : {&red, &green, &blue, &grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye,
+                                      &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
+    bytes += buffer->capacity_bytes();
+  }
+  return bytes;
+}
+
+}  // namespace dpr

@@ -1,0 +1,98 @@
+// Fragment colours, unlit or lit, and their gradients.
+#pragma once
+
+#include <optional>
+
+#include "device/kernel.hpp"
+#include "stages/bin.hpp"
+#include "stages/gather.hpp"
+#include "stages/geometry.hpp"
+#include "stages/rasterize.hpp"
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+/// Gradients of fragments' colours, planes of [fragment].
+struct ColorGradients {
+  Buffer<float> red, green, blue;
+};
+
+/// Channels of shade_lit_backward_lights: a light's position, diffuse, specular, and the ambient light.
+inline constexpr std::size_t k_light_channels = 12;
+
+/// The kernels of a shading model.
+class LitShading {
+ public:
+  LitShading(Device::Impl& device, Shading shading);
+
+  Shading shading;
+  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> normals_forward;
+  Kernel<shared::FrameParams, In<cl_float4>, Out<cl_float4>> normals_backward_normalize;
+  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>, Out<cl_float4>>
+      normals_backward;
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>, In<cl_uint4>,
+         In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+         Out<float>, Out<float>, Out<float>>
+      forward;
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>, In<cl_uint4>,
+         In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>,
+         Out<float>>
+      backward;
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>, In<shared::Light>,
+         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint2>,
+         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
+      backward_lights;
+};
+
+/// Everything of a frame that shading reads.
+struct ShadeInputs {
+  const shared::FrameParams& p;
+  const DeviceViews& views;
+  const Geometry& geometry;
+  const Transform& transform;
+  const Bin& bin;
+  const Rasterize& rasterize;
+};
+
+class Shade {
+ public:
+  explicit Shade(Device::Impl& device);
+
+  /// No lights: colours as they are.
+  void set_lights(const std::optional<Lights>& lights);
+  bool lit() const { return lit_.has_value(); }
+  std::size_t lights() const { return lighting_.lights; }
+
+  void forward(const ShadeInputs& in);
+  /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and the eye.
+  void backward(const ShadeInputs& in, const ColorGradients& grad);
+  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Zero if unlit.
+  void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
+  /// The gradients of one light and of the ambient light, per pair: k_light_channels channels.
+  void backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light);
+
+  Buffer<float> red, green, blue;          ///< [fragment]
+  Buffer<float> grad_bary1, grad_bary2;    ///< [fragment] relative to corner 0's
+  Buffer<float> grad_corner_colors;        ///< [pair][9]
+  Buffer<float> grad_eye;                  ///< [3][pair]
+  Buffer<float> light_channels;            ///< [k_light_channels][pair]
+
+  std::size_t bytes() const;
+
+ private:
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>, In<float>,
+         Out<float>, Out<float>, Out<float>>
+      forward_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
+      backward_;
+  std::optional<LitShading> lit_;
+  shared::LightingParams lighting_{};
+  Buffer<shared::Light> lights_;
+  Buffer<cl_float4> normals_, grad_normals_;             // [view][vertex]
+  Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
+};
+
+}  // namespace dpr

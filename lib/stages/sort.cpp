@@ -1,0 +1,46 @@
+#include "stages/sort.hpp"
+
+#include <utility>
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_block = 1024;  // DPR_SORT_BLOCK
+constexpr unsigned k_digit_bits = 8;
+constexpr std::size_t k_digits = std::size_t{1} << k_digit_bits;
+
+std::string options() { return " -DDPR_SORT_BLOCK=" + std::to_string(k_block); }
+
+}  // namespace
+
+Sort::Sort(Device::Impl& device)
+    : device_(device),
+      scan_(device),
+      histogram_(device, "sort.cl", "sort_histogram", options()),
+      scatter_(device, "sort.cl", "sort_scatter", options()),
+      ranges_(device, "sort.cl", "sort_ranges", options()) {}
+
+void Sort::operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys, Buffer<cl_uint>& values,
+                      Buffer<cl_uint>& starts) {
+  const std::size_t blocks = (count + k_block - 1) / k_block;
+  const auto n = static_cast<cl_uint>(count);
+  counts_.resize(device_, k_digits * blocks);
+  other_keys_.resize(device_, count);
+  other_values_.resize(device_, count);
+  for (unsigned shift = 0; count > 0 && shift < 32 && (key_count - 1) >> shift != 0; shift += k_digit_bits) {
+    histogram_(blocks, n, shift, keys, counts_);
+    scan_(k_digits * blocks, counts_, offsets_);
+    scatter_(blocks, n, shift, keys, values, offsets_, other_keys_, other_values_);
+    std::swap(keys, other_keys_);
+    std::swap(values, other_values_);
+  }
+  starts.resize(device_, key_count + 1);
+  ranges_(key_count + 1, n, static_cast<cl_uint>(key_count), keys, starts);
+}
+
+std::size_t Sort::bytes() const {
+  return scan_.bytes() + counts_.capacity_bytes() + offsets_.capacity_bytes() + other_keys_.capacity_bytes() +
+         other_values_.capacity_bytes();
+}
+
+}  // namespace dpr

@@ -1,0 +1,31 @@
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+Transform::Transform(Device::Impl& device)
+    : device_(device),
+      forward_(device, "transform.cl", "transform_forward"),
+      backward_(device, "transform.cl", "transform_backward"),
+      backward_positions_(device, "transform.cl", "transform_backward_positions") {}
+
+void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry) {
+  const std::size_t count = std::size_t{p.views} * p.vertices;
+  world.resize(device_, count);
+  ndc.resize(device_, count);
+  forward_(count, p, views.cameras, views.models, geometry.positions, geometry.vertex_mesh, world, ndc);
+}
+
+void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                         const Buffer<cl_float4>& grad_ndc, Buffer<cl_float4>& grad_world) {
+  const std::size_t count = std::size_t{p.views} * p.vertices;
+  channels.resize(device_, DPR_POSE_CHANNELS * count);
+  backward_(count, p, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc, grad_world, channels);
+}
+
+void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                                   const Buffer<cl_float4>& grad_world) {
+  grad_positions.resize(device_, p.vertices);
+  backward_positions_(p.vertices, p, views.models, geometry.vertex_mesh, grad_world, grad_positions);
+}
+
+}  // namespace dpr

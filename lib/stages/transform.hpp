@@ -1,0 +1,46 @@
+// Vertices to world and NDC, and gradients back to object space and to the poses.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "stages/geometry.hpp"
+
+namespace dpr {
+
+/// The views of a frame on the device.
+struct DeviceViews {
+  Buffer<shared::ViewParams> cameras;  ///< [view]
+  Buffer<cl_float4> models;            ///< [view][mesh][3] rows of object to world
+};
+
+class Transform {
+ public:
+  explicit Transform(Device::Impl& device);
+
+  void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
+  /// `grad_world` holds what shading adds, and gets the whole gradient. Fills `channels`.
+  void backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                const Buffer<cl_float4>& grad_ndc, Buffer<cl_float4>& grad_world);
+  void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                          const Buffer<cl_float4>& grad_world);
+
+  Buffer<cl_float4> world;           ///< [view][vertex]
+  Buffer<cl_float4> ndc;             ///< [view][vertex] x, y, view depth
+  Buffer<float> channels;            ///< [DPR_POSE_CHANNELS][view][vertex]
+  Buffer<cl_float4> grad_positions;  ///< [vertex] object space
+
+  std::size_t bytes() const {
+    return world.capacity_bytes() + ndc.capacity_bytes() + channels.capacity_bytes() + grad_positions.capacity_bytes();
+  }
+
+ private:
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>, Out<cl_float4>,
+         Out<cl_float4>>
+      forward_;
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
+         Out<cl_float4>, Out<float>>
+      backward_;
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> backward_positions_;
+};
+
+}  // namespace dpr

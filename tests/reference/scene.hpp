@@ -1,0 +1,46 @@
+/// The scene of the reference renderer: the scene file in doubles.
+#pragma once
+
+#include "aggregate.hpp"
+#include "priors.hpp"
+#include "rasterize.hpp"
+#include "shade.hpp"
+#include "transform.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace dpr::reference {
+
+struct Mesh {
+  std::vector<Vec3d> positions;      ///< object space
+  std::vector<Face> faces;           ///< vertex indices, counter-clockwise seen from outside
+  std::vector<Vec3d> vertex_colors;  ///< one per vertex, or empty
+  std::vector<Vec3d> face_colors;    ///< one per face, or empty; without any colours the mesh is white
+  Mat4d transform = k_identity;      ///< object to world
+};
+
+struct Smoothing {
+  Prior occupancy_prior = Prior::gaussian;
+  Prior depth_prior = Prior::gaussian;
+  double sigma = 1e-3;
+  double gamma = 1e-2;
+  double alpha = 1.0;
+  Composition composition = Composition::barrier;
+  double blur_radius = 9.21e-3;
+  double background_depth = 1e-10;
+  DistanceMetric distance = DistanceMetric::squared;
+};
+
+struct Scene {
+  int width = 0;
+  int height = 0;
+  Camera camera;
+  Vec3d background;
+  std::vector<Mesh> meshes;
+  std::optional<Lights> lights;
+  Smoothing smoothing;
+  bool perspective_correct = true;
+};
+
+}  // namespace dpr::reference

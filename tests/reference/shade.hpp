@@ -1,0 +1,272 @@
+/// Reference for the shade stage: interpolated colours and Phong's lighting, evaluated per face normal, per
+/// fragment or per vertex.
+///
+///     colour = base * (ambient + sum_l diffuse_l max(n.l, 0)) + sum_l specular_l [n.l > 0] max(v.r,
+///     0)^shininess
+///
+/// l, v: unit vectors to the light and to the camera; r = 2 (n.l) n - l (Phong 1975). Normals are not turned
+/// to the viewer.
+#pragma once
+
+#include "rasterize.hpp"
+#include "vec.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace dpr::reference {
+
+/// flat: the normal of the face; phong: vertex normals interpolated; both at the fragment's interpolated
+/// world position. gouraud: light at the vertices, interpolated.
+enum class Shading { flat, phong, gouraud };
+
+struct PointLight {
+  Vec3d position;  ///< world space
+  Vec3d diffuse{0.3, 0.3, 0.3};
+  Vec3d specular{0.2, 0.2, 0.2};
+};
+
+struct Lights {
+  Vec3d ambient{0.5, 0.5, 0.5};
+  std::vector<PointLight> point;
+  double shininess = 64.0;
+  Shading shading = Shading::phong;
+};
+
+/// colour = base * factor + specular.
+struct LightTerms {
+  Vec3d factor;
+  Vec3d specular;
+};
+
+inline LightTerms light_terms(const Lights& lights, const Vec3d& camera, const Vec3d& position,
+                              const Vec3d& normal) {
+  LightTerms terms{lights.ambient, {}};
+  const Vec3d v = unit(camera - position);
+  for (const PointLight& light : lights.point) {
+    const Vec3d l = unit(light.position - position);
+    const double cosine = dot(normal, l);
+    if (!(cosine > 0.0)) continue;
+    terms.factor += cosine * light.diffuse;
+    const double mirror = dot(v, 2.0 * cosine * normal - l);
+    if (mirror > 0.0) terms.specular += std::pow(mirror, lights.shininess) * light.specular;
+  }
+  return terms;
+}
+
+/// Gradients of the shading of a whole mesh or scene, accumulated over fragments.
+struct ShadeGradient {
+  std::vector<Vec3d> world;              ///< world positions of the vertices
+  std::vector<Vec3d> face_normals;       ///< unit normals, flat
+  std::vector<Vec3d> vertex_normals;     ///< unit normals, phong and gouraud
+  std::vector<LightTerms> vertex_light;  ///< gouraud
+  Vec3d camera;
+  Lights lights{{}, {}, 0.0, Shading::phong};  ///< ambient, and position, diffuse, specular of every light
+};
+
+/// Derivatives of `light_terms` for position and normal; camera and lights are accumulated into `total`.
+struct SurfaceGradient {
+  Vec3d position;
+  Vec3d normal;
+};
+
+inline SurfaceGradient light_terms_backward(const Lights& lights, const Vec3d& camera, const Vec3d& position,
+                                            const Vec3d& normal, const LightTerms& grad,
+                                            ShadeGradient& total) {
+  SurfaceGradient surface;
+  total.lights.ambient += grad.factor;
+  const Vec3d v = unit(camera - position);
+  Vec3d grad_v;
+  for (std::size_t i = 0; i < lights.point.size(); ++i) {
+    const PointLight& light = lights.point[i];
+    PointLight& grad_light = total.lights.point[i];
+    const Vec3d l = unit(light.position - position);
+    const double cosine = dot(normal, l);
+    if (!(cosine > 0.0)) continue;
+    grad_light.diffuse += cosine * grad.factor;
+    double grad_cosine = dot(grad.factor, light.diffuse);
+    Vec3d grad_l;
+    const Vec3d r = 2.0 * cosine * normal - l;
+    const double mirror = dot(v, r);
+    if (mirror > 0.0) {
+      grad_light.specular += std::pow(mirror, lights.shininess) * grad.specular;
+      const double grad_mirror =
+          dot(grad.specular, light.specular) * lights.shininess * std::pow(mirror, lights.shininess - 1.0);
+      grad_v += grad_mirror * r;
+      grad_cosine += 2.0 * grad_mirror * dot(v, normal);
+      surface.normal += 2.0 * grad_mirror * cosine * v;
+      grad_l += -grad_mirror * v;
+    }
+    surface.normal += grad_cosine * l;
+    const Vec3d grad_to_light = unit_backward(light.position - position, grad_l + grad_cosine * normal);
+    grad_light.position += grad_to_light;
+    surface.position += -grad_to_light;
+  }
+  const Vec3d grad_to_camera = unit_backward(camera - position, grad_v);
+  total.camera += grad_to_camera;
+  surface.position += -grad_to_camera;
+  return surface;
+}
+
+/// World-space geometry and what the lighting prepares once for all pixels. Without lights only colours are
+/// interpolated.
+struct ShadeScene {
+  std::vector<Vec3d> world;
+  std::vector<Face> faces;
+  std::optional<Lights> lights;
+  Vec3d camera;                          ///< world position of the camera
+  std::vector<Vec3d> face_areas;         ///< cross(v1 - v0, v2 - v0)
+  std::vector<Vec3d> vertex_areas;       ///< sums of face_areas over the faces of a vertex
+  std::vector<LightTerms> vertex_light;  ///< gouraud
+};
+
+inline ShadeScene shade_prepare(std::vector<Vec3d> world, std::vector<Face> faces,
+                                std::optional<Lights> lights, const Vec3d& camera) {
+  ShadeScene scene{std::move(world), std::move(faces), std::move(lights), camera, {}, {}, {}};
+  if (!scene.lights) return scene;
+  scene.vertex_areas.resize(scene.world.size());
+  for (const Face& face : scene.faces) {
+    const Vec3d& origin = scene.world[face[0]];
+    scene.face_areas.push_back(cross(scene.world[face[1]] - origin, scene.world[face[2]] - origin));
+    for (std::size_t vertex : face) scene.vertex_areas[vertex] += scene.face_areas.back();
+  }
+  if (scene.lights->shading == Shading::gouraud) {
+    for (std::size_t i = 0; i < scene.world.size(); ++i) {
+      scene.vertex_light.push_back(
+          light_terms(*scene.lights, camera, scene.world[i], unit(scene.vertex_areas[i])));
+    }
+  }
+  return scene;
+}
+
+/// Colours at the three corners of a triangle: three times the same for face colours.
+using CornerColors = std::array<Vec3d, 3>;
+
+template <class Values>
+Vec3d interpolate(const Vec3d& barycentric, const Values& at_corner) {
+  return barycentric.x * at_corner(0) + barycentric.y * at_corner(1) + barycentric.z * at_corner(2);
+}
+
+inline Vec3d fragment_position(const ShadeScene& scene, const Face& face, const Vec3d& c) {
+  return interpolate(c, [&](std::size_t i) { return scene.world[face[i]]; });
+}
+
+/// Sum of the unit vertex normals weighted with c_i, before normalisation.
+inline Vec3d fragment_normal_sum(const ShadeScene& scene, const Face& face, const Vec3d& c) {
+  return interpolate(c, [&](std::size_t i) { return unit(scene.vertex_areas[face[i]]); });
+}
+
+inline LightTerms fragment_light(const ShadeScene& scene, std::size_t face_index, const Vec3d& c) {
+  const Face& face = scene.faces[face_index];
+  if (scene.lights->shading == Shading::gouraud) {
+    return {interpolate(c, [&](std::size_t i) { return scene.vertex_light[face[i]].factor; }),
+            interpolate(c, [&](std::size_t i) { return scene.vertex_light[face[i]].specular; })};
+  }
+  const Vec3d normal = scene.lights->shading == Shading::flat ? unit(scene.face_areas[face_index])
+                                                              : unit(fragment_normal_sum(scene, face, c));
+  return light_terms(*scene.lights, scene.camera, fragment_position(scene, face, c), normal);
+}
+
+/// Colour of a fragment with barycentrics `c`.
+inline Vec3d shade_forward(const ShadeScene& scene, std::size_t face_index, const Vec3d& c,
+                           const CornerColors& corners) {
+  const Vec3d base = interpolate(c, [&](std::size_t i) { return corners[i]; });
+  if (!scene.lights) return base;
+  const LightTerms light = fragment_light(scene, face_index, c);
+  return base * light.factor + light.specular;
+}
+
+inline ShadeGradient make_shade_gradient(const ShadeScene& scene) {
+  ShadeGradient grad;
+  grad.world.resize(scene.world.size());
+  grad.face_normals.resize(scene.faces.size());
+  grad.vertex_normals.resize(scene.world.size());
+  grad.vertex_light.resize(scene.world.size());
+  if (scene.lights) grad.lights.point.assign(scene.lights->point.size(), PointLight{{}, {}, {}});
+  return grad;
+}
+
+/// Gradient of a fragment's light to its barycentrics (returned) and to the scene (accumulated).
+inline Vec3d fragment_light_backward(const ShadeScene& scene, std::size_t face_index, const Vec3d& c,
+                                     const LightTerms& grad_light, ShadeGradient& total) {
+  const Face& face = scene.faces[face_index];
+  Vec3d grad_c;
+  if (scene.lights->shading == Shading::gouraud) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const LightTerms& light = scene.vertex_light[face[i]];
+      grad_c[i] = dot(grad_light.factor, light.factor) + dot(grad_light.specular, light.specular);
+      total.vertex_light[face[i]].factor += c[i] * grad_light.factor;
+      total.vertex_light[face[i]].specular += c[i] * grad_light.specular;
+    }
+    return grad_c;
+  }
+  const bool flat = scene.lights->shading == Shading::flat;
+  const Vec3d normal_sum = flat ? scene.face_areas[face_index] : fragment_normal_sum(scene, face, c);
+  const SurfaceGradient surface = light_terms_backward(
+      *scene.lights, scene.camera, fragment_position(scene, face, c), unit(normal_sum), grad_light, total);
+  if (flat) total.face_normals[face_index] += surface.normal;
+  const Vec3d grad_sum = flat ? Vec3d{} : unit_backward(normal_sum, surface.normal);
+  for (std::size_t i = 0; i < 3; ++i) {
+    grad_c[i] =
+        dot(surface.position, scene.world[face[i]]) + dot(grad_sum, unit(scene.vertex_areas[face[i]]));
+    total.world[face[i]] += c[i] * surface.position;
+    total.vertex_normals[face[i]] += c[i] * grad_sum;
+  }
+  return grad_c;
+}
+
+struct ShadeFragmentGradient {
+  Vec3d barycentric;
+  CornerColors corners;
+};
+
+/// Gradient of one fragment's colour. The rest goes into `total`, which `shade_finish_backward` completes.
+inline ShadeFragmentGradient shade_backward(const ShadeScene& scene, std::size_t face_index, const Vec3d& c,
+                                            const CornerColors& corners, const Vec3d& grad_color,
+                                            ShadeGradient& total) {
+  ShadeFragmentGradient grad;
+  Vec3d grad_base = grad_color;
+  if (scene.lights) {
+    const Vec3d base = interpolate(c, [&](std::size_t i) { return corners[i]; });
+    const LightTerms light = fragment_light(scene, face_index, c);
+    grad.barycentric = fragment_light_backward(scene, face_index, c, {grad_color * base, grad_color}, total);
+    grad_base = grad_color * light.factor;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    grad.barycentric[i] += dot(grad_base, corners[i]);
+    grad.corners[i] = c[i] * grad_base;
+  }
+  return grad;
+}
+
+/// After all fragments: light at the vertices and normals to the world positions, in `total.world`.
+inline void shade_finish_backward(const ShadeScene& scene, ShadeGradient& total) {
+  if (!scene.lights) return;
+  if (scene.lights->shading == Shading::gouraud) {
+    for (std::size_t i = 0; i < scene.world.size(); ++i) {
+      const SurfaceGradient surface =
+          light_terms_backward(*scene.lights, scene.camera, scene.world[i], unit(scene.vertex_areas[i]),
+                               total.vertex_light[i], total);
+      total.world[i] += surface.position;
+      total.vertex_normals[i] += surface.normal;
+    }
+  }
+  for (std::size_t f = 0; f < scene.faces.size(); ++f) {
+    const Face& face = scene.faces[f];
+    Vec3d grad_area = unit_backward(scene.face_areas[f], total.face_normals[f]);
+    for (std::size_t vertex : face) {
+      grad_area += unit_backward(scene.vertex_areas[vertex], total.vertex_normals[vertex]);
+    }
+    const Vec3d grad_u = cross(scene.world[face[2]] - scene.world[face[0]], grad_area);
+    const Vec3d grad_v = cross(grad_area, scene.world[face[1]] - scene.world[face[0]]);
+    total.world[face[1]] += grad_u;
+    total.world[face[2]] += grad_v;
+    total.world[face[0]] += -(grad_u + grad_v);
+  }
+}
+
+}  // namespace dpr::reference

@@ -1,0 +1,173 @@
+// Images on disk: what is written is read back, and nothing half-written stays.
+#include "dpr/image.hpp"
+
+#include <doctest/doctest.h>
+
+#include <limits>
+
+#include "support/messages.hpp"
+#include "support/temp_dir.hpp"
+
+using namespace dpr;
+using dpr::test::TempDir;
+
+namespace {
+
+// Colours beside small alphas: they do not survive being multiplied by alpha in eight bits.
+Image sample() {
+  Image image(3, 2);
+  image.pixels = {{1, 0.5F, 0.25F, 0}, {0.2F, 0.4F, 0.6F, 0.1F}, {1, 1, 1, 1},
+                  {0, 0, 0, 1},        {0.9F, 0.8F, 0.7F, 0.5F}, {0.1F, 0.2F, 0.3F, 0.004F}};
+  return image;
+}
+
+float largest_difference(const Image& a, const Image& b) {
+  REQUIRE(a.width == b.width);
+  REQUIRE(a.height == b.height);
+  float largest = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    const glm::vec4 difference = glm::abs(a.pixels[i] - b.pixels[i]);
+    for (int c = 0; c < 4; ++c) largest = std::max(largest, difference[c]);
+  }
+  return largest;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("rows and columns") {
+    Image image(3, 2, glm::vec4(0.5F));
+    image.at(2, 1).g = 7;
+    CHECK(image.pixels[5] == glm::vec4(0.5F, 7, 0.5F, 0.5F));
+    CHECK(image.pixels[0] == glm::vec4(0.5F));
+  }
+
+  TEST_CASE("EXR keeps the floats, whatever alpha is") {
+    const TempDir folder;
+    Image image = sample();
+    image.at(0, 0) = {-3, 1e-20F, 12345.678F, 0};
+    write_image(folder / "a.exr", image);
+    bool has_alpha = false;
+    CHECK(read_image(folder / "a.exr", &has_alpha).pixels == image.pixels);
+    CHECK(has_alpha);
+    CHECK(folder.entries() == 1);
+  }
+
+  TEST_CASE("formats of eight bits with alpha keep colour and alpha apart") {
+    const TempDir folder;
+    for (const char* name : {"a.png", "a.tif", "a.tga"}) {
+      bool has_alpha = false;
+      write_image(folder / name, sample());
+      CHECK_MESSAGE(largest_difference(read_image(folder / name, &has_alpha), sample()) <= 0.5F / 255 + 1e-6F,
+                    name);
+      CHECK_MESSAGE(has_alpha, name);
+    }
+  }
+
+  TEST_CASE("formats without alpha") {
+    const TempDir folder;
+    for (const char* name : {"a.bmp", "a.ppm"}) {
+      bool has_alpha = true;
+      write_image(folder / name, sample());
+      const Image back = read_image(folder / name, &has_alpha);
+      CHECK_FALSE(has_alpha);
+      Image opaque = sample();
+      for (glm::vec4& pixel : opaque.pixels) pixel.a = 1;
+      CHECK_MESSAGE(largest_difference(back, opaque) <= 0.5F / 255 + 1e-6F, name);
+    }
+    write_image(folder / "a.jpg", Image(16, 16, {0.5F, 0.25F, 0.75F, 0}));
+    CHECK(largest_difference(read_image(folder / "a.jpg"), Image(16, 16, {0.5F, 0.25F, 0.75F, 1})) < 0.03F);
+  }
+
+  TEST_CASE("eight bits are clamped, not wrapped") {
+    const TempDir folder;
+    write_image(folder / "a.png", Image(1, 1, {-0.5F, 1.5F, 300, 2}));
+    CHECK(read_image(folder / "a.png").pixels[0] == glm::vec4(0, 1, 1, 1));
+  }
+
+  TEST_CASE("grey images") {
+    const TempDir folder;
+    bool has_alpha = true;
+    const auto file = folder.write("grey.pgm", std::string("P5\n2 1\n255\n") + '\x33' + '\xff');
+    const Image image = read_image(file, &has_alpha);
+    CHECK_FALSE(has_alpha);
+    CHECK(image.width == 2);
+    CHECK(glm::length(image.pixels[0] - glm::vec4(0.2F, 0.2F, 0.2F, 1)) < 1e-6F);
+    CHECK(image.pixels[1] == glm::vec4(1));
+  }
+
+  TEST_CASE("an existing file is replaced whole") {
+    const TempDir folder;
+    write_image(folder / "a.png", Image(4, 4, glm::vec4(1)));
+    write_image(folder / "a.png", sample());
+    CHECK(read_image(folder / "a.png").width == 3);
+    CHECK(folder.entries() == 1);
+  }
+
+  TEST_CASE("side by side") {
+    CHECK(hstack({}).pixels.empty());
+    const Image strip = hstack({Image(1, 2, glm::vec4(0)), Image(2, 2, glm::vec4(0.5F))}, 1, glm::vec4(1));
+    CHECK(strip.width == 4);
+    CHECK(strip.height == 2);
+    for (int row = 0; row < 2; ++row) {
+      CHECK(strip.at(0, row) == glm::vec4(0));
+      CHECK(strip.at(1, row) == glm::vec4(1));
+      CHECK(strip.at(2, row) == glm::vec4(0.5F));
+      CHECK(strip.at(3, row) == glm::vec4(0.5F));
+    }
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("files that cannot be read") {
+    const TempDir folder;
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder / "no.png"), "does not exist");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.path()), "folder");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.write("noise.png", "not a picture")),
+                          "noise.png: cannot be read");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.write("a.xyz", "not a picture")),
+                          "a.xyz: cannot be read");
+  }
+
+  TEST_CASE("truncated images") {
+    const TempDir folder;
+    for (const std::string extension : {".png", ".exr", ".tif", ".tga"}) {
+#ifdef __SANITIZE_ADDRESS__
+      // libpng jumps over a destructor in OpenImageIO, which leaks the text of its message.
+      if (extension == ".png") continue;
+#endif
+      write_image(folder / ("whole" + extension), Image(64, 64, glm::vec4(0.3F)));
+      const std::string whole = folder.read("whole" + extension);
+      const auto cut = folder.write("cut" + extension, whole.substr(0, whole.size() / 2));
+      CHECK_THROWS_AS(read_image(cut), IoError);
+    }
+  }
+
+  TEST_CASE("images that cannot be written leave nothing behind") {
+    const TempDir folder;
+    DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / "a.gif", sample()), "expected one of .exr, .png");
+    DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / "a", sample()), "got the extension \"\"");
+    DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / "no" / "a.png", sample()), "does not exist");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, write_image(folder / "a.png", Image()), "got 0x0 with 0 pixels");
+    Image short_of_pixels = sample();
+    short_of_pixels.pixels.pop_back();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, write_image(folder / "a.png", short_of_pixels), "with 5 pixels");
+    Image not_finite = sample();
+    not_finite.at(2, 1).b = std::numeric_limits<float>::quiet_NaN();
+    DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / "a.exr", not_finite), "the pixel in column 2, row 1");
+    CHECK(folder.entries() == 0);
+  }
+
+  TEST_CASE("a float file with a pixel that is not finite") {
+    const TempDir folder;
+    // PFM: floats from the bottom row up; the third of them is a NaN.
+    std::string bytes = "Pf\n2 2\n-1.0\n";
+    bytes += std::string(8, '\0') + std::string("\0\0\xc0\x7f", 4) + std::string(4, '\0');
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.write("a.pfm", bytes)), "the pixel in column 0, row 0");
+  }
+
+  TEST_CASE("strips of different heights") {
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, hstack({Image(1, 2), Image(1, 3)}), "images[1] (hstack)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, hstack({Image(1, 2)}, -1), "gap (hstack)");
+  }
+}

@@ -1,0 +1,435 @@
+// Mesh files: what they hold arrives, in order and in full, or the error says where it is wrong.
+#include <doctest/doctest.h>
+
+#include <array>
+#include <bit>
+#include <cstring>
+#include <iostream>
+#include <locale>
+#include <sstream>
+
+#include "dpr/mesh.hpp"
+#include "support/messages.hpp"
+#include "support/temp_dir.hpp"
+
+using namespace dpr;
+using dpr::test::TempDir;
+
+namespace {
+
+const std::string k_obj_square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+const std::string k_ply_start =
+    "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 3\n"
+    "property float x\nproperty float y\nproperty float z\n";
+const std::string k_ply_corners = "property list uchar int vertex_indices\n";
+const std::string k_ply_vertices = "0 0 0\n1 0 0\n0 1 0\n";
+
+std::vector<glm::uvec3> faces_of(const TempDir& folder, const std::string& obj_faces) {
+  return read_mesh(folder.write("mesh.obj", k_obj_square + obj_faces)).faces;
+}
+
+void append_float(std::string& bytes, float value, bool big_endian = false) {
+  auto bits = std::bit_cast<std::uint32_t>(value);
+  for (unsigned i = 0; i < 4; ++i) bytes += static_cast<char>(bits >> (big_endian ? 24 - 8 * i : 8 * i));
+}
+
+std::string binary_stl(const std::vector<std::array<glm::vec3, 3>>& facets) {
+  std::string bytes = "solid, and yet binary";
+  bytes.resize(80, ' ');
+  append_float(bytes, std::bit_cast<float>(static_cast<std::uint32_t>(facets.size())));
+  for (const auto& facet : facets) {
+    for (int i = 0; i < 3; ++i) append_float(bytes, 0);
+    for (const glm::vec3& corner : facet) {
+      for (int i = 0; i < 3; ++i) append_float(bytes, corner[i]);
+    }
+    bytes += std::string(2, '\0');
+  }
+  return bytes;
+}
+
+std::string text_facet(const std::string& a, const std::string& b, const std::string& c) {
+  return "facet normal 0 0 1\n  outer loop\n    vertex " + a + "\n    vertex " + b + "\n    vertex " + c +
+         "\n  endloop\nendfacet\n";
+}
+
+// Numbers as in much of Europe: 1.234,5.
+class CommaPunctuation : public std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+// Everything written to the standard streams while it lives.
+class Captured {
+ public:
+  Captured() : errors_(std::cerr.rdbuf(text_.rdbuf())), log_(std::clog.rdbuf(text_.rdbuf())) {}
+  ~Captured() {
+    std::cerr.rdbuf(errors_);
+    std::clog.rdbuf(log_);
+  }
+  Captured(const Captured&) = delete;
+  Captured& operator=(const Captured&) = delete;
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::streambuf *errors_, *log_;
+};
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("OBJ: vertices in order, polygons as fans, corners of every form") {
+    const TempDir folder;
+    const Mesh mesh = read_mesh(
+        folder.write("mesh.obj", "# a comment\r\n\r\no thing\r\n" + k_obj_square +
+                                     "vt 0 0\nvn 0 0 1\ns off\n"
+                                     "f 1/1/1 2/1/1 3/1/1 4/1/1\nf 1//1 3//1 4//1\nf -4 -3 -2\nl 1 2\n"
+                                     "v +5e-1 .5 -1.25 1\nf 1 2 5"));  // no newline at the end
+    CHECK(mesh.positions ==
+          std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5F, 0.5F, -1.25F}});
+    CHECK(mesh.faces == std::vector<glm::uvec3>{{0, 1, 2}, {0, 2, 3}, {0, 2, 3}, {0, 1, 2}, {0, 1, 4}});
+    CHECK(mesh.vertex_colors.empty());
+    CHECK(mesh.face_colors.empty());
+  }
+
+  TEST_CASE("OBJ: no face is lost, whatever its edges are") {
+    const TempDir folder;
+    CHECK(faces_of(folder, "f 1 2 3\nf 1 2 3\nf 2 1 3\nf 1 2 4\nf 1 2 4\n") ==
+          std::vector<glm::uvec3>{{0, 1, 2}, {0, 1, 2}, {1, 0, 2}, {0, 1, 3}, {0, 1, 3}});
+    // With equal corners: OpenMesh drops the first, shortens the third.
+    CHECK(faces_of(folder, "f 1 1 2\nf 1 2 3\nf 1 2 3 1\nf 2 3 4\nf 4 4 4\n") ==
+          std::vector<glm::uvec3>{{0, 0, 1}, {0, 1, 2}, {0, 1, 2}, {0, 2, 0}, {1, 2, 3}, {3, 3, 3}});
+  }
+
+  TEST_CASE("OBJ: colours of vertices") {
+    const TempDir folder;
+    const Mesh mesh =
+        read_mesh(folder.write("mesh.obj", "v 0 0 0\nv 1 0 0 0.1 0.2 0.3\nv 0 1 0 1 0.5 2\nf 1 2 3\n"));
+    CHECK(mesh.vertex_colors == std::vector<glm::vec3>{{1, 1, 1}, {0.1F, 0.2F, 0.3F}, {1, 0.5F, 2}});
+  }
+
+  TEST_CASE("OBJ: materials are face colours, and stay in their file") {
+    const TempDir folder;
+    folder.write("m.mtl", "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n");
+    const std::string faces = "usemtl red\nf 1 2 3 4\nusemtl blue\nf 2 2 3\nf 1 2 3\n";
+    const Mesh mesh = read_mesh(folder.write("a.obj", "mtllib m.mtl\n" + k_obj_square + faces));
+    CHECK(mesh.face_colors == std::vector<glm::vec3>{{1, 0, 0}, {1, 0, 0}, {1, 1, 1}, {0, 0, 1}});
+    CHECK(read_mesh(folder.write("b.obj", k_obj_square + faces)).face_colors.empty());
+    CHECK(read_mesh(folder.write("c.obj", "mtllib no.mtl\n" + k_obj_square + faces)).face_colors.empty());
+  }
+
+  TEST_CASE("OBJ: written and read back, bit for bit") {
+    const TempDir folder;
+    Mesh mesh = make_icosphere(2, 1.0F / 3.0F);
+    write_mesh(folder / "sphere.obj", mesh);
+    const Mesh back = read_mesh(folder / "sphere.obj");
+    CHECK(back.positions == mesh.positions);
+    CHECK(back.faces == mesh.faces);
+    CHECK(back.vertex_colors == mesh.vertex_colors);
+    CHECK(folder.entries() == 1);
+  }
+
+  TEST_CASE("PLY: written and read back; colours in bytes") {
+    const TempDir folder;
+    Mesh mesh = make_cube();
+    mesh.face_colors[3] = {51.0F / 255.0F, 2, -1};
+    write_mesh(folder / "cube.ply", mesh);
+    const Mesh back = read_mesh(folder / "cube.ply");
+    CHECK(back.positions == mesh.positions);
+    CHECK(back.faces == mesh.faces);
+    REQUIRE(back.face_colors.size() == 12);
+    CHECK(back.face_colors[3] == glm::vec3(51.0F / 255.0F, 1, 0));
+    CHECK(glm::length(back.face_colors[0] - mesh.face_colors[0]) < 0.5F * std::sqrt(3.0F) / 255.0F + 1e-6F);
+    CHECK(back.vertex_colors.empty());
+    const Mesh sphere = make_icosphere(1);
+    write_mesh(folder / "sphere.ply", sphere);
+    const Mesh colored = read_mesh(folder / "sphere.ply");
+    REQUIRE(colored.vertex_colors.size() == sphere.positions.size());
+    CHECK(glm::length(colored.vertex_colors[5] - sphere.vertex_colors[5]) < 0.005F);
+  }
+
+  TEST_CASE("PLY: colours in floats arrive uncut, other properties do not disturb") {
+    const TempDir folder;
+    const std::string vertex_colors = "property float red\nproperty float green\nproperty float blue\n";
+    const Mesh mesh = read_mesh(
+        folder.write("mesh.ply", k_ply_start + "property uchar quality\n" + vertex_colors +
+                                     "element face 2\n" + k_ply_corners +
+                                     "property list uchar float texcoord\nproperty int group\nend_header\n"
+                                     "0 0 0 200 0.999 2 -1\n1 0 0 7 0.25 0.5 0.125\n0 1 0 12 0 0 0\n"
+                                     "3 0 1 2 6 0 0 1 0 0 1 4\n3 2 1 0 0 5\n"));
+    CHECK(mesh.faces == std::vector<glm::uvec3>{{0, 1, 2}, {2, 1, 0}});
+    CHECK(mesh.vertex_colors == std::vector<glm::vec3>{{0.999F, 2, -1}, {0.25F, 0.5F, 0.125F}, {0, 0, 0}});
+  }
+
+  TEST_CASE("PLY: face colours in doubles and in bytes, CRLF, elements before and after the faces") {
+    const TempDir folder;
+    std::string text = k_ply_start +
+                       "element camera 1\nproperty float view_x\nproperty int id\nelement face 2\n" +
+                       k_ply_corners + "property double red\nproperty double green\nproperty double blue\n" +
+                       "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n" +
+                       k_ply_vertices + "0.5 3\n3 0 1 2 1 0.25 0\n4 0 1 2 1 0 0 1\n0 1\n";
+    for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += 2) text.replace(i, 1, "\r\n");
+    const Mesh mesh = read_mesh(folder.write("mesh.ply", text));
+    CHECK(mesh.faces == std::vector<glm::uvec3>{{0, 1, 2}, {0, 1, 2}, {0, 2, 1}});
+    CHECK(mesh.face_colors == std::vector<glm::vec3>{{1, 0.25F, 0}, {0, 0, 1}, {0, 0, 1}});
+    const Mesh bytes =
+        read_mesh(folder.write("bytes.ply", k_ply_start + "element face 1\n" + k_ply_corners +
+                                                "property uchar red\nproperty uchar green\n" +
+                                                "property uchar blue\nproperty uchar alpha\nend_header\n" +
+                                                k_ply_vertices + "3 0 1 2 255 51 0 128\n"));
+    CHECK(bytes.face_colors == std::vector<glm::vec3>{{1, 51.0F / 255.0F, 0}});
+  }
+
+  TEST_CASE("PLY: binary of both byte orders, with types that OpenMesh does not take") {
+    const TempDir folder;
+    for (const bool big_endian : {false, true}) {
+      std::string bytes = std::string("ply\nformat binary_") + (big_endian ? "big" : "little") +
+                          "_endian 1.0\nelement vertex 3\nproperty float32 x\nproperty float32 y\n"
+                          "property float32 z\nproperty int32 nx\nproperty uint8 red\nproperty uint8 green\n"
+                          "property uint8 blue\nelement face 1\nproperty list uint32 uint32 vertex_index\n"
+                          "property float32 red\nproperty float32 green\nproperty float32 blue\nend_header\n";
+      const auto append_word = [&](std::uint32_t word) {
+        append_float(bytes, std::bit_cast<float>(word), big_endian);
+      };
+      for (unsigned i = 0; i < 3; ++i) {
+        for (unsigned axis = 0; axis < 3; ++axis) append_float(bytes, axis == i ? 1.5F : 0.0F, big_endian);
+        append_word(77);
+        bytes += {static_cast<char>(255), static_cast<char>(51 * i), '\0'};
+      }
+      for (const std::uint32_t word : {3U, 2U, 1U, 0U}) append_word(word);
+      for (const float channel : {0.3F, 0.6F, 0.9F}) append_float(bytes, channel, big_endian);
+      const Mesh mesh = read_mesh(folder.write("mesh.ply", bytes));
+      CHECK(mesh.positions == std::vector<glm::vec3>{{1.5F, 0, 0}, {0, 1.5F, 0}, {0, 0, 1.5F}});
+      CHECK(mesh.faces == std::vector<glm::uvec3>{{2, 1, 0}});
+      CHECK(mesh.vertex_colors == std::vector<glm::vec3>{{1, 0, 0}, {1, 0.2F, 0}, {1, 0.4F, 0}});
+      CHECK(mesh.face_colors.empty());  // those of the vertices are finer
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.ply", bytes.substr(0, bytes.size() - 1))),
+                            "truncated");
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.ply", bytes + "x")), "goes on after");
+    }
+  }
+
+  TEST_CASE("OFF: comments, colours of every form, counts on the header's line") {
+    const TempDir folder;
+    const Mesh mesh =
+        read_mesh(folder.write("mesh.off",
+                               "OFF\n# a comment\n\n4 3 0\n0 0 0\n1 0 0  # another\n1 1 0\n0 1 0\n"
+                               "4 0 1 2 3  255  51 0\n3 0 1 2 0.5 1 0 1\n3 2 1 0\n"));
+    CHECK(mesh.faces == std::vector<glm::uvec3>{{0, 1, 2}, {0, 2, 3}, {0, 1, 2}, {2, 1, 0}});
+    CHECK(mesh.face_colors ==
+          std::vector<glm::vec3>{{1, 51.0F / 255.0F, 0}, {1, 51.0F / 255.0F, 0}, {0.5F, 1, 0}, {1, 1, 1}});
+    const Mesh colored = read_mesh(folder.write(
+        "mesh.off", "COFF 3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n"));
+    CHECK(colored.vertex_colors == std::vector<glm::vec3>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+    CHECK(colored.faces.size() == 1);
+  }
+
+  TEST_CASE("STL: text and binary; equal positions become one vertex") {
+    const TempDir folder;
+    const std::string text = "solid the outer one\n" + text_facet("0 0 0", "1 0 0", "0 1 0") +
+                             text_facet("0 0 0", "0 0 0", "1 1 1") + text_facet("1 0 0", "1 1 0", "0 1 0") +
+                             "endsolid the outer one\n";
+    const Mesh from_text = read_mesh(folder.write("text.stl", text));
+    CHECK(from_text.positions.size() == 5);  // that of the facet without an area is there, unused
+    CHECK(from_text.faces == std::vector<glm::uvec3>{{0, 1, 2}, {1, 4, 2}});
+    const std::array<glm::vec3, 3> low{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
+        high{{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
+    const std::array<glm::vec3, 3> degenerate{{{0, 0, 0}, {0, 0, 0}, {0, 1, 0}}};
+    const Mesh from_bytes = read_mesh(folder.write("bytes.STL", binary_stl({low, degenerate, high})));
+    CHECK(from_bytes.positions.size() == 4);
+    CHECK(from_bytes.faces == std::vector<glm::uvec3>{{0, 1, 2}, {1, 3, 2}});
+  }
+
+  TEST_CASE("the program's locale has no say") {
+    const TempDir folder;
+    const std::string v = "0.125 0.250 1.500";
+    const std::vector<std::filesystem::path> files{
+        folder.write("a.obj", "v " + v + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        folder.write("a.ply", k_ply_start + "element face 1\n" + k_ply_corners + "end_header\n" + v +
+                                  "\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        folder.write("a.off", "OFF\n3 1 0\n" + v + "\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        folder.write("a.stl", "solid a\n" + text_facet(v, "1 0 0", "0 1 0") + "endsolid a\n")};
+    const std::locale before = std::locale::global(std::locale(std::locale(), new CommaPunctuation));
+    for (const std::filesystem::path& file : files) {
+      CHECK_MESSAGE(read_mesh(file).positions[0] == glm::vec3(0.125F, 0.25F, 1.5F), file.string());
+    }
+    write_mesh(folder / "b.ply", read_mesh(files[1]));
+    CHECK(read_mesh(folder / "b.ply").positions[0] == glm::vec3(0.125F, 0.25F, 1.5F));
+    CHECK(std::use_facet<std::numpunct<char>>(std::locale()).decimal_point() == ',');
+    std::locale::global(before);
+  }
+
+  TEST_CASE("the same files give the same meshes whatever was read before") {
+    const TempDir folder;
+    const auto off = folder.write("mesh.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    const auto coff =
+        folder.write("color.off", "COFF\n3 1 0\n0 0 0 1 1 1\n1 0 0 1 1 1\n0 1 0 1 1 1\n3 0 1 2\n");
+    for (int i = 0; i < 2; ++i) {
+      CHECK(read_mesh(off).vertex_colors.empty());
+      CHECK(read_mesh(coff).vertex_colors.size() == 3);
+    }
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("files that are not there, or no mesh files") {
+    const TempDir folder;
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "no.obj"), "does not exist");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.fbx", "x")),
+                          "expected .obj, .ply, .off or .stl");
+    std::filesystem::create_directory(folder / "folder.obj");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "folder.obj"), "folder");
+    for (const char* extension : {".ply", ".off", ".stl"}) {
+      CHECK_THROWS_AS(read_mesh(folder.write(std::string("empty") + extension, "")), IoError);
+      CHECK_THROWS_AS(read_mesh(folder.write(std::string("noise") + extension, "\x01\xff\n\n8 9\n")),
+                      IoError);
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, read_mesh(folder.write("empty.obj", "")), "got none");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, read_mesh(folder.write("points.obj", k_obj_square)), "got none");
+  }
+
+  TEST_CASE("OBJ: the line at fault") {
+    const TempDir folder;
+    const auto check = [&](const std::string& faces, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(IoError, faces_of(folder, faces), part);
+    };
+    check("f 1 2 5\n", "mesh.obj:5: a face with the vertex 5: expected 1 to 4");
+    check("f 1 2 3\nf 0 1 2\n", "mesh.obj:6: a face with the vertex 0");
+    check("f -5 1 2\n", "mesh.obj:5: a face with the vertex -5");
+    check("f 1 2 99999999999\n", "mesh.obj:5:");
+    check("f 1 2\n", "mesh.obj:5: a face with 2 corners");
+    check("f\n", "mesh.obj:5: a face with 0 corners");
+    check("f 1 2 x\n", "mesh.obj:5: got the corner \"x\"");
+    check("f 1 2 /3\n", "mesh.obj:5: got the corner \"/3\"");
+    check("f 1 2 \\\n3\n", "mesh.obj:5: a line continued by a backslash");
+    check("v 1 2\nf 1 2 3\n", "mesh.obj:5: too few numbers");
+    check("v nan 0 0\nf 1 2 3\n", "mesh.obj:5: got \"nan\"");
+    check("v 0 inf 0\nf 1 2 3\n", "mesh.obj:5: got \"inf\"");
+    check("v 1e39 0 0\nf 1 2 3\n", "mesh.obj:5: got \"1e39\"");
+    check("v 1,5 0 0\nf 1 2 3\n", "mesh.obj:5: got \"1,5\"");
+    check("v 0 0 0 1 0 x\nf 1 2 3\n", "mesh.obj:5: got \"x\"");
+    check("vt 0.5\nf 1 2 3\n", "mesh.obj:5: too few numbers");
+  }
+
+  TEST_CASE("PLY: headers") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.ply", text)), part);
+    };
+    const std::string face = "element face 1\n" + k_ply_corners,
+                      rest = "end_header\n" + k_ply_vertices + "3 0 1 2\n";
+    CHECK_NOTHROW(read_mesh(folder.write("mesh.ply", k_ply_start + face + rest)));
+    check("plyx\n", "mesh.ply:1: not a PLY file");
+    check("ply\nformat ascii 1.0\n", "the header has no end");
+    check("ply\nformat text 1.0\n", "mesh.ply:2: expected the format");
+    check("ply\nelement vertex 1\nend_header\n", "no format");
+    check("ply\nformat ascii 1.0\nproperty float x\n", "mesh.ply:3: expected \"property");
+    check(k_ply_start + "end_header\n", "no element face");
+    check(k_ply_start + "property float x\n", "mesh.ply:8: the property x twice");
+    check(k_ply_start + "property half w\n", "mesh.ply:8: a property of unknown type");
+    check("ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list int float s\n",
+          "mesh.ply:4: the list s counted in int");
+    check(k_ply_start + "element face -1\n", "mesh.ply:8: expected \"element");
+    check(k_ply_start + "element face 5000000000\n", "mesh.ply:8: expected \"element");
+    check(k_ply_start + "element face 1\nend_header\n", "expected the list vertex_indices");
+    check(k_ply_start + "element face 1\nproperty int id\n" + k_ply_corners + rest,
+          "expected the list vertex_indices");
+    check(k_ply_start + "property list uchar int near\n" + face + rest,
+          "the list near of the element vertex");
+    check(k_ply_start + "property ushort red\nproperty ushort green\nproperty ushort blue\n" + face + rest,
+          "in ushort: expected uchar, float or double");
+    check("ply\nformat ascii 1.0\nelement vertex 4000000000\n" + face + "end_header\n", "x, y and z");
+    check("ply\nformat ascii 1.0\n" + face + "element vertex 1\nproperty float x\nend_header\n", "before");
+  }
+
+  TEST_CASE("PLY: bodies") {
+    const TempDir folder;
+    const std::string head = k_ply_start + "element face 2\n" + k_ply_corners + "end_header\n";
+    const auto check = [&](const std::string& body, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.ply", head + body)), part);
+    };
+    check(k_ply_vertices + "3 0 1 2\n3 0 1", "truncated");
+    check(k_ply_vertices + "3 0 1 2\n", "truncated");
+    check("0 0 0\n1 0", "truncated");
+    check("", "truncated");
+    check("0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n3 0 1 2\n", "mesh.ply:12: got no number where one must be");
+    check(k_ply_vertices + "3 0 1 2\n3 0 x 2\n", "mesh.ply:15:");
+    check(k_ply_vertices + "3 0 1 2\n2 0 1\n", "face 1 has 2 corners");
+    const std::string lists =
+        "element face 1\n" + k_ply_corners + "property list uchar float s\nend_header\n";
+    DPR_CHECK_MESSAGE_HAS(
+        IoError,
+        read_mesh(folder.write("mesh.ply", k_ply_start + lists + k_ply_vertices + "3 0 1 2 4000000000 1\n")),
+        "mesh.ply:15: too few numbers for a face");
+    check(k_ply_vertices + "4000000000 0 1 2\n3 0 1 2\n", "truncated");
+    check(k_ply_vertices + "3 0 1 2\n3 0 1 2\n3 0 1 2\n", "goes on after the last face");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument,
+                          read_mesh(folder.write("mesh.ply", head + k_ply_vertices + "3 0 1 2\n3 0 1 3\n")),
+                          "faces[1]");
+    CHECK_THROWS_AS(read_mesh(folder.write("mesh.ply", head + k_ply_vertices + "3 0 1 2\n3 0 1 -1\n")),
+                    Error);
+  }
+
+  TEST_CASE("OFF") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.off", text)), part);
+    };
+    const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n";
+    check("NOFF\n3 1 0\n", "mesh.off:1: got the header \"NOFF\"");
+    check("OFF BINARY\n", "mesh.off:1: a binary OFF file");
+    check("OFF\n3 x 0\n", "mesh.off:2: got \"x\", expected the number of faces");
+    check("OFF\n3 5 0\n" + vertices + "3 0 1 2\n",
+          "mesh.off:6: the file ends here: expected 3 vertices and 5 faces");
+    check("OFF\n4000000000 1 0\n0 0 0\n", "the file ends here");
+    check("OFF\n3 1 0\n0 0\n", "mesh.off:3: too few numbers");
+    check("OFF\n3 1 0\n0 0 nan\n", "mesh.off:3: got \"nan\"");
+    check("OFF\n3 1 0\n" + vertices + "3 0 1 3\n", "mesh.off:6: a face with the vertex \"3\"");
+    check("OFF\n3 1 0\n" + vertices + "2 0 1\n", "mesh.off:6: a face with 2 corners");
+    check("OFF\n3 1 0\n" + vertices + "3 0 1 2 255 0\n", "mesh.off:6: 2 numbers for a colour");
+  }
+
+  TEST_CASE("STL") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.stl", text)), part);
+    };
+    const std::string facet = text_facet("0 0 0", "1 0 0", "0 1 0");
+    check("solid a\n" + facet, "expected \"endsolid\"");
+    check("solid a\n" + facet.substr(0, 60), "mesh.stl:");
+    check("solid a\n" + text_facet("0 0 0", "nan 0 0", "0 1 0") + "endsolid\n", "mesh.stl:5: got \"nan\"");
+    check("solid a\n" + text_facet("0 0 0", "1 0", "0 1 0") + "endsolid\n", "mesh.stl:5: too few numbers");
+    check("solid a\nouter loop\nvertex 0 0 0\nendloop\nendsolid\n",
+          "mesh.stl:4: a loop without three vertices");
+    const std::string bytes = binary_stl({{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}});
+    std::string shortened = bytes.substr(0, bytes.size() - 7);
+    shortened[0] = 'S';
+    check(shortened, "truncated: expected 1 facets, got 0");
+    check("short", "too short");
+    std::string not_finite = bytes;
+    not_finite.replace(84 + 12, 4, std::string("\0\0\xc0\x7f", 4));
+    check(not_finite, "facet 0 has a coordinate that is not finite");
+  }
+
+  TEST_CASE("OpenMesh is silent") {
+    const TempDir folder;
+    const auto file =
+        folder.write("mesh.obj", "mtllib no.mtl\n" + k_obj_square + "usemtl x\nvn 0 0 1\nf 1//9 2 3\n");
+    const Captured captured;
+    CHECK_NOTHROW(read_mesh(file));
+    CHECK(captured.text().empty());
+  }
+
+  TEST_CASE("writing") {
+    const TempDir folder;
+    const Mesh cube = make_cube();
+    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "cube.obj", cube), "OBJ has no face colours");
+    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "cube.stl", cube), "expected .obj or .ply");
+    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "no" / "cube.ply", cube), "does not exist");
+    CHECK_THROWS_AS(write_mesh(folder / "none.ply", Mesh{}), InvalidArgument);
+    std::filesystem::create_directory(folder / "cube.ply");
+    CHECK_THROWS_AS(write_mesh(folder / "cube.ply", cube), IoError);
+    CHECK(folder.entries() == 1);  // the folder made above, and no temporary file
+  }
+}

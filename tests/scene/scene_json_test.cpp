@@ -1,0 +1,252 @@
+// The scene format: the example of the documentation, every default, and every error with its place.
+#include <doctest/doctest.h>
+
+#include <limits>
+#include <string>
+
+#include "dpr/scene.hpp"
+#include "support/messages.hpp"
+#include "support/temp_dir.hpp"
+
+using namespace dpr;
+using dpr::test::TempDir;
+
+namespace {
+
+const std::string k_triangle = R"("positions": [[0,0,0],[1,0,0],[0,1,0]], "faces": [[0,1,2]])";
+
+// A scene with one triangle and these members beside it.
+std::string with(const std::string& members) {
+  return R"({"meshes": [{)" + k_triangle + "}]" + (members.empty() ? "" : ", " + members) + "}";
+}
+
+std::string with_mesh(const std::string& members) { return R"({"meshes": [{)" + members + "}]}"; }
+
+Scene read(const TempDir& folder, const std::string& text) {
+  return read_scene(folder.write("S.json", text));
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("the example of the documentation") {
+    const TempDir folder;
+    write_mesh(folder / "cube.ply", make_cube());
+    const Scene scene = read(folder, R"({
+      "width": 64, "height": 128,
+      "camera": {"view": [[1,0,0,0],[0,1,0,0],[0,0,1,-6.7],[0,0,0,1]], "fov_y_degrees": 60,
+                 "znear": 1, "zfar": 100},
+      "background": [0, 0.5, 1],
+      "meshes": [{"file": "cube.ply", "transform": [[1,0,0,2],[0,1,0,3],[0,0,1,4],[0,0,0,1]],
+                  "face_colors": [[1,0,0]]}],
+      "lights": {"ambient": [0.5,0.5,0.5], "point": [{"position": [0,2,-2], "diffuse": [0.3,0.3,0.3],
+                 "specular": [0.2,0.2,0.2]}], "shininess": 64},
+      "smoothing": {
+        "occupancy_prior": "gaussian", "depth_prior": "cauchy", "sigma": 2e-3, "gamma": 3e-2, "alpha": 4,
+        "composition": "barrier", "estimator": "exact", "samples": 16,
+        "variance_reduction": "none", "seed": 18446744073709551615,
+        "occupancy_threshold": 2e-4, "blur_radius": 9.21e-3, "background_depth": 2e-10,
+        "distance": "euclidean"
+      },
+      "perspective_correct": false,
+      "gradients": ["positions", "lights"]
+    })");
+    CHECK(scene.width == 64);
+    CHECK(scene.height == 128);
+    CHECK(scene.camera.view[3] == glm::vec4(0, 0, -6.7F, 1));
+    CHECK(scene.background == glm::vec3(0, 0.5F, 1));
+    REQUIRE(scene.meshes.size() == 1);
+    CHECK(scene.meshes[0].transform[3] == glm::vec4(2, 3, 4, 1));
+    CHECK(scene.meshes[0].mesh.face_colors == std::vector<glm::vec3>(12, {1, 0, 0}));
+    REQUIRE(scene.lights);
+    CHECK(scene.lights->point[0].position == glm::vec3(0, 2, -2));
+    CHECK(scene.lights->shading == Shading::phong);
+    CHECK(scene.smoothing.depth_prior == Prior::cauchy);
+    CHECK(scene.smoothing.sigma == 2e-3F);
+    CHECK(scene.smoothing.gamma == 3e-2F);
+    CHECK(scene.smoothing.alpha == 4);
+    CHECK(scene.smoothing.samples == 16);
+    CHECK(scene.smoothing.variance_reduction == VarianceReduction::none);
+    CHECK(scene.smoothing.seed == std::numeric_limits<std::uint64_t>::max());
+    CHECK(scene.smoothing.occupancy_threshold == 2e-4F);
+    CHECK(*scene.smoothing.blur_radius == 9.21e-3F);
+    CHECK(scene.smoothing.background_depth == 2e-10F);
+    CHECK(scene.smoothing.distance == DistanceMetric::euclidean);
+    CHECK_FALSE(scene.perspective_correct);
+    CHECK(scene.gradients.positions);
+    CHECK(scene.gradients.lights);
+    CHECK_FALSE(scene.gradients.colors);
+    CHECK_FALSE(scene.gradients.smoothing);
+  }
+
+  TEST_CASE("what is not given takes its default") {
+    const TempDir folder;
+    const Scene scene = read(folder, with(R"("camera": {"znear": 2}, "smoothing": {})"));
+    CHECK(scene.width == 128);
+    CHECK(scene.camera.view == glm::mat4(1));
+    CHECK(scene.camera.fov_y_degrees == 60);
+    CHECK(scene.camera.znear == 2);
+    CHECK_FALSE(scene.camera.intrinsics);
+    CHECK_FALSE(scene.lights);
+    CHECK(scene.meshes[0].mesh.vertex_colors.empty());
+    CHECK(scene.smoothing.sigma == Smoothing{}.sigma);
+    CHECK_FALSE(scene.smoothing.blur_radius);
+    CHECK(scene.perspective_correct);
+    CHECK(scene.gradients.positions);
+    CHECK_FALSE(scene.gradients.lights);
+    CHECK(read(folder, with(R"("lights": {"shading": "gouraud"})")).lights->shading == Shading::gouraud);
+    CHECK_FALSE(read(folder, with(R"("gradients": [])")).gradients.camera);
+  }
+
+  TEST_CASE("matrices are rows; intrinsics instead of the field of view") {
+    const TempDir folder;
+    const Scene scene = read(folder, with(R"("camera": {"view": [[0,0,1,5],[0,1,0,6],[-1,0,0,7],[0,0,0,1]],
+                                             "intrinsics": {"fx": 1, "fy": 2, "cx": 3, "cy": -4}})"));
+    CHECK(scene.camera.view * glm::vec4(1, 2, 3, 1) == glm::vec4(8, 8, 6, 1));
+    REQUIRE(scene.camera.intrinsics);
+    CHECK(scene.camera.intrinsics->fy == 2);
+    CHECK(scene.camera.intrinsics->cy == -4);
+  }
+
+  TEST_CASE("colours: one for all, one for each, in place of the file's") {
+    const TempDir folder;
+    Scene scene = read(folder, with_mesh(k_triangle + R"(, "vertex_colors": [[0,1,0]])"));
+    CHECK(scene.meshes[0].mesh.vertex_colors == std::vector<glm::vec3>(3, {0, 1, 0}));
+    scene = read(folder, with_mesh(k_triangle + R"(, "vertex_colors": [[0,1,0],[1,0,0],[0,0,1]])"));
+    CHECK(scene.meshes[0].mesh.vertex_colors[2] == glm::vec3(0, 0, 1));
+    folder.write("mesh.obj", "v 0 0 0 1 1 0\nv 1 0 0 1 1 0\nv 0 1 0 1 1 0\nf 1 2 3\n");
+    scene = read(folder, with_mesh(R"("file": "mesh.obj")"));
+    CHECK(scene.meshes[0].mesh.vertex_colors[0] == glm::vec3(1, 1, 0));
+    scene = read(folder, with_mesh(R"("file": "mesh.obj", "face_colors": [[0,0,1]])"));
+    CHECK(scene.meshes[0].mesh.vertex_colors.empty());
+    CHECK(scene.meshes[0].mesh.face_colors[0] == glm::vec3(0, 0, 1));
+  }
+
+  TEST_CASE("presets and estimators") {
+    const TempDir folder;
+    Smoothing smoothing = read(folder, with(R"("smoothing": {"preset": "softras"})")).smoothing;
+    CHECK(smoothing.depth_prior == Prior::gumbel);
+    smoothing =
+        read(folder, with(R"("smoothing": {"preset": "softras", "depth_prior": "gaussian", "sigma": 0.1})"))
+            .smoothing;
+    CHECK(smoothing.occupancy_prior == Prior::logistic);
+    CHECK(smoothing.depth_prior == Prior::gaussian);
+    CHECK(blur_radius(smoothing) == doctest::Approx(0.921).epsilon(1e-4));  // the preset's follows sigma
+    smoothing =
+        read(folder, with(R"("smoothing": {"preset": "softras", "sigma": 0.1, "blur_radius": 2})")).smoothing;
+    CHECK(blur_radius(smoothing) == 2);
+    smoothing = read(folder, with(R"("smoothing": {"estimator": "monte_carlo"})")).smoothing;
+    CHECK(smoothing.occupancy_estimator == Estimator::monte_carlo);
+    CHECK(smoothing.aggregation_estimator == Estimator::monte_carlo);
+    smoothing =
+        read(folder, with(R"("smoothing": {"occupancy_estimator": "exact", "estimator": "monte_carlo"})"))
+            .smoothing;
+    CHECK(smoothing.occupancy_estimator == Estimator::exact);
+    CHECK(smoothing.aggregation_estimator == Estimator::monte_carlo);
+    smoothing =
+        read(folder, with(R"("smoothing": {"preset": "paper_cauchy", "aggregation_estimator": "exact"})"))
+            .smoothing;
+    CHECK(smoothing.occupancy_estimator == Estimator::monte_carlo);
+    CHECK(smoothing.aggregation_estimator == Estimator::exact);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("files that are not scenes") {
+    const TempDir folder;
+    DPR_CHECK_MESSAGE_HAS(IoError, read_scene(folder / "no.json"), "does not exist");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_scene(folder.path()), "folder");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, ""), "S.json:1: not JSON");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, "{\n\"width\": 3,\n}"), "S.json:3: not JSON");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, "{\n\"width\": NaN}"), "S.json:2: not JSON");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, "{\"width\": 1e999}"), "S.json");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, "{} x"), "S.json:1: not JSON");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, "{\"a\": \"\xff\"}"), "not JSON");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, "[1, 2]"), "got a list of 2, expected an object");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, "{}"), "got no key \"meshes\"");
+    DPR_CHECK_MESSAGE_HAS(IoError, read(folder, with_mesh(R"("file": "no.obj")")),
+                          "no.obj: the file does not exist");
+  }
+
+  TEST_CASE("unknown keys are named, with their object") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text), part);
+    };
+    check(with(R"("widht": 3)"), "got the unknown key \"widht\", expected keys out of width, height");
+    check(with(R"("camera": {"fov": 60})"), "camera (");
+    check(with(R"("camera": {"fov": 60})"), "got the unknown key \"fov\"");
+    check(with(R"("camera": {"intrinsics": {"f": 1}})"), "camera.intrinsics (");
+    check(with(R"("lights": {"point": [{}, {"colour": 1}]})"), "lights.point[1] (");
+    check(with(R"("smoothing": {"Sigma": 1})"), "smoothing (");
+    check(with_mesh(R"("file": "a", "colour": 1)"), "meshes[0] (");
+    check(R"({"camera": {"view": 1, "znear": 1, "view": 2}})", "camera.view (");
+    check(R"({"camera": {"view": 1, "znear": 1, "view": 2}})", "got the key twice");
+  }
+
+  TEST_CASE("values of the wrong type say where they are") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text), part);
+    };
+    check(with(R"("width": "3")"), "width (");
+    check(with(R"("width": 3.5)"), "got 3.5, expected a whole number");
+    check(with(R"("width": -1)"), "got -1, expected a whole number");
+    check(with(R"("background": [0, 0])"), "got a list of 2, expected a list of 3");
+    check(with(R"("background": [0, 0, null])"), "background[2] (");
+    check(with(R"("lights": null)"), "lights (");
+    check(with(R"("perspective_correct": 1)"), "got 1, expected true or false");
+    check(with(R"("gradients": ["colour"])"), "gradients[0] (");
+    check(with(R"("gradients": ["colors", "colors"])"), "got \"colors\" twice");
+    check(with(R"("smoothing": {"sigma": "small"})"), "got \"small\", expected a number");
+    check(with(R"("smoothing": {"sigma": 1e300})"), "32-bit floats");
+    check(with(R"("smoothing": {"depth_prior": "normal"})"), "smoothing.depth_prior (");
+    check(with(R"("smoothing": {"samples": 1e3})"), "smoothing.samples (");
+    check(with(R"("smoothing": {"preset": "soft"})"), "got \"soft\", expected softras");
+    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong or gouraud");
+    check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
+    const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";
+    check(with_mesh(k_triangle + R"(, "transform": )" + rows), "meshes[0].transform[2] (");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,0,0,0]])"), "meshes[0].faces[0] (");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,-1,0]])"), "meshes[0].faces[0][1] (");
+  }
+
+  TEST_CASE("contradictions") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text), part);
+    };
+    check(with_mesh(R"("file": "a.obj", )" + k_triangle), "got file beside positions or faces");
+    check(with_mesh(R"("transform": [])"), "got no mesh");
+    check(with_mesh(R"("positions": [[0,0,0]])"), "got no key \"faces\"");
+    check(with_mesh(k_triangle + R"(, "vertex_colors": [[1,1,1]], "face_colors": [[1,1,1]])"),
+          "one of the two");
+    check(with_mesh(k_triangle + R"(, "vertex_colors": [[1,1,1],[1,1,1]])"),
+          "got 2 colours, expected one, or 3");
+    check(with_mesh(k_triangle + R"(, "vertex_colors": [])"), "got 0 colours");
+    check(with(R"("camera": {"fov_y_degrees": 60, "intrinsics": {"fx": 1, "fy": 1, "cx": 0, "cy": 0}})"),
+          "got fov_y_degrees and intrinsics");
+  }
+
+  TEST_CASE("scenes that cannot be rendered") {
+    const TempDir folder;
+    const auto check = [&](const std::string& text, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text), part);
+    };
+    check(R"({"meshes": []})", "meshes (scene): got none");
+    check(with(R"("width": 0)"), "width (scene): got 0, expected 1 to 16384");
+    check(with(R"("height": 16385)"), "height (scene): got 16385");
+    check(with(R"("camera": {"znear": -1})"), "znear (camera)");
+    check(with(R"("lights": {"shininess": 0})"), "shininess (lights)");
+    check(with(R"("smoothing": {"alpha": 0})"), "alpha (smoothing)");
+    check(with(R"("smoothing": {"estimator": "monte_carlo", "depth_prior": "uniform"})"), "uniform");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,0,1]])"), "faces[0] (meshes[0])");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [])"), "faces (meshes[0])");
+    const std::string flat = R"([[1,0,0,0],[0,1,0,0],[0,0,0,0],[0,0,0,1]])";
+    check(with_mesh(k_triangle + R"(, "transform": )" + flat),
+          "transform (meshes[0]): got a singular matrix");
+    Scene scene = read(folder, with(""));
+    scene.background.r = std::numeric_limits<float>::quiet_NaN();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(scene), "background (scene)");
+  }
+}

@@ -1,0 +1,183 @@
+// The smoothing: how far it reaches, its named members, its words, its checks.
+#include "dpr/smoothing.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "support/messages.hpp"
+
+using namespace dpr;
+
+namespace {
+
+constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
+
+// p = 1 - F(-s / sigma) at s = -x sigma, MATHS sections 2 and 4.1.
+double occupancy_outside(Prior prior, double x) {
+  switch (prior) {
+    case Prior::gaussian:
+      return 0.5 * std::erfc(x / std::numbers::sqrt2);
+    case Prior::cauchy:
+      return std::atan2(1.0, x) / std::numbers::pi;
+    case Prior::logistic:
+      return 1 / (1 + std::exp(x));
+    case Prior::gumbel:
+      return -std::expm1(-std::exp(-x));
+    case Prior::uniform:
+      return std::max(0.5 - x, 0.0);
+  }
+  return 0;
+}
+
+double reach(Prior prior, float threshold) {
+  Smoothing smoothing;
+  smoothing.occupancy_prior = prior;
+  smoothing.occupancy_threshold = threshold;
+  smoothing.sigma = 1;
+  return static_cast<double>(blur_radius(smoothing));
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("the blur radius is where the occupancy falls to the threshold") {
+    for (const Prior prior :
+         {Prior::gaussian, Prior::logistic, Prior::gumbel, Prior::uniform, Prior::cauchy}) {
+      for (const float threshold : {0.49F, 0.1F, 4e-3F, 1e-4F, 1e-12F, 1e-38F}) {
+        if (prior == Prior::cauchy && threshold < 4e-3F) continue;  // capped, see below
+        const double p = occupancy_outside(prior, reach(prior, threshold));
+        // The radius is a float: its rounding is as large as this in p.
+        const double tolerance = prior == Prior::uniform ? 1e-7 : 1e-5 * static_cast<double>(threshold);
+        CHECK_MESSAGE(std::abs(p - static_cast<double>(threshold)) <= tolerance,
+                      to_string(prior) << " at " << threshold << ": p " << p);
+      }
+    }
+    CHECK(reach(Prior::gaussian, 1e-4F) == doctest::Approx(3.7190165).epsilon(1e-6));
+    CHECK(reach(Prior::logistic, 1e-4F) == doctest::Approx(9.2102404).epsilon(1e-6));
+    CHECK(reach(Prior::gumbel, 1e-4F) == doctest::Approx(9.2102904).epsilon(1e-6));
+    CHECK(reach(Prior::uniform, 1e-4F) == doctest::Approx(0.4999).epsilon(1e-6));
+  }
+
+  TEST_CASE("Cauchy's radius is capped at 100 sigma") {
+    CHECK(reach(Prior::cauchy, 1e-4F) == 100);
+    CHECK(occupancy_outside(Prior::cauchy, 100) == doctest::Approx(3.18e-3).epsilon(1e-3));
+    CHECK(reach(Prior::cauchy, 0.01F) < 32);
+  }
+
+  TEST_CASE("the blur radius follows sigma, unless it is given") {
+    Smoothing smoothing;
+    const float at_default = blur_radius(smoothing);
+    smoothing.sigma *= 2;
+    CHECK(blur_radius(smoothing) == doctest::Approx(2 * at_default));
+    smoothing.blur_radius = 0.25F;
+    CHECK(blur_radius(smoothing) == 0.25F);
+  }
+
+  TEST_CASE("presets") {
+    for (const char* name : {"softras", "paper_gaussian", "paper_cauchy", "joint_gaussian", "rigid"}) {
+      CHECK_NOTHROW(validate(smoothing_preset(name)));
+    }
+    const Smoothing softras = smoothing_preset("softras");
+    CHECK(softras.occupancy_prior == Prior::logistic);
+    CHECK(softras.depth_prior == Prior::gumbel);
+    CHECK(softras.composition == Composition::barrier);
+    CHECK(softras.occupancy_estimator == Estimator::exact);
+    CHECK(softras.aggregation_estimator == Estimator::exact);
+    for (const bool is_cauchy : {false, true}) {
+      const Smoothing paper = smoothing_preset(is_cauchy ? "paper_cauchy" : "paper_gaussian");
+      CHECK(paper.occupancy_prior == (is_cauchy ? Prior::cauchy : Prior::gaussian));
+      CHECK(paper.depth_prior == paper.occupancy_prior);
+      CHECK(paper.occupancy_estimator == Estimator::monte_carlo);
+      CHECK(paper.aggregation_estimator == Estimator::monte_carlo);
+      CHECK(paper.samples == 8);
+      CHECK(paper.variance_reduction == VarianceReduction::rigid);
+      CHECK(paper.sigma == 1e-3F);
+      CHECK(paper.gamma == 1e-2F);
+      CHECK(blur_radius(paper) == doctest::Approx(9.21e-3).epsilon(1e-4));
+    }
+    CHECK(smoothing_preset("joint_gaussian").composition == Composition::joint);
+    CHECK(smoothing_preset("joint_gaussian").occupancy_prior == Prior::gaussian);
+    const Smoothing rigid = smoothing_preset("rigid");
+    CHECK(rigid.composition == Composition::joint);
+    CHECK(rigid.sigma == 1e-12F);
+    CHECK(rigid.gamma == 1e-9F);
+    CHECK(blur_radius(rigid) == 0);
+  }
+
+  TEST_CASE("words are read as they are written") {
+    for (const Prior value :
+         {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel, Prior::uniform}) {
+      CHECK(parse_prior(to_string(value), "x") == value);
+    }
+    for (const Composition value : {Composition::barrier, Composition::joint}) {
+      CHECK(parse_composition(to_string(value), "x") == value);
+    }
+    for (const Estimator value : {Estimator::exact, Estimator::monte_carlo}) {
+      CHECK(parse_estimator(to_string(value), "x") == value);
+    }
+    for (const VarianceReduction value : {VarianceReduction::none, VarianceReduction::rigid}) {
+      CHECK(parse_variance_reduction(to_string(value), "x") == value);
+    }
+    for (const DistanceMetric value : {DistanceMetric::squared, DistanceMetric::euclidean}) {
+      CHECK(parse_distance_metric(to_string(value), "x") == value);
+    }
+    CHECK(to_string(Estimator::monte_carlo) == "monte_carlo");
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("values out of range") {
+    const auto check = [](auto change, const std::string& part) {
+      Smoothing smoothing;
+      change(smoothing);
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), part);
+    };
+    for (const float bad : {0.0F, -1e-3F, k_nan, std::numeric_limits<float>::infinity()}) {
+      check([bad](Smoothing& s) { s.sigma = bad; }, "sigma (smoothing): got ");
+      check([bad](Smoothing& s) { s.gamma = bad; }, "gamma (smoothing): got ");
+      check([bad](Smoothing& s) { s.alpha = bad; }, "alpha (smoothing): got ");
+    }
+    for (const std::uint32_t bad : {0U, (1U << 20U) + 1U}) {
+      check([bad](Smoothing& s) { s.samples = bad; }, "samples (smoothing): got ");
+    }
+    for (const float bad : {0.0F, 0.5F, k_nan}) {
+      check([bad](Smoothing& s) { s.occupancy_threshold = bad; }, "occupancy_threshold (smoothing): got ");
+    }
+    for (const float bad : {-1.0F, k_nan}) {
+      check([bad](Smoothing& s) { s.blur_radius = bad; }, "blur_radius (smoothing): got ");
+    }
+    check([](Smoothing& s) { s.background_depth = k_nan; }, "background_depth (smoothing): got nan");
+    check([](Smoothing& s) { s.depth_prior = static_cast<Prior>(9); }, "depth_prior (smoothing): got 9");
+  }
+
+  TEST_CASE("what has no estimator") {
+    Smoothing smoothing;
+    smoothing.occupancy_prior = Prior::uniform;
+    CHECK_NOTHROW(validate(smoothing));
+    smoothing.aggregation_estimator = Estimator::monte_carlo;  // of the Gaussian depth prior
+    CHECK_NOTHROW(validate(smoothing));
+    smoothing.occupancy_estimator = Estimator::monte_carlo;
+    DPR_CHECK_MESSAGE_HAS(
+        InvalidArgument, validate(smoothing),
+        "occupancy_estimator (smoothing): got monte_carlo with the uniform prior, expected exact");
+    smoothing = Smoothing();
+    smoothing.depth_prior = Prior::uniform;
+    smoothing.aggregation_estimator = Estimator::monte_carlo;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "aggregation_estimator (smoothing)");
+    smoothing = smoothing_preset("joint_gaussian");
+    smoothing.aggregation_estimator = Estimator::monte_carlo;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "with the joint composition, expected exact");
+  }
+
+  TEST_CASE("unknown words") {
+    DPR_CHECK_MESSAGE_HAS(
+        InvalidArgument, parse_prior("normal", "depth_prior (S.json)"),
+        "depth_prior (S.json): got \"normal\", expected gaussian, cauchy, logistic, gumbel or");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, parse_estimator("", "x"), "expected exact or monte_carlo");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, smoothing_preset("SoftRas"),
+                          "preset (smoothing): got \"SoftRas\"");
+  }
+}
