@@ -1,7 +1,7 @@
 # Kernel sources as bytes of a C++ file, so that the library needs no files at run time.
 #
-# dpr_embed_kernels(DIR OUT): generates a C++ file that implements lib/device/kernel_sources.hpp for every *.cl
-# and *.h in DIR and sets OUT to its path. Editing a kernel regenerates it. This file is also that generator.
+# dpr_embed_kernels(DIR OUT): generates a C++ file that implements lib/device/kernel_sources.hpp for every
+# *.cl and *.h in DIR and sets OUT to its path. Editing a kernel regenerates it. This file is also that generator.
 
 if(NOT CMAKE_SCRIPT_MODE_FILE)
   function(dpr_embed_kernels dir out)

@@ -4,14 +4,13 @@
 
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <limits>
 
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
-
-extern char** environ;
 
 namespace dpr::cli {
 namespace {

@@ -5,8 +5,8 @@
 // - in a text every line with "outer" in it, the solid's name included, starts a facet;
 // - a facet with two equal corners is dropped.
 //
-// Those have no area and an STL facet has no attributes, so nothing is lost to the image or to the caller: the
-// scan leaves them out of the count.
+// Those have no area and an STL facet has no attributes, so nothing is lost to the image or to the caller:
+// the scan leaves them out of the count.
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -95,8 +95,9 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
                           size_text(scene_.width, scene_.height) + ", the scene's");
   }
   require(options_.iterations > 0, "iterations (pose)", options_.iterations, "at least 1");
-  Optimizer{options_.optimizer};  // each throws what is wrong with its options
-  AdaptiveSmoothing{options_.schedule};
+  // Each throws what is wrong with its options.
+  [[maybe_unused]] const Optimizer optimizer(options_.optimizer);
+  [[maybe_unused]] const AdaptiveSmoothing adaptive(options_.schedule);
 
   const glm::dmat3 linear(scene_.meshes.front().transform);
   require(std::abs(glm::determinant(linear)) > 0, "determinant of the transform (pose)",
