@@ -82,4 +82,25 @@ static inline realn exp_n(realn x) {
 #endif
 }
 
+/// Natural logarithm of a positive normal number. Absolute error below 1e-7 + 6e-8 |ln x|; a polynomial for the same
+/// reason: ln(1 + f) = f - f^2 / 2 + f^3 P(f), the least maximum relative error on [sqrt(1/2) - 1, sqrt(2) - 1].
+static inline realn log_n(realn x) {
+#if DPR_WIDTH == 1
+  return log(x);
+#else
+  const intn bits = as_intn(x);
+  const intn exponent = (bits - 0x3f3504f3) >> 23; /* of x / sqrt(1/2) */
+  const realn f = as_realn(bits - (exponent << 23)) - 1.0f;
+  realn p = 0.0870029986f;
+  p = mad(p, f, -0.142672828f);
+  p = mad(p, f, 0.149147247f);
+  p = mad(p, f, -0.165776079f);
+  p = mad(p, f, 0.1996307f);
+  p = mad(p, f, -0.250013364f);
+  p = mad(p, f, 0.333339106f);
+  const realn f2 = f * f;
+  return mad(convert_realn(exponent), M_LN2_F, mad(f2 * f, p, mad(f2, -0.5f, f)));
+#endif
+}
+
 #endif

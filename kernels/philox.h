@@ -14,14 +14,19 @@
 #define DPR_STAGE_OCCUPANCY 0u
 #define DPR_STAGE_AGGREGATE 1u
 
+/// Scalars inside: as vectors the words would travel between registers in every round.
 static inline uint4 philox4x32_10(uint4 counter, uint2 key) {
+  uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
   for (int round = 0; round < DPR_PHILOX_ROUNDS; ++round) {
-    const uint high0 = mul_hi(DPR_PHILOX_M0, counter.x), low0 = DPR_PHILOX_M0 * counter.x;
-    const uint high1 = mul_hi(DPR_PHILOX_M1, counter.z), low1 = DPR_PHILOX_M1 * counter.z;
-    counter = (uint4)(high1 ^ counter.y ^ key.x, low1, high0 ^ counter.w ^ key.y, low0);
-    key += (uint2)(DPR_PHILOX_W0, DPR_PHILOX_W1);
+    const ulong first = (ulong)DPR_PHILOX_M0 * a, second = (ulong)DPR_PHILOX_M1 * c;
+    a = (uint)(second >> 32) ^ b ^ k0;
+    b = (uint)second;
+    c = (uint)(first >> 32) ^ d ^ k1;
+    d = (uint)first;
+    k0 += DPR_PHILOX_W0;
+    k1 += DPR_PHILOX_W1;
   }
-  return counter;
+  return (uint4)(a, b, c, d);
 }
 
 #endif

@@ -83,7 +83,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   const realn density = normal_density(x);
   const realn tail = density * mills;
   const intn negative = x < 0.0f;
-  const realn log_tail = log(mills) - 0.5f * x * x - DPR_LOG_SQRT_2PI;
+  const realn log_tail = log_n(mills) - 0.5f * x * x - DPR_LOG_SQRT_2PI;
   *log_p = choose(negative, log_tail, log1p(-tail));
   *hazard = choose(negative, 1.0f / mills, density / (1.0f - tail));
 }
@@ -95,7 +95,7 @@ static inline realn prior_sample(realn u) {
   const realn central =
       q * mad(mad(mad(59.109374720f, s, 159.29113202f), s, 50.434271938f), s, 3.3871327179f) /
       mad(mad(mad(67.187563600f, s, 78.757757664f), s, 17.895169469f), s, 1.0f);
-  const realn r = sqrt(-log(min(u, 1.0f - u))) - 1.6f;
+  const realn r = sqrt(-log_n(min(u, 1.0f - u))) - 1.6f;
   const realn tail = mad(mad(mad(0.17023821103f, r, 1.3067284816f), r, 2.7568153900f), r, 1.4234372777f) /
                      mad(mad(0.12021132975f, r, 0.73700164250f), r, 1.0f);
   return choose(fabs(q) <= 0.425f, central, copysign(tail, q));
@@ -138,7 +138,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(x < 0.0f, 1.0f / (1.0f + e), e / (1.0f + e));
 }
 
-static inline realn prior_sample(realn u) { return log(u) - log(1.0f - u); }
+static inline realn prior_sample(realn u) { return log_n(u) - log_n(1.0f - u); }
 
 static inline realn prior_score(realn z) { return tanh(0.5f * z); }
 
@@ -164,7 +164,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(small, mad(u, mad(u, 1.0f / 12.0f, -0.5f), 1.0f), u * survival / (1.0f - survival));
 }
 
-static inline realn prior_sample(realn u) { return -log(-log(u)); }
+static inline realn prior_sample(realn u) { return -log_n(-log_n(u)); }
 
 static inline realn prior_score(realn z) { return 1.0f - exp_n(-z); }
 
