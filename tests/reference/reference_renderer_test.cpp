@@ -196,7 +196,27 @@ void check_scene(const Scene& scene, Directions directions, double tolerance) {
 
 }  // namespace
 
-TEST_SUITE("reference") {
+TEST_SUITE("unit") {
+  TEST_CASE("renderer: nothing to see, hidden and degenerate triangles") {
+    Scene scene = small_scene();
+    scene.meshes[0].faces.push_back({0, 0, 1});
+    scene.meshes[1].transform =
+        moved(scene.meshes[1].transform, {}, {0.0, 0.0, 3.2});  // through the camera's plane
+    scene.lights = two_lights(Shading::phong);
+    const Image weights = random_weights(scene);
+    for (const double v : render(scene).rgba) CHECK(std::isfinite(v));
+    for (const Block& block : blocks_of(scene, gradient(scene, weights))) {
+      for (const double g : block.gradient) CHECK(std::isfinite(g));
+    }
+    scene.meshes.clear();
+    const Image empty = render(scene);
+    CHECK(empty.rgba[1] == 0.5);
+    CHECK(empty.rgba[3] == 0.0);
+    CHECK(gradient(scene, weights).meshes.empty());
+  }
+}
+
+TEST_SUITE("gradient") {
   TEST_CASE("renderer: every single gradient, and a wrong one in every block is rejected") {
     Scene scene = small_scene();
     scene.lights = two_lights(Shading::phong);
@@ -283,23 +303,5 @@ TEST_SUITE("reference") {
       expected[0] *= -1.0;
       CHECK_FALSE(check_gradient(f, std::vector<double>(6), expected, 1e-6, 1e-5).passed);
     }
-  }
-
-  TEST_CASE("renderer: nothing to see, hidden and degenerate triangles") {
-    Scene scene = small_scene();
-    scene.meshes[0].faces.push_back({0, 0, 1});
-    scene.meshes[1].transform =
-        moved(scene.meshes[1].transform, {}, {0.0, 0.0, 3.2});  // through the camera's plane
-    scene.lights = two_lights(Shading::phong);
-    const Image weights = random_weights(scene);
-    for (const double v : render(scene).rgba) CHECK(std::isfinite(v));
-    for (const Block& block : blocks_of(scene, gradient(scene, weights))) {
-      for (const double g : block.gradient) CHECK(std::isfinite(g));
-    }
-    scene.meshes.clear();
-    const Image empty = render(scene);
-    CHECK(empty.rgba[1] == 0.5);
-    CHECK(empty.rgba[3] == 0.0);
-    CHECK(gradient(scene, weights).meshes.empty());
   }
 }

@@ -13,19 +13,7 @@
 
 using namespace dpr::reference;
 
-TEST_SUITE("reference") {
-  TEST_CASE("finite differences: a right gradient passes, wrong ones are rejected") {
-    const ScalarFunction f = [](const std::vector<double>& x) { return std::sin(x[0]) * x[1]; };
-    const std::vector<double> at = {0.3, 2.0};
-    const double a = 2.0 * std::cos(0.3);
-    const double b = std::sin(0.3);
-    CHECK(check_gradient(f, at, {a, b}, 1e-5, 1e-8).passed);
-    CHECK_FALSE(check_gradient(f, at, {a, -b}, 1e-5, 1e-8).passed);
-    CHECK_FALSE(check_gradient(f, at, {a * 1.001, b}, 1e-5, 1e-8).passed);
-    CHECK_FALSE(check_gradient(f, at, {a, std::nan("")}, 1e-5, 1e-8).passed);
-    CHECK_FALSE(check_gradient(f, at, {a}, 1e-5, 1e-8).passed);
-  }
-
+TEST_SUITE("unit") {
   TEST_CASE("priors: known values deep in the tail") {
     const auto near = [](double value, double expected) { return std::fabs(value / expected - 1.0) < 1e-14; };
     CHECK(near(log_cdf(Prior::gaussian, -9.0), -43.628149113332115497));
@@ -39,6 +27,39 @@ TEST_SUITE("reference") {
     CHECK(near(log_survival(Prior::gumbel, 700.0), -700.0));
     CHECK_FALSE(
         near(std::log(0.5 * (1.0 + std::erf(-8.0 / std::numbers::sqrt2))), log_cdf(Prior::gaussian, -8.0)));
+  }
+
+  TEST_CASE("rasterize: inside and outside, metrics and discarded triangles") {
+    const NdcTriangle t = {Vec3d{0.0, 0.0, 2.0}, Vec3d{1.0, 0.0, 4.0}, Vec3d{0.0, 1.0, 8.0}};
+    RasterizeParameters p;
+    p.blur_radius = 0.05;
+    const auto inside = rasterize_forward(t, 7, {0.25, 0.1}, p);
+    REQUIRE(inside);
+    CHECK(inside->face == 7);
+    CHECK(inside->distance == doctest::Approx(0.01));
+    CHECK(1.0 / inside->depth == doctest::Approx(0.65 / 2.0 + 0.25 / 4.0 + 0.1 / 8.0));
+    p.metric = DistanceMetric::euclidean;
+    CHECK(rasterize_forward(t, 7, {0.25, -0.04}, p)->distance == doctest::Approx(-0.04));
+    CHECK_FALSE(rasterize_forward(t, 7, {0.25, -0.06}, p));
+    CHECK_FALSE(is_discarded(t, p));
+    CHECK(is_discarded({t[0], t[1], Vec3d{2.0, 0.0, 3.0}}, p));
+    CHECK(is_discarded({t[0], t[1], Vec3d{0.0, 1.0, 0.5}}, p));
+    CHECK(is_discarded({Vec3d{0.0, 0.0, 101.0}, Vec3d{1.0, 0.0, 102.0}, Vec3d{0.0, 1.0, 103.0}}, p));
+    CHECK(is_discarded({t[0], t[1], Vec3d{std::nan(""), 1.0, 3.0}}, p));
+  }
+}
+
+TEST_SUITE("gradient") {
+  TEST_CASE("finite differences: a right gradient passes, wrong ones are rejected") {
+    const ScalarFunction f = [](const std::vector<double>& x) { return std::sin(x[0]) * x[1]; };
+    const std::vector<double> at = {0.3, 2.0};
+    const double a = 2.0 * std::cos(0.3);
+    const double b = std::sin(0.3);
+    CHECK(check_gradient(f, at, {a, b}, 1e-5, 1e-8).passed);
+    CHECK_FALSE(check_gradient(f, at, {a, -b}, 1e-5, 1e-8).passed);
+    CHECK_FALSE(check_gradient(f, at, {a * 1.001, b}, 1e-5, 1e-8).passed);
+    CHECK_FALSE(check_gradient(f, at, {a, std::nan("")}, 1e-5, 1e-8).passed);
+    CHECK_FALSE(check_gradient(f, at, {a}, 1e-5, 1e-8).passed);
   }
 
   TEST_CASE("priors: density, hazard and score are derivatives of one another") {
@@ -149,25 +170,6 @@ TEST_SUITE("reference") {
     append(gradient, g.translation);
     CHECK_GRADIENT(f, std::vector<double>(6), gradient, 1e-6, 1e-8);
     CHECK_FALSE(check_gradient(f, std::vector<double>(6), std::vector<double>(6), 1e-6, 1e-8).passed);
-  }
-
-  TEST_CASE("rasterize: inside and outside, metrics and discarded triangles") {
-    const NdcTriangle t = {Vec3d{0.0, 0.0, 2.0}, Vec3d{1.0, 0.0, 4.0}, Vec3d{0.0, 1.0, 8.0}};
-    RasterizeParameters p;
-    p.blur_radius = 0.05;
-    const auto inside = rasterize_forward(t, 7, {0.25, 0.1}, p);
-    REQUIRE(inside);
-    CHECK(inside->face == 7);
-    CHECK(inside->distance == doctest::Approx(0.01));
-    CHECK(1.0 / inside->depth == doctest::Approx(0.65 / 2.0 + 0.25 / 4.0 + 0.1 / 8.0));
-    p.metric = DistanceMetric::euclidean;
-    CHECK(rasterize_forward(t, 7, {0.25, -0.04}, p)->distance == doctest::Approx(-0.04));
-    CHECK_FALSE(rasterize_forward(t, 7, {0.25, -0.06}, p));
-    CHECK_FALSE(is_discarded(t, p));
-    CHECK(is_discarded({t[0], t[1], Vec3d{2.0, 0.0, 3.0}}, p));
-    CHECK(is_discarded({t[0], t[1], Vec3d{0.0, 1.0, 0.5}}, p));
-    CHECK(is_discarded({Vec3d{0.0, 0.0, 101.0}, Vec3d{1.0, 0.0, 102.0}, Vec3d{0.0, 1.0, 103.0}}, p));
-    CHECK(is_discarded({t[0], t[1], Vec3d{std::nan(""), 1.0, 3.0}}, p));
   }
 
   TEST_CASE("rasterize: gradients at faces, edges, vertices and beyond the horizon") {

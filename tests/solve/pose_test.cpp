@@ -37,6 +37,10 @@ dpr::Pose turned(double degrees) { return {dpr::rotation_from_vector(glm::radian
 dpr::PoseOptions options(unsigned iterations) {
   dpr::PoseOptions result;
   result.iterations = iterations;
+  result.schedule.start = 60;
+  result.schedule.interval = 10;
+  result.schedule.rate = 1.15F;
+  result.schedule.learning_rate_divisor = 1.05F;
   return result;
 }
 

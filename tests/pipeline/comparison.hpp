@@ -1,0 +1,270 @@
+// The library against the double-precision reference: the same scene in its types, the gradients side by side, and
+// the pixels where single and double precision may rightly differ.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "reference/renderer.hpp"
+
+namespace dpr::test::pipeline {
+
+inline reference::Vec3d to_reference(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+inline std::vector<reference::Vec3d> to_reference(const std::vector<glm::vec3>& values) {
+  std::vector<reference::Vec3d> result;
+  for (const glm::vec3& v : values) result.push_back(to_reference(v));
+  return result;
+}
+
+inline reference::Mat4d to_reference(const glm::mat4& m) {
+  reference::Mat4d rows{};
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] = m[column][row];
+    }
+  }
+  return rows;
+}
+
+inline reference::Image to_reference(const Image& image) {
+  reference::Image result = reference::make_image(image.width, image.height);
+  for (std::size_t i = 0; i < result.rgba.size(); ++i) {
+    result.rgba[i] = image.pixels[i / 4][static_cast<int>(i % 4)];
+  }
+  return result;
+}
+
+inline reference::Prior to_reference(Prior prior) {
+  switch (prior) {
+    case Prior::cauchy:
+      return reference::Prior::cauchy;
+    case Prior::logistic:
+      return reference::Prior::logistic;
+    case Prior::gumbel:
+      return reference::Prior::gumbel;
+    case Prior::uniform:
+      return reference::Prior::uniform;
+    case Prior::gaussian:
+      break;
+  }
+  return reference::Prior::gaussian;
+}
+
+inline reference::Camera to_reference(const Camera& camera) {
+  reference::Camera result{to_reference(camera.view), camera.fov_y_degrees, {}, camera.znear, camera.zfar};
+  if (camera.intrinsics) {
+    const Intrinsics& k = *camera.intrinsics;
+    result.intrinsics = {k.fx, k.fy, k.cx, k.cy};
+  }
+  return result;
+}
+
+inline reference::Smoothing to_reference(const Smoothing& s) {
+  return {to_reference(s.occupancy_prior),
+          to_reference(s.depth_prior),
+          s.sigma,
+          s.gamma,
+          s.alpha,
+          s.composition == Composition::joint ? reference::Composition::joint : reference::Composition::barrier,
+          blur_radius(s),
+          s.background_depth,
+          s.distance == DistanceMetric::euclidean ? reference::DistanceMetric::euclidean
+                                                  : reference::DistanceMetric::squared};
+}
+
+inline reference::Lights to_reference(const Lights& lights) {
+  reference::Lights result{to_reference(lights.ambient), {}, lights.shininess, reference::Shading::phong};
+  if (lights.shading == Shading::flat) result.shading = reference::Shading::flat;
+  if (lights.shading == Shading::gouraud) result.shading = reference::Shading::gouraud;
+  for (const PointLight& light : lights.point) {
+    result.point.push_back(
+        {to_reference(light.position), to_reference(light.diffuse), to_reference(light.specular)});
+  }
+  return result;
+}
+
+inline reference::Scene to_reference(const Scene& scene) {
+  reference::Scene result;
+  result.width = scene.width;
+  result.height = scene.height;
+  result.camera = to_reference(scene.camera);
+  result.background = to_reference(scene.background);
+  for (const Instance& instance : scene.meshes) {
+    reference::Mesh mesh{to_reference(instance.mesh.positions),
+                         {},
+                         to_reference(instance.mesh.vertex_colors),
+                         to_reference(instance.mesh.face_colors),
+                         to_reference(instance.transform)};
+    for (const glm::uvec3& face : instance.mesh.faces) mesh.faces.push_back({face.x, face.y, face.z});
+    result.meshes.push_back(mesh);
+  }
+  if (scene.lights) result.lights = to_reference(*scene.lights);
+  result.smoothing = to_reference(scene.smoothing);
+  result.perspective_correct = scene.perspective_correct;
+  return result;
+}
+
+inline void append(std::vector<double>& list, double v) { list.push_back(v); }
+inline void append(std::vector<double>& list, const glm::vec3& v) { list.insert(list.end(), {v.x, v.y, v.z}); }
+inline void append(std::vector<double>& list, const glm::dvec3& v) { list.insert(list.end(), {v.x, v.y, v.z}); }
+inline void append(std::vector<double>& list, const reference::Vec3d& v) {
+  list.insert(list.end(), {v.x, v.y, v.z});
+}
+
+template <typename Value>
+std::vector<double> flat(const std::vector<Value>& values) {
+  std::vector<double> list;
+  for (const Value& v : values) append(list, v);
+  return list;
+}
+
+inline double norm(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return std::sqrt(sum);
+}
+
+/// A group of gradients that is compared as one vector.
+struct Block {
+  std::string name;  ///< the same for all meshes and lights
+  std::vector<double> found;
+  std::vector<double> expected;
+};
+
+inline bool is_sensitivity(const Block& block) {
+  return block.name == "sigma" || block.name == "gamma" || block.name == "alpha";
+}
+
+/// Every gradient of a scene with one view, by block.
+inline std::vector<Block> blocks_of(const SceneGradient& found) {
+  std::vector<Block> blocks;
+  const auto add = [&](const std::string& name, std::vector<double> values) {
+    blocks.push_back({name, std::move(values), {}});
+  };
+  for (std::size_t m = 0; m < found.meshes.size(); ++m) {
+    add("positions", flat(found.meshes[m].positions));
+    add("colors", flat(found.meshes[m].colors));
+    const PoseGradient& pose = found.views[0].transforms[m];
+    add("rotation", flat<glm::dvec3>({pose.rotation}));
+    add("translation", flat<glm::dvec3>({pose.translation}));
+  }
+  const CameraGradient& camera = found.views[0].camera;
+  add("camera rotation", flat<glm::dvec3>({camera.view.rotation}));
+  add("camera translation", flat<glm::dvec3>({camera.view.translation}));
+  add("fov", {camera.fov_y_degrees});
+  add("intrinsics", {camera.intrinsics.begin(), camera.intrinsics.end()});
+  add("sigma", {found.sigma});
+  add("gamma", {found.gamma});
+  add("alpha", {found.alpha});
+  add("background", flat<glm::dvec3>({found.background}));
+  add("ambient", flat<glm::dvec3>({found.ambient}));
+  for (const PointLightGradient& light : found.lights) {
+    add("light position", flat<glm::dvec3>({light.position}));
+    add("light colors", flat<glm::dvec3>({light.diffuse, light.specular}));
+  }
+  return blocks;
+}
+
+/// The same with the reference's values beside them.
+inline std::vector<Block> blocks_of(const SceneGradient& found, const reference::Gradients& expected) {
+  std::vector<Block> blocks = blocks_of(found);
+  std::size_t next = 0;
+  const auto set = [&](std::vector<double> values) { blocks.at(next++).expected = std::move(values); };
+  for (const reference::MeshGradient& mesh : expected.meshes) {
+    set(flat(mesh.positions));
+    set(flat(mesh.colors));
+    set(flat<reference::Vec3d>({mesh.rotation}));
+    set(flat<reference::Vec3d>({mesh.translation}));
+  }
+  set(flat<reference::Vec3d>({expected.camera.rotation}));
+  set(flat<reference::Vec3d>({expected.camera.translation}));
+  set({expected.camera.fov_y_degrees});
+  const reference::Intrinsics& k = expected.camera.intrinsics;
+  set({k.fx, k.fy, k.cx, k.cy});
+  set({expected.sigma});
+  set({expected.gamma});
+  set({expected.alpha});
+  set(flat<reference::Vec3d>({expected.background}));
+  set(flat<reference::Vec3d>({expected.lights.ambient}));
+  for (const reference::PointLight& light : expected.lights.point) {
+    set(flat<reference::Vec3d>({light.position}));
+    set(flat<reference::Vec3d>({light.diffuse, light.specular}));
+  }
+  return blocks;
+}
+
+/// Euclidean norm of the difference relative to the reference's; where that is tiny, relative to what makes
+/// `tolerance` 1e-7 absolute. Infinite where the sizes differ or a value is not finite.
+inline double block_error(const Block& block, double tolerance) {
+  if (block.found.size() != block.expected.size()) return INFINITY;
+  std::vector<double> difference = block.found;
+  for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= block.expected[i];
+  const double error = norm(difference) / std::max(norm(block.expected), 1e-7 / tolerance);
+  return std::isfinite(error) ? error : INFINITY;
+}
+
+/// Where the image jumps or kinks: within a distance of a few roundings, NDC.
+struct Delicate {
+  std::vector<bool> jump;  ///< [pixel] a triangle's distance equals the blur radius
+  std::vector<bool> kink;  ///< [pixel] a jump, or on an edge's line, or as near to one edge as to another
+};
+
+inline void find_delicate(const reference::NdcTriangle& t, const reference::Vec2d& point, double reach,
+                          double margin, std::vector<bool>::reference jump, std::vector<bool>::reference kink) {
+  const reference::Vec3d b = reference::screen_barycentric(t, point);
+  const bool inside = reference::is_inside(b);
+  const double distance = std::sqrt(reference::nearest_edge(t, point).squared_distance);
+  if (!inside && std::fabs(distance - reach) < margin) jump = kink = true;
+  if (!inside && distance > reach) return;
+  // Nearer together than this, two closest points are one for the gradient.
+  constexpr double apart2 = 1e-6;
+  std::array<double, 3> to_edge{};
+  std::array<reference::Vec2d, 3> nearest{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const reference::Vec2d start = reference::screen(t[i]);
+    const reference::Vec2d along = reference::screen(t[(i + 1) % 3]) - start;
+    const double squared = reference::dot(along, along);
+    // Height over the edge's line: where it is zero a barycentric changes its sign.
+    if (std::fabs(reference::cross(along, point - start)) < margin * std::sqrt(squared)) kink = true;
+    const double at = std::clamp(reference::dot(point - start, along) / squared, 0.0, 1.0);
+    nearest[i] = start + at * along;
+    const reference::Vec2d difference = point - nearest[i];
+    to_edge[i] = std::sqrt(reference::dot(difference, difference));
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    const reference::Vec2d apart = nearest[i] - nearest[j];
+    const bool are_nearest = std::min(to_edge[i], to_edge[j]) < distance + margin;
+    if (are_nearest && std::fabs(to_edge[i] - to_edge[j]) < margin && reference::dot(apart, apart) > apart2) {
+      kink = true;
+    }
+  }
+}
+
+inline Delicate delicate_pixels(const reference::Scene& scene, double margin = 2e-6) {
+  reference::Scene wider = scene;
+  wider.smoothing.blur_radius = scene.smoothing.blur_radius * 1.001 + 1e-9;
+  const reference::PreparedScene prepared = reference::prepare(wider);
+  const double reach = scene.smoothing.distance == reference::DistanceMetric::squared
+                           ? std::sqrt(scene.smoothing.blur_radius)
+                           : scene.smoothing.blur_radius;
+  const std::size_t pixels = prepared.candidates.size();
+  Delicate delicate{std::vector<bool>(pixels), std::vector<bool>(pixels)};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const int row = static_cast<int>(i) / scene.width;
+    const int column = static_cast<int>(i) % scene.width;
+    const reference::Vec2d point = reference::pixel_center(column, row, {scene.width, scene.height});
+    for (const std::size_t face : prepared.candidates[i]) {
+      find_delicate(reference::ndc_triangle(prepared, face), point, reach, margin, delicate.jump[i],
+                    delicate.kink[i]);
+    }
+  }
+  return delicate;
+}
+
+}  // namespace dpr::test::pipeline

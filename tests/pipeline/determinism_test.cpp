@@ -1,0 +1,293 @@
+// The same input gives the same bits: from run to run, from renderer to renderer, alone or in a batch, set piece by
+// piece or at once. And memory: independent of the samples, and settled after the first iteration.
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/comparison.hpp"
+#include "pipeline/scenes.hpp"
+#include "support/reduced.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+using dpr::test::reduced;
+
+namespace {
+
+/// Bit by bit: NaN equals itself, and 0 is not -0.
+bool same_bits(const Image& a, const Image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(glm::vec4)) == 0;
+}
+
+bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+bool same_bits(const SceneGradient& a, const SceneGradient& b) {
+  const std::vector<Block> blocks_a = blocks_of(a), blocks_b = blocks_of(b);
+  bool same = blocks_a.size() == blocks_b.size();
+  for (std::size_t i = 0; same && i < blocks_a.size(); ++i) {
+    same = same_bits(blocks_a[i].found, blocks_b[i].found);
+  }
+  return same;
+}
+
+struct Result {
+  Image image;
+  SceneGradient gradient;
+};
+
+bool same_bits(const Result& a, const Result& b) {
+  return same_bits(a.image, b.image) && same_bits(a.gradient, b.gradient);
+}
+
+Result render(Renderer& renderer) {
+  renderer.forward();
+  const Image grad = random_image(renderer.scene().width, renderer.scene().height, -1.0F, 1.0F);
+  return {renderer.image(), renderer.backward(std::span(&grad, 1))};
+}
+
+Result render(const Device& device, const Scene& scene) {
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  return render(renderer);
+}
+
+bool is_finite(const Result& result) {
+  for (const glm::vec4& p : result.image.pixels) {
+    if (!std::isfinite(p.x + p.y + p.z + p.w)) return false;
+  }
+  for (const Block& block : blocks_of(result.gradient)) {
+    if (!std::isfinite(norm(block.found))) return false;
+  }
+  return true;
+}
+
+Scene test_scene() {
+  const int size = reduced(40, 9);
+  return scene_of(reduced(1, 0) == 1 ? make_icosphere(1, 1.3F) : make_cube(), size, size - 3);
+}
+
+Scene sampled_scene() {
+  Scene scene = test_scene();
+  scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
+  return scene;
+}
+
+Scene joint_scene() {
+  Scene scene = test_scene();
+  scene.smoothing.composition = Composition::joint;
+  scene.lights = two_lights(Shading::phong);
+  scene.gradients.lights = true;
+  return scene;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("determinism: two runs and two renderers agree in every bit") {
+    const Device device = open_device();
+    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene()}) {
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      const Result first = render(renderer);
+      CHECK(is_finite(first));
+      CHECK(norm(flat(first.gradient.meshes[0].positions)) > 0);
+      CHECK(same_bits(first, render(renderer)));
+      CHECK(same_bits(first, render(device, scene)));
+      CHECK(same_bits(first, render(open_device(), scene)));
+    }
+  }
+
+  TEST_CASE("determinism: another seed or another scene is told apart") {
+    const Device device = open_device();
+    Scene scene = sampled_scene();
+    const Result first = render(device, scene);
+    scene.smoothing.seed += 1;
+    const Result other_seed = render(device, scene);
+    CHECK_FALSE(same_bits(first.image, other_seed.image));
+    CHECK_FALSE(same_bits(first.gradient, other_seed.gradient));
+    scene = test_scene();
+    const Result exact = render(device, scene);
+    scene.meshes[0].mesh.positions[0].x += 1e-5F;
+    CHECK_FALSE(same_bits(exact, render(device, scene)));
+    scene = test_scene();
+    scene.smoothing.seed += 1;
+    CHECK(same_bits(exact, render(device, scene)));  // nothing is random in the exact renderer
+  }
+
+  TEST_CASE("determinism: sampled inside sampled is finite for every prior and both variance reductions") {
+    const Device device = open_device();
+    for (const Prior prior : k_noisy_priors) {
+      for (const VarianceReduction reduction : {VarianceReduction::none, VarianceReduction::rigid}) {
+        if (reduced(1, 0) == 0 && prior != Prior::cauchy) continue;
+        Scene scene = sampled_scene();
+        scene.smoothing.occupancy_prior = scene.smoothing.depth_prior = prior;
+        scene.smoothing.variance_reduction = reduction;
+        CAPTURE(to_string(prior));
+        const Result first = render(device, scene);
+        CHECK(is_finite(first));
+        CHECK(same_bits(first, render(device, scene)));
+      }
+    }
+  }
+
+  TEST_CASE("determinism: memory does not grow with the samples, nor from one iteration to the next") {
+    std::vector<std::size_t> bytes, peaks;
+    for (const std::uint32_t samples : {8U, 128U}) {
+      const Device device = open_device();
+      Scene scene = sampled_scene();
+      scene.smoothing.samples = reduced(1, 0) == 1 ? samples : samples / 8;
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      render(renderer);
+      const std::size_t allocated = device.allocated_bytes(), peak = device.peak_allocated_bytes();
+      bytes.push_back(renderer.statistics().device_bytes);
+      peaks.push_back(peak);
+      for (int iteration = 0; iteration < 2; ++iteration) render(renderer);
+      CHECK(device.allocated_bytes() == allocated);
+      CHECK(device.peak_allocated_bytes() == peak);
+    }
+    CHECK(bytes[0] > 0);
+    CHECK(bytes[0] == bytes[1]);
+    CHECK(peaks[0] == peaks[1]);
+    // A larger image is told apart, and what is destroyed is given back.
+    const Device device = open_device();
+    Scene scene = sampled_scene();
+    scene.width *= 2;
+    {
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      render(renderer);
+      CHECK(renderer.statistics().device_bytes > bytes[0]);
+    }
+    CHECK(device.allocated_bytes() == 0);
+  }
+
+  TEST_CASE("determinism: the statistics of a renderer do not count another's memory") {
+    const Device device = open_device();
+    Renderer first(device), second(device);
+    first.set_scene(test_scene());
+    first.forward();
+    const std::size_t alone = first.statistics().device_bytes;
+    second.set_scene(test_scene());
+    second.forward();
+    CHECK(first.statistics().device_bytes == alone);
+    CHECK(second.statistics().device_bytes == alone);
+  }
+
+  TEST_CASE("determinism: a batch of views equals the single renders") {
+    const Device device = open_device();
+    Scene scene = test_scene();
+    scene.meshes.push_back({make_cube(), placed(70.0F, 0.4F, {0.9F, 0.4F, 0.2F})});
+    std::vector<View> views;
+    const int count = reduced(5, 2);
+    for (int v = 0; v < count; ++v) {
+      const auto turn = static_cast<float>(v);
+      View view{orbit_camera(5.0F + 0.3F * turn, 20.0F - 9.0F * turn, 70.0F * turn), {}};
+      view.camera.fov_y_degrees = 40.0F + turn;
+      view.camera.zfar = 20.0F;
+      view.transforms = {placed(11.0F * turn), placed(40.0F * turn, 0.4F, {0.9F, 0.4F, 0.2F})};
+      views.push_back(view);
+    }
+    for (const Composition composition : {Composition::barrier, Composition::joint}) {
+      scene.smoothing.composition = composition;
+      std::vector<Image> grads;
+      for (int v = 0; v < count; ++v) {
+        grads.push_back(random_image(scene.width, scene.height, -1.0F, 1.0F, 30U + static_cast<unsigned>(v)));
+      }
+      Renderer batch(device);
+      batch.set_scene(scene);
+      batch.set_views(views);
+      batch.forward();
+      const SceneGradient together = batch.backward(grads);
+      REQUIRE(together.views.size() == views.size());
+
+      std::vector<std::vector<double>> positions(2), colors(2);
+      double sigma = 0, gamma = 0;
+      Renderer single(device);
+      single.set_scene(scene);
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        single.set_views(std::span(&views[v], 1));
+        single.forward();
+        CHECK(same_bits(batch.image(v), single.image()));
+        const SceneGradient g = single.backward(std::span(&grads[v], 1));
+        const auto view_values = [](const ViewGradient& view) {
+          std::vector<double> values = flat<glm::dvec3>({view.camera.view.rotation, view.camera.view.translation});
+          values.push_back(view.camera.fov_y_degrees);
+          for (const PoseGradient& pose : view.transforms) {
+            append(values, pose.rotation);
+            append(values, pose.translation);
+          }
+          return values;
+        };
+        CHECK(block_error({"view", view_values(together.views[v]), view_values(g.views[0])}, 1e-5) < 1e-5);
+        for (std::size_t m = 0; m < 2; ++m) {
+          const std::vector<double> p = flat(g.meshes[m].positions), c = flat(g.meshes[m].colors);
+          positions[m].resize(p.size());
+          colors[m].resize(c.size());
+          for (std::size_t i = 0; i < p.size(); ++i) positions[m][i] += p[i];
+          for (std::size_t i = 0; i < c.size(); ++i) colors[m][i] += c[i];
+        }
+        sigma += g.sigma;
+        gamma += g.gamma;
+      }
+      for (std::size_t m = 0; m < 2; ++m) {
+        const MeshGradient& mesh = together.meshes[m];
+        CHECK(block_error({"positions", flat(mesh.positions), positions[m]}, 1e-5) < 1e-5);
+        CHECK(block_error({"colors", flat(mesh.colors), colors[m]}, 1e-5) < 1e-5);
+        positions[m][0] += 1e-4 * norm(positions[m]);
+        CHECK(block_error({"positions", flat(mesh.positions), positions[m]}, 1e-5) > 1e-5);
+      }
+      CHECK(block_error({"sigma", {together.sigma}, {sigma}}, 1e-5) < 1e-4);
+      CHECK(block_error({"gamma", {together.gamma}, {gamma}}, 1e-5) < 1e-4);
+    }
+  }
+
+  TEST_CASE("determinism: pieces replaced one by one equal a fresh scene") {
+    const Device device = open_device();
+    Scene scene = test_scene();
+    scene.meshes.push_back({make_cube(), placed(70.0F, 0.4F, {0.9F, 0.4F, 0.2F})});
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    const Result before = render(renderer);
+
+    std::vector<glm::vec3>& positions = scene.meshes[1].mesh.positions;
+    for (glm::vec3& position : positions) position = 1.1F * position + glm::vec3(0.05F, -0.02F, 0.1F);
+    renderer.set_positions(1, positions);
+    const Result moved = render(renderer);
+    CHECK(same_bits(moved, render(device, scene)));
+    CHECK_FALSE(same_bits(moved, before));
+
+    Mesh& mesh = scene.meshes[0].mesh;
+    std::vector<glm::vec3>& colors = mesh.vertex_colors.empty() ? mesh.face_colors : mesh.vertex_colors;
+    for (glm::vec3& color : colors) color = glm::vec3(1) - color * color;
+    renderer.set_colors(0, colors);
+    const Result colored = render(renderer);
+    CHECK(same_bits(colored, render(device, scene)));
+    CHECK_FALSE(same_bits(colored, moved));
+
+    for (Smoothing smoothing : {smoothing_preset("softras"), smoothing_preset("joint_gaussian"),
+                                smoothing_preset("paper_cauchy"), Smoothing{}}) {
+      smoothing.sigma *= 2;
+      smoothing.distance = DistanceMetric::squared;
+      scene.smoothing = smoothing;
+      renderer.set_smoothing(smoothing);
+      CHECK(same_bits(render(renderer), render(device, scene)));
+    }
+
+    View view{renderer.views()[0]};
+    view.camera.view[3].x += 0.2F;
+    scene.camera = view.camera;
+    renderer.set_views(std::span(&view, 1));
+    CHECK(same_bits(render(renderer), render(device, scene)));
+
+    // A second scene in the same renderer leaves nothing of the first.
+    const Scene other = joint_scene();
+    renderer.set_scene(other);
+    CHECK(same_bits(render(renderer), render(device, other)));
+  }
+}

@@ -1,0 +1,222 @@
+// Sampled aggregation over exact occupancies end to end: the mean over many seeds is the exact image, and the exact
+// gradient of every block, within the standard error. Sampled inside sampled approaches neither (the logarithm of a
+// sampled occupancy is biased): determinism_test.cpp.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/comparison.hpp"
+#include "pipeline/scenes.hpp"
+#include "support/reduced.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+using dpr::test::reduced;
+
+namespace {
+
+/// How many standard errors a mean may be away: for a right estimator once in 16,000 figures.
+constexpr double k_standard_errors = 4;
+/// What single precision and the quadrature of the exact renderer may add, relative to the figure's own size.
+constexpr double k_rounding = 1e-4;
+
+/// One vector of a render: the image's colours, or a block of gradients.
+struct Vector {
+  std::string name;
+  std::vector<double> values;
+};
+
+std::vector<Vector> render(Renderer& renderer, const Image& grad) {
+  renderer.forward();
+  std::vector<double> image;
+  for (const glm::vec4& p : renderer.image().pixels) append(image, glm::vec3(p));
+  std::vector<Vector> vectors{{"image", image}};
+  for (Block& block : blocks_of(renderer.backward(std::span(&grad, 1)))) {
+    if (norm(block.found) > 0) vectors.push_back({block.name, std::move(block.found)});
+  }
+  return vectors;
+}
+
+/// A number that stands for a vector: its component along a fixed direction.
+struct Figure {
+  std::string name;
+  std::vector<double> direction;
+  double expected = 0;
+};
+
+double component(const std::vector<double>& values, const std::vector<double>& direction) {
+  double sum = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) sum += values[i] * direction[i];
+  return sum / norm(direction);
+}
+
+/// Two a vector: along the exact vector itself, where an error of scale shows, and along a random direction.
+std::vector<Figure> figures_of(const std::vector<Vector>& exact) {
+  std::vector<Figure> figures;
+  for (const Vector& vector : exact) {
+    figures.push_back({vector.name, vector.values, norm(vector.values)});
+    if (vector.values.size() == 1) continue;
+    Random random(100);
+    std::vector<double> direction;
+    for (std::size_t i = 0; i < vector.values.size(); ++i) direction.push_back(random(-1.0F, 1.0F));
+    figures.push_back({vector.name, direction, component(vector.values, direction)});
+  }
+  return figures;
+}
+
+struct Sample {
+  std::vector<double> mean, standard_error;
+};
+
+Sample sample(const Device& device, Scene scene, const Image& grad, const std::vector<Figure>& figures, int seeds) {
+  scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  std::vector<double> mean(figures.size()), squares(figures.size());
+  for (int seed = 1; seed <= seeds; ++seed) {
+    scene.smoothing.seed = static_cast<std::uint64_t>(seed);
+    renderer.set_smoothing(scene.smoothing);
+    const std::vector<Vector> vectors = render(renderer, grad);
+    std::size_t v = 0;
+    for (std::size_t i = 0; i < figures.size(); ++i) {
+      while (vectors.at(v).name != figures[i].name) ++v;
+      const double value = component(vectors[v].values, figures[i].direction);
+      // Welford: the spread is far below the values.
+      const double change = value - mean[i];
+      mean[i] += change / seed;
+      squares[i] += change * (value - mean[i]);
+    }
+  }
+  Sample result{mean, {}};
+  for (const double s : squares) result.standard_error.push_back(std::sqrt(s / (seeds - 1.0) / seeds));
+  return result;
+}
+
+std::vector<Figure> exact_figures(const Device& device, const Scene& scene, const Image& grad) {
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  return figures_of(render(renderer, grad));
+}
+
+/// |mean - expected| in standard errors, after what rounding explains; 0 where both vanish.
+double deviation(double mean, double standard_error, double expected) {
+  const double unexplained = std::fabs(mean - expected) - k_rounding * std::fabs(expected);
+  return unexplained <= 0 ? 0 : unexplained / standard_error;
+}
+
+Scene test_scene(Prior prior, int size) {
+  Scene scene = cube_scene(size, size);
+  // Depths of the cube's sides differ by a few gamma, so that several of them win.
+  scene.smoothing.gamma = 5e-2F;
+  scene.smoothing.depth_prior = prior;
+  scene.smoothing.samples = static_cast<std::uint32_t>(reduced(256, 16));
+  return scene;
+}
+
+/// Which way to a sharper image of the cube in another pose: the gradients of all blocks stand out in it.
+Image test_grad(const Device& device, int size) {
+  Scene scene = test_scene(Prior::gaussian, size);
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  Image grad = renderer.image();
+  scene.meshes[0].transform = placed(33.0F, 1.05F, {0.1F, -0.05F, 0.2F});
+  scene.smoothing = smoothing_preset("rigid");
+  renderer.set_scene(scene);
+  renderer.forward();
+  const Image target = renderer.image();
+  for (std::size_t i = 0; i < grad.pixels.size(); ++i) grad.pixels[i] -= target.pixels[i];
+  return grad;
+}
+
+}  // namespace
+
+TEST_SUITE("statistical") {
+  TEST_CASE("monte carlo: the mean over seeds is the exact image and gradient, every prior and variance reduction") {
+    const int size = reduced(24, 6), seeds = reduced(64, 8);
+    const Device device = open_device();
+    const Image grad = test_grad(device, size);
+    double worst = 0;
+    std::string worst_name;
+    std::size_t count = 0;
+    std::map<std::string, double> power;
+    for (const Prior prior : k_noisy_priors) {
+      if (reduced(1, 0) == 0 && prior != Prior::gaussian) continue;
+      for (const VarianceReduction reduction : {VarianceReduction::none, VarianceReduction::rigid}) {
+        Scene scene = test_scene(prior, size);
+        scene.smoothing.variance_reduction = reduction;
+        const std::string name = std::string(to_string(prior)) + " " + std::string(to_string(reduction));
+        CAPTURE(name);
+        const std::vector<Figure> figures = exact_figures(device, scene, grad);
+        const Sample found = sample(device, scene, grad, figures, seeds);
+        for (std::size_t i = 0; i < figures.size(); ++i) {
+          const double mean = found.mean[i], error = found.standard_error[i], expected = figures[i].expected;
+          CAPTURE(figures[i].name);
+          CAPTURE(expected);
+          CAPTURE(mean);
+          CAPTURE(error);
+          const double z = deviation(mean, error, expected);
+          // With 8 seeds the standard error itself is uncertain.
+          CHECK(z < (seeds < 64 ? 2 * k_standard_errors : k_standard_errors));
+          ++count;
+          if (z > worst) worst_name = name + ", " + figures[i].name;
+          worst = std::max(worst, z);
+          // What must not pass: a figure of twice the length, or with the other sign.
+          const double wrong = std::min(deviation(2 * mean, 2 * error, expected), deviation(-mean, error, expected));
+          power[figures[i].name] = std::max(power[figures[i].name], wrong);
+        }
+      }
+    }
+    MESSAGE("worst of " << count << " figures: " << worst << " standard errors, " << worst_name);
+    if (reduced(1, 0) == 0) return;  // with few seeds nothing stands out
+    std::string text;
+    for (const auto& [name, wrong] : power) {
+      CAPTURE(name);
+      CHECK(wrong > k_standard_errors);
+      text += name + " " + std::to_string(wrong) + "\n";
+    }
+    MESSAGE("standard errors by which a factor of 2 or -1 would show:\n" << text);
+  }
+
+  TEST_CASE("monte carlo: the rigid baseline lowers the variance of the gradient where one face dominates") {
+    if (reduced(1, 0) == 0) return;
+    const Device device = open_device();
+    const Image grad = test_grad(device, 24);
+    Scene scene = test_scene(Prior::gaussian, 24);
+    scene.smoothing.gamma = 1e-2F;
+    const std::vector<Figure> figures = exact_figures(device, scene, grad);
+    scene.smoothing.variance_reduction = VarianceReduction::none;
+    const Sample none = sample(device, scene, grad, figures, 32);
+    scene.smoothing.variance_reduction = VarianceReduction::rigid;
+    const Sample rigid = sample(device, scene, grad, figures, 32);
+    for (std::size_t i = 0; i < figures.size(); ++i) {
+      CAPTURE(figures[i].name);
+      if (figures[i].name == "positions" || figures[i].name == "gamma") {
+        CHECK(rigid.standard_error[i] < none.standard_error[i]);
+      }
+      // The image itself has no baseline.
+      if (figures[i].name == "image") CHECK(rigid.standard_error[i] == none.standard_error[i]);
+    }
+  }
+
+  TEST_CASE("monte carlo: four times the samples halve the standard error") {
+    if (reduced(1, 0) == 0) return;
+    const Device device = open_device();
+    const Image grad = test_grad(device, 24);
+    Scene scene = test_scene(Prior::logistic, 24);
+    scene.smoothing.samples = 16;
+    const std::vector<Figure> figures = exact_figures(device, scene, grad);
+    const Sample few = sample(device, scene, grad, figures, 64);
+    scene.smoothing.samples = 64;
+    const Sample many = sample(device, scene, grad, figures, 64);
+    // Of 64 seeds a standard error is known to 9%.
+    REQUIRE(figures[0].name == "image");
+    CHECK(few.standard_error[0] / many.standard_error[0] > 1.5);
+    CHECK(few.standard_error[0] / many.standard_error[0] < 2.7);
+  }
+}

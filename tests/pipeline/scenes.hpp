@@ -1,0 +1,114 @@
+// The scenes that the tests of the whole pipeline share: nothing in them is symmetric about a pixel.
+#pragma once
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+#include <vector>
+
+#include "dpr/scene.hpp"
+
+namespace dpr::test::pipeline {
+
+/// Uniform numbers that are the same with every standard library.
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  float operator()(float low, float high) {
+    return low + (high - low) * static_cast<float>(static_cast<double>(engine_()) / 4294967296.0);
+  }
+  glm::vec3 vector(float low, float high) {
+    const float x = (*this)(low, high);
+    const float y = (*this)(low, high);
+    return {x, y, (*this)(low, high)};
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+/// A rotation about a skew axis, a scale, a shift.
+inline glm::mat4 placed(float degrees, float scale = 1.0F, glm::vec3 shift = glm::vec3(0)) {
+  const glm::mat4 moved = glm::translate(glm::mat4(1.0F), shift);
+  return glm::scale(glm::rotate(moved, glm::radians(degrees), glm::vec3(0.3F, 0.8F, 0.52F)), glm::vec3(scale));
+}
+
+/// A mesh of about unit size that fills most of the image. Depth spans a tenth of the clipping range, so that
+/// gamma mixes what lies behind one another, and the background shows through.
+inline Scene scene_of(Mesh mesh, int width, int height) {
+  Scene scene;
+  scene.width = width;
+  scene.height = height;
+  scene.camera = orbit_camera(5.3F, 24.0F, 37.0F, {0.03F, -0.02F, 0.01F});
+  scene.camera.fov_y_degrees = 44.0F;
+  scene.camera.zfar = 20.0F;
+  scene.background = {0.2F, 0.5F, 0.3F};
+  scene.meshes.push_back({std::move(mesh), placed(23.0F)});
+  scene.smoothing.sigma = 2e-3F;
+  scene.smoothing.gamma = 3e-2F;
+  scene.smoothing.background_depth = 0.6F;
+  return scene;
+}
+
+inline Scene cube_scene(int width, int height) { return scene_of(make_cube(), width, height); }
+
+/// Random numbers in all four channels, for a derivative of the image or for a target.
+inline Image random_image(int width, int height, float low, float high, unsigned seed = 5) {
+  Random random(seed);
+  Image image(width, height);
+  for (glm::vec4& pixel : image.pixels) pixel = glm::vec4(random.vector(low, high), random(low, high));
+  return image;
+}
+
+/// Triangles all over the place, each with its own vertices.
+inline Mesh random_soup(unsigned faces, unsigned seed) {
+  Random random(seed);
+  Mesh mesh;
+  for (unsigned f = 0; f < faces; ++f) {
+    const glm::vec3 middle = random.vector(-1.2F, 1.2F);
+    for (unsigned i = 0; i < 3; ++i) {
+      mesh.positions.push_back(middle + random.vector(-0.6F, 0.6F));
+      mesh.vertex_colors.push_back(random.vector(0.0F, 1.0F));
+    }
+    mesh.faces.emplace_back(3 * f, 3 * f + 1, 3 * f + 2);
+  }
+  return mesh;
+}
+
+/// Beside a few ordinary triangles: two corners in one place, one in a point, one smaller than a hundredth of a
+/// pixel, one a tenth of a pixel, one twenty times as large as the image.
+inline Scene odd_scene(int width, int height) {
+  Scene scene = scene_of(random_soup(6, 17), width, height);
+  Mesh& mesh = scene.meshes[0].mesh;
+  const glm::mat4 from_camera = glm::inverse(scene.camera.view * scene.meshes[0].transform);
+  Random random(18);
+  const auto add = [&](glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+    const auto first = static_cast<unsigned>(mesh.positions.size());
+    for (const glm::vec3& corner : {a, b, c}) {
+      mesh.positions.emplace_back(from_camera * glm::vec4(corner, 1.0F));
+      mesh.vertex_colors.push_back(random.vector(0.0F, 1.0F));
+    }
+    mesh.faces.emplace_back(first, first + 1, first + 2);
+  };
+  const glm::vec3 a(-0.4F, 0.5F, -5.3F), b(0.6F, -0.2F, -5.1F);
+  add(a, a, b);
+  add(b, b, b);
+  add({0.31F, 0.4F, -5.2F}, {0.31F + 1e-7F, 0.4F, -5.2F}, {0.31F, 0.4F + 1e-7F, -5.2F});
+  add({-0.52F, 0.1F, -4.9F}, {-0.505F, 0.1F, -4.9F}, {-0.52F, 0.12F, -4.92F});
+  add({-60.0F, -50.0F, -6.9F}, {65.0F, -45.0F, -7.3F}, {3.0F, 80.0F, -6.5F});
+  return scene;
+}
+
+inline Lights two_lights(Shading shading) {
+  Lights lights;
+  lights.ambient = {0.4F, 0.3F, 0.5F};
+  lights.point = {{{2.0F, 3.5F, 6.0F}, {0.4F, 0.5F, 0.3F}, {0.5F, 0.3F, 0.6F}},
+                  {{5.0F, 0.5F, 3.0F}, {0.3F, 0.2F, 0.6F}, {0.3F, 0.6F, 0.2F}}};
+  lights.shininess = 6.0F;
+  lights.shading = shading;
+  return lights;
+}
+
+inline constexpr Prior k_noisy_priors[] = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel};
+
+}  // namespace dpr::test::pipeline

@@ -1,0 +1,186 @@
+// Pixels made by hand for the aggregation stage: the buffers of the stages before it, filled with any fragments, and
+// what the reference says of them.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "reference/aggregate.hpp"
+#include "stages/aggregate.hpp"
+#include "support/probe.hpp"
+
+namespace dpr::test {
+
+struct SyntheticFragment {
+  float depth = 1, occupancy = 0;
+  glm::vec3 color{0.0F};
+};
+
+using SyntheticPixel = std::vector<SyntheticFragment>;
+
+/// The normalised depth range of the synthetic camera.
+inline constexpr float k_znear = 1, k_zfar = 100;
+
+inline float log_of(float occupancy) { return occupancy > 0 ? std::log(occupancy) : DPR_LOG_ZERO; }
+
+/// What the kernel reads, as the reference takes it: the same floats.
+inline std::vector<reference::FragmentInput> reference_fragments(const SyntheticPixel& pixel) {
+  std::vector<reference::FragmentInput> inputs;
+  for (const SyntheticFragment& f : pixel) {
+    reference::FragmentInput input;
+    input.depth = static_cast<double>(f.depth);
+    input.occupancy = static_cast<double>(f.occupancy);
+    if (f.occupancy > 0) input.log_occupancy = static_cast<double>(log_of(f.occupancy));
+    input.color = {static_cast<double>(f.color.x), static_cast<double>(f.color.y), static_cast<double>(f.color.z)};
+    inputs.push_back(input);
+  }
+  return inputs;
+}
+
+inline reference::AggregateParameters reference_parameters(const Smoothing& s, const glm::vec3& background) {
+  reference::AggregateParameters p;
+  p.composition = s.composition == Composition::joint ? reference::Composition::joint
+                                                      : reference::Composition::barrier;
+  p.prior = static_cast<reference::Prior>(s.depth_prior);
+  p.gamma = static_cast<double>(s.gamma);
+  p.alpha = static_cast<double>(s.alpha);
+  p.znear = static_cast<double>(k_znear);
+  p.zfar = static_cast<double>(k_zfar);
+  p.background_depth = static_cast<double>(s.background_depth);
+  p.background = {static_cast<double>(background.x), static_cast<double>(background.y),
+                  static_cast<double>(background.z)};
+  return p;
+}
+
+/// One view, one row of pixels; the fragments of a pixel are the faces 0, 1, 2 ... Fragments are stored in another
+/// order than they are listed, and the buffers hold one that no pixel lists.
+class SyntheticFrame {
+ public:
+  explicit SyntheticFrame(const std::vector<SyntheticPixel>& pixels)
+      : bin_(device_impl()),
+        rasterize_(device_impl()),
+        occupancy_(device_impl()),
+        shade_(device_impl()),
+        aggregate_(device_impl()) {
+    std::vector<cl_uint> starts{0}, list, pair, faces;
+    std::size_t count = 0, most = 0;
+    for (const SyntheticPixel& pixel : pixels) {
+      for (std::size_t k = 0; k < pixel.size(); ++k) list.push_back(static_cast<cl_uint>(count + k));
+      count += pixel.size();
+      most = std::max(most, pixel.size());
+      starts.push_back(static_cast<cl_uint>(count));
+    }
+    for (cl_uint& fragment : list) fragment = static_cast<cl_uint>(count) - fragment;  // count ... 1; 0 is unlisted
+    fragments_ = count + 1;
+    first_ = starts;
+    std::vector<float> depth(fragments_, k_poison), log_p(fragments_, k_poison), p(fragments_, k_poison),
+        red(fragments_, k_poison), green(fragments_, k_poison), blue(fragments_, k_poison);
+    pair.assign(fragments_, 0);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      for (std::size_t k = 0; k < pixels[i].size(); ++k) {
+        const std::size_t at = list[first_[i] + k];
+        const SyntheticFragment& f = pixels[i][k];
+        depth[at] = f.depth;
+        p[at] = f.occupancy;
+        log_p[at] = log_of(f.occupancy);
+        red[at] = f.color.x;
+        green[at] = f.color.y;
+        blue[at] = f.color.z;
+        pair[at] = static_cast<cl_uint>(k);
+      }
+    }
+    for (std::size_t k = 0; k < std::max<std::size_t>(most, 1); ++k) faces.push_back(static_cast<cl_uint>(k));
+    place_ = list;
+    frame_.views = frame_.meshes = 1;
+    frame_.width = static_cast<cl_uint>(pixels.size());
+    frame_.height = 1;
+    frame_.faces = static_cast<cl_uint>(faces.size());
+    bin_.pairs = faces.size();
+    bin_.pair_face.upload(device_impl(), faces);
+    rasterize_.fragments = fragments_;
+    rasterize_.listed_fragments = count;
+    rasterize_.pixel_starts.upload(device_impl(), starts);
+    rasterize_.list.resize(device_impl(), std::max<std::size_t>(count, 1));
+    rasterize_.list.upload(device_impl(), list);
+    rasterize_.fragment_pair.upload(device_impl(), pair);
+    rasterize_.depth.upload(device_impl(), depth);
+    occupancy_.log_occupancy.upload(device_impl(), log_p);
+    occupancy_.occupancy.upload(device_impl(), p);
+    shade_.red.upload(device_impl(), red);
+    shade_.green.upload(device_impl(), green);
+    shade_.blue.upload(device_impl(), blue);
+    shared::ViewParams view{};
+    view.znear = k_znear;
+    view.zfar = k_zfar;
+    view.inverse_range = 1.0F / (k_zfar - k_znear);
+    views_.cameras.upload(device_impl(), std::span(&view, 1));
+  }
+
+  /// The image of every pixel. The buffer is poisoned before.
+  std::vector<cl_float4> forward(const Smoothing& smoothing, const glm::vec3& background) {
+    aggregate_.set_smoothing(smoothing);
+    poison(aggregate_.image, frame_.width, cl_float4{{k_poison, k_poison, k_poison, k_poison}});
+    aggregate_.forward(inputs(), background);
+    return aggregate_.image.download();
+  }
+
+  /// Gradients of every fragment, as they were given, and of every pixel. After forward(). Buffers are poisoned before.
+  struct Gradients {
+    std::vector<std::vector<float>> depth, log_occupancy, red, green, blue;  // [pixel][fragment]
+    std::vector<float> gamma, alpha;                                         // [pixel]
+    std::vector<glm::vec3> background;                                       // [pixel]
+  };
+  Gradients backward(const glm::vec3& background, const std::vector<cl_float4>& grad_image) {
+    const Buffer<cl_float4> grad(device_impl(), std::span<const cl_float4>(grad_image));
+    for (Buffer<float>* buffer : {&aggregate_.grad_depth, &aggregate_.grad_log_occupancy, &aggregate_.grad_color.red,
+                                  &aggregate_.grad_color.green, &aggregate_.grad_color.blue}) {
+      poison(*buffer, fragments_);
+    }
+    const std::size_t pixels = frame_.width;
+    poison(aggregate_.channels, DPR_PIXEL_CHANNELS * pixels);
+    aggregate_.backward(inputs(), background, grad);
+    Gradients g;
+    g.depth = by_pixel(aggregate_.grad_depth);
+    g.log_occupancy = by_pixel(aggregate_.grad_log_occupancy);
+    g.red = by_pixel(aggregate_.grad_color.red);
+    g.green = by_pixel(aggregate_.grad_color.green);
+    g.blue = by_pixel(aggregate_.grad_color.blue);
+    const std::vector<float> channels = aggregate_.channels.download();
+    const auto channel = [&](std::size_t c, std::size_t i) { return channels[c * pixels + i]; };
+    for (std::size_t i = 0; i < pixels; ++i) {
+      g.gamma.push_back(channel(DPR_CHANNEL_GAMMA, i));
+      g.alpha.push_back(channel(DPR_CHANNEL_ALPHA, i));
+      g.background.emplace_back(channel(DPR_CHANNEL_BACKGROUND, i), channel(DPR_CHANNEL_BACKGROUND + 1, i),
+                                channel(DPR_CHANNEL_BACKGROUND + 2, i));
+    }
+    return g;
+  }
+
+  /// The fragments as the pixels list them now: the joint composition sorts.
+  std::vector<cl_uint> list() const { return rasterize_.list.download(); }
+  std::vector<float> depths() const { return rasterize_.depth.download(); }
+
+ private:
+  AggregateInputs inputs() { return {frame_, views_, bin_, rasterize_, occupancy_, shade_}; }
+
+  std::vector<std::vector<float>> by_pixel(const Buffer<float>& buffer) const {
+    const std::vector<float> all = buffer.download();
+    std::vector<std::vector<float>> values(frame_.width);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) values[i].push_back(all[place_[at]]);
+    }
+    return values;
+  }
+
+  shared::FrameParams frame_{};
+  DeviceViews views_;
+  Bin bin_;
+  Rasterize rasterize_;
+  Occupancy occupancy_;
+  Shade shade_;
+  Aggregate aggregate_;
+  std::size_t fragments_ = 0;
+  std::vector<cl_uint> first_, place_;
+};
+
+}  // namespace dpr::test
