@@ -17,6 +17,10 @@
 
 #define DPR_OPAQUE 1e-9f
 
+/// The backward pass skips fragments whose occupancy is below this: an error of at most that in the weights. The
+/// forward pass keeps them, since an L1 loss asks for the sign of the smallest difference.
+#define DPR_NEGLIGIBLE 1e-8f
+
 /// Runs up to this length are sorted by insertion.
 #define DPR_INSERTION_SORT 24
 
@@ -75,12 +79,15 @@ static inline int overlaps(float nearer, float further, float depth_scale) {
   return (further - nearer) * depth_scale < DPR_JOINT_BELOW + DPR_JOINT_ABOVE;
 }
 
+/// As many blocks as the largest step allows; their nodes share the whole span evenly.
 static inline void place_nodes(const Fragments f, Cluster* c) {
   c->nearest = f.depth[f.list[c->first]];
   const float extent = (f.depth[f.list[c->last - 1]] - c->nearest) * c->depth_scale;
-  c->step = c->last - c->first > DPR_CROWD ? DPR_JOINT_CROWD_STEP : DPR_JOINT_STEP;
-  c->top = DPR_JOINT_ABOVE;
-  c->blocks = 1 + (uint)((extent + DPR_JOINT_BELOW + DPR_JOINT_ABOVE) / (c->step * DPR_WIDTH));
+  const float span = extent + DPR_JOINT_BELOW + DPR_JOINT_ABOVE;
+  const float largest_step = c->last - c->first > DPR_CROWD ? DPR_JOINT_CROWD_STEP : DPR_JOINT_STEP;
+  c->blocks = (uint)ceil(span / (largest_step * DPR_WIDTH));
+  c->step = span / (float)(DPR_WIDTH * c->blocks);
+  c->top = DPR_JOINT_ABOVE - 0.5f * c->step;
 }
 
 static inline Cluster cluster_from(const Fragments f, uint first, uint end, float depth_scale) {
@@ -187,6 +194,7 @@ static inline float cluster_gradients(const Cluster c, const Fragments f, float3
     realn product = c.step, ratio_sum = 0.0f, grad_sum = 0.0f, passing, ratio, cdf;
     for (uint i = c.first; i < c.last; ++i) {
       const uint k = f.list[i];
+      if (f.occupancy[k] < DPR_NEGLIGIBLE) continue;
       slot_terms(c, f, k, t, &passing, &ratio, &cdf);
       product *= passing;
       ratio_sum += ratio;
@@ -195,11 +203,12 @@ static inline float cluster_gradients(const Cluster c, const Fragments f, float3
     seen += sum_lanes(product * grad_sum);
     for (uint i = c.first; i < c.last; ++i) {
       const uint k = f.list[i];
+      if (f.occupancy[k] < DPR_NEGLIGIBLE) continue;
       const float g = dot(grad, fragment_color(f, k));
       slot_terms(c, f, k, t, &passing, &ratio, &cdf);
       const realn others = product / passing;
       // r_k / p_k without dividing by p: P r_k / p_k = (P / T_k) f_k.
-      const realn density = f.occupancy[k] > 0.0f ? product * ratio / f.occupancy[k] : (realn)(0.0f);
+      const realn density = product * ratio / f.occupancy[k];
       share[k] += sum_lanes(density);
       grad_beta[k] += sum_lanes(product * ratio * (g * ratio_sum - grad_sum));
       grad_p[k] += sum_lanes(g * density + others * (cdf - 1.0f) * (grad_sum - g * ratio));

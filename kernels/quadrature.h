@@ -20,12 +20,12 @@
 #define DPR_CROWD_HIGH 6.2f
 #define DPR_CROWD_BLOCKS 2
 #define DPR_BARRIER_REACH 9.5f
-/// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each), the step
-/// of the nodes, and the step for a crowd.
+/// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each), the largest
+/// step between nodes, and that for a crowd.
 #define DPR_JOINT_BELOW 4.8f
 #define DPR_JOINT_ABOVE 4.8f
-#define DPR_JOINT_STEP 0.6f
-#define DPR_JOINT_CROWD_STEP 0.3f
+#define DPR_JOINT_STEP 0.67f
+#define DPR_JOINT_CROWD_STEP 0.335f
 #elif DPR_PRIOR == DPR_LOGISTIC
 #define DPR_BARRIER_LOW (-11.0f)
 #define DPR_BARRIER_HIGH 20.0f
@@ -36,8 +36,8 @@
 #define DPR_BARRIER_REACH 26.0f
 #define DPR_JOINT_BELOW 14.0f
 #define DPR_JOINT_ABOVE 14.0f
-#define DPR_JOINT_STEP 0.875f
-#define DPR_JOINT_CROWD_STEP 0.4375f
+#define DPR_JOINT_STEP 0.95f
+#define DPR_JOINT_CROWD_STEP 0.475f
 #elif DPR_PRIOR == DPR_GUMBEL
 #define DPR_BARRIER_REACH 17.0f /* softmax: exp(-17) = 4e-8 */
 #define DPR_JOINT_BELOW 3.0f

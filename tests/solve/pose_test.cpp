@@ -66,6 +66,7 @@ TEST_SUITE("pipeline") {
     transform = glm::translate(glm::mat4(1.0F), glm::vec3(0.3F, -0.2F, 0.1F)) *
                 glm::rotate(glm::mat4(1.0F), 0.4F, glm::vec3(k_axis)) *
                 glm::scale(glm::mat4(1.0F), glm::vec3(0.8F));
+    scene.smoothing = dpr::smoothing_preset("joint_gaussian");  // does not swell, so sizes tell distances
     dpr::PoseOptions with_translation = options(reduced() ? 3 : 200);
     with_translation.solve_translation = true;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), with_translation);
