@@ -2,6 +2,7 @@
 #pragma once
 
 #include "dpr/adaptive_smoothing.hpp"
+#include "dpr/annealed_smoothing.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"

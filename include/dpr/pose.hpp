@@ -3,10 +3,11 @@
 
 #include <functional>
 #include <glm/glm.hpp>
-#include <optional>
+#include <variant>
 #include <vector>
 
 #include "dpr/adaptive_smoothing.hpp"
+#include "dpr/annealed_smoothing.hpp"
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
 #include "dpr/loss.hpp"
@@ -28,16 +29,22 @@ glm::dvec3 vector_from_rotation(const glm::dmat3& rotation);
 double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
 
 struct PoseOptions {
-  unsigned iterations = 300;
+  unsigned iterations = 200;
   OptimizerOptions optimizer;
-  AdaptiveSchedule schedule;
+  /// How the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has it.
+  std::variant<AnnealSchedule, AdaptiveSchedule> schedule;
   LossWeights loss = LossWeights::only(LossKind::mse);
   bool solve_translation = false;
+  /// Further descents, each from a rotation turned away from the initial one, as long as the target is not explained:
+  /// as long as the loss is above that part of the initial pose's loss, both under the finest smoothing reached.
+  unsigned restarts = 6;
+  float explained = 0.1F;  ///< in (0, 1)
 };
 
 /// One iteration: the pose it evaluated, and under which smoothing.
 struct PoseIteration {
-  unsigned iteration = 0;
+  unsigned iteration = 0;  ///< counted through all descents
+  unsigned descent = 0;    ///< 0, or the number of the restart
   double loss = 0;
   float sigma = 0, gamma = 0;
   std::uint32_t samples = 0;
@@ -45,9 +52,11 @@ struct PoseIteration {
 };
 
 struct PoseResult {
-  Pose pose;        ///< the best of the last smoothing level; losses of different levels are never compared
-  double loss = 0;  ///< at that level
-  unsigned iterations = 0;
+  /// The best of the last smoothing level of the best descent; losses of different levels are never compared.
+  Pose pose;
+  double loss = 0;          ///< at the finest level
+  unsigned iterations = 0;  ///< of all descents
+  unsigned descent = 0;     ///< the one that found the pose
   double seconds = 0;
   std::vector<PoseIteration> history;
 };
@@ -64,6 +73,7 @@ class PoseSolver {
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;
+  /// Throws InvalidArgument if the initial rotation is none.
   PoseResult solve(const Pose& initial, const Callback& callback = {}) const;
 
  private:

@@ -22,6 +22,7 @@ Scene cube_scene() {
   Lights lights;
   lights.point = {{.position = {3, 5, -4}, .diffuse = glm::vec3(0.5F), .specular = glm::vec3(0.1F)}};
   scene.lights = lights;
+  scene.smoothing = smoothing_preset("joint_gaussian");
   return scene;
 }
 
@@ -31,17 +32,6 @@ Image render_rigidly(const Device& device, Scene scene) {
   renderer.set_scene(scene);
   renderer.forward();
   return renderer.image();
-}
-
-/// Without the noise of sampling the smoothing can shrink in quicker steps than in the published schedule: a
-/// degree of error instead of three after as many iterations.
-PoseOptions solver_options() {
-  PoseOptions options;
-  options.schedule.start = 60;
-  options.schedule.interval = 10;
-  options.schedule.rate = 1.15F;
-  options.schedule.learning_rate_divisor = 1.05F;
-  return options;
 }
 
 /// Uniform on the sphere, by rejection; the distributions of the standard library differ from one to the
@@ -62,7 +52,7 @@ void run(const std::string& folder, const CommonOptions& common) {
   apply(common, scene);
   const Device device = open_device(common);
   const Image target = render_rigidly(device, scene);
-  const PoseOptions options = solver_options();
+  const PoseOptions options;
   const PoseSolver solver(device, scene, target, options);
   const Pose truth = solver.scene_pose();
 

@@ -13,7 +13,8 @@ namespace dpr::cli {
 namespace {
 
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, loss = "mse", optimizer = "adam", output, report;
+  std::string scene, target, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
+                              output, report;
   PoseOptions solver;
 };
 
@@ -21,6 +22,12 @@ OptimizerKind parse_optimizer(const std::string& word) {
   if (word == "adam") return OptimizerKind::adam;
   if (word == "sgd") return OptimizerKind::sgd;
   throw InvalidArgument("--optimizer (command line)", "\"" + word + "\"", "adam or sgd");
+}
+
+std::variant<AnnealSchedule, AdaptiveSchedule> parse_schedule(const std::string& word) {
+  if (word == "anneal") return AnnealSchedule{};
+  if (word == "adaptive") return AdaptiveSchedule{};
+  throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
 }
 
 void run(PoseCommandOptions& options, const CommonOptions& common) {
@@ -36,6 +43,7 @@ void run(PoseCommandOptions& options, const CommonOptions& common) {
   const Image target = read_image(options.target);
   options.solver.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
   options.solver.optimizer.kind = parse_optimizer(options.optimizer);
+  options.solver.schedule = parse_schedule(options.schedule);
 
   const Device device = open_device(common);
   const PoseSolver solver(device, scene, target, options.solver);
@@ -55,9 +63,16 @@ void add_solver_options(CLI::App& command, PoseCommandOptions& options) {
   command.add_flag("--translation", solver.solve_translation, "Look for the translation too");
   command.add_option("--loss", options.loss, "What is made small; mse by default")
       ->type_name("mse|l1|silhouette");
-  command.add_option("--iterations", solver.iterations, "How many steps; 300 by default")->type_name("N");
+  command.add_option("--iterations", solver.iterations, "How many steps; 200 by default")->type_name("N");
+  command.add_option("--restarts", solver.restarts, "Further descents while the target is not explained; 6 by default")
+      ->type_name("N");
   command.add_option("--optimizer", options.optimizer, "How steps are made; adam by default")
       ->type_name("adam|sgd");
+  command
+      .add_option("--schedule", options.schedule,
+                  "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive "
+                  "schedule; anneal by default")
+      ->type_name("anneal|adaptive");
   command
       .add_option("--learning-rate", solver.optimizer.learning_rate,
                   "Size of the first steps; 0.05 by default")

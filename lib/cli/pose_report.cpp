@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 
 #include "cli/plot.hpp"
@@ -52,8 +53,11 @@ Image difference(const Image& a, const Image& b) {
   return result;
 }
 
-/// Iterations at equal distances, first and last among them.
-Image strip(PoseCamera& camera, const Smoothing& base, const std::vector<PoseIteration>& history) {
+/// Iterations of the descent that found the pose, at equal distances, first and last among them.
+Image strip(PoseCamera& camera, const Smoothing& base, const PoseResult& result) {
+  std::vector<PoseIteration> history;
+  std::ranges::copy_if(result.history, std::back_inserter(history),
+                       [&](const PoseIteration& step) { return step.descent == result.descent; });
   std::vector<Image> images;
   const std::size_t count = std::min(k_strip_length, history.size());
   for (std::size_t i = 0; i < count; ++i) {
@@ -91,11 +95,11 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
 
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);
-  return [progress](const PoseIteration& step) {
+  return [progress, iterations](const PoseIteration& step) {
     char text[96];
-    std::snprintf(text, sizeof text, "loss %.4e  sigma %.1e  gamma %.1e", step.loss, number(step.sigma),
-                  number(step.gamma));
-    progress->update(step.iteration + 1, text);
+    std::snprintf(text, sizeof text, "descent %u  loss %.4e  sigma %.1e  gamma %.1e", step.descent + 1, step.loss,
+                  number(step.sigma), number(step.gamma));
+    progress->update(step.iteration % iterations + 1, text);
     return true;
   };
 }
@@ -114,6 +118,7 @@ Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& tru
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) {
     Json entry{{"iteration", step.iteration},
+               {"descent", step.descent},
                {"loss", step.loss},
                {"sigma", number(step.sigma)},
                {"gamma", number(step.gamma)},
@@ -134,7 +139,7 @@ void write_pose_report(const std::filesystem::path& folder, const Device& device
   write_image(folder / "start.png", opaque(camera.render(result.history.front().pose, rigid_smoothing())));
   write_image(folder / "end.png", opaque(end));
   write_image(folder / "difference.png", opaque(difference(end, target)));
-  write_image(folder / "iterations.png", strip(camera, scene.smoothing, result.history));
+  write_image(folder / "iterations.png", strip(camera, scene.smoothing, result));
   if (!plot_history(folder / "plot.png", result.history, truth) && !quiet) {
     std::printf("plot.png is left out: gnuplot is not installed\n");
   }

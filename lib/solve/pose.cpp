@@ -4,9 +4,12 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
+#include <variant>
 
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
@@ -84,6 +87,81 @@ void descend(Pose& pose, Optimizer& optimizer, const PoseGradient& gradient, boo
   if (with_translation) pose.translation += glm::dvec3(step[3], step[4], step[5]);
 }
 
+/// The schedule at work: changes smoothing and learning rate between two iterations.
+class Schedule {
+ public:
+  explicit Schedule(const PoseOptions& options, const Smoothing& start) {
+    if (const auto* anneal = std::get_if<AnnealSchedule>(&options.schedule)) {
+      annealed_.emplace(*anneal, options.iterations, start, options.optimizer.learning_rate);
+    } else {
+      adaptive_.emplace(std::get<AdaptiveSchedule>(options.schedule));
+    }
+  }
+
+  /// True if the smoothing changed.
+  bool update(unsigned iteration, double grad_gamma, Smoothing& smoothing, Optimizer& optimizer) {
+    double learning_rate = optimizer.learning_rate();
+    if (annealed_ ? !annealed_->update(iteration, smoothing, learning_rate)
+                  : !adaptive_->update(iteration, grad_gamma, smoothing, learning_rate)) {
+      return false;
+    }
+    optimizer.set_learning_rate(learning_rate);
+    if (adaptive_) optimizer.restart();  // as published; annealing's steps are too small to need it
+    return true;
+  }
+
+ private:
+  std::optional<AnnealedSmoothing> annealed_;
+  std::optional<AdaptiveSmoothing> adaptive_;
+};
+
+/// Where a descent starts: the initial pose, then that pose turned by a fixed angle about axes spread evenly over the
+/// sphere (a Fibonacci lattice).
+Pose restart_pose(const Pose& initial, unsigned descent) {
+  if (descent == 0) return initial;
+  constexpr double k_turn_degrees = 60;  // out of the valley, not out of the neighbourhood
+  constexpr double k_lattice_points = 8;
+  const double golden_angle = glm::pi<double>() * (3 - std::sqrt(5.0));
+  const double height = 1 - 2 * (std::fmod(descent - 1, k_lattice_points) + 0.5) / k_lattice_points;
+  const double radius = std::sqrt(1 - height * height), angle = golden_angle * descent;
+  const glm::dvec3 axis(radius * std::cos(angle), height, radius * std::sin(angle));
+  return {rotation_from_vector(glm::radians(k_turn_degrees) * axis) * initial.rotation, initial.translation};
+}
+
+/// What one descent found: the best pose of its last smoothing level.
+struct Descent {
+  Pose pose;
+  Smoothing smoothing;
+  bool stopped = false;  // by the callback
+};
+
+Descent descend_from(Objective& objective, const PoseOptions& options, Pose pose, const Smoothing& start,
+                     unsigned descent, const PoseSolver::Callback& callback, std::vector<PoseIteration>& history) {
+  Optimizer optimizer(options.optimizer);
+  Schedule schedule(options, start);
+  Descent best{pose, start};
+  objective.set_smoothing(start);
+  double best_loss = 0;
+  for (unsigned i = 0; i < options.iterations; ++i) {
+    const Smoothing& smoothing = best.smoothing;
+    const double loss = objective.evaluate(pose, i);
+    if (i == 0 || loss < best_loss) std::tie(best.pose, best_loss) = std::tie(pose, loss);
+    history.push_back({static_cast<unsigned>(history.size()), descent, loss, smoothing.sigma, smoothing.gamma,
+                       smoothing.samples, pose});
+    if (callback && !callback(history.back())) {
+      best.stopped = true;
+      break;
+    }
+    const SceneGradient gradient = objective.gradient();
+    descend(pose, optimizer, gradient.views.front().transforms.front(), options.solve_translation);
+    if (schedule.update(i, gradient.gamma, best.smoothing, optimizer)) {
+      objective.set_smoothing(best.smoothing);
+      best_loss = objective.evaluate(best.pose, i);  // its loss so far is of another level
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options)
@@ -95,9 +173,11 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
                           size_text(scene_.width, scene_.height) + ", the scene's");
   }
   require(options_.iterations > 0, "iterations (pose)", options_.iterations, "at least 1");
+  require(options_.explained > 0 && options_.explained < 1, "explained (pose)", options_.explained,
+          "a number in (0, 1)");
   // Each throws what is wrong with its options.
   [[maybe_unused]] const Optimizer optimizer(options_.optimizer);
-  [[maybe_unused]] const AdaptiveSmoothing adaptive(options_.schedule);
+  [[maybe_unused]] const Schedule schedule(options_, scene_.smoothing);
 
   const glm::dmat3 linear(scene_.meshes.front().transform);
   require(std::abs(glm::determinant(linear)) > 0, "determinant of the transform (pose)",
@@ -110,7 +190,7 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
                       .transform = true,
                       .camera = false,
                       .lights = false,
-                      .smoothing = options_.iterations > options_.schedule.start,
+                      .smoothing = std::holds_alternative<AdaptiveSchedule>(options_.schedule),
                       .background = false};
 }
 
@@ -123,31 +203,27 @@ PoseResult PoseSolver::solve(const Pose& initial, const Callback& callback) cons
   require_rotation(initial.rotation);
   const auto start = std::chrono::steady_clock::now();
   Objective objective(device_, scene_, target_, options_.loss, stretch_);
-  Optimizer optimizer(options_.optimizer);
-  AdaptiveSmoothing adaptive(options_.schedule);
-  Smoothing smoothing = scene_.smoothing;
-  double learning_rate = options_.optimizer.learning_rate;
+  const Pose first{polar_decomposition(initial.rotation).rotation, initial.translation};
 
-  PoseResult best;
-  Pose pose{polar_decomposition(initial.rotation).rotation, initial.translation};
-  for (unsigned i = 0; i < options_.iterations; ++i) {
-    const double loss = objective.evaluate(pose, i);
-    if (i == 0 || loss < best.loss) std::tie(best.pose, best.loss) = std::tie(pose, loss);
-    best.history.push_back({i, loss, smoothing.sigma, smoothing.gamma, smoothing.samples, pose});
-    if (callback && !callback(best.history.back())) break;
-
-    const SceneGradient gradient = objective.gradient();
-    descend(pose, optimizer, gradient.views.front().transforms.front(), options_.solve_translation);
-    if (adaptive.update(i, gradient.gamma, smoothing, learning_rate)) {
-      objective.set_smoothing(smoothing);
-      optimizer.set_learning_rate(learning_rate);
-      optimizer.restart();
-      best.loss = objective.evaluate(best.pose, i);  // its loss so far is of another level
+  PoseResult result;
+  Smoothing finest = scene_.smoothing;
+  double enough = 0;
+  for (unsigned descent = 0; descent <= options_.restarts; ++descent) {
+    const Descent found = descend_from(objective, options_, restart_pose(first, descent), scene_.smoothing, descent,
+                                       callback, result.history);
+    // Descents may end at different levels: they are compared at that of the first.
+    if (descent == 0) finest = found.smoothing;
+    objective.set_smoothing(finest);
+    const double loss = objective.evaluate(found.pose, 0);
+    if (descent == 0) enough = options_.explained * objective.evaluate(first, 0);
+    if (descent == 0 || loss < result.loss) {
+      std::tie(result.pose, result.loss, result.descent) = std::tie(found.pose, loss, descent);
     }
+    if (found.stopped || result.loss <= enough) break;
   }
-  best.iterations = static_cast<unsigned>(best.history.size());
-  best.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return best;
+  result.iterations = static_cast<unsigned>(result.history.size());
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
 }
 
 }  // namespace dpr

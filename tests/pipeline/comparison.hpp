@@ -1,5 +1,5 @@
-// The library against the double-precision reference: the same scene in its types, the gradients side by side, and
-// the pixels where single and double precision may rightly differ.
+// The library against the double-precision reference: the same scene in its types, the gradients side by
+// side, and the pixels where single and double precision may rightly differ.
 #pragma once
 
 #include <algorithm>
@@ -65,16 +65,17 @@ inline reference::Camera to_reference(const Camera& camera) {
 }
 
 inline reference::Smoothing to_reference(const Smoothing& s) {
-  return {to_reference(s.occupancy_prior),
-          to_reference(s.depth_prior),
-          s.sigma,
-          s.gamma,
-          s.alpha,
-          s.composition == Composition::joint ? reference::Composition::joint : reference::Composition::barrier,
-          blur_radius(s),
-          s.background_depth,
-          s.distance == DistanceMetric::euclidean ? reference::DistanceMetric::euclidean
-                                                  : reference::DistanceMetric::squared};
+  return {
+      to_reference(s.occupancy_prior),
+      to_reference(s.depth_prior),
+      s.sigma,
+      s.gamma,
+      s.alpha,
+      s.composition == Composition::joint ? reference::Composition::joint : reference::Composition::barrier,
+      blur_radius(s),
+      s.background_depth,
+      s.distance == DistanceMetric::euclidean ? reference::DistanceMetric::euclidean
+                                              : reference::DistanceMetric::squared};
 }
 
 inline reference::Lights to_reference(const Lights& lights) {
@@ -110,8 +111,12 @@ inline reference::Scene to_reference(const Scene& scene) {
 }
 
 inline void append(std::vector<double>& list, double v) { list.push_back(v); }
-inline void append(std::vector<double>& list, const glm::vec3& v) { list.insert(list.end(), {v.x, v.y, v.z}); }
-inline void append(std::vector<double>& list, const glm::dvec3& v) { list.insert(list.end(), {v.x, v.y, v.z}); }
+inline void append(std::vector<double>& list, const glm::vec3& v) {
+  list.insert(list.end(), {v.x, v.y, v.z});
+}
+inline void append(std::vector<double>& list, const glm::dvec3& v) {
+  list.insert(list.end(), {v.x, v.y, v.z});
+}
 inline void append(std::vector<double>& list, const reference::Vec3d& v) {
   list.insert(list.end(), {v.x, v.y, v.z});
 }
@@ -215,7 +220,8 @@ struct Delicate {
 };
 
 inline void find_delicate(const reference::NdcTriangle& t, const reference::Vec2d& point, double reach,
-                          double margin, std::vector<bool>::reference jump, std::vector<bool>::reference kink) {
+                          double margin, std::vector<bool>::reference jump,
+                          std::vector<bool>::reference kink) {
   const reference::Vec3d b = reference::screen_barycentric(t, point);
   const bool inside = reference::is_inside(b);
   const double distance = std::sqrt(reference::nearest_edge(t, point).squared_distance);

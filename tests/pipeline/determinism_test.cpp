@@ -1,5 +1,5 @@
-// The same input gives the same bits: from run to run, from renderer to renderer, alone or in a batch, set piece by
-// piece or at once. And memory: independent of the samples, and settled after the first iteration.
+// The same input gives the same bits: from run to run, from renderer to renderer, alone or in a batch, set
+// piece by piece or at once. And memory: independent of the samples, and settled after the first iteration.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -216,7 +216,8 @@ TEST_SUITE("pipeline") {
         CHECK(same_bits(batch.image(v), single.image()));
         const SceneGradient g = single.backward(std::span(&grads[v], 1));
         const auto view_values = [](const ViewGradient& view) {
-          std::vector<double> values = flat<glm::dvec3>({view.camera.view.rotation, view.camera.view.translation});
+          std::vector<double> values =
+              flat<glm::dvec3>({view.camera.view.rotation, view.camera.view.translation});
           values.push_back(view.camera.fov_y_degrees);
           for (const PoseGradient& pose : view.transforms) {
             append(values, pose.rotation);

@@ -1,6 +1,6 @@
-// Sampled aggregation over exact occupancies end to end: the mean over many seeds is the exact image, and the exact
-// gradient of every block, within the standard error. Sampled inside sampled approaches neither (the logarithm of a
-// sampled occupancy is biased): determinism_test.cpp.
+// Sampled aggregation over exact occupancies end to end: the mean over many seeds is the exact image, and the
+// exact gradient of every block, within the standard error. Sampled inside sampled approaches neither (the
+// logarithm of a sampled occupancy is biased): determinism_test.cpp.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -73,7 +73,8 @@ struct Sample {
   std::vector<double> mean, standard_error;
 };
 
-Sample sample(const Device& device, Scene scene, const Image& grad, const std::vector<Figure>& figures, int seeds) {
+Sample sample(const Device& device, Scene scene, const Image& grad, const std::vector<Figure>& figures,
+              int seeds) {
   scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
   Renderer renderer(device);
   renderer.set_scene(scene);
@@ -114,7 +115,7 @@ Scene test_scene(Prior prior, int size) {
   // Depths of the cube's sides differ by a few gamma, so that several of them win.
   scene.smoothing.gamma = 5e-2F;
   scene.smoothing.depth_prior = prior;
-  scene.smoothing.samples = static_cast<std::uint32_t>(reduced(256, 16));
+  scene.smoothing.samples = static_cast<std::uint32_t>(reduced(512, 16));
   return scene;
 }
 
@@ -137,7 +138,9 @@ Image test_grad(const Device& device, int size) {
 }  // namespace
 
 TEST_SUITE("statistical") {
-  TEST_CASE("monte carlo: the mean over seeds is the exact image and gradient, every prior and variance reduction") {
+  TEST_CASE(
+      "monte carlo: the mean over seeds is the exact image and gradient, every prior and variance "
+      "reduction") {
     const int size = reduced(24, 6), seeds = reduced(64, 8);
     const Device device = open_device();
     const Image grad = test_grad(device, size);
@@ -167,7 +170,8 @@ TEST_SUITE("statistical") {
           if (z > worst) worst_name = name + ", " + figures[i].name;
           worst = std::max(worst, z);
           // What must not pass: a figure of twice the length, or with the other sign.
-          const double wrong = std::min(deviation(2 * mean, 2 * error, expected), deviation(-mean, error, expected));
+          const double wrong =
+              std::min(deviation(2 * mean, 2 * error, expected), deviation(-mean, error, expected));
           power[figures[i].name] = std::max(power[figures[i].name], wrong);
         }
       }
@@ -175,10 +179,10 @@ TEST_SUITE("statistical") {
     MESSAGE("worst of " << count << " figures: " << worst << " standard errors, " << worst_name);
     if (reduced(1, 0) == 0) return;  // with few seeds nothing stands out
     std::string text;
-    for (const auto& [name, wrong] : power) {
-      CAPTURE(name);
-      CHECK(wrong > k_standard_errors);
-      text += name + " " + std::to_string(wrong) + "\n";
+    for (const auto& entry : power) {
+      CAPTURE(entry.first);
+      CHECK(entry.second > k_standard_errors);
+      text += entry.first + " " + std::to_string(entry.second) + "\n";
     }
     MESSAGE("standard errors by which a factor of 2 or -1 would show:\n" << text);
   }

@@ -1,5 +1,5 @@
-// The exact renderer end to end against the serial reference in double precision: images, losses and every block of
-// gradients, over shapes, cameras, image sizes, lights, priors, compositions and metrics.
+// The exact renderer end to end against the serial reference in double precision: images, losses and every
+// block of gradients, over shapes, cameras, image sizes, lights, priors, compositions and metrics.
 #include <doctest/doctest.h>
 
 #include <functional>
@@ -146,7 +146,8 @@ TEST_SUITE("pipeline") {
     }
     const std::size_t shapes = scenes.size();
     for (std::size_t i = 0; i < shapes; ++i) {
-      scenes.emplace_back(scenes[i].first + ", joint", with_composition(scenes[i].second, Composition::joint));
+      scenes.emplace_back(scenes[i].first + ", joint",
+                          with_composition(scenes[i].second, Composition::joint));
     }
     check_scenes(scenes);
   }
@@ -188,7 +189,9 @@ TEST_SUITE("pipeline") {
     Scene& euclidean = scenes.emplace_back("euclidean", cube_scene(size, size)).second;
     euclidean.smoothing.distance = DistanceMetric::euclidean;
     euclidean.smoothing.sigma = 0.03F;
-    Scene& affine = scenes.emplace_back("not perspective correct", scene_of(make_torus(1.1F, 0.45F, 9, 7), size, size)).second;
+    Scene& affine =
+        scenes.emplace_back("not perspective correct", scene_of(make_torus(1.1F, 0.45F, 9, 7), size, size))
+            .second;
     affine.perspective_correct = false;
     Scene& black = scenes.emplace_back("default smoothing, black background", cube_scene(size, size)).second;
     black.smoothing = Smoothing{};
@@ -235,9 +238,10 @@ TEST_SUITE("pipeline") {
     const int size = reduced(25, 7);
     const Device device = open_device();
     Worst worst;
-    const std::pair<LossKind, reference::Loss> kinds[] = {{LossKind::mse, reference::Loss::mse},
-                                                          {LossKind::l1, reference::Loss::l1},
-                                                          {LossKind::silhouette, reference::Loss::silhouette}};
+    const std::pair<LossKind, reference::Loss> kinds[] = {
+        {LossKind::mse, reference::Loss::mse},
+        {LossKind::l1, reference::Loss::l1},
+        {LossKind::silhouette, reference::Loss::silhouette}};
     for (const Composition composition : {Composition::barrier, Composition::joint}) {
       const Scene scene = with_composition(cube_scene(size, size), composition);
       const reference::Scene twin = to_reference(scene);
@@ -255,7 +259,8 @@ TEST_SUITE("pipeline") {
         const double error = std::fabs(loss.evaluate(renderer) / expected.value - 1);
         CHECK(error < 1e-5);
         worst.add("loss", name, error, 1e-5);
-        for (const Block& block : blocks_of(renderer.backward(loss), reference::gradient(twin, expected.grad_image))) {
+        for (const Block& block :
+             blocks_of(renderer.backward(loss), reference::gradient(twin, expected.grad_image))) {
           CAPTURE(block.name);
           const double tolerance = tolerance_of(block, scene.smoothing);
           CHECK(block_error(block, tolerance) < tolerance);
@@ -297,8 +302,8 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("reference: pixels at the blur radius and on edges are found") {
-    // A triangle whose upper edge runs through the centres of row 2 of 8x8 pixels, its left edge a blur radius
-    // to the right of column 1.
+    // A triangle whose upper edge runs through the centres of row 2 of 8x8 pixels, its left edge a blur
+    // radius to the right of column 1.
     Scene scene;
     scene.width = scene.height = 8;
     const float distance = 2.0F, per_ndc = distance * std::tan(glm::radians(30.0F));

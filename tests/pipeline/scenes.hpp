@@ -30,7 +30,8 @@ class Random {
 /// A rotation about a skew axis, a scale, a shift.
 inline glm::mat4 placed(float degrees, float scale = 1.0F, glm::vec3 shift = glm::vec3(0)) {
   const glm::mat4 moved = glm::translate(glm::mat4(1.0F), shift);
-  return glm::scale(glm::rotate(moved, glm::radians(degrees), glm::vec3(0.3F, 0.8F, 0.52F)), glm::vec3(scale));
+  return glm::scale(glm::rotate(moved, glm::radians(degrees), glm::vec3(0.3F, 0.8F, 0.52F)),
+                    glm::vec3(scale));
 }
 
 /// A mesh of about unit size that fills most of the image. Depth spans a tenth of the clipping range, so that
@@ -75,8 +76,8 @@ inline Mesh random_soup(unsigned faces, unsigned seed) {
   return mesh;
 }
 
-/// Beside a few ordinary triangles: two corners in one place, one in a point, one smaller than a hundredth of a
-/// pixel, one a tenth of a pixel, one twenty times as large as the image.
+/// Beside a few ordinary triangles: two corners in one place, one in a point, one smaller than a hundredth of
+/// a pixel, one a tenth of a pixel, one twenty times as large as the image.
 inline Scene odd_scene(int width, int height) {
   Scene scene = scene_of(random_soup(6, 17), width, height);
   Mesh& mesh = scene.meshes[0].mesh;

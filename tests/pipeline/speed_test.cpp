@@ -1,5 +1,5 @@
-// A smoke test of the speed: the pose experiment's iteration has no stage that is slow by orders of magnitude.
-// Measurements are the benchmarks' business.
+// A smoke test of the speed: the pose experiment's iteration has no stage that is slow by orders of
+// magnitude. Measurements are the benchmarks' business.
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -37,10 +37,6 @@ dpr::Pose turned(double degrees) { return {dpr::rotation_from_vector(glm::radian
 dpr::PoseOptions options(unsigned iterations) {
   dpr::PoseOptions result;
   result.iterations = iterations;
-  result.schedule.start = 60;
-  result.schedule.interval = 10;
-  result.schedule.rate = 1.15F;
-  result.schedule.learning_rate_divisor = 1.05F;
   return result;
 }
 
@@ -66,8 +62,9 @@ TEST_SUITE("pipeline") {
     transform = glm::translate(glm::mat4(1.0F), glm::vec3(0.3F, -0.2F, 0.1F)) *
                 glm::rotate(glm::mat4(1.0F), 0.4F, glm::vec3(k_axis)) *
                 glm::scale(glm::mat4(1.0F), glm::vec3(0.8F));
-    scene.smoothing = dpr::smoothing_preset("joint_gaussian");  // does not swell, so sizes tell distances
-    dpr::PoseOptions with_translation = options(reduced() ? 3 : 200);
+    // Sizes must tell distances: this composition neither swells nor cuts its skirt off at the blur radius.
+    scene.smoothing = dpr::smoothing_preset("joint_gaussian");
+    dpr::PoseOptions with_translation = options(reduced() ? 3 : 400);
     with_translation.solve_translation = true;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), with_translation);
 
@@ -81,16 +78,16 @@ TEST_SUITE("pipeline") {
     const dpr::PoseResult result = solver.solve(start);
     CHECK(result.loss < result.history.front().loss);
     if (reduced()) return;
-    CHECK(dpr::angle_degrees(result.pose.rotation, truth.rotation) < 5);
-    CHECK(glm::length(result.pose.translation - truth.translation) < 0.1);
+    CHECK(dpr::angle_degrees(result.pose.rotation, truth.rotation) < 3);
+    CHECK(glm::length(result.pose.translation - truth.translation) < 0.15);  // 2% of the distance
   }
 
   TEST_CASE("the best pose is the best of the last smoothing level") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(16);
     dpr::PoseOptions eager = options(reduced() ? 4 : 30);
-    eager.schedule.start = 1;
-    eager.schedule.interval = 1;
+    eager.schedule = dpr::AdaptiveSchedule{.start = 1, .interval = 1};
+    eager.restarts = 0;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), eager);
     const dpr::PoseResult result = solver.solve(turned(20));
     for (const dpr::PoseIteration& step : result.history) {
@@ -145,7 +142,13 @@ TEST_SUITE("robustness") {
     wrong.optimizer.learning_rate = -1;
     refuses(good, target, wrong);
     wrong = {};
-    wrong.schedule.interval = 0;
+    wrong.schedule = dpr::AdaptiveSchedule{.interval = 0};
+    refuses(good, target, wrong);
+    wrong = {};
+    wrong.schedule = dpr::AnnealSchedule{.levels = 0};
+    refuses(good, target, wrong);
+    wrong = {};
+    wrong.explained = 1;
     refuses(good, target, wrong);
   }
 

@@ -1,0 +1,148 @@
+// The structs that host and kernels share have one layout: a kernel writes every size and offset, and the
+// host compares them with its own.
+#include <doctest/doctest.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "shared_types.h"
+#include "support/probe.hpp"
+
+namespace {
+
+namespace shared = dpr::shared;
+
+/// A struct or a field: its OpenCL C expression, and the host's value.
+struct Entry {
+  std::string expression;
+  std::size_t host;
+};
+
+/// OpenCL C has no offsetof: the address of a field of an object, less the object's.
+std::string offset_expression(const std::string& type, const std::string& field) {
+  return "offset_of(" + type + ", " + field + ")";
+}
+
+#define DPR_SIZE(type) \
+  Entry { "(uint)sizeof(" #type ")", sizeof(shared::type) }
+#define DPR_FIELD(type, field) \
+  Entry { offset_expression(#type, #field), offsetof(shared::type, field) }
+
+std::vector<Entry> entries() {
+  return {DPR_SIZE(FrameParams),
+          DPR_FIELD(FrameParams, views),
+          DPR_FIELD(FrameParams, meshes),
+          DPR_FIELD(FrameParams, vertices),
+          DPR_FIELD(FrameParams, faces),
+          DPR_FIELD(FrameParams, width),
+          DPR_FIELD(FrameParams, height),
+          DPR_FIELD(FrameParams, tiles_x),
+          DPR_FIELD(FrameParams, tiles_y),
+          DPR_FIELD(FrameParams, pixel_size),
+          DPR_FIELD(FrameParams, blur_distance),
+          DPR_FIELD(FrameParams, euclidean),
+          DPR_FIELD(FrameParams, perspective_correct),
+          DPR_SIZE(ViewParams),
+          DPR_FIELD(ViewParams, row),
+          DPR_FIELD(ViewParams, projection),
+          DPR_FIELD(ViewParams, eye),
+          DPR_FIELD(ViewParams, znear),
+          DPR_FIELD(ViewParams, zfar),
+          DPR_FIELD(ViewParams, inverse_range),
+          DPR_SIZE(Triangle),
+          DPR_FIELD(Triangle, x0),
+          DPR_FIELD(Triangle, y0),
+          DPR_FIELD(Triangle, x1),
+          DPR_FIELD(Triangle, y1),
+          DPR_FIELD(Triangle, x2),
+          DPR_FIELD(Triangle, y2),
+          DPR_FIELD(Triangle, z0),
+          DPR_FIELD(Triangle, z1),
+          DPR_FIELD(Triangle, z2),
+          DPR_FIELD(Triangle, orientation),
+          DPR_FIELD(Triangle, first_tile),
+          DPR_FIELD(Triangle, last_tile),
+          DPR_SIZE(LightingParams),
+          DPR_FIELD(LightingParams, ambient),
+          DPR_FIELD(LightingParams, lights),
+          DPR_FIELD(LightingParams, shininess),
+          DPR_SIZE(Light),
+          DPR_FIELD(Light, position),
+          DPR_FIELD(Light, diffuse),
+          DPR_FIELD(Light, specular),
+          DPR_SIZE(OccupancyParams),
+          DPR_FIELD(OccupancyParams, sigma),
+          DPR_FIELD(OccupancyParams, samples),
+          DPR_FIELD(OccupancyParams, baseline),
+          DPR_FIELD(OccupancyParams, seed_low),
+          DPR_FIELD(OccupancyParams, seed_high),
+          DPR_FIELD(OccupancyParams, width),
+          DPR_FIELD(OccupancyParams, faces),
+          DPR_FIELD(OccupancyParams, pixels_per_view),
+          DPR_SIZE(AggregateParams),
+          DPR_FIELD(AggregateParams, background),
+          DPR_FIELD(AggregateParams, gamma),
+          DPR_FIELD(AggregateParams, alpha),
+          DPR_FIELD(AggregateParams, background_depth),
+          DPR_FIELD(AggregateParams, samples),
+          DPR_FIELD(AggregateParams, baseline),
+          DPR_FIELD(AggregateParams, seed_low),
+          DPR_FIELD(AggregateParams, seed_high),
+          DPR_FIELD(AggregateParams, pixels_per_view),
+          DPR_FIELD(AggregateParams, pixels),
+          DPR_FIELD(AggregateParams, faces),
+          DPR_SIZE(LossParams),
+          DPR_FIELD(LossParams, mse),
+          DPR_FIELD(LossParams, l1),
+          DPR_FIELD(LossParams, silhouette),
+          DPR_FIELD(LossParams, views),
+          DPR_FIELD(LossParams, pixels_per_view)};
+}
+
+/// What the device says of every entry.
+std::vector<cl_uint> device_values(const std::vector<Entry>& all, const std::string& header) {
+  std::string text =
+      header +
+      "#define offset_of(type, field) (uint)((size_t)&((type*)&storage)->field - (size_t)&storage)\n"
+      "kernel void probe(global uint* restrict out) {\n  float4 storage[32];\n";
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    text += "  out[" + std::to_string(i) + "] = " + all[i].expression + ";\n";
+  }
+  dpr::test::Probe probe({}, text + "}\n");
+  dpr::Buffer<cl_uint> out;
+  dpr::test::poison(out, all.size(), 0xdeadbeefU);
+  probe(1, out);
+  return out.download();
+}
+
+std::vector<std::string> differences(const std::string& header) {
+  const std::vector<Entry> all = entries();
+  const std::vector<cl_uint> values = device_values(all, header);
+  std::vector<std::string> wrong;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (values[i] != all[i].host) wrong.push_back(all[i].expression + " is " + std::to_string(values[i]));
+  }
+  return wrong;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("shared structs have the same layout on the device") {
+    CHECK(differences(dpr::test::header_text("shared_types.h")) == std::vector<std::string>{});
+  }
+
+  TEST_CASE("a field that only the device has is noticed") {
+    std::string header = dpr::test::header_text("shared_types.h");
+    const std::string field = "  uint lights;\n";
+    const std::size_t at = header.find(field);
+    REQUIRE(at != std::string::npos);
+    header.insert(at, "  uint surplus;\n");
+    const std::vector<std::string> wrong = differences(header);
+    REQUIRE(wrong.size() == 3);
+    CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 48");
+    CHECK(wrong[1] == "offset_of(LightingParams, lights) is 20");
+    CHECK(wrong[2] == "offset_of(LightingParams, shininess) is 24");
+  }
+}

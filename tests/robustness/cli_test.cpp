@@ -1,0 +1,228 @@
+// The command when something is wrong: its exit status, one line on stderr, and no output left behind. Runs
+// where the environment variable DPR_CLI names the command.
+#include <doctest/doctest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dpr/image.hpp"
+#include "dpr/mesh.hpp"
+#include "support/messages.hpp"
+#include "support/reduced.hpp"
+#include "support/temp_dir.hpp"
+
+using dpr::test::TempDir;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The command's path, or empty where it cannot be run.
+std::string command_path() {
+  const char* path = std::getenv("DPR_CLI");
+  if (path == nullptr || dpr::test::reduced(1, 0) == 0) return {};
+  return path;
+}
+
+/// A word of a shell's command line.
+std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) {
+    if (c == '\'') {
+      text += "'\\''";
+    } else {
+      text += c;
+    }
+  }
+  return text + "'";
+}
+
+struct Outcome {
+  int status = -1;
+  std::string out, err;
+};
+
+/// Runs the command in the folder. `environment` is NAME=VALUE or empty.
+Outcome run(const TempDir& folder, const std::vector<std::string>& arguments,
+            const std::string& environment = "") {
+  const TempDir streams;
+  std::string line = "cd " + quoted(folder.path().string()) + " && env " +
+                     (environment.empty() ? "" : quoted(environment) + " ") + quoted(command_path());
+  for (const std::string& argument : arguments) line += " " + quoted(argument);
+  line +=
+      " >" + quoted((streams / "out").string()) + " 2>" + quoted((streams / "err").string()) + " </dev/null";
+  const int result = std::system(line.c_str());
+  Outcome outcome;
+  if (WIFEXITED(result)) outcome.status = WEXITSTATUS(result);
+  outcome.out = streams.read("out");
+  outcome.err = streams.read("err");
+  return outcome;
+}
+
+/// "dpr: error: WHAT (WHERE): got ..., expected ...": one line and nothing else.
+bool is_error_line(const std::string& text) {
+  return text.starts_with("dpr: error: ") && text.size() > 13 && text.ends_with('\n') &&
+         std::ranges::count(text, '\n') == 1;
+}
+
+/// A mesh, a scene that shows it, and an image of another size than the scene's.
+void write_inputs(const TempDir& folder) {
+  dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+  folder.write("scene.json",
+               R"({"width": 16, "height": 12, "camera": {"view": [[1,0,0,0],[0,1,0,0],[0,0,1,-6.7],
+      [0,0,0,1]]}, "meshes": [{"file": "cube.ply"}]})");
+  dpr::write_image(folder / "target.exr", dpr::Image(16, 12, glm::vec4(0.5F)));
+  dpr::write_image(folder / "other.exr", dpr::Image(16, 16, glm::vec4(0.5F)));
+}
+
+std::vector<std::string> files(const TempDir& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path()))
+    names.push_back(entry.path().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+/// The command fails with that status, says one line that names the part, and leaves the folder as it was.
+void check_fails(const TempDir& folder, int status, const std::string& part,
+                 const std::vector<std::string>& arguments, const std::string& environment = "") {
+  std::string line;
+  for (const std::string& argument : arguments) line += " " + argument;
+  CAPTURE(line);
+  const std::vector<std::string> before = files(folder);
+  const Outcome outcome = run(folder, arguments, environment);
+  CAPTURE(outcome.err);
+  CHECK(outcome.status == status);
+  CHECK(is_error_line(outcome.err));
+  CHECK(dpr::test::contains(outcome.err, part));
+  CHECK(files(folder) == before);
+}
+
+bool is_skipped() {
+  if (!command_path().empty()) return false;
+  MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
+  return true;
+}
+
+}  // namespace
+
+TEST_SUITE("robustness") {
+  TEST_CASE("cli: right input gives status 0, the output, and nothing on stderr") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const std::size_t before = files(folder).size();
+    const std::vector<std::vector<std::string>> commands{
+        {"render", "cube.ply", "-o", "a.png", "--size", "16x16"},
+        {"render", "--scene", "scene.json", "-o", "b.exr"},
+        {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "c.json"},
+        {"render", "--scene", "scene.json", "-o", "d.exr", "--device", "cpu", "--sigma", "1e-4", "--quiet"}};
+    for (const std::vector<std::string>& command : commands) {
+      const Outcome outcome = run(folder, command);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      CHECK(outcome.err.empty());
+    }
+    CHECK(files(folder).size() == before + commands.size());
+    CHECK(dpr::read_image(folder / "a.png").width == 16);
+    CHECK(dpr::read_image(folder / "b.exr").height == 12);
+    CHECK(run(folder, {"--help"}).status == 0);
+    CHECK(run(folder, {"render", "--help"}).status == 0);
+    CHECK(run(folder, {"devices"}).status == 0);
+    // An existing output is replaced.
+    CHECK(run(folder, {"render", "cube.ply", "-o", "a.png", "--size", "20x10"}).status == 0);
+    CHECK(dpr::read_image(folder / "a.png").width == 20);
+  }
+
+  TEST_CASE("cli: wrong files") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    std::string mesh = folder.read("cube.ply");
+    folder.write("truncated.ply", mesh.substr(0, mesh.size() * 2 / 3));
+    folder.write("truncated.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n");
+    folder.write("empty.obj", "");
+    folder.write("unknown_key.json", R"({"meshes": [{"file": "cube.ply"}], "smoothing": {"sigmma": 1e-3}})");
+    folder.write("broken.json", "{\"width\": 16,\n \"height\": ]}");
+    folder.write("lost_mesh.json", R"({"meshes": [{"file": "lost.ply"}]})");
+    folder.write("wrong_value.json", R"({"meshes": [{"file": "cube.ply"}], "smoothing": {"sigma": -1}})");
+    folder.write("not_an_image.exr", "nothing");
+
+    check_fails(folder, 1, "missing.obj", {"render", "missing.obj", "-o", "o.png"});
+    check_fails(folder, 1, "truncated.ply", {"render", "truncated.ply", "-o", "o.png"});
+    check_fails(folder, 1, "truncated.off", {"render", "truncated.off", "-o", "o.png"});
+    check_fails(folder, 1, "empty.obj", {"render", "empty.obj", "-o", "o.png"});
+    check_fails(folder, 1, "missing.json", {"render", "--scene", "missing.json", "-o", "o.png"});
+    check_fails(folder, 1, "sigmma", {"render", "--scene", "unknown_key.json", "-o", "o.png"});
+    check_fails(folder, 1, "broken.json", {"render", "--scene", "broken.json", "-o", "o.png"});
+    check_fails(folder, 1, "lost.ply", {"render", "--scene", "lost_mesh.json", "-o", "o.png"});
+    check_fails(folder, 1, "sigma", {"render", "--scene", "wrong_value.json", "-o", "o.png"});
+    const auto gradient = [](const std::string& target, const std::string& output) {
+      return std::vector<std::string>{"gradient", "--scene", "scene.json", "--target", target, "-o", output};
+    };
+    check_fails(folder, 1, "16x16", gradient("other.exr", "g.json"));
+    check_fails(folder, 1, "not_an_image.exr", gradient("not_an_image.exr", "g.json"));
+    check_fails(folder, 1, "missing.exr", gradient("missing.exr", "g.json"));
+    check_fails(folder, 1, "no_folder", gradient("target.exr", "no_folder/g.json"));
+  }
+
+  TEST_CASE("cli: outputs that cannot be written") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    fs::create_directories(folder / "folder.png");
+    check_fails(folder, 1, "no_folder", {"render", "cube.ply", "-o", "no_folder/o.png"});
+    check_fails(folder, 1, "folder.png", {"render", "cube.ply", "-o", "folder.png"});
+    check_fails(folder, 1, "o.nonsense", {"render", "cube.ply", "-o", "o.nonsense"});
+  }
+
+  TEST_CASE("cli: wrong arguments") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto render = [](std::vector<std::string> more) {
+      std::vector<std::string> words{"render", "--scene", "scene.json", "-o", "o.png"};
+      words.insert(words.end(), more.begin(), more.end());
+      return words;
+    };
+    check_fails(folder, 1, "no such device", render({"--device", "no such device"}));
+    check_fails(folder, 1, "no such device", render({}), "DPR_DEVICE=no such device");
+    check_fails(folder, 1, "samples", render({"--samples", "0"}));
+    check_fails(folder, 1, "sigma", render({"--sigma", "nan"}));
+    check_fails(folder, 1, "--size", render({"--size", "0x16"}));
+    check_fails(folder, 1, "nonsense", render({"--depth-prior", "nonsense"}));
+    check_fails(folder, 1, "--nonsense", render({"--nonsense"}));
+    check_fails(folder, 1, "nonsense", {"nonsense"});
+    check_fails(folder, 1, "", {});
+    check_fails(folder, 1, "--output", {"render", "cube.ply"});
+    check_fails(folder, 1, "nonsense",
+                {"gradient", "--scene", "scene.json", "--target", "target.exr", "--loss", "nonsense", "-o",
+                 "g.json"});
+  }
+
+  TEST_CASE("cli: without an OpenCL device the status is 2") {
+    if (is_skipped()) return;
+    const TempDir folder, no_vendors;
+    write_inputs(folder);
+    const std::string environment = "OCL_ICD_VENDORS=" + no_vendors.path().string();
+    check_fails(folder, 2, "OpenCL device", {"render", "cube.ply", "-o", "o.png"}, environment);
+    check_fails(folder, 2, "OpenCL device",
+                {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "g.json"}, environment);
+    // Wrong input is found out before the device is looked for.
+    check_fails(folder, 1, "missing.obj", {"render", "missing.obj", "-o", "o.png"}, environment);
+    CHECK(run(folder, {"devices"}, environment).status == 0);
+  }
+
+  TEST_CASE("cli: what is no error line is told apart") {
+    CHECK(is_error_line("dpr: error: mesh (x.obj): got nothing, expected a mesh\n"));
+    CHECK_FALSE(is_error_line(""));
+    CHECK_FALSE(is_error_line("dpr: error: \n"));
+    CHECK_FALSE(is_error_line("dpr: error: no end"));
+    CHECK_FALSE(is_error_line("error: mesh\n"));
+    CHECK_FALSE(is_error_line("dpr: error: mesh\nand a second line\n"));
+  }
+}

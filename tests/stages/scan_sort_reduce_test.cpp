@@ -1,0 +1,245 @@
+// Prefix sums, stable sorting and compensated sums against serial ones: at the sizes where a chunk, a block or a level
+// begins, with saturation, with empty segments, with sums that cancel.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+#include "stages/reduce.hpp"
+#include "stages/scan.hpp"
+#include "stages/sort.hpp"
+#include "support/messages.hpp"
+#include "support/probe.hpp"
+#include "support/reduced.hpp"
+
+namespace {
+
+using dpr::Buffer;
+using dpr::test::device_impl;
+using dpr::test::poison;
+using dpr::test::reduced;
+
+constexpr cl_uint k_poison = 0xdeadbeefU;
+constexpr cl_uint k_most = 0xffffffffU;
+
+std::vector<cl_uint> random_values(std::size_t count, cl_uint below, unsigned seed) {
+  std::mt19937 engine(seed);
+  std::vector<cl_uint> values(count);
+  for (cl_uint& value : values) value = static_cast<cl_uint>(engine()) % below;
+  return values;
+}
+
+Buffer<cl_uint> on_device(const std::vector<cl_uint>& values) {
+  Buffer<cl_uint> buffer;
+  poison(buffer, std::max<std::size_t>(values.size(), 1), k_poison);
+  buffer.upload(device_impl(), values);
+  return buffer;
+}
+
+std::vector<cl_uint> scan(const std::vector<cl_uint>& values) {
+  dpr::Scan operation(device_impl());
+  const Buffer<cl_uint> in = on_device(values);
+  Buffer<cl_uint> out;
+  poison(out, values.size() + 1, k_poison);
+  operation(values.size(), in, out);
+  return out.download();
+}
+
+std::vector<cl_uint> serial_scan(const std::vector<cl_uint>& values) {
+  std::vector<cl_uint> offsets{0};
+  for (const cl_uint value : values) {
+    offsets.push_back(value > k_most - offsets.back() ? k_most : offsets.back() + value);
+  }
+  return offsets;
+}
+
+/// Around a chunk of 256, its square, and more; under a simulator only the first of them.
+std::vector<std::size_t> sizes() {
+  if (dpr::test::is_reduced()) return {0, 1, 257};
+  return {0, 1, 2, 255, 256, 257, 511, 65535, 65536, 65537, 70000};
+}
+
+struct Sorted {
+  std::vector<cl_uint> keys, values, starts;
+};
+
+Sorted sort(const std::vector<cl_uint>& keys, std::size_t key_count) {
+  dpr::Sort operation(device_impl());
+  std::vector<cl_uint> places(keys.size());
+  std::iota(places.begin(), places.end(), 0U);
+  Buffer<cl_uint> key_buffer = on_device(keys), value_buffer = on_device(places), starts;
+  poison(starts, key_count + 1, k_poison);
+  operation(keys.size(), key_count, key_buffer, value_buffer, starts);
+  return {key_buffer.download(), value_buffer.download(), starts.download()};
+}
+
+/// Sorted by key, equal keys in their first order, and every run where `starts` says.
+bool is_stably_sorted(const std::vector<cl_uint>& keys, std::size_t key_count, const Sorted& sorted) {
+  std::vector<cl_uint> places(keys.size());
+  std::iota(places.begin(), places.end(), 0U);
+  std::stable_sort(places.begin(), places.end(), [&](cl_uint a, cl_uint b) { return keys[a] < keys[b]; });
+  if (sorted.values != places || sorted.starts.size() != key_count + 1) return false;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (sorted.keys[i] != keys[places[i]]) return false;
+  }
+  for (std::size_t key = 0; key <= key_count; ++key) {
+    const auto before = std::ranges::lower_bound(sorted.keys, static_cast<cl_uint>(key));
+    if (sorted.starts[key] != static_cast<cl_uint>(before - sorted.keys.begin())) return false;
+  }
+  return true;
+}
+
+struct Reduction {
+  std::size_t channels = 1, segments = 1, stride = 1;
+  std::vector<cl_uint> starts;
+  std::vector<float> values;  // [channel][count]
+};
+
+std::vector<float> reduce(const Reduction& r) {
+  dpr::Reduce operation(device_impl());
+  const Buffer<cl_uint> starts = on_device(r.starts);
+  Buffer<float> values, sums;
+  poison(values, std::max<std::size_t>(r.values.size(), 1));
+  values.upload(device_impl(), r.values);
+  poison(sums, r.channels * r.segments);
+  operation(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values, sums);
+  std::vector<float> found = sums.download();
+  CHECK(operation.read(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values) == found);
+  return found;
+}
+
+std::vector<float> repeated(std::initializer_list<float> pattern, std::size_t times) {
+  std::vector<float> values;
+  for (std::size_t i = 0; i < times; ++i) values.insert(values.end(), pattern);
+  return values;
+}
+
+float plain_sum(const std::vector<float>& values) {
+  float sum = 0;
+  for (const float value : values) sum += value;
+  return sum;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("scan: every size around a chunk and a level") {
+    for (const std::size_t count : sizes()) {
+      CAPTURE(count);
+      const std::vector<cl_uint> values = random_values(count, 100, static_cast<unsigned>(count) + 1);
+      CHECK(scan(values) == serial_scan(values));
+    }
+  }
+
+  TEST_CASE("scan: one operation serves sizes that grow and shrink") {
+    dpr::Scan operation(device_impl());
+    Buffer<cl_uint> out;
+    for (const std::size_t count : {std::size_t{300}, std::size_t{3}, static_cast<std::size_t>(reduced(70000, 600))}) {
+      const std::vector<cl_uint> values = random_values(count, 5, 3);
+      operation(count, on_device(values), out);
+      CHECK(out.download() == serial_scan(values));
+      CHECK(dpr::read_total(out, count, "items") == serial_scan(values).back());
+    }
+  }
+
+  TEST_CASE("scan: sums saturate, and the total then is refused by name") {
+    std::vector<cl_uint> values(1000, 0x00ffffffU);  // passes 2^32 after 256
+    const std::vector<cl_uint> offsets = scan(values);
+    CHECK(offsets == serial_scan(values));
+    CHECK(offsets.back() == k_most);
+    const Buffer<cl_uint> device_offsets = on_device(offsets);
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::read_total(device_offsets, values.size(), "fragments (frame)"),
+                          "fragments (frame)");
+    CHECK(dpr::read_total(device_offsets, 256, "fragments") == 256U * 0x00ffffffU);
+  }
+
+  TEST_CASE("scan: a sum that is wrong at one place is found out") {
+    const std::vector<cl_uint> values = random_values(300, 9, 1);
+    std::vector<cl_uint> offsets = scan(values);
+    ++offsets[257];
+    CHECK(offsets != serial_scan(values));
+  }
+
+  TEST_CASE("sort: stable, whatever the number of items and keys") {
+    for (const std::size_t count : dpr::test::is_reduced() ? std::vector<std::size_t>{0, 1, 40}
+                                                           : std::vector<std::size_t>{0, 1, 1023, 1024, 1025, 5000}) {
+      for (const std::size_t key_count : dpr::test::is_reduced() ? std::vector<std::size_t>{1, 257}
+                                                                 : std::vector<std::size_t>{1, 2, 255, 256, 257, 70000}) {
+        CAPTURE(count);
+        CAPTURE(key_count);
+        const auto keys = random_values(count, static_cast<cl_uint>(key_count), static_cast<unsigned>(count));
+        CHECK(is_stably_sorted(keys, key_count, sort(keys, key_count)));
+      }
+    }
+  }
+
+  TEST_CASE("sort: many items of few keys, and keys of three digits") {
+    const auto count = static_cast<std::size_t>(reduced(70000, 50));
+    const std::vector<cl_uint> few = random_values(count, 3, 5), many = random_values(count, 1U << 24U, 6);
+    CHECK(is_stably_sorted(few, 3, sort(few, 3)));
+    if (!dpr::test::is_reduced()) CHECK(is_stably_sorted(many, 1U << 24U, sort(many, 1U << 24U)));
+  }
+
+  TEST_CASE("sort: all items of the last key, and of none") {
+    const std::vector<cl_uint> keys(10, 299);
+    const Sorted sorted = sort(keys, 300);
+    CHECK(is_stably_sorted(keys, 300, sorted));
+    CHECK(sorted.starts[299] == 0);
+    CHECK(sorted.starts[300] == 10);
+    CHECK(sort({}, 4).starts == std::vector<cl_uint>(5, 0));
+  }
+
+  TEST_CASE("sort: two equal keys that changed places are found out") {
+    const std::vector<cl_uint> keys{2, 1, 2, 0};
+    Sorted sorted = sort(keys, 3);
+    CHECK(is_stably_sorted(keys, 3, sorted));
+    std::swap(sorted.values[2], sorted.values[3]);
+    CHECK_FALSE(is_stably_sorted(keys, 3, sorted));
+  }
+
+  TEST_CASE("reduce: what a plain sum loses is kept") {
+    // Of one slot: 64 items apart, the slots' stride. The exact sum is the number of ones.
+    for (const std::size_t times : {1, 64, 640}) {
+      std::vector<float> values;
+      for (const float value : {1e8F, 1.0F, -1e8F}) values.insert(values.end(), times, value);
+      CHECK(reduce({1, 1, 1, {0, static_cast<cl_uint>(values.size())}, values})[0] == static_cast<float>(times));
+    }
+    const std::vector<float> values = repeated({1e8F, 1.0F, -1e8F}, 500);
+    CHECK(reduce({1, 1, 1, {0, 1500}, values})[0] == 500.0F);
+    CHECK(plain_sum(values) != 500.0F);
+  }
+
+  TEST_CASE("reduce: many small numbers beside a large one") {
+    std::vector<float> values(static_cast<std::size_t>(reduced(100000, 1000)), 1e-3F);
+    values[10] = 1e6F;
+    double exact = 0;
+    for (const float value : values) exact += static_cast<double>(value);
+    const float found = reduce({1, 1, 1, {0, static_cast<cl_uint>(values.size())}, values})[0];
+    CHECK(std::abs(static_cast<double>(found) - exact) <= 6e-8 * exact);
+  }
+
+  TEST_CASE("reduce: segments by stride, channels apart, empty segments zero") {
+    const std::vector<cl_uint> starts{0, 2, 2, 5, 5, 5, 9};
+    std::vector<float> values;
+    for (int i = 0; i < 18; ++i) values.push_back(static_cast<float>(1 << i));  // two channels of nine
+    CHECK(reduce({2, 6, 1, starts, values}) ==
+          std::vector<float>{3, 0, 28, 0, 0, 480, 1536, 0, 14336, 0, 0, 245760});
+    CHECK(reduce({2, 3, 2, starts, values}) == std::vector<float>{3, 28, 480, 1536, 14336, 245760});
+    CHECK(reduce({2, 2, 3, starts, values}) == std::vector<float>{31, 480, 15872, 245760});
+    CHECK(reduce({2, 1, 6, starts, values}) == std::vector<float>{511, 261632});
+    CHECK(reduce({1, 2, 1, {0, 0, 0}, {}}) == std::vector<float>{0, 0});
+  }
+
+  TEST_CASE("reduce: the same bits from run to run, and a NaN is not swallowed") {
+    std::mt19937 engine(4);
+    std::vector<float> values(static_cast<std::size_t>(reduced(5000, 200)));
+    for (float& value : values) value = static_cast<float>(engine()) * 0x1p-32F - 0.5F;
+    const Reduction r{1, 1, 1, {0, static_cast<cl_uint>(values.size())}, values};
+    CHECK(reduce(r) == reduce(r));
+    dpr::Reduce operation(device_impl());
+    values[7] = dpr::test::k_poison;
+    const Buffer<float> poisoned(device_impl(), std::span<const float>(values));
+    CHECK(std::isnan(operation.read(values.size(), 1, 1, 1, on_device(r.starts), poisoned)[0]));
+  }
+}

@@ -1,0 +1,214 @@
+// The transform stage against the reference: vertices of several meshes and views, and the gradients of positions,
+// poses and projections.
+#include <doctest/doctest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "dpr/dpr.hpp"
+#include "reference/transform.hpp"
+#include "renderer_impl.hpp"
+#include "support/aggregate_errors.hpp"
+#include "support/probe.hpp"
+#include "support/reduced.hpp"
+#include "support/worst.hpp"
+
+namespace {
+
+namespace ref = dpr::reference;
+using dpr::test::number;
+using dpr::test::poison;
+using dpr::test::RandomFloat;
+using dpr::test::Worst;
+
+constexpr int k_width = 22, k_height = 13;
+
+ref::Mat4d to_reference(const glm::mat4& m) {
+  ref::Mat4d r;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      r[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] = number(m[column][row]);
+    }
+  }
+  return r;
+}
+
+ref::Vec3d to_reference(const glm::vec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
+ref::Vec3d to_reference(const cl_float4& v) { return {number(v.s[0]), number(v.s[1]), number(v.s[2])}; }
+
+/// The projection in single precision, as the kernel gets it: the test is of the kernel, not of the camera.
+ref::Projection to_reference(const dpr::Projection& p) {
+  return {{number(p.scale.x), number(p.scale.y)}, {number(p.offset.x), number(p.offset.y)}};
+}
+
+glm::mat4 random_pose(RandomFloat& random) {
+  const glm::vec3 axis = glm::normalize(glm::vec3(random(-1, 1), random(-1, 1), random(-1, 1)));
+  const glm::mat4 turned = glm::rotate(glm::mat4(1.0F), random(0, 3), axis);
+  return glm::scale(turned, glm::vec3(random(0.5F, 1.5F), random(0.5F, 1.5F), random(0.5F, 1.5F)));
+}
+
+/// Two meshes in three views: one camera with intrinsics off the centre.
+class TwoMeshes {
+ public:
+  TwoMeshes() : renderer(dpr::test::test_device()) {
+    RandomFloat random(5);
+    scene.width = k_width;
+    scene.height = k_height;
+    scene.meshes = {{dpr::make_cube(), glm::mat4(1.0F)}, {dpr::make_icosphere(dpr::test::is_reduced() ? 0 : 2), glm::mat4(1.0F)}};
+    for (int v = 0; v < 3; ++v) {
+      dpr::View view{dpr::orbit_camera(6.0F, 20.0F * static_cast<float>(v), 50.0F), {}};
+      if (v == 1) view.camera.intrinsics = dpr::Intrinsics{20, 24, 12, 5};
+      for (int m = 0; m < 2; ++m) {
+        glm::mat4 pose = random_pose(random);
+        pose[3] = glm::vec4(random(-1, 1), random(-1, 1), random(-1, 1), 1);
+        view.transforms.push_back(pose);
+      }
+      views.push_back(view);
+    }
+    renderer.set_scene(scene);
+    renderer.set_views(views);
+    for (std::size_t m = 0; m < 2; ++m) {
+      for (const glm::vec3& position : scene.meshes[m].mesh.positions) {
+        positions.push_back(position);
+        mesh.push_back(m);
+      }
+    }
+  }
+
+  dpr::Renderer::Impl& impl() { return renderer.impl(); }
+  ref::Mat4d model(std::size_t view, std::size_t vertex) const {
+    return to_reference(views[view].transforms[mesh[vertex]]);
+  }
+  ref::Mat4d camera(std::size_t view) const { return to_reference(views[view].camera.view); }
+  ref::Projection projection(std::size_t view) const {
+    return to_reference(dpr::projection(views[view].camera, k_width, k_height));
+  }
+
+  dpr::Scene scene;
+  dpr::Renderer renderer;
+  std::vector<dpr::View> views;
+  std::vector<glm::vec3> positions;
+  std::vector<std::size_t> mesh;  // of every vertex
+};
+
+void add_error(Worst& worst, const ref::Vec3d& found, const ref::Vec3d& wanted, double scale, std::size_t i) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    worst.add(std::abs(found[k] - wanted[k]) / scale, "vertex", i, "axis", k, "found", found[k], "wanted", wanted[k]);
+  }
+}
+
+/// Twice the errors measured: world @, NDC and depth @, gradients @, relative to the largest of their kind.
+constexpr double k_world = 1e-6, k_ndc = 1e-6, k_gradient = 1e-5;
+
+struct TransformErrors {
+  Worst world, positions, model, camera, projection;
+};
+
+/// Runs the backward kernels on random gradients. `flip` is 1, or -1 to show that a wrong sign is noticed.
+TransformErrors backward_errors(double flip) {
+  TwoMeshes t;
+  dpr::Renderer::Impl& m = t.impl();
+  m.transform.forward(m.frame, m.device_views, *m.geometry);
+  const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
+  RandomFloat random(6);
+  std::vector<cl_float4> grad_ndc, grad_world;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool used = i % 5 != 0;  // no kept triangle uses the others
+    grad_ndc.push_back(used ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}} : cl_float4{});
+    grad_world.push_back({{random(-1, 1), random(-1, 1), random(-1, 1), 0}});
+  }
+  const dpr::Buffer<cl_float4> ndc_buffer(m.device.impl(), std::span<const cl_float4>(grad_ndc));
+  dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
+  poison(m.transform.channels, DPR_POSE_CHANNELS * count);
+  poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
+  m.transform.backward(m.frame, m.device_views, *m.geometry, ndc_buffer, world_buffer);
+  m.transform.backward_positions(m.frame, m.device_views, *m.geometry, world_buffer);
+  const std::vector<cl_float4> found_world = world_buffer.download(),
+                               found_positions = m.transform.grad_positions.download();
+  const std::vector<float> channels = m.transform.channels.download();
+
+  TransformErrors errors;
+  std::vector<ref::Vec3d> positions(vertices);
+  constexpr double k_size = 5;  // of the largest gradients
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t view = i / vertices, vertex = i % vertices;
+    ref::TransformGradient g =
+        ref::transform_backward(to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view),
+                                t.projection(view), to_reference(grad_ndc[i]), to_reference(grad_world[i]));
+    g.view_rotation = flip * g.view_rotation;
+    const auto channel = [&](std::size_t c) { return number(channels[c * count + i]); };
+    const auto channel3 = [&](std::size_t c) { return ref::Vec3d{channel(c), channel(c + 1), channel(c + 2)}; };
+    add_error(errors.world, to_reference(found_world[i]), g.model_translation, k_size, i);
+    add_error(errors.model, channel3(DPR_CHANNEL_MODEL), g.model_rotation, k_size, i);
+    add_error(errors.model, channel3(DPR_CHANNEL_MODEL + 3), g.model_translation, k_size, i);
+    add_error(errors.camera, channel3(DPR_CHANNEL_VIEW), g.view_rotation, k_size, i);
+    add_error(errors.camera, channel3(DPR_CHANNEL_VIEW + 3), g.view_translation, k_size, i);
+    add_error(errors.projection,
+              {channel(DPR_CHANNEL_PROJECTION), channel(DPR_CHANNEL_PROJECTION + 1), channel(DPR_CHANNEL_PROJECTION + 2)},
+              {g.projection.scale.x, g.projection.scale.y, g.projection.offset.x}, k_size, i);
+    errors.projection.add(std::abs(channel(DPR_CHANNEL_PROJECTION + 3) - g.projection.offset.y), "vertex", i);
+    positions[vertex] += g.position;
+  }
+  for (std::size_t v = 0; v < vertices; ++v) {
+    add_error(errors.positions, to_reference(found_positions[v]), positions[v], k_size, v);
+  }
+  return errors;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("transform: world, NDC and depth are the reference's") {
+    TwoMeshes t;
+    dpr::Renderer::Impl& m = t.impl();
+    const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
+    poison(m.transform.world, count, cl_float4{{NAN, NAN, NAN, NAN}});
+    poison(m.transform.ndc, count, cl_float4{{NAN, NAN, NAN, NAN}});
+    m.transform.forward(m.frame, m.device_views, *m.geometry);
+    const std::vector<cl_float4> world = m.transform.world.download(), ndc = m.transform.ndc.download();
+    Worst world_error, ndc_error, shifted;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t view = i / vertices, vertex = i % vertices;
+      const ref::TransformedVertex v = ref::transform_forward(to_reference(t.positions[vertex]), t.model(view, vertex),
+                                                              t.camera(view), t.projection(view));
+      add_error(world_error, to_reference(world[i]), v.world, 1, i);
+      add_error(ndc_error, to_reference(ndc[i]), v.ndc, 1, i);
+      add_error(shifted, to_reference(ndc[i]), v.ndc + ref::Vec3d{0, 1e-4, 0}, 1, i);
+      CHECK(world[i].s[3] == 1.0F);
+      CHECK(ndc[i].s[3] == 0.0F);
+    }
+    DPR_CHECK_WORST(world_error, k_world);
+    DPR_CHECK_WORST(ndc_error, k_ndc);
+    CHECK(shifted.error > k_ndc);
+  }
+}
+
+TEST_SUITE("gradient") {
+  TEST_CASE("transform: gradients of positions, poses and projections are the reference's") {
+    const TransformErrors errors = backward_errors(1);
+    DPR_CHECK_WORST(errors.world, k_gradient);
+    DPR_CHECK_WORST(errors.positions, k_gradient);
+    DPR_CHECK_WORST(errors.model, k_gradient);
+    DPR_CHECK_WORST(errors.camera, k_gradient);
+    DPR_CHECK_WORST(errors.projection, k_gradient);
+    CHECK(backward_errors(-1).camera.error > k_gradient);
+  }
+
+  TEST_CASE("transform: a vertex in the camera's plane that no triangle uses has a gradient of zero, not NaN") {
+    dpr::Scene scene;
+    scene.width = scene.height = 8;
+    dpr::Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.faces = {{0, 1, 2}};
+    scene.meshes = {{mesh, glm::mat4(1.0F)}};  // the camera stands at the origin
+    dpr::Renderer renderer(dpr::test::test_device());
+    renderer.set_scene(scene);
+    dpr::Renderer::Impl& m = renderer.impl();
+    m.transform.forward(m.frame, m.device_views, *m.geometry);
+    const std::vector<cl_float4> zeros(3, cl_float4{});
+    const dpr::Buffer<cl_float4> grad_ndc(m.device.impl(), std::span<const cl_float4>(zeros));
+    dpr::Buffer<cl_float4> grad_world(m.device.impl(), std::span<const cl_float4>(zeros));
+    m.transform.backward(m.frame, m.device_views, *m.geometry, grad_ndc, grad_world);
+    CHECK(m.transform.channels.download() == std::vector<float>(DPR_POSE_CHANNELS * 3, 0.0F));
+    for (const cl_float4& g : grad_world.download()) CHECK(g.s[0] == 0.0F);
+  }
+}
