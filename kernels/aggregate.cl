@@ -8,7 +8,10 @@
 // The weights sum to 1, so dividing by the quadrature's own sum removes most of its error. The Gumbel prior needs no
 // quadrature: its weights are the softmax (40). All betas are differences to the pixel's nearest fragment: zeta / gamma
 // itself would waste its bits. Errors: tests/stages/aggregate_test.cpp.
-#define DPR_WIDTH 16 /* lanes are quadrature nodes */
+#ifndef DPR_NODE_LANES
+#define DPR_NODE_LANES 16
+#endif
+#define DPR_WIDTH DPR_NODE_LANES /* lanes are quadrature nodes */
 #include "pixel.h"
 #include "priors.h"
 #include "quadrature.h"
@@ -75,7 +78,7 @@ static inline int next_segment(const Pixel q, const Fragments f, int first, floa
   s->high = asinh(first ? DPR_CAUCHY_REACH : 0.5f * (s->centre - *head));
   s->low = -asinh(next > -INFINITY ? 0.5f * (*head - next) : DPR_CAUCHY_REACH);
   s->centre = *head;
-  s->blocks = DPR_CLUSTER_BLOCKS;
+  s->blocks = DPR_CLUSTER_NODES / DPR_WIDTH;
   *head = next;
   return 1;
 }
@@ -90,7 +93,7 @@ static inline int next_segment(const Pixel q, const Fragments f, int first, floa
   s->centre = q.largest;
   s->low = crowded ? DPR_CROWD_LOW : DPR_BARRIER_LOW;
   s->high = crowded ? DPR_CROWD_HIGH : DPR_BARRIER_HIGH;
-  s->blocks = crowded ? DPR_CROWD_BLOCKS : DPR_BARRIER_BLOCKS;
+  s->blocks = (crowded ? DPR_CROWD_NODES : DPR_BARRIER_NODES) / DPR_WIDTH;
   return first;
 }
 

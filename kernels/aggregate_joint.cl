@@ -10,7 +10,10 @@
 // for its gradients everything behind it is one background whose g_0 is what would be seen there. Fragments alone need
 // no integral. Reached when the transparency in front falls below DPR_OPAQUE, the rest is left out: an error of at most
 // that in the weights. Errors: tests/stages/aggregate_joint_test.cpp.
-#define DPR_WIDTH 16 /* lanes are quadrature nodes */
+#ifndef DPR_NODE_LANES
+#define DPR_NODE_LANES 16
+#endif
+#define DPR_WIDTH DPR_NODE_LANES /* lanes are quadrature nodes */
 #include "pixel.h"
 #include "priors.h"
 #include "quadrature.h"

@@ -5,9 +5,20 @@
 
 namespace dpr {
 
+namespace {
+
+/// What a device needs beside the standard options.
+std::string quirks(const DeviceInfo& info) {
+  // oclgrind 21.10 stops at LLVM intrinsics that only optimised code holds (llvm.experimental.noalias.scope.decl), and
+  // takes vectors of 64 bytes for uninitialised when they are function arguments.
+  return info.platform == "Oclgrind" ? " -cl-opt-disable -DDPR_NODE_LANES=8" : "";
+}
+
+}  // namespace
+
 std::string build_options(const Device::Impl& device, const std::string& more) {
   // -w: compilers remark on vectors wider than the registers; what is worth a warning, the lint test finds.
-  return "-cl-std=CL1.2 -cl-kernel-arg-info -w -DDPR_LANES=" + std::to_string(device.info.lanes) + more;
+  return "-cl-std=CL1.2 -cl-kernel-arg-info -w -DDPR_LANES=" + std::to_string(device.info.lanes) + quirks(device.info) + more;
 }
 
 namespace detail {

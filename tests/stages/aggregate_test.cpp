@@ -15,16 +15,25 @@ using dpr::test::compare_with_reference;
 using dpr::test::SyntheticFrame;
 using dpr::test::SyntheticPixel;
 
+/// Tolerances, about twice the errors measured; what is measured says dpr::test::AggregateErrors.
 struct PriorCase {
   Prior prior;
   std::string_view name;
-  double weight, gradient;
+  double weight, color, beta, gamma, alpha;  // beta: gradients of depth and ln p
 };
 
-constexpr std::array<PriorCase, 4> k_cases{{{Prior::gaussian, "gaussian", 5e-6, 5e-5},
-                                            {Prior::cauchy, "cauchy", 1e-4, 1e-3},
-                                            {Prior::logistic, "logistic", 2e-5, 2e-4},
-                                            {Prior::gumbel, "gumbel", 2e-5, 2e-4}}};
+/// Measured over gamma 1e-7, 1e-4, 1e-2, 1 and alpha 0.5, 1, 3:
+constexpr std::array<PriorCase, 4> k_cases{{{Prior::gaussian, "gaussian", 5e-6, 5e-6, 5e-5, 5e-5, 5e-5},
+                                            {Prior::cauchy, "cauchy", 1e-4, 1e-4, 1e-3, 1e-3, 1e-3},
+                                            {Prior::logistic, "logistic", 2e-5, 2e-5, 2e-4, 2e-4, 2e-4},
+                                            {Prior::gumbel, "gumbel", 2e-5, 2e-5, 2e-4, 2e-4, 2e-4}}};
+
+constexpr double k_alpha = 4e-7;  // of the image; measured 1.6e-7
+
+struct Setting {
+  float gamma, alpha;
+};
+constexpr std::array<Setting, 4> k_settings{{{1e-7F, 0.5F}, {1e-4F, 3.0F}, {1e-2F, 1.0F}, {1.0F, 0.5F}}};
 
 Smoothing barrier(Prior prior, float gamma, float alpha) {
   Smoothing smoothing;
@@ -34,15 +43,20 @@ Smoothing barrier(Prior prior, float gamma, float alpha) {
   return smoothing;
 }
 
-AggregateErrors all_errors(Prior prior, float distortion) {
+AggregateErrors all_errors(Prior prior) {
   AggregateErrors errors;
   unsigned seed = 1;
-  for (const float gamma : {1e-7F, 1e-4F, 1e-2F, 1.0F}) {
-    for (const float alpha : {0.5F, 1.0F, 3.0F}) {
-      compare_with_reference(dpr::test::make_pixels(gamma, seed++), barrier(prior, gamma, alpha), errors, distortion);
-    }
+  for (const Setting& s : k_settings) {
+    compare_with_reference(dpr::test::make_pixels(s.gamma, seed++), barrier(prior, s.gamma, s.alpha), errors);
   }
+  compare_with_reference(dpr::test::make_crowds(1e-2F, 99), barrier(prior, 1e-2F, 1), errors);
   return errors;
+}
+
+bool passes(const AggregateErrors& e, const PriorCase& c) {
+  return e.weight.error <= c.weight && e.color.error <= c.color && e.alpha.error <= k_alpha &&
+         e.grad_depth.error <= c.beta && e.grad_log_occupancy.error <= c.beta && e.grad_gamma.error <= c.gamma &&
+         e.grad_alpha.error <= c.alpha;
 }
 
 }  // namespace
@@ -51,14 +65,90 @@ TEST_SUITE("gradient") {
   TEST_CASE("barrier aggregation: weights, image and gradients are the reference's") {
     for (const PriorCase& c : k_cases) {
       CAPTURE(std::string(c.name));
-      const AggregateErrors errors = all_errors(c.prior, 1);
+      const AggregateErrors errors = all_errors(c.prior);
       DPR_CHECK_WORST(errors.weight, c.weight);
-      DPR_CHECK_WORST(errors.color, c.weight);
-      DPR_CHECK_WORST(errors.alpha, 1e-6);
-      DPR_CHECK_WORST(errors.grad_depth, c.gradient);
-      DPR_CHECK_WORST(errors.grad_log_occupancy, c.gradient);
-      DPR_CHECK_WORST(errors.grad_gamma, c.gradient);
-      DPR_CHECK_WORST(errors.grad_alpha, c.gradient);
+      DPR_CHECK_WORST(errors.color, c.color);
+      DPR_CHECK_WORST(errors.alpha, k_alpha);
+      DPR_CHECK_WORST(errors.grad_depth, c.beta);
+      DPR_CHECK_WORST(errors.grad_log_occupancy, c.beta);
+      DPR_CHECK_WORST(errors.grad_gamma, c.gamma);
+      DPR_CHECK_WORST(errors.grad_alpha, c.alpha);
     }
+  }
+
+  TEST_CASE("barrier aggregation: results that are off by a few per cent are found out") {
+    for (const PriorCase& c : k_cases) {
+      CAPTURE(std::string(c.name));
+      AggregateErrors good, bad;
+      const std::vector<SyntheticPixel> pixels = dpr::test::make_pixels(1e-2F, 4);
+      const std::vector<SyntheticPixel> few(pixels.begin(), pixels.begin() + 12);
+      compare_with_reference(few, barrier(c.prior, 1e-2F, 1), good);
+      compare_with_reference(few, barrier(c.prior, 1e-2F, 1), bad, 1.03F);
+      CHECK(passes(good, c));
+      CHECK(bad.weight.error > c.weight);
+      CHECK(bad.color.error > c.color);
+      CHECK(bad.grad_depth.error > c.beta);
+      CHECK(bad.grad_log_occupancy.error > c.beta);
+      CHECK(bad.grad_gamma.error > c.gamma);
+      CHECK(bad.grad_alpha.error > c.alpha);
+    }
+  }
+}
+
+TEST_SUITE("unit") {
+  TEST_CASE("barrier aggregation: a pixel without fragments shows the background, and gives it all of the gradient") {
+    SyntheticFrame frame({{}, {{2.0F, 0.5F, glm::vec3(1, 0, 0)}}, {}});
+    const auto image = frame.forward(barrier(Prior::gaussian, 1e-2F, 1), dpr::test::k_background);
+    const std::vector<cl_float4> grad(3, cl_float4{{1, 2, 3, 4}});
+    const SyntheticFrame::Gradients g = frame.backward(dpr::test::k_background, grad);
+    for (const std::size_t i : {0U, 2U}) {
+      CHECK(glm::vec3(image[i].s[0], image[i].s[1], image[i].s[2]) == dpr::test::k_background);
+      CHECK(image[i].s[3] == 0.0F);
+      CHECK(g.background[i] == glm::vec3(1, 2, 3));
+      CHECK(g.gamma[i] == 0.0F);
+      CHECK(g.alpha[i] == 0.0F);
+    }
+  }
+
+  TEST_CASE("barrier aggregation: a fragment with p = 0 changes nothing and has no gradient") {
+    for (const PriorCase& c : k_cases) {
+      CAPTURE(std::string(c.name));
+      const dpr::test::SyntheticFragment absent{1.5F, 0.0F, glm::vec3(0, 1, 0)}, a{2.0F, 0.5F, glm::vec3(1, 0, 0)},
+          b{2.5F, 0.9F, glm::vec3(0, 0, 1)};
+      SyntheticFrame frame({{a, b}, {absent, a, b}, {absent}});
+      const auto image = frame.forward(barrier(c.prior, 1e-2F, 1), dpr::test::k_background);
+      const std::vector<cl_float4> grad(3, cl_float4{{1, -2, 3, 4}});
+      const SyntheticFrame::Gradients g = frame.backward(dpr::test::k_background, grad);
+      for (std::size_t channel = 0; channel < 4; ++channel) {
+        CHECK(std::abs(image[0].s[channel] - image[1].s[channel]) < 2e-6F);
+      }
+      CHECK(std::abs(image[2].s[0] - dpr::test::k_background.x) < 1e-6F);
+      for (const std::size_t i : {1U, 2U}) {
+        CHECK(g.depth[i][0] == 0.0F);
+        CHECK(g.log_occupancy[i][0] == 0.0F);
+        CHECK(g.red[i][0] == 0.0F);
+      }
+      CHECK(std::isfinite(g.gamma[2]));
+      CHECK(g.alpha[2] == 0.0F);
+    }
+  }
+
+  TEST_CASE("barrier aggregation: fragments beside each other and in any order give the same colour") {
+    for (const PriorCase& c : k_cases) {
+      CAPTURE(std::string(c.name));
+      dpr::test::RandomFloat random(2);
+      SyntheticPixel pixel = dpr::test::make_pixel(9, 4, 1e-2F, dpr::test::Occupancies::any, random);
+      SyntheticPixel turned(pixel.rbegin(), pixel.rend());
+      SyntheticFrame frame({pixel, turned});
+      const auto image = frame.forward(barrier(c.prior, 1e-2F, 1), dpr::test::k_background);
+      for (std::size_t channel = 0; channel < 4; ++channel) {
+        CHECK(std::abs(image[0].s[channel] - image[1].s[channel]) < 1e-6F);
+      }
+    }
+  }
+
+  TEST_CASE("barrier aggregation: a depth prior without a kernel is refused before anything is built") {
+    Smoothing smoothing = barrier(Prior::uniform, 1e-2F, 1);
+    CHECK_THROWS_AS(dpr::validate(smoothing), dpr::InvalidArgument);
   }
 }

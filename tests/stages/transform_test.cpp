@@ -96,8 +96,8 @@ void add_error(Worst& worst, const ref::Vec3d& found, const ref::Vec3d& wanted, 
   }
 }
 
-/// Twice the errors measured: world @, NDC and depth @, gradients @, relative to the largest of their kind.
-constexpr double k_world = 1e-6, k_ndc = 1e-6, k_gradient = 1e-5;
+/// Twice the errors measured: world 2.1e-7, NDC and depth 4.0e-7, gradients 6.5e-8 of the largest of their kind.
+constexpr double k_world = 4.2e-7, k_ndc = 8e-7, k_gradient = 1.3e-7;
 
 struct TransformErrors {
   Worst world, positions, model, camera, projection;
