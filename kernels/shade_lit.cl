@@ -164,7 +164,7 @@ static inline void flat_normal_backward(const float4 world[3], float4 grad_unit,
   const float inverse = n.w > DPR_MIN_LENGTH ? 1.0f / n.w : 0.0f;
   const float3 g = (grad_unit.xyz - n.xyz * dot(n.xyz, grad_unit.xyz)) * inverse;
   for (int k = 0; k < 3; ++k) {
-    grad_position[k].xyz += cross(world[(k + 1) % 3].xyz - world[(k + 2) % 3].xyz, g);
+    grad_position[k] += (float4)(cross(world[(k + 1) % 3].xyz - world[(k + 2) % 3].xyz, g), 0.0f);
   }
 }
 

@@ -30,15 +30,17 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float depth = -c.z;
   world[i] = (float4)(w, 1.0f);
-  ndc[i] = (float4)(c.xy * camera->projection.xy / depth + camera->projection.zw, depth, 0.0f);
+  const float2 xy = c.xy * camera->projection.xy / depth + camera->projection.zw;
+  ndc[i] = (float4)(xy.x, xy.y, depth, 0.0f);
 }
 
 /// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that no kept
 /// triangle uses has zero gradient, whatever its projection. One work-item per (view, vertex).
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
+/// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
 /// out     channels    float[DPR_POSE_CHANNELS][view][vertex]
-kernel void transform_backward(const FrameParams p, global const ViewParams* restrict views,
+kernel void transform_backward(const FrameParams p, const uint lit, global const ViewParams* restrict views,
                                global const float4* restrict models, global const uint* restrict vertex_mesh,
                                global const float4* restrict world, global const float4* restrict grad_ndc,
                                global float4* restrict grad_world, global float* restrict channels) {
@@ -57,9 +59,9 @@ kernel void transform_backward(const FrameParams p, global const ViewParams* res
   const float2 tangent = c.xy * inverse_depth;
   const float2 g_tangent = g.xy * camera->projection.xy;
   const float g_depth = g.z - dot(g_tangent, tangent) * inverse_depth;
-  const float3 g_camera = (float3)(g_tangent * inverse_depth, -g_depth);
-  const float3 g_world =
-      grad_world[i].xyz + apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera);
+  const float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
+  float3 g_world = apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera);
+  if (lit) g_world += grad_world[i].xyz;
   grad_world[i] = (float4)(g_world, 0.0f);
 
   const float3 turned_in_world = w - (float3)(model[0].w, model[1].w, model[2].w);

@@ -2,6 +2,7 @@
 #include "dpr/renderer.hpp"
 
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "dpr/opencl.hpp"
@@ -56,6 +57,9 @@ void check_frame_size(const shared::FrameParams& p) {
   if (std::max(pixels * DPR_PIXEL_CHANNELS, corners) < largest) return;
   throw InvalidArgument("views (frame)", std::to_string(p.views), "fewer, so that pixels and vertices can be counted");
 }
+
+/// Frames of all renderers, so that a loss knows which one it was evaluated on.
+std::atomic<std::uint64_t> frames_rendered = 0;
 
 }  // namespace
 
@@ -112,9 +116,9 @@ void Renderer::Impl::set_views(std::span<const View> new_views) {
 }
 
 void Renderer::Impl::set_smoothing(const Smoothing& smoothing) {
-  scene.smoothing = smoothing;
   occupancy.set_smoothing(smoothing);
   aggregate.set_smoothing(smoothing);
+  scene.smoothing = smoothing;
   if (!views.empty()) frame = frame_params(scene, *geometry, views.size());
   rendered = false;
 }
@@ -130,6 +134,7 @@ void Renderer::Impl::forward() {
   occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   rendered = true;
+  frame_number = ++frames_rendered;
 }
 
 SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
@@ -147,8 +152,8 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
     rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth, shade.grad_bary1,
                        shade.grad_bary2);
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners, grad_ndc);
-    shade.backward_world(shade_inputs(), gather, grad_world);
-    transform.backward(frame, device_views, *geometry, grad_ndc, grad_world);
+    if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
+    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
   }
   read_smoothing_gradients(gradient);
   read_mesh_gradients(gradient);
@@ -281,6 +286,14 @@ void Renderer::Impl::read_light_gradients(SceneGradient& gradient) {
   }
 }
 
+std::size_t Renderer::Impl::bytes() const {
+  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() + rasterize.bytes() +
+         shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() + device_views.cameras.capacity_bytes() +
+         device_views.models.capacity_bytes() + view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes() +
+         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
+         grad_colors.capacity_bytes();
+}
+
 Renderer::Renderer(Device device) : impl_(std::make_unique<Impl>(std::move(device))) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
@@ -316,6 +329,7 @@ namespace {
 /// Replaces a mesh's part of a joined buffer.
 void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
                  std::span<const glm::vec3> values) {
+  if (values.empty()) return;
   std::vector<cl_float4> rows;
   rows.reserve(values.size());
   for (const glm::vec3& v : values) rows.push_back(to_cl(v));
@@ -393,12 +407,8 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
       throw InvalidArgument("size (grad_images)", std::to_string(image.width) + "x" + std::to_string(image.height),
                             std::to_string(m.scene.width) + "x" + std::to_string(m.scene.height));
     }
-    for (const glm::vec4& p : image.pixels) {
-      if (!std::isfinite(p.x + p.y + p.z + p.w)) {
-        throw InvalidArgument("grad_images", "a pixel that is not finite", "finite values");
-      }
-      values.push_back({{p.x, p.y, p.z, p.w}});
-    }
+    checks::require_pixels(image, "grad_images");
+    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
   }
   m.host_grad_images.upload(m.device.impl(), values);
   return m.backward(m.host_grad_images);
@@ -406,11 +416,11 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
 
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");
-  const ImageLoss::Impl& l = loss.impl();
-  if (l.grad_image.size() != impl_->aggregate.image.size()) {
-    throw InvalidArgument("loss", "the gradient of other images", "a loss evaluated on the last forward()");
+  if (loss.impl().frame_number != impl_->frame_number) {
+    throw InvalidArgument("loss (Renderer::backward)", "the gradient of other images",
+                          "a loss evaluated on this renderer's last forward()");
   }
-  return impl_->backward(l.grad_image);
+  return impl_->backward(loss.impl().grad_image);
 }
 
 RenderStatistics Renderer::statistics() const {
@@ -423,7 +433,7 @@ RenderStatistics Renderer::statistics() const {
   }
   s.pairs = m.bin.pairs;
   s.fragments = m.rasterize.listed_fragments;
-  s.device_bytes = m.device.allocated_bytes();
+  s.device_bytes = m.bytes();
   return s;
 }
 

@@ -1,6 +1,7 @@
 // What a Renderer holds: the scene, its geometry on the device, and the stages with their buffers.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -30,11 +31,14 @@ struct Renderer::Impl {
   /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it.
   void require_scene(const char* caller) const;
   void require_forward(const char* caller) const;
+  /// Held in buffers.
+  std::size_t bytes() const;
 
   Device device;
   Scene scene;
   std::vector<View> views;
-  bool rendered = false;  // the stages hold the frame of the current scene
+  bool rendered = false;           // the stages hold the frame of the current scene
+  std::uint64_t frame_number = 0;  // which frame that is, among all renderers'
 
   std::optional<Geometry> geometry;
   DeviceViews device_views;

@@ -42,7 +42,8 @@ struct Smoothing {
 };
 
 /// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform prior
-/// (its density is no exp(-nu), so it has no score), sampling the joint composition.
+/// (its density is no exp(-nu), so it has no score), sampling the joint composition, uniform depths, and Cauchy depths
+/// in the joint composition.
 void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to

@@ -85,8 +85,10 @@ class Buffer {
   }
 
   void release() {
-    if (device_ != nullptr) device_->allocated_bytes -= capacity_bytes();
-    buffer_ = cl::Buffer();
+    if (device_ != nullptr) {
+      device_->allocated_bytes -= capacity_bytes();
+      device_->release(std::move(buffer_));
+    }
     device_ = nullptr;
     capacity_ = size_ = 0;
   }

@@ -6,6 +6,7 @@
 
 #include "loss/image_loss_impl.hpp"
 #include "renderer_impl.hpp"
+#include "scene/checks.hpp"
 
 namespace dpr {
 namespace {
@@ -32,11 +33,7 @@ void check_targets(std::span<const Image> targets) {
       throw InvalidArgument("target size (loss)", size_text(image.width, image.height),
                             "images of one size, " + size_text(targets[0].width, targets[0].height));
     }
-    for (const glm::vec4& pixel : image.pixels) {
-      if (!std::isfinite(pixel.x + pixel.y + pixel.z + pixel.w)) {
-        throw InvalidArgument("target (loss)", "a pixel that is not finite", "finite values");
-      }
-    }
+    checks::require_pixels(image, "target (loss)");
   }
 }
 
@@ -113,6 +110,7 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   m.forward(pixels, p, r.aggregate.image, m.target, m.channels);
   m.reduce(pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels, m.sums);
   m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.grad_image);
+  m.frame_number = r.frame_number;
 
   const std::vector<float> sums = m.sums.download();
   double total = 0;

@@ -1,6 +1,8 @@
 // What an ImageLoss holds on its device.
 #pragma once
 
+#include <cstdint>
+
 #include "device/kernel.hpp"
 #include "dpr/loss.hpp"
 #include "stages/reduce.hpp"
@@ -15,6 +17,7 @@ struct ImageLoss::Impl {
   int width, height;
   std::size_t views;
   std::vector<double> per_view;
+  std::uint64_t frame_number = 0;  // of the render that grad_image belongs to; 0: none
 
   Kernel<shared::LossParams, In<cl_float4>, In<cl_float4>, Out<float>> forward;
   Kernel<shared::LossParams, In<cl_float4>, In<cl_float4>, In<float>, Out<cl_float4>> backward;

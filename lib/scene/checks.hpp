@@ -9,6 +9,7 @@
 #include <string>
 
 #include "dpr/error.hpp"
+#include "dpr/image.hpp"
 
 namespace dpr::checks {
 
@@ -75,6 +76,19 @@ inline void require_affine(const glm::mat4& matrix, const std::string& argument)
   if (!(volume > k_smallest_volume * box)) {
     throw InvalidArgument(argument, "a singular matrix of determinant " + text(glm::determinant(linear)),
                           "an invertible matrix");
+  }
+}
+
+/// Throws unless the image has the pixels its size asks for, all finite.
+inline void require_pixels(const Image& image, const std::string& argument) {
+  const std::size_t expected = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  if (image.pixels.size() != expected) {
+    throw InvalidArgument(argument, std::to_string(image.pixels.size()) + " pixels",
+                          std::to_string(expected) + ", width x height");
+  }
+  for (const glm::vec4& p : image.pixels) {
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.w)) continue;
+    throw InvalidArgument(argument, "a pixel that is not finite", "finite values");
   }
 }
 

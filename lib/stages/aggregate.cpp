@@ -22,19 +22,21 @@ Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
       backward(device, "aggregate_sampled.cl", "aggregate_sampled_backward", options) {}
 
 void Aggregate::set_smoothing(const Smoothing& smoothing) {
-  smoothing_ = smoothing;
   const std::string options = prior_option(smoothing.depth_prior);
   const std::string wanted = std::string(to_string(smoothing.composition)) +
                              std::string(to_string(smoothing.aggregation_estimator)) + options;
-  if (wanted == built_) return;
-  exact_.reset();
-  sampled_.reset();
-  if (smoothing.aggregation_estimator == Estimator::exact) {
-    exact_.emplace(device_, smoothing.composition, options);
-  } else {
-    sampled_.emplace(device_, options);
+  if (wanted != built_) {
+    // New kernels first: if they do not build, the old ones stay.
+    const bool exact = smoothing.aggregation_estimator == Estimator::exact;
+    std::optional<Exact> new_exact;
+    std::optional<Sampled> new_sampled;
+    if (exact) new_exact.emplace(device_, smoothing.composition, options);
+    if (!exact) new_sampled.emplace(device_, options);
+    exact_ = std::move(new_exact);
+    sampled_ = std::move(new_sampled);
+    built_ = wanted;
   }
-  built_ = wanted;
+  smoothing_ = smoothing;
 }
 
 shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {

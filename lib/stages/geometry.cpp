@@ -79,4 +79,13 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   color_corners = make_incidence(device, all_face_colors, colors);
 }
 
+std::size_t Geometry::bytes() const {
+  std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() + face_vertices.capacity_bytes() +
+                      face_colors.capacity_bytes() + color_values.capacity_bytes();
+  for (const Incidence* incidence : {&vertex_corners, &color_corners}) {
+    bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
+  }
+  return bytes;
+}
+
 }  // namespace dpr

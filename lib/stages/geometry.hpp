@@ -32,6 +32,8 @@ struct Geometry {
   Buffer<cl_uint4> face_colors;    ///< [face] colour of each corner
   Buffer<cl_float4> color_values;  ///< [color]
   Incidence vertex_corners, color_corners;
+
+  std::size_t bytes() const;
 };
 
 /// A vector of three in the first components; w = 0.

@@ -13,18 +13,20 @@ Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
       backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
 
 void Occupancy::set_smoothing(const Smoothing& smoothing) {
-  smoothing_ = smoothing;
-  const std::string options = prior_option(smoothing.occupancy_prior);
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
-  if (options == built_ && (exact ? exact_.has_value() : sampled_.has_value())) return;
-  exact_.reset();
-  sampled_.reset();
-  if (exact) {
-    exact_.emplace(device_, options);
-  } else {
-    sampled_.emplace(device_, options);
+  const std::string options = prior_option(smoothing.occupancy_prior);
+  const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
+  if (wanted != built_) {
+    // New kernels first: if they do not build, the old ones stay.
+    std::optional<Exact> new_exact;
+    std::optional<Sampled> new_sampled;
+    if (exact) new_exact.emplace(device_, options);
+    if (!exact) new_sampled.emplace(device_, options);
+    exact_ = std::move(new_exact);
+    sampled_ = std::move(new_sampled);
+    built_ = wanted;
   }
-  built_ = options;
+  smoothing_ = smoothing;
 }
 
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {

@@ -80,11 +80,6 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
-  if (!lit_) {
-    grad_world.resize(device_, vertices);
-    grad_world.fill(cl_float4{});
-    return;
-  }
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_, grad_world);
   if (lit_->shading == Shading::flat) return;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_, grad_normals_);

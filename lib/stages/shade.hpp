@@ -67,7 +67,7 @@ class Shade {
   void forward(const ShadeInputs& in);
   /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and the eye.
   void backward(const ShadeInputs& in, const ColorGradients& grad);
-  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Zero if unlit.
+  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
   /// The gradients of one light and of the ambient light, per pair: k_light_channels channels.
   void backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light);

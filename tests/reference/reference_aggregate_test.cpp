@@ -109,7 +109,7 @@ TEST_SUITE("unit") {
     Random random(5);
     for (const Prior prior : k_priors) {
       for (const Composition composition : k_compositions) {
-        for (const std::size_t count : {0, 1, 7, 40}) {
+        for (const std::size_t count : {0U, 1U, 7U, 40U}) {
           for (const double gamma : {1e-7, 1e-4, 1e-2, 1.0}) {
             AggregateParameters p;
             p.prior = prior;

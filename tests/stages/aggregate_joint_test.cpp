@@ -1,5 +1,6 @@
-// The exact joint aggregation against the reference: weights, image and every gradient of synthetic pixels, from none to
-// 300 fragments, from coincident to far apart, for each prior it serves; and the sorting it begins with.
+// The exact joint aggregation against the reference: weights, image and every gradient of synthetic pixels,
+// from none to 300 fragments, from coincident to far apart, for each prior it serves; and the sorting it
+// begins with.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -25,12 +26,19 @@ struct PriorCase {
   double weight, color, depth, log_occupancy, gamma;
 };
 
-constexpr std::array<PriorCase, 3> k_cases{{{Prior::gaussian, "gaussian", 5e-6, 2e-5, 5e-5, 5e-5, 5e-5},
-                                            {Prior::logistic, "logistic", 2e-5, 2e-5, 2e-4, 2e-4, 2e-4},
-                                            {Prior::gumbel, "gumbel", 2e-5, 2e-5, 2e-4, 2e-4, 2e-4}}};
-constexpr double k_crowd_color = 1.4e-4, k_crowd_log_occupancy = 2.4e-4;
-
-constexpr double k_alpha = 2e-7;  // of the image; measured @
+/// Measured over gamma 1e-7, 1e-2 and 1, up to 40 fragments:
+///   prior     weight  colour  depth   ln p    gamma   wanted for the weights
+///   gaussian  1.2e-6  1.8e-5  1.8e-5  1.7e-5  1.5e-5  5e-6
+///   logistic  1.8e-6  2.1e-5  2.2e-5  4.7e-5  1.4e-5  2e-5
+///   gumbel    9.4e-7  2.1e-5  4.4e-6  2.1e-5  2.3e-5  2e-5
+/// The colour's error grows with the number of fragments, 8e-7 of the weight for each that shares a cluster:
+/// what its nodes leave out. With 300 it is 6.3e-5, that of ln p 1.1e-4.
+constexpr std::array<PriorCase, 3> k_cases{
+    {{Prior::gaussian, "gaussian", 2.4e-6, 3.6e-5, 3.6e-5, 3.4e-5, 3e-5},
+     {Prior::logistic, "logistic", 3.6e-6, 4.2e-5, 4.4e-5, 9.4e-5, 3e-5},
+     {Prior::gumbel, "gumbel", 1.9e-6, 4.2e-5, 9e-6, 4.2e-5, 4.6e-5}}};
+constexpr double k_crowd_color = 1.3e-4, k_crowd_log_occupancy = 2.2e-4;
+constexpr double k_alpha = 2e-7;  // of the image; measured 9.5e-8
 
 Smoothing joint(Prior prior, float gamma) {
   Smoothing smoothing;
@@ -59,7 +67,8 @@ AggregateErrors crowd_errors(Prior prior) {
 std::vector<SyntheticPixel> sort_cases() {
   dpr::test::RandomFloat random(3);
   std::vector<SyntheticPixel> pixels;
-  for (const int count : {0, 1, 2, 3, reduced(23, 4), reduced(24, 5), reduced(25, 26), reduced(26, 6), reduced(300, 27)}) {
+  for (const int count :
+       {0, 1, 2, 3, reduced(23, 4), reduced(24, 5), reduced(25, 26), reduced(26, 6), reduced(300, 27)}) {
     SyntheticPixel pixel = dpr::test::make_pixel(count, 50, 1e-2F, dpr::test::Occupancies::any, random);
     for (std::size_t k = 3; k < pixel.size(); k += 4) pixel[k].depth = pixel[k - 1].depth;  // equal depths
     pixels.push_back(pixel);
@@ -78,7 +87,8 @@ bool is_sorted_by_depth(const std::vector<SyntheticPixel>& pixels, const std::ve
   for (const SyntheticPixel& pixel : pixels) {
     for (std::size_t k = 1; k < pixel.size(); ++k) {
       const cl_uint before = list[at + k - 1], after = list[at + k];
-      if (depths[before] > depths[after] || (depths[before] == depths[after] && before >= after)) return false;
+      if (depths[before] > depths[after] || (depths[before] == depths[after] && before >= after))
+        return false;
     }
     at += pixel.size();
   }
@@ -120,7 +130,8 @@ TEST_SUITE("gradient") {
       CAPTURE(std::string(c.name));
       AggregateErrors bad;
       const std::vector<SyntheticPixel> pixels = dpr::test::make_pixels(1e-2F, 4);
-      const std::vector<SyntheticPixel> few(pixels.begin(), pixels.begin() + 24);
+      const std::vector<SyntheticPixel> few(pixels.begin(),
+                                            pixels.begin() + (dpr::test::is_reduced() ? 8 : 24));
       compare_with_reference(few, joint(c.prior, 1e-2F), bad, 1.03F);
       CHECK(bad.weight.error > c.weight);
       CHECK(bad.color.error > c.color);

@@ -1,5 +1,5 @@
-// The counter-based generator against its published known answers, and what is drawn with it: uniform numbers, the
-// priors' samplers against the exact inverse CDFs, their scores against the reference.
+// The counter-based generator against its published known answers, and what is drawn with it: uniform
+// numbers, the priors' samplers against the exact inverse CDFs, their scores against the reference.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -117,8 +117,9 @@ struct SamplerCase {
   double sample_tolerance, score_tolerance;
 };
 
-/// Twice the worst errors on the grid. Samples: |error| / max(1, |z|); scores: absolute where |nu'| < 1, else relative.
-/// Measured: gaussian 3.1e-7 and 0, cauchy 2.3e-7 and 8.8e-8, logistic 1.7e-7 and 4.9e-8, gumbel 1.6e-7 and 1.3e-7.
+/// Twice the worst errors on the grid. Samples: |error| / max(1, |z|); scores: absolute where |nu'| < 1, else
+/// relative. Measured: gaussian 3.1e-7 and 0, cauchy 2.3e-7 and 8.8e-8, logistic 1.7e-7 and 4.9e-8,
+/// gumbel 1.6e-7 and 1.3e-7.
 constexpr std::array<SamplerCase, 4> k_samplers{{{RefPrior::gaussian, "gaussian", 6e-7, 0.0},
                                                  {RefPrior::cauchy, "cauchy", 5e-7, 2e-7},
                                                  {RefPrior::logistic, "logistic", 4e-7, 1e-7},
@@ -168,9 +169,11 @@ TEST_SUITE("unit") {
       for (std::size_t i = 0; i < grid.size(); ++i) {
         const long double expected = quantile(c.prior, static_cast<long double>(grid[i]));
         const long double scale = std::max(1.0L, std::abs(expected));
-        const auto error = static_cast<double>(std::abs(static_cast<long double>(found[i]) - expected) / scale);
+        const auto error =
+            static_cast<double>(std::abs(static_cast<long double>(found[i]) - expected) / scale);
         worst.add(error, "u", grid[i], "found", found[i], "expected", static_cast<double>(expected));
-        shifted.add(static_cast<double>(std::abs(static_cast<long double>(found[i]) * 1.00001L - expected) / scale));
+        shifted.add(
+            static_cast<double>(std::abs(static_cast<long double>(found[i]) * 1.00001L - expected) / scale));
       }
       DPR_CHECK_WORST(worst, c.sample_tolerance);
       CHECK(shifted.error > c.sample_tolerance);  // a sampler wrong by 1e-5 is found out
@@ -195,7 +198,8 @@ TEST_SUITE("unit") {
       for (std::size_t i = 0; i < points.size(); ++i) {
         const double expected = dpr::reference::score(c.prior, static_cast<double>(points[i]));
         const double scale = std::max(1.0, std::abs(expected));
-        worst.add(std::abs(static_cast<double>(found[i]) - expected) / scale, "z", points[i], "found", found[i]);
+        worst.add(std::abs(static_cast<double>(found[i]) - expected) / scale, "z", points[i], "found",
+                  found[i]);
         turned.add(std::abs(static_cast<double>(found[i]) + expected) / scale);
       }
       DPR_CHECK_WORST(worst, c.score_tolerance);

@@ -1,5 +1,5 @@
-// The priors' functions against closed forms in long double: F and f / F at any argument, and by way of the occupancy
-// stage ln p, p and the hazard over the whole line, for every prior and from small to large sigma.
+// The priors' functions against closed forms in long double: F and f / F at any argument, and by way of the
+// occupancy stage ln p, p and the hazard over the whole line, for every prior and from small to large sigma.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -72,8 +72,8 @@ Exact uniform(long double x) {
   return {std::log(p), p, p > 0.0L && p < 1.0L ? 1.0L / p : 0.0L};
 }
 
-/// Tolerances, twice the worst error measured. `log_p`: |error| / max(1, |ln p|); `p`: absolute; `hazard`: relative
-/// above 1e-25: further out Gumbel's exp(-exp(x)) stands still at 7e-31.
+/// Tolerances, twice the worst error measured. `log_p`: |error| / max(1, |ln p|); `p`: absolute; `hazard`:
+/// relative above 1e-25: further out Gumbel's exp(-exp(x)) stands still at 7e-31.
 struct PriorCase {
   Prior prior;
   std::string_view name;
@@ -83,9 +83,8 @@ struct PriorCase {
 
 /// Measured on x in [-1e4, 1e4] with sigma from 1e-7 to 1:
 ///   prior      ln p     p        hazard
-///   gaussian   4.2e-7   2.4e-7   6.6e-6   (in the upper tail, where exp(-x^2 / 2) magnifies the rounding of x)
-///   cauchy     1.5e-7   9.0e-8   3.1e-7
-///   logistic   9.8e-8   6.6e-8   2.0e-6
+///   gaussian   4.2e-7   2.4e-7   6.6e-6   (in the upper tail, where exp(-x^2 / 2) magnifies the rounding of
+///   x) cauchy     1.5e-7   9.0e-8   3.1e-7 logistic   9.8e-8   6.6e-8   2.0e-6
 ///   gumbel     2.7e-7   7.7e-8   1.4e-5   (in the upper tail, by exp(-exp(x)))
 ///   uniform    1.2e-6   8.0e-8   7.6e-6   (near x = -1/2, where p = x + 1/2 cancels)
 constexpr std::array<PriorCase, 5> k_priors{{{Prior::gaussian, "gaussian", gaussian, 8e-7, 5e-7, 1.3e-5},
@@ -111,7 +110,8 @@ std::vector<float> line() {
   return xs;
 }
 
-/// The occupancy stage on a list of distances, in runs of 13 fragments padded to the width of the rasterizer's vectors.
+/// The occupancy stage on a list of distances, in runs of 13 fragments padded to the width of the
+/// rasterizer's vectors.
 class Distances {
  public:
   static constexpr std::size_t k_run = 13;
@@ -217,8 +217,10 @@ TEST_SUITE("unit") {
           const Exact exact = c.exact(x);
           const double wanted = std::max(static_cast<double>(exact.log_p), static_cast<double>(DPR_LOG_ZERO));
           const auto found = static_cast<double>(stage.log_p[i]);
-          log_p.add(relative(found, wanted, 1.0), "x", static_cast<double>(x), "found", found, "wanted", wanted);
-          p.add(std::abs(static_cast<double>(stage.p[i]) - static_cast<double>(exact.p)), "x", static_cast<double>(x));
+          log_p.add(relative(found, wanted, 1.0), "x", static_cast<double>(x), "found", found, "wanted",
+                    wanted);
+          p.add(std::abs(static_cast<double>(stage.p[i]) - static_cast<double>(exact.p)), "x",
+                static_cast<double>(x));
           moved.add(relative(found, wanted + 1e-4, 1.0));
         }
         DPR_CHECK_WORST(log_p, c.log_p);
@@ -293,7 +295,8 @@ kernel void probe(global const float* restrict in, global float* restrict cdfs, 
       Worst cdf, ratio, doubled;
       for (std::size_t i = 0; i < xs.size(); ++i) {
         const auto x = static_cast<long double>(xs[i]);
-        // Gumbel's F is no reflection of its survival function; below x = -4.2 its F is less than 1e-29, and clamped.
+        // Gumbel's F is no reflection of its survival function; below x = -4.2 its F is less than 1e-29, and
+        // clamped.
         const bool is_gumbel = c.prior == Prior::gumbel;
         if (is_gumbel && x < -4.2L) continue;
         const auto wanted_cdf = static_cast<double>(is_gumbel ? std::exp(-std::exp(-x)) : c.exact(x).p);
@@ -335,7 +338,8 @@ kernel void probe(global const float* restrict in, global float* restrict out) {
         if (xs[i] < -87.0F) {
           CHECK(found[i] <= 1.7e-38F);
         } else {
-          worst.add(relative(static_cast<double>(found[i]), std::exp(static_cast<double>(xs[i])), 0.0), "x", xs[i]);
+          worst.add(relative(static_cast<double>(found[i]), std::exp(static_cast<double>(xs[i])), 0.0), "x",
+                    xs[i]);
         }
       }
       DPR_CHECK_WORST(worst, 2e-7);
@@ -372,14 +376,15 @@ TEST_SUITE("gradient") {
                                static_cast<double>(grads[i]);
           hazard.add(relative(found, exact, k_least_hazard), "x", static_cast<double>(x), "found", found);
           halved.add(relative(found, 2.0 * exact, k_least_hazard));
-          const double share = -static_cast<double>(x) * exact * static_cast<double>(grads[i]) /
-                               static_cast<double>(sigma);
+          const double share =
+              -static_cast<double>(x) * exact * static_cast<double>(grads[i]) / static_cast<double>(sigma);
           sums[stage.pair(i)] += share;
           sizes[stage.pair(i)] += std::abs(share);
         }
         for (std::size_t pair = 0; pair < sums.size(); ++pair) {
           // Relative to the sum of the magnitudes: the terms cancel.
-          sum.add(std::abs(static_cast<double>(stage.grad_sigma[pair]) - sums[pair]) / std::max(sizes[pair], 1e-30),
+          sum.add(std::abs(static_cast<double>(stage.grad_sigma[pair]) - sums[pair]) /
+                      std::max(sizes[pair], 1e-30),
                   "pair", pair);
         }
         DPR_CHECK_WORST(hazard, c.hazard);

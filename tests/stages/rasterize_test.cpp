@@ -1,5 +1,6 @@
-// Rasterization against the brute-force reference: the set of fragments, their distance, depth and barycentrics, the
-// gradients of the corners; and against the tables of ../shared/conformance/rasterizer, where that folder is.
+// Rasterization against the brute-force reference: the set of fragments, their distance, depth and
+// barycentrics, the gradients of the corners; and against the tables of ../shared/conformance/rasterizer,
+// where that folder is.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -31,9 +32,10 @@ using dpr::test::Worst;
 /// A fragment this close to the edge of the criterion may be present or absent.
 constexpr double k_criterion = 1e-6;
 
-/// Tolerances, about twice the errors measured. Distance: in the metric's unit, relative above 1, measured 5.2e-7; depth:
-/// relative, measured 5.3e-7; barycentrics: absolute, measured 9.6e-7. The last two of triangles lower than 0.1 NDC are
-/// taken times their height over 0.1, because the rounding of a corner is divided by the height.
+/// Tolerances, about twice the errors measured. Distance: in the metric's unit, relative above 1,
+/// measured 5.2e-7; depth: relative, measured 5.3e-7; barycentrics: absolute, measured 9.6e-7. The last two
+/// of triangles lower than 0.1 NDC are taken times their height over 0.1, because the rounding of a corner is
+/// divided by the height.
 constexpr double k_distance = 1e-6, k_depth = 1.1e-6, k_bary = 2e-6;
 
 struct Frames {
@@ -59,7 +61,8 @@ std::vector<Frames> frames() {
 }
 
 std::vector<NdcTriangle> triangles_of(const Frames& f) {
-  return dpr::test::random_triangles(static_cast<std::size_t>(reduced(40, 4)) * f.frame.views, f.size, f.seed);
+  return dpr::test::random_triangles(static_cast<std::size_t>(reduced(40, 4)) * f.frame.views, f.size,
+                                     f.seed);
 }
 
 /// The doubled area over the longest side: what a rounding of a corner is divided by in a barycentric.
@@ -145,8 +148,8 @@ std::vector<float> corner_gradients(NdcStages& s, const Gradients& g) {
     return dpr::Buffer<float>(dpr::test::device_impl(), std::span<const float>(values));
   };
   dpr::test::poison(s.rasterize.grad_corners, 9 * s.bin.pairs);
-  s.rasterize.backward(s.params, s.setup.triangles, s.bin, upload(g.distance), upload(g.depth), upload(g.bary1),
-                       upload(g.bary2));
+  s.rasterize.backward(s.params, s.setup.triangles, s.bin, upload(g.distance), upload(g.depth),
+                       upload(g.bary1), upload(g.bary2));
   return s.rasterize.grad_corners.download();
 }
 
@@ -164,8 +167,8 @@ Worst compare_gradients(const NdcFrame& frame, const std::vector<NdcTriangle>& t
     const ref::NdcTriangle t = dpr::test::to_reference(triangles[key.view * faces + key.face]);
     const ref::Vec2d point = ref::pixel_center(key.column, key.row, {frame.width, frame.height});
     const std::size_t i = fragment.index;
-    const ref::FragmentGradient grad{number(g.distance[i]), number(g.depth[i]),
-                                     {0.0, number(g.bary1[i]), number(g.bary2[i])}};
+    const ref::FragmentGradient grad{
+        number(g.distance[i]), number(g.depth[i]), {0.0, number(g.bary1[i]), number(g.bary2[i])}};
     const ref::NdcTriangle corners = ref::rasterize_backward(t, point, p, grad);
     for (std::size_t k = 0; k < 9; ++k) {
       const double value = corners[k / 3][k % 3];
@@ -178,8 +181,8 @@ Worst compare_gradients(const NdcFrame& frame, const std::vector<NdcTriangle>& t
   Worst worst;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (!comparable[i / 9]) continue;
-    worst.add(std::abs(number(grad_corners[i]) * distortion - wanted[i]) / size[i / 9], "pair", i / 9, "value", i % 9,
-              "found", grad_corners[i], "wanted", wanted[i]);
+    worst.add(std::abs(number(grad_corners[i]) * distortion - wanted[i]) / size[i / 9], "pair", i / 9,
+              "value", i % 9, "found", grad_corners[i], "wanted", wanted[i]);
   }
   return worst;
 }
@@ -221,26 +224,30 @@ TEST_SUITE("unit") {
     }
   }
 
-  TEST_CASE("rasterize: runs are padded to whole vectors, the padding repeats the last and is listed nowhere") {
+  TEST_CASE(
+      "rasterize: runs are padded to whole vectors, the padding repeats the last and is listed nowhere") {
     const NdcFrame frame{22, 12, 0.02F};
     NdcStages s(frame, dpr::test::random_triangles(static_cast<std::size_t>(reduced(40, 4)), 0.5F, 2));
     s.forward();
     const std::size_t width = std::min<std::size_t>(dpr::test::device_impl().info.lanes, DPR_TILE);
     const std::vector<cl_uint> starts = s.rasterize.fragment_starts.download(),
-                               pixels = s.rasterize.fragment_pixel.download(), list = s.rasterize.list.download();
+                               pixels = s.rasterize.fragment_pixel.download(),
+                               list = s.rasterize.list.download();
     const std::vector<float> distance = s.rasterize.distance.download(), depth = s.rasterize.depth.download();
     const std::vector<cl_uint2> masks = s.rasterize.masks.download();
     std::vector<int> listed(s.rasterize.fragments, 0);
     for (const cl_uint fragment : list) ++listed.at(fragment);
     std::size_t wrong = 0;
     for (std::size_t pair = 0; pair < s.bin.pairs; ++pair) {
-      const auto count = static_cast<cl_uint>(std::popcount(masks[pair].s[0]) + std::popcount(masks[pair].s[1]));
+      const auto count =
+          static_cast<cl_uint>(std::popcount(masks[pair].s[0]) + std::popcount(masks[pair].s[1]));
       wrong += starts[pair] % width != 0;
       wrong += starts[pair + 1] - starts[pair] != (count + width - 1) / width * width;
       for (cl_uint i = starts[pair]; i < starts[pair + 1]; ++i) {
         const bool is_padding = i - starts[pair] >= count;
         wrong += listed[i] != (is_padding ? 0 : 1);
-        wrong += is_padding && (pixels[i] != pixels[i - 1] || distance[i] != distance[i - 1] || depth[i] != depth[i - 1]);
+        wrong += is_padding &&
+                 (pixels[i] != pixels[i - 1] || distance[i] != distance[i - 1] || depth[i] != depth[i - 1]);
       }
     }
     CHECK(wrong == 0);
@@ -311,7 +318,8 @@ TEST_SUITE("unit") {
       const ref::RasterizeParameters p = dpr::test::reference_parameters(frame);
       const auto is_borderline = [&](const FragmentKey& key) {
         const ref::Vec2d point = ref::pixel_center(key.column, key.row, {frame.width, frame.height});
-        return dpr::test::criterion_margin(dpr::test::to_reference(triangles[key.face]), point, p) < k_criterion;
+        return dpr::test::criterion_margin(dpr::test::to_reference(triangles[key.face]), point, p) <
+               k_criterion;
       };
       Worst distance, depth, bary;
       std::size_t missing = 0, surplus = 0;
@@ -325,8 +333,8 @@ TEST_SUITE("unit") {
         const FoundFragment fragment = at->second;
         found.all.erase(at);
         const double want = row[4];
-        distance.add(std::abs(fragment.distance - want) / std::max(1.0, std::abs(want)), "row", key.row, "column",
-                     key.column, "face", key.face, "found", fragment.distance, "wanted", want);
+        distance.add(std::abs(fragment.distance - want) / std::max(1.0, std::abs(want)), "row", key.row,
+                     "column", key.column, "face", key.face, "found", fragment.distance, "wanted", want);
         if (row[3].is_null() || !clipped) continue;
         depth.add(std::abs(fragment.depth / row[3].get<double>() - 1), "row", key.row, "column", key.column);
         bary.add(std::abs(fragment.bary1 - row[6].get<double>()), "row", key.row, "column", key.column);

@@ -1,5 +1,5 @@
-// Prefix sums, stable sorting and compensated sums against serial ones: at the sizes where a chunk, a block or a level
-// begins, with saturation, with empty segments, with sums that cancel.
+// Prefix sums, stable sorting and compensated sums against serial ones: at the sizes where a chunk, a block
+// or a level begins, with saturation, with empty segments, with sums that cancel.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -105,7 +105,8 @@ std::vector<float> reduce(const Reduction& r) {
   poison(sums, r.channels * r.segments);
   operation(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values, sums);
   std::vector<float> found = sums.download();
-  CHECK(operation.read(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values) == found);
+  CHECK(operation.read(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values) ==
+        found);
   return found;
 }
 
@@ -135,7 +136,8 @@ TEST_SUITE("unit") {
   TEST_CASE("scan: one operation serves sizes that grow and shrink") {
     dpr::Scan operation(device_impl());
     Buffer<cl_uint> out;
-    for (const std::size_t count : {std::size_t{300}, std::size_t{3}, static_cast<std::size_t>(reduced(70000, 600))}) {
+    for (const std::size_t count :
+         {std::size_t{300}, std::size_t{3}, static_cast<std::size_t>(reduced(70000, 600))}) {
       const std::vector<cl_uint> values = random_values(count, 5, 3);
       operation(count, on_device(values), out);
       CHECK(out.download() == serial_scan(values));
@@ -149,7 +151,8 @@ TEST_SUITE("unit") {
     CHECK(offsets == serial_scan(values));
     CHECK(offsets.back() == k_most);
     const Buffer<cl_uint> device_offsets = on_device(offsets);
-    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::read_total(device_offsets, values.size(), "fragments (frame)"),
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument,
+                          dpr::read_total(device_offsets, values.size(), "fragments (frame)"),
                           "fragments (frame)");
     CHECK(dpr::read_total(device_offsets, 256, "fragments") == 256U * 0x00ffffffU);
   }
@@ -162,10 +165,12 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("sort: stable, whatever the number of items and keys") {
-    for (const std::size_t count : dpr::test::is_reduced() ? std::vector<std::size_t>{0, 1, 40}
-                                                           : std::vector<std::size_t>{0, 1, 1023, 1024, 1025, 5000}) {
-      for (const std::size_t key_count : dpr::test::is_reduced() ? std::vector<std::size_t>{1, 257}
-                                                                 : std::vector<std::size_t>{1, 2, 255, 256, 257, 70000}) {
+    for (const std::size_t count : dpr::test::is_reduced()
+                                       ? std::vector<std::size_t>{0, 1, 40}
+                                       : std::vector<std::size_t>{0, 1, 1023, 1024, 1025, 5000}) {
+      for (const std::size_t key_count : dpr::test::is_reduced()
+                                             ? std::vector<std::size_t>{1, 257}
+                                             : std::vector<std::size_t>{1, 2, 255, 256, 257, 70000}) {
         CAPTURE(count);
         CAPTURE(key_count);
         const auto keys = random_values(count, static_cast<cl_uint>(key_count), static_cast<unsigned>(count));
@@ -203,7 +208,8 @@ TEST_SUITE("unit") {
     for (const std::size_t times : {1, 64, 640}) {
       std::vector<float> values;
       for (const float value : {1e8F, 1.0F, -1e8F}) values.insert(values.end(), times, value);
-      CHECK(reduce({1, 1, 1, {0, static_cast<cl_uint>(values.size())}, values})[0] == static_cast<float>(times));
+      CHECK(reduce({1, 1, 1, {0, static_cast<cl_uint>(values.size())}, values})[0] ==
+            static_cast<float>(times));
     }
     const std::vector<float> values = repeated({1e8F, 1.0F, -1e8F}, 500);
     CHECK(reduce({1, 1, 1, {0, 1500}, values})[0] == 500.0F);

@@ -1,7 +1,8 @@
-// The transform stage against the reference: vertices of several meshes and views, and the gradients of positions,
-// poses and projections.
+// The transform stage against the reference: vertices of several meshes and views, and the gradients of
+// positions, poses and projections.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "dpr/dpr.hpp"
@@ -53,7 +54,8 @@ class TwoMeshes {
     RandomFloat random(5);
     scene.width = k_width;
     scene.height = k_height;
-    scene.meshes = {{dpr::make_cube(), glm::mat4(1.0F)}, {dpr::make_icosphere(dpr::test::is_reduced() ? 0 : 2), glm::mat4(1.0F)}};
+    scene.meshes = {{dpr::make_cube(), glm::mat4(1.0F)},
+                    {dpr::make_icosphere(dpr::test::is_reduced() ? 0 : 2), glm::mat4(1.0F)}};
     for (int v = 0; v < 3; ++v) {
       dpr::View view{dpr::orbit_camera(6.0F, 20.0F * static_cast<float>(v), 50.0F), {}};
       if (v == 1) view.camera.intrinsics = dpr::Intrinsics{20, 24, 12, 5};
@@ -92,19 +94,22 @@ class TwoMeshes {
 
 void add_error(Worst& worst, const ref::Vec3d& found, const ref::Vec3d& wanted, double scale, std::size_t i) {
   for (std::size_t k = 0; k < 3; ++k) {
-    worst.add(std::abs(found[k] - wanted[k]) / scale, "vertex", i, "axis", k, "found", found[k], "wanted", wanted[k]);
+    worst.add(std::abs(found[k] - wanted[k]) / scale, "vertex", i, "axis", k, "found", found[k], "wanted",
+              wanted[k]);
   }
 }
 
-/// Twice the errors measured: world 2.1e-7, NDC and depth 4.0e-7, gradients 6.5e-8 of the largest of their kind.
+/// Twice the errors measured: world 2.1e-7, NDC and depth 4.0e-7, gradients 6.5e-8 of the largest of their
+/// kind.
 constexpr double k_world = 4.2e-7, k_ndc = 8e-7, k_gradient = 1.3e-7;
 
 struct TransformErrors {
   Worst world, positions, model, camera, projection;
 };
 
-/// Runs the backward kernels on random gradients. `flip` is 1, or -1 to show that a wrong sign is noticed.
-TransformErrors backward_errors(double flip) {
+/// Runs the backward kernels on random gradients. Unlit, what the world gradients hold before does not count.
+/// `flip` is 1, or -1 to show that a wrong sign is noticed.
+TransformErrors backward_errors(bool lit, double flip) {
   TwoMeshes t;
   dpr::Renderer::Impl& m = t.impl();
   m.transform.forward(m.frame, m.device_views, *m.geometry);
@@ -114,13 +119,14 @@ TransformErrors backward_errors(double flip) {
   for (std::size_t i = 0; i < count; ++i) {
     const bool used = i % 5 != 0;  // no kept triangle uses the others
     grad_ndc.push_back(used ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}} : cl_float4{});
-    grad_world.push_back({{random(-1, 1), random(-1, 1), random(-1, 1), 0}});
+    grad_world.push_back(lit ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}}
+                             : cl_float4{{NAN, NAN, NAN, NAN}});
   }
   const dpr::Buffer<cl_float4> ndc_buffer(m.device.impl(), std::span<const cl_float4>(grad_ndc));
   dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
   poison(m.transform.channels, DPR_POSE_CHANNELS * count);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
-  m.transform.backward(m.frame, m.device_views, *m.geometry, ndc_buffer, world_buffer);
+  m.transform.backward(m.frame, m.device_views, *m.geometry, true, lit, ndc_buffer, world_buffer);
   m.transform.backward_positions(m.frame, m.device_views, *m.geometry, world_buffer);
   const std::vector<cl_float4> found_world = world_buffer.download(),
                                found_positions = m.transform.grad_positions.download();
@@ -131,19 +137,22 @@ TransformErrors backward_errors(double flip) {
   constexpr double k_size = 5;  // of the largest gradients
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t view = i / vertices, vertex = i % vertices;
-    ref::TransformGradient g =
-        ref::transform_backward(to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view),
-                                t.projection(view), to_reference(grad_ndc[i]), to_reference(grad_world[i]));
+    ref::TransformGradient g = ref::transform_backward(
+        to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view), t.projection(view),
+        to_reference(grad_ndc[i]), lit ? to_reference(grad_world[i]) : ref::Vec3d{});
     g.view_rotation = flip * g.view_rotation;
     const auto channel = [&](std::size_t c) { return number(channels[c * count + i]); };
-    const auto channel3 = [&](std::size_t c) { return ref::Vec3d{channel(c), channel(c + 1), channel(c + 2)}; };
+    const auto channel3 = [&](std::size_t c) {
+      return ref::Vec3d{channel(c), channel(c + 1), channel(c + 2)};
+    };
     add_error(errors.world, to_reference(found_world[i]), g.model_translation, k_size, i);
     add_error(errors.model, channel3(DPR_CHANNEL_MODEL), g.model_rotation, k_size, i);
     add_error(errors.model, channel3(DPR_CHANNEL_MODEL + 3), g.model_translation, k_size, i);
     add_error(errors.camera, channel3(DPR_CHANNEL_VIEW), g.view_rotation, k_size, i);
     add_error(errors.camera, channel3(DPR_CHANNEL_VIEW + 3), g.view_translation, k_size, i);
     add_error(errors.projection,
-              {channel(DPR_CHANNEL_PROJECTION), channel(DPR_CHANNEL_PROJECTION + 1), channel(DPR_CHANNEL_PROJECTION + 2)},
+              {channel(DPR_CHANNEL_PROJECTION), channel(DPR_CHANNEL_PROJECTION + 1),
+               channel(DPR_CHANNEL_PROJECTION + 2)},
               {g.projection.scale.x, g.projection.scale.y, g.projection.offset.x}, k_size, i);
     errors.projection.add(std::abs(channel(DPR_CHANNEL_PROJECTION + 3) - g.projection.offset.y), "vertex", i);
     positions[vertex] += g.position;
@@ -168,8 +177,8 @@ TEST_SUITE("unit") {
     Worst world_error, ndc_error, shifted;
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t view = i / vertices, vertex = i % vertices;
-      const ref::TransformedVertex v = ref::transform_forward(to_reference(t.positions[vertex]), t.model(view, vertex),
-                                                              t.camera(view), t.projection(view));
+      const ref::TransformedVertex v = ref::transform_forward(
+          to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view), t.projection(view));
       add_error(world_error, to_reference(world[i]), v.world, 1, i);
       add_error(ndc_error, to_reference(ndc[i]), v.ndc, 1, i);
       add_error(shifted, to_reference(ndc[i]), v.ndc + ref::Vec3d{0, 1e-4, 0}, 1, i);
@@ -184,16 +193,20 @@ TEST_SUITE("unit") {
 
 TEST_SUITE("gradient") {
   TEST_CASE("transform: gradients of positions, poses and projections are the reference's") {
-    const TransformErrors errors = backward_errors(1);
-    DPR_CHECK_WORST(errors.world, k_gradient);
-    DPR_CHECK_WORST(errors.positions, k_gradient);
-    DPR_CHECK_WORST(errors.model, k_gradient);
-    DPR_CHECK_WORST(errors.camera, k_gradient);
-    DPR_CHECK_WORST(errors.projection, k_gradient);
-    CHECK(backward_errors(-1).camera.error > k_gradient);
+    for (const bool lit : {true, false}) {
+      CAPTURE(lit);
+      const TransformErrors errors = backward_errors(lit, 1);
+      DPR_CHECK_WORST(errors.world, k_gradient);
+      DPR_CHECK_WORST(errors.positions, k_gradient);
+      DPR_CHECK_WORST(errors.model, k_gradient);
+      DPR_CHECK_WORST(errors.camera, k_gradient);
+      DPR_CHECK_WORST(errors.projection, k_gradient);
+    }
+    CHECK(backward_errors(true, -1).camera.error > k_gradient);
   }
 
-  TEST_CASE("transform: a vertex in the camera's plane that no triangle uses has a gradient of zero, not NaN") {
+  TEST_CASE(
+      "transform: a vertex in the camera's plane that no triangle uses has a gradient of zero, not NaN") {
     dpr::Scene scene;
     scene.width = scene.height = 8;
     dpr::Mesh mesh;
@@ -207,7 +220,7 @@ TEST_SUITE("gradient") {
     const std::vector<cl_float4> zeros(3, cl_float4{});
     const dpr::Buffer<cl_float4> grad_ndc(m.device.impl(), std::span<const cl_float4>(zeros));
     dpr::Buffer<cl_float4> grad_world(m.device.impl(), std::span<const cl_float4>(zeros));
-    m.transform.backward(m.frame, m.device_views, *m.geometry, grad_ndc, grad_world);
+    m.transform.backward(m.frame, m.device_views, *m.geometry, true, true, grad_ndc, grad_world);
     CHECK(m.transform.channels.download() == std::vector<float>(DPR_POSE_CHANNELS * 3, 0.0F));
     for (const cl_float4& g : grad_world.download()) CHECK(g.s[0] == 0.0F);
   }

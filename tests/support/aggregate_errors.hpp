@@ -29,7 +29,8 @@ class RandomFloat {
   std::mt19937 engine_;
 };
 
-/// How a pixel's occupancies are drawn: all 1; over the unit interval; 0, 1 and tiny ones among others; over 30 decades.
+/// How a pixel's occupancies are drawn: all 1; over the unit interval; 0, 1 and tiny ones among others; over
+/// 30 decades.
 enum class Occupancies { solid, any, extreme, decades };
 
 inline float draw_occupancy(Occupancies kind, RandomFloat& random) {
@@ -48,7 +49,8 @@ inline float draw_occupancy(Occupancies kind, RandomFloat& random) {
 }
 
 /// `spread`: the interval the depths fill, in units of gamma, as far as the camera's range allows.
-inline SyntheticPixel make_pixel(int fragments, float spread, float gamma, Occupancies kind, RandomFloat& random) {
+inline SyntheticPixel make_pixel(int fragments, float spread, float gamma, Occupancies kind,
+                                 RandomFloat& random) {
   const float range = k_zfar - k_znear;
   const float reach = std::min(spread * gamma * range, 90.0F);
   const float nearest = random(1.5F, 8.0F);
@@ -66,8 +68,8 @@ inline SyntheticPixel make_pixel(int fragments, float spread, float gamma, Occup
 /// Pixels from none to 40 fragments, from coincident to far apart, with every kind of occupancy.
 inline std::vector<SyntheticPixel> make_pixels(float gamma, unsigned seed) {
   RandomFloat random(seed);
-  const std::vector<int> counts =
-      is_reduced() ? std::vector<int>{0, 1, 3, 7} : std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 40};
+  const std::vector<int> counts = is_reduced() ? std::vector<int>{0, 1, 3, 7}
+                                               : std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 20, 40};
   const std::vector<float> spreads =
       is_reduced() ? std::vector<float>{0, 3} : std::vector<float>{0, 0.3F, 1, 3, 8, 20, 60, 300, 1e4F};
   std::vector<SyntheticPixel> pixels;
@@ -91,10 +93,11 @@ inline std::vector<SyntheticPixel> make_crowds(float gamma, unsigned seed) {
   return pixels;
 }
 
-/// Absolute errors of weights (background's included), colours and alphas; of the gradients the error over the largest
-/// gradient of the pixel, or over 0.01 where all are smaller. The gradients of gamma and alpha are sums of the fragments'
-/// gradients times beta by depth, or ln p / alpha: their errors count over the sum of the terms' magnitudes, a gradient
-/// below 0.01 of its weight as that. Depth and gamma count in units of gamma, alpha in its own.
+/// Absolute errors of weights (background's included), colours and alphas; of the gradients the error over
+/// the largest gradient of the pixel, or over 0.01 where all are smaller. The gradients of gamma and alpha
+/// are sums of the fragments' gradients times beta by depth, or ln p / alpha: their errors count over the sum
+/// of the terms' magnitudes, a gradient below 0.01 of its weight as that. Depth and gamma count in units of
+/// gamma, alpha in its own.
 struct AggregateErrors {
   Worst weight, color, alpha, grad_depth, grad_log_occupancy, grad_gamma, grad_alpha;
 };
@@ -104,9 +107,9 @@ inline constexpr double k_least_gradient = 0.01;
 inline double number(float value) { return static_cast<double>(value); }
 
 /// One pixel's errors. `pixel` is what the reference gets, the rest what the stage found.
-inline void add_errors(const SyntheticPixel& pixel, const reference::AggregateParameters& p, const cl_float4& image,
-                       const cl_float4& grad, const SyntheticFrame::Gradients& found, std::size_t i,
-                       AggregateErrors& errors) {
+inline void add_errors(const SyntheticPixel& pixel, const reference::AggregateParameters& p,
+                       const cl_float4& image, const cl_float4& grad, const SyntheticFrame::Gradients& found,
+                       std::size_t i, AggregateErrors& errors) {
   const std::vector<reference::FragmentInput> inputs = reference_fragments(pixel);
   const reference::AggregateResult result = reference::aggregate_forward(inputs, p);
   const reference::Vec3d grad_color{number(grad.s[0]), number(grad.s[1]), number(grad.s[2])};
@@ -120,9 +123,11 @@ inline void add_errors(const SyntheticPixel& pixel, const reference::AggregatePa
     const double have = number(image.s[c]);
     where(errors.color, std::abs(have - result.color[c]), n, have, result.color[c]);
   }
-  where(errors.alpha, std::abs(number(image.s[3]) - result.silhouette), n, number(image.s[3]), result.silhouette);
+  where(errors.alpha, std::abs(number(image.s[3]) - result.silhouette), n, number(image.s[3]),
+        result.silhouette);
   const double background = number(found.background[i].x) / grad_color.x;
-  where(errors.weight, std::abs(background - result.background_weight), n, background, result.background_weight);
+  where(errors.weight, std::abs(background - result.background_weight), n, background,
+        result.background_weight);
 
   const double unit = p.gamma * (p.zfar - p.znear);
   std::vector<double> by_log(n);
@@ -154,8 +159,8 @@ inline void add_errors(const SyntheticPixel& pixel, const reference::AggregatePa
     const double depth = number(found.depth[i][k]), log_p = number(found.log_occupancy[i][k]);
     const double want = wanted.fragments[k].depth;
     where(errors.grad_depth, std::abs(depth - want) * unit / largest_depth, k, depth * unit, want * unit);
-    // The joint composition stops at an opaque fragment: for p = 1 itself it takes the background to be what it hides.
-    // No harm is done, because d ln p / ds is below 1e-6 there.
+    // The joint composition stops at an opaque fragment: for p = 1 itself it takes the background to be what
+    // it hides. No harm is done, because d ln p / ds is below 1e-6 there.
     if (p.composition == reference::Composition::joint && pixel[k].occupancy == 1) continue;
     where(errors.grad_log_occupancy, std::abs(log_p - by_log[k]) / largest_log, k, log_p, by_log[k]);
   }
@@ -180,8 +185,8 @@ inline std::vector<cl_float4> make_grad_image(std::size_t pixels, unsigned seed)
   return grad;
 }
 
-/// Renders the pixels and adds their errors. `distortion` multiplies what the stage found: 1, but where a test shows
-/// that a wrong result is noticed.
+/// Renders the pixels and adds their errors. `distortion` multiplies what the stage found: 1, but where a
+/// test shows that a wrong result is noticed.
 inline void compare_with_reference(const std::vector<SyntheticPixel>& pixels, const Smoothing& smoothing,
                                    AggregateErrors& errors, float distortion = 1) {
   SyntheticFrame frame(pixels);
@@ -195,7 +200,8 @@ inline void compare_with_reference(const std::vector<SyntheticPixel>& pixels, co
     }
     found.gamma[i] *= distortion;
     found.alpha[i] *= distortion;
-    add_errors(pixels[i], reference_parameters(smoothing, k_background), image[i], grad_image[i], found, i, errors);
+    add_errors(pixels[i], reference_parameters(smoothing, k_background), image[i], grad_image[i], found, i,
+               errors);
   }
 }
 

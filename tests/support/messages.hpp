@@ -20,7 +20,7 @@ std::string message_of(Action action) {
     CHECK_MESSAGE(message.find('\n') == std::string::npos, message);  // an error is one line
     return message;
   } catch (const std::exception& other) {
-    FAIL("another exception: " << other.what());
+    FAIL("another exception: " << std::string(other.what()));
   }
   FAIL("no exception");
   return {};

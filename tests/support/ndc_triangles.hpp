@@ -1,5 +1,5 @@
-// Triangles given directly in NDC and view depth, through setup, binning and rasterization; and what the reference finds
-// by brute force.
+// Triangles given directly in NDC and view depth, through setup, binning and rasterization; and what the
+// reference finds by brute force.
 #pragma once
 
 #include <array>
@@ -50,7 +50,10 @@ inline reference::NdcTriangle to_reference(const NdcTriangle& t) {
 class NdcStages {
  public:
   NdcStages(const NdcFrame& frame, const std::vector<NdcTriangle>& all)
-      : setup(device_impl()), bin(device_impl()), rasterize(device_impl()), geometry_(device_impl(), scene_of(frame, all)) {
+      : setup(device_impl()),
+        bin(device_impl()),
+        rasterize(device_impl()),
+        geometry_(device_impl(), scene_of(frame, all)) {
     std::vector<cl_float4> ndc;
     for (const NdcTriangle& t : all) {
       for (const glm::vec3& v : t) ndc.push_back({{v.x, v.y, v.z, 0.0F}});
@@ -85,7 +88,8 @@ class NdcStages {
   void forward() {
     list_pairs();
     rasterize.forward(params, setup.triangles, bin);
-    for (Buffer<float>* buffer : {&rasterize.distance, &rasterize.depth, &rasterize.bary1, &rasterize.bary2}) {
+    for (Buffer<float>* buffer :
+         {&rasterize.distance, &rasterize.depth, &rasterize.bary1, &rasterize.bary2}) {
       poison(*buffer, rasterize.fragments);
     }
     poison(rasterize.list, rasterize.listed_fragments, 0xdeadbeefU);
@@ -129,7 +133,8 @@ struct FoundFragment {
   double distance, depth, bary1, bary2;
 };
 
-/// The fragments of every pixel's list. A fragment listed twice, or under another pixel than it says, is counted.
+/// The fragments of every pixel's list. A fragment listed twice, or under another pixel than it says, is
+/// counted.
 struct FoundFragments {
   std::map<FragmentKey, FoundFragment> all;
   std::size_t misplaced = 0, unordered = 0;
@@ -140,21 +145,23 @@ inline FoundFragments read_fragments(const NdcStages& s) {
   const std::vector<cl_uint> starts = r.pixel_starts.download(), list = r.list.download(),
                              pair = r.fragment_pair.download(), place = r.fragment_pixel.download(),
                              faces = s.bin.pair_face.download();
-  const std::vector<float> distance = r.distance.download(), depth = r.depth.download(), bary1 = r.bary1.download(),
-                           bary2 = r.bary2.download();
+  const std::vector<float> distance = r.distance.download(), depth = r.depth.download(),
+                           bary1 = r.bary1.download(), bary2 = r.bary2.download();
   FoundFragments found;
   const std::size_t pixels = std::size_t{s.params.width} * s.params.height;
   for (std::size_t pixel = 0; pixel < pixels * s.params.views; ++pixel) {
-    const std::size_t view = pixel / pixels, row = pixel % pixels / s.params.width, column = pixel % s.params.width;
+    const std::size_t view = pixel / pixels, row = pixel % pixels / s.params.width,
+                      column = pixel % s.params.width;
     cl_uint last_face = 0;
     for (cl_uint at = starts[pixel]; at < starts[pixel + 1]; ++at) {
       const cl_uint fragment = list.at(at);
       const cl_uint view_face = faces.at(pair.at(fragment));
-      const FragmentKey key{view, static_cast<int>(row), static_cast<int>(column), view_face % s.params.faces};
+      const FragmentKey key{view, static_cast<int>(row), static_cast<int>(column),
+                            view_face % s.params.faces};
       const bool is_new = found.all
-                              .emplace(key, FoundFragment{fragment, pair[fragment], number(distance[fragment]),
-                                                          number(depth[fragment]), number(bary1[fragment]),
-                                                          number(bary2[fragment])})
+                              .emplace(key, FoundFragment{fragment, pair[fragment],
+                                                          number(distance[fragment]), number(depth[fragment]),
+                                                          number(bary1[fragment]), number(bary2[fragment])})
                               .second;
       if (!is_new || place[fragment] != (column | row << 16U) || view_face / s.params.faces != view) {
         ++found.misplaced;
@@ -166,7 +173,8 @@ inline FoundFragments read_fragments(const NdcStages& s) {
   return found;
 }
 
-/// How far a pixel is from changing sides: of being inside, or within the blur radius. In the unit of the metric.
+/// How far a pixel is from changing sides: of being inside, or within the blur radius. In the unit of the
+/// metric.
 inline double criterion_margin(const reference::NdcTriangle& t, const reference::Vec2d& point,
                                const reference::RasterizeParameters& p) {
   const double squared = reference::nearest_edge(t, point).squared_distance;

@@ -14,7 +14,8 @@
 namespace dpr::test {
 
 inline const Device& test_device() {
-  static const Device device = open_device();
+  // Never released: OpenCL implementations may be gone before static objects are.
+  static const Device& device = *new Device(open_device());
   return device;
 }
 
@@ -46,7 +47,8 @@ inline std::string header_text(std::string_view name) {
 /// One kernel, `probe`, of a program made of headers and a text. Arguments are not checked.
 class Probe {
  public:
-  Probe(std::initializer_list<std::string_view> headers, const std::string& text, const std::string& options = "") {
+  Probe(std::initializer_list<std::string_view> headers, const std::string& text,
+        const std::string& options = "") {
     std::string source;
     for (const std::string_view header : headers) source += header_text(header);
     Device::Impl& device = device_impl();
@@ -67,8 +69,9 @@ class Probe {
   void operator()(std::size_t items, const Args&... args) {
     unsigned index = 0;
     (check_cl(set(index++, args), "clSetKernelArg probe"), ...);
-    check_cl(device_impl().queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(items), cl::NullRange),
-             "probe");
+    check_cl(
+        device_impl().queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(items), cl::NullRange),
+        "probe");
   }
 
  private:

@@ -1,5 +1,5 @@
-// Pixels made by hand for the aggregation stage: the buffers of the stages before it, filled with any fragments, and
-// what the reference says of them.
+// Pixels made by hand for the aggregation stage: the buffers of the stages before it, filled with any
+// fragments, and what the reference says of them.
 #pragma once
 
 #include <cmath>
@@ -31,7 +31,8 @@ inline std::vector<reference::FragmentInput> reference_fragments(const Synthetic
     input.depth = static_cast<double>(f.depth);
     input.occupancy = static_cast<double>(f.occupancy);
     if (f.occupancy > 0) input.log_occupancy = static_cast<double>(log_of(f.occupancy));
-    input.color = {static_cast<double>(f.color.x), static_cast<double>(f.color.y), static_cast<double>(f.color.z)};
+    input.color = {static_cast<double>(f.color.x), static_cast<double>(f.color.y),
+                   static_cast<double>(f.color.z)};
     inputs.push_back(input);
   }
   return inputs;
@@ -39,8 +40,8 @@ inline std::vector<reference::FragmentInput> reference_fragments(const Synthetic
 
 inline reference::AggregateParameters reference_parameters(const Smoothing& s, const glm::vec3& background) {
   reference::AggregateParameters p;
-  p.composition = s.composition == Composition::joint ? reference::Composition::joint
-                                                      : reference::Composition::barrier;
+  p.composition =
+      s.composition == Composition::joint ? reference::Composition::joint : reference::Composition::barrier;
   p.prior = static_cast<reference::Prior>(s.depth_prior);
   p.gamma = static_cast<double>(s.gamma);
   p.alpha = static_cast<double>(s.alpha);
@@ -52,8 +53,8 @@ inline reference::AggregateParameters reference_parameters(const Smoothing& s, c
   return p;
 }
 
-/// One view, one row of pixels; the fragments of a pixel are the faces 0, 1, 2 ... Fragments are stored in another
-/// order than they are listed, and the buffers hold one that no pixel lists.
+/// One view, one row of pixels; the fragments of a pixel are the faces 0, 1, 2 ... Fragments are stored in
+/// another order than they are listed, and the buffers hold one that no pixel lists.
 class SyntheticFrame {
  public:
   explicit SyntheticFrame(const std::vector<SyntheticPixel>& pixels)
@@ -70,7 +71,8 @@ class SyntheticFrame {
       most = std::max(most, pixel.size());
       starts.push_back(static_cast<cl_uint>(count));
     }
-    for (cl_uint& fragment : list) fragment = static_cast<cl_uint>(count) - fragment;  // count ... 1; 0 is unlisted
+    for (cl_uint& fragment : list)
+      fragment = static_cast<cl_uint>(count) - fragment;  // count ... 1; 0 is unlisted
     fragments_ = count + 1;
     first_ = starts;
     std::vector<float> depth(fragments_, k_poison), log_p(fragments_, k_poison), p(fragments_, k_poison),
@@ -124,7 +126,8 @@ class SyntheticFrame {
     return aggregate_.image.download();
   }
 
-  /// Gradients of every fragment, as they were given, and of every pixel. After forward(). Buffers are poisoned before.
+  /// Gradients of every fragment, as they were given, and of every pixel. After forward(). Buffers are
+  /// poisoned before.
   struct Gradients {
     std::vector<std::vector<float>> depth, log_occupancy, red, green, blue;  // [pixel][fragment]
     std::vector<float> gamma, alpha;                                         // [pixel]
@@ -132,8 +135,9 @@ class SyntheticFrame {
   };
   Gradients backward(const glm::vec3& background, const std::vector<cl_float4>& grad_image) {
     const Buffer<cl_float4> grad(device_impl(), std::span<const cl_float4>(grad_image));
-    for (Buffer<float>* buffer : {&aggregate_.grad_depth, &aggregate_.grad_log_occupancy, &aggregate_.grad_color.red,
-                                  &aggregate_.grad_color.green, &aggregate_.grad_color.blue}) {
+    for (Buffer<float>* buffer :
+         {&aggregate_.grad_depth, &aggregate_.grad_log_occupancy, &aggregate_.grad_color.red,
+          &aggregate_.grad_color.green, &aggregate_.grad_color.blue}) {
       poison(*buffer, fragments_);
     }
     const std::size_t pixels = frame_.width;

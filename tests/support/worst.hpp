@@ -27,8 +27,8 @@ struct Worst {
 }  // namespace dpr::test
 
 /// The largest error is within the tolerance; if not, the message says where it is.
-#define DPR_CHECK_WORST(worst, tolerance)       \
-  do {                                          \
-    CAPTURE((worst).where);                     \
-    CHECK((worst).error <= (tolerance));        \
+#define DPR_CHECK_WORST(worst, tolerance) \
+  do {                                    \
+    CAPTURE((worst).where);               \
+    CHECK((worst).error <= (tolerance));  \
   } while (false)

@@ -1,0 +1,352 @@
+// Shading against the reference, every model: the fragments' colours, and the gradients of colours,
+// barycentrics, world positions, the eye and the lights.
+#include <doctest/doctest.h>
+
+#include <array>
+
+#include "dpr/dpr.hpp"
+#include "reference/shade.hpp"
+#include "renderer_impl.hpp"
+#include "support/aggregate_errors.hpp"
+#include "support/probe.hpp"
+#include "support/reduced.hpp"
+#include "support/worst.hpp"
+
+namespace {
+
+namespace ref = dpr::reference;
+using dpr::Buffer;
+using dpr::Shading;
+using dpr::test::number;
+using dpr::test::poison;
+using dpr::test::RandomFloat;
+using dpr::test::Worst;
+
+ref::Vec3d to_reference(const glm::vec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
+ref::Vec3d to_reference(const cl_float4& v) { return {number(v.s[0]), number(v.s[1]), number(v.s[2])}; }
+
+struct Model {
+  std::string_view name;
+  std::optional<Shading> shading;
+};
+constexpr std::array<Model, 4> k_models{{{"unlit", std::nullopt},
+                                         {"flat", Shading::flat},
+                                         {"phong", Shading::phong},
+                                         {"gouraud", Shading::gouraud}}};
+
+/// Tolerances, about twice the errors measured, relative to the largest of their kind. Colours 2.5e-6
+/// (Phong's power); gradients: colours 1.1e-7, barycentrics 1.1e-6, positions 3.3e-6 (flat), eye 2.1e-6,
+/// lights 6.8e-7.
+constexpr double k_color = 5e-6, k_gradient = 6.5e-6;
+
+dpr::Lights make_lights(Shading shading) {
+  dpr::Lights lights;
+  lights.shading = shading;
+  lights.ambient = glm::vec3(0.4F, 0.5F, 0.3F);
+  lights.shininess = 12;
+  lights.point = {{glm::vec3(1, 3, 4), glm::vec3(0.5F, 0.3F, 0.4F), glm::vec3(0.6F, 0.5F, 0.4F)},
+                  {glm::vec3(-4, 1, 2), glm::vec3(0.2F, 0.4F, 0.3F), glm::vec3(0.3F, 0.2F, 0.5F)},
+                  {glm::vec3(0, -1, -9), glm::vec3(0.5F), glm::vec3(0.5F)}};  // from behind
+  return lights;
+}
+
+/// A smooth mesh with vertex colours and one with face colours, in two views.
+dpr::Scene make_scene(const Model& model) {
+  dpr::Scene scene;
+  scene.width = dpr::test::reduced(26, 5);
+  scene.height = dpr::test::reduced(19, 5);
+  scene.camera = dpr::orbit_camera(5, 20, 30);
+  dpr::Mesh sphere = dpr::make_icosphere(dpr::test::is_reduced() ? 0 : 1);
+  RandomFloat random(3);
+  for (glm::vec3& color : sphere.vertex_colors) color = random.color();
+  dpr::Mesh cube = dpr::make_cube();
+  cube.vertex_colors.clear();
+  cube.face_colors.clear();
+  for (std::size_t i = 0; i < cube.faces.size(); ++i) cube.face_colors.push_back(random.color());
+  glm::mat4 aside(1.0F);
+  aside[3] = glm::vec4(1.2F, 0.5F, -0.8F, 1);
+  scene.meshes = {{sphere, glm::mat4(1.0F)}, {cube, aside}};
+  if (model.shading) scene.lights = make_lights(*model.shading);
+  scene.smoothing.blur_radius = 0.02F;
+  return scene;
+}
+
+/// The stages up to shading, and the same scene for the reference, from the very positions and barycentrics
+/// the stage gets.
+class Shaded {
+ public:
+  explicit Shaded(const Model& model) : renderer_(dpr::test::test_device()), scene_(make_scene(model)) {
+    renderer_.set_scene(scene_);
+    std::vector<dpr::View> views;
+    for (const float azimuth : {30.0F, 140.0F}) {
+      dpr::View view{scene_.camera, {scene_.meshes[0].transform, scene_.meshes[1].transform}};
+      view.camera.view = dpr::orbit_camera(5, 20, azimuth).view;
+      views.push_back(view);
+    }
+    renderer_.set_views(views);
+    renderer_.forward();
+    dpr::Renderer::Impl& m = impl();
+    for (Buffer<float>* buffer : {&m.shade.red, &m.shade.green, &m.shade.blue}) {
+      poison(*buffer, m.rasterize.fragments);
+    }
+    m.shade.forward(inputs());
+    read();
+  }
+
+  dpr::Renderer::Impl& impl() { return renderer_.impl(); }
+  dpr::ShadeInputs inputs() {
+    dpr::Renderer::Impl& m = impl();
+    return {m.frame, m.device_views, *m.geometry, m.transform, m.bin, m.rasterize};
+  }
+
+  ref::Vec3d barycentric(std::size_t fragment) const {
+    const double c1 = number(bary1[fragment]), c2 = number(bary2[fragment]);
+    return {1.0 - c1 - c2, c1, c2};
+  }
+  std::size_t view(std::size_t fragment) const { return pair_face[fragment_pair[fragment]] / faces; }
+  std::size_t face(std::size_t fragment) const { return pair_face[fragment_pair[fragment]] % faces; }
+  ref::CornerColors corners(std::size_t fragment) const {
+    ref::CornerColors result;
+    for (std::size_t k = 0; k < 3; ++k) result[k] = to_reference(colors[face_colors[face(fragment)].s[k]]);
+    return result;
+  }
+
+  std::size_t faces = 0, vertices = 0;
+  std::vector<ref::ShadeScene> reference;  // of every view
+  std::vector<cl_uint> list, fragment_pair, pair_face;
+  std::vector<float> bary1, bary2;
+  std::vector<cl_uint4> face_colors;
+  std::vector<cl_float4> colors;
+
+ private:
+  void read() {
+    dpr::Renderer::Impl& m = impl();
+    faces = m.geometry->faces;
+    vertices = m.geometry->vertices;
+    list = m.rasterize.list.download();
+    fragment_pair = m.rasterize.fragment_pair.download();
+    pair_face = m.bin.pair_face.download();
+    bary1 = m.rasterize.bary1.download();
+    bary2 = m.rasterize.bary2.download();
+    face_colors = m.geometry->face_colors.download();
+    colors = m.geometry->color_values.download();
+    const std::vector<cl_float4> world = m.transform.world.download();
+    const std::vector<dpr::shared::ViewParams> cameras = m.device_views.cameras.download();
+    std::vector<ref::Face> reference_faces;
+    for (const cl_uint4& f : m.geometry->face_vertices.download())
+      reference_faces.push_back({f.s[0], f.s[1], f.s[2]});
+    for (std::size_t v = 0; v < cameras.size(); ++v) {
+      std::vector<ref::Vec3d> positions;
+      for (std::size_t i = 0; i < vertices; ++i) positions.push_back(to_reference(world[v * vertices + i]));
+      reference.push_back(
+          ref::shade_prepare(positions, reference_faces, reference_lights(), to_reference(cameras[v].eye)));
+    }
+  }
+
+  std::optional<ref::Lights> reference_lights() const {
+    if (!scene_.lights) return std::nullopt;
+    ref::Lights lights;
+    lights.ambient = to_reference(scene_.lights->ambient);
+    lights.shininess = number(scene_.lights->shininess);
+    lights.shading = static_cast<ref::Shading>(scene_.lights->shading);
+    for (const dpr::PointLight& l : scene_.lights->point) {
+      lights.point.push_back({to_reference(l.position), to_reference(l.diffuse), to_reference(l.specular)});
+    }
+    return lights;
+  }
+
+  dpr::Renderer renderer_;
+  dpr::Scene scene_;
+};
+
+/// Errors against the largest value of their kind.
+struct Kind {
+  std::vector<double> found, wanted;
+  void add(double have, double want) {
+    found.push_back(have);
+    wanted.push_back(want);
+  }
+  void add(const ref::Vec3d& have, const ref::Vec3d& want) {
+    for (std::size_t k = 0; k < 3; ++k) add(have[k], want[k]);
+  }
+  double largest() const {
+    double size = 0;
+    for (const double value : wanted) size = std::max(size, std::abs(value));
+    return size;
+  }
+  Worst worst(double distortion = 1) const {
+    Worst result;
+    const double size = largest();
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      result.add(std::abs(found[i] * distortion - wanted[i]) / std::max(size, 1e-30), "value", i, "found",
+                 found[i], "wanted", wanted[i]);
+    }
+    return result;
+  }
+};
+
+struct ShadeErrors {
+  Kind color, corner_colors, bary, world, eye, lights, ambient;
+};
+
+ShadeErrors all_errors(const Model& model) {
+  Shaded s(model);
+  dpr::Renderer::Impl& m = s.impl();
+  ShadeErrors errors;
+  const std::vector<float> red = m.shade.red.download(), green = m.shade.green.download(),
+                           blue = m.shade.blue.download();
+  const std::size_t fragments = m.rasterize.fragments, views = s.reference.size();
+
+  RandomFloat random(9);
+  std::array<std::vector<float>, 3> grad;
+  for (auto& plane : grad) plane.assign(fragments, dpr::test::k_poison);  // the padding's are not numbers
+  dpr::ColorGradients device_grad;
+  for (const cl_uint fragment : s.list) {
+    for (auto& plane : grad) plane[fragment] = random(-1, 1);
+  }
+  device_grad.red.upload(m.device.impl(), grad[0]);
+  device_grad.green.upload(m.device.impl(), grad[1]);
+  device_grad.blue.upload(m.device.impl(), grad[2]);
+  poison(m.shade.grad_bary1, fragments);
+  poison(m.shade.grad_bary2, fragments);
+  poison(m.shade.grad_corner_colors, 9 * m.bin.pairs);
+  poison(m.shade.grad_eye, 3 * m.bin.pairs);
+  m.shade.backward(s.inputs(), device_grad);
+  Buffer<cl_float4> grad_world;
+  if (model.shading) m.shade.backward_world(s.inputs(), m.gather, grad_world);
+
+  // The reference, fragment by fragment.
+  std::vector<ref::ShadeGradient> totals;
+  for (const ref::ShadeScene& scene : s.reference) totals.push_back(ref::make_shade_gradient(scene));
+  const std::vector<float> grad_bary1 = m.shade.grad_bary1.download(),
+                           grad_bary2 = m.shade.grad_bary2.download(),
+                           corner_colors = m.shade.grad_corner_colors.download();
+  std::vector<ref::CornerColors> pair_colors(m.bin.pairs);
+  for (const cl_uint i : s.list) {
+    const ref::ShadeScene& scene = s.reference[s.view(i)];
+    const ref::Vec3d c = s.barycentric(i);
+    errors.color.add({number(red[i]), number(green[i]), number(blue[i])},
+                     ref::shade_forward(scene, s.face(i), c, s.corners(i)));
+    const ref::ShadeFragmentGradient g =
+        ref::shade_backward(scene, s.face(i), c, s.corners(i),
+                            {number(grad[0][i]), number(grad[1][i]), number(grad[2][i])}, totals[s.view(i)]);
+    errors.bary.add(number(grad_bary1[i]), g.barycentric.y - g.barycentric.x);
+    errors.bary.add(number(grad_bary2[i]), g.barycentric.z - g.barycentric.x);
+    for (std::size_t k = 0; k < 3; ++k) pair_colors[s.fragment_pair[i]][k] += g.corners[k];
+  }
+  for (std::size_t v = 0; v < views; ++v) ref::shade_finish_backward(s.reference[v], totals[v]);
+  for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
+    for (std::size_t k = 0; k < 9; ++k) {
+      errors.corner_colors.add(number(corner_colors[9 * pair + k]), pair_colors[pair][k / 3][k % 3]);
+    }
+  }
+  const std::vector<cl_float4> world = grad_world.download();
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    errors.world.add(to_reference(world[i]), totals[i / s.vertices].world[i % s.vertices]);
+  }
+  if (!model.shading) return errors;
+
+  const std::vector<float> eye = m.shade.grad_eye.download();
+  std::vector<ref::Vec3d> eye_sums(views);
+  for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      eye_sums[s.pair_face[pair] / s.faces][k] += number(eye[k * m.bin.pairs + pair]);
+    }
+  }
+  for (std::size_t v = 0; v < views; ++v) errors.eye.add(eye_sums[v], totals[v].camera);
+  for (std::size_t l = 0; l < m.shade.lights(); ++l) {
+    poison(m.shade.light_channels, dpr::k_light_channels * m.bin.pairs);
+    m.shade.backward_light(s.inputs(), device_grad, l);
+    const std::vector<float> channels = m.shade.light_channels.download();
+    std::array<ref::Vec3d, 4> sums{};  // position, diffuse, specular, ambient
+    for (std::size_t k = 0; k < dpr::k_light_channels; ++k) {
+      for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
+        sums[k / 3][k % 3] += number(channels[k * m.bin.pairs + pair]);
+      }
+    }
+    ref::PointLight wanted{{}, {}, {}};
+    ref::Vec3d ambient;
+    for (const ref::ShadeGradient& total : totals) {
+      wanted.position += total.lights.point[l].position;
+      wanted.diffuse += total.lights.point[l].diffuse;
+      wanted.specular += total.lights.point[l].specular;
+      ambient += total.lights.ambient;
+    }
+    errors.lights.add(sums[0], wanted.position);
+    errors.lights.add(sums[1], wanted.diffuse);
+    errors.lights.add(sums[2], wanted.specular);
+    errors.ambient.add(sums[3], ambient);  // the same with every light
+  }
+  return errors;
+}
+
+}  // namespace
+
+TEST_SUITE("gradient") {
+  TEST_CASE("shade: colours and every gradient are the reference's, whatever the model") {
+    for (const Model& model : k_models) {
+      CAPTURE(std::string(model.name));
+      const ShadeErrors errors = all_errors(model);
+      REQUIRE(!errors.color.found.empty());
+      DPR_CHECK_WORST(errors.color.worst(), k_color);
+      DPR_CHECK_WORST(errors.corner_colors.worst(), k_gradient);
+      DPR_CHECK_WORST(errors.bary.worst(), k_gradient);
+      CHECK(errors.color.worst(1.001).error > k_color);
+      CHECK(errors.corner_colors.worst(1.01).error > k_gradient);
+      CHECK(errors.bary.worst(1.01).error > k_gradient);
+      if (!model.shading) continue;
+      DPR_CHECK_WORST(errors.world.worst(), k_gradient);
+      DPR_CHECK_WORST(errors.eye.worst(), k_gradient);
+      DPR_CHECK_WORST(errors.lights.worst(), k_gradient);
+      DPR_CHECK_WORST(errors.ambient.worst(), k_gradient);
+      CHECK(errors.world.worst(1.01).error > k_gradient);
+      CHECK(errors.eye.worst(1.01).error > k_gradient);
+      CHECK(errors.lights.worst(1.01).error > k_gradient);
+      CHECK(errors.ambient.worst(1.01).error > k_gradient);
+    }
+  }
+}
+
+TEST_SUITE("unit") {
+  TEST_CASE("shade: without point lights the ambient light alone colours") {
+    Model model{"phong", Shading::phong};
+    dpr::Scene scene = make_scene(model);
+    scene.lights->point.clear();
+    dpr::Renderer renderer(dpr::test::test_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    const std::vector<float> lit = renderer.impl().shade.red.download();
+    scene.lights.reset();
+    renderer.set_scene(scene);
+    renderer.forward();
+    const std::vector<float> unlit = renderer.impl().shade.red.download();
+    REQUIRE(lit.size() == unlit.size());
+    Worst worst;
+    for (std::size_t i = 0; i < lit.size(); ++i)
+      worst.add(std::abs(number(lit[i]) - 0.4 * number(unlit[i])), i);
+    DPR_CHECK_WORST(worst, 1e-6);
+  }
+
+  TEST_CASE("shade: a face without area, or a light on the surface, gives no NaN") {
+    for (const Model& model : k_models) {
+      if (!model.shading) continue;
+      CAPTURE(std::string(model.name));
+      dpr::Scene scene = make_scene(model);
+      dpr::Mesh mesh;
+      mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 1, 0}};
+      mesh.faces = {
+          {0, 1, 2}, {2, 3, 2}, {0, 2, 1}};  // the last turns the vertex normals of the first to zero
+      scene.meshes = {{mesh, glm::mat4(1.0F)}};
+      scene.lights->point[0].position = glm::vec3(0, 1, 0);
+      dpr::Renderer renderer(dpr::test::test_device());
+      renderer.set_scene(scene);
+      renderer.forward();
+      dpr::Image grad(scene.width, scene.height);
+      for (glm::vec4& pixel : grad.pixels) pixel = glm::vec4(1.0F);
+      const dpr::SceneGradient g = renderer.backward(std::span(&grad, 1));
+      for (const glm::vec4& pixel : renderer.image().pixels)
+        CHECK(!std::isnan(pixel.x + pixel.y + pixel.z + pixel.w));
+      for (const glm::vec3& p : g.meshes[0].positions) CHECK(!std::isnan(p.x + p.y + p.z));
+    }
+  }
+}
