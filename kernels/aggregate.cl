@@ -25,6 +25,7 @@ typedef struct {
   float background;     // beta of the background slot
   float largest;        // the largest beta, the background's too
   uint crowd;           // slots that count
+  float depth_origin, log_origin;  // what depth and ln p add to the largest beta
 } Pixel;
 
 /// What depth adds to beta, and beta itself. A fragment with p = 0 is far below all others.
@@ -51,7 +52,16 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   q.inverse_alpha = 1.0f / p.alpha;
   q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
   q.largest = q.background;
-  for (uint i = q.first; i < q.last; ++i) q.largest = max(q.largest, slot_beta(q, f, f.list[i]));
+  q.depth_origin = q.background;
+  q.log_origin = 0.0f;
+  for (uint i = q.first; i < q.last; ++i) {
+    const uint k = f.list[i];
+    const float beta = slot_beta(q, f, k);
+    if (beta <= q.largest) continue;
+    q.largest = beta;
+    q.depth_origin = depth_beta(q, f.depth[k]);
+    q.log_origin = f.log_occupancy[k];
+  }
   q.crowd = slot_counts(q, q.background) ? 1 : 0;
   for (uint i = q.first; i < q.last; ++i) q.crowd += slot_counts(q, slot_beta(q, f, f.list[i])) ? 1 : 0;
   return q;
@@ -94,6 +104,7 @@ static inline int next_segment(const Pixel q, const Fragments f, int first, floa
   s->low = crowded ? DPR_CROWD_LOW : DPR_BARRIER_LOW;
   s->high = crowded ? DPR_CROWD_HIGH : DPR_BARRIER_HIGH;
   s->blocks = (crowded ? DPR_CROWD_NODES : DPR_BARRIER_NODES) / DPR_WIDTH;
+  if (q.crowd > DPR_THRONG) s->blocks *= 2;
   return first;
 }
 
@@ -289,8 +300,11 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
     const float transparency = run_transparency(f, q.first, q.last);
     background_weight = g.background_weight * scale;
     // d beta / d gamma = -(beta by depth) / gamma; d beta / d alpha = -ln p / alpha^2. Shifting all betas changes
-    // nothing, so they may be taken from the nearest fragment here too.
-    grad_gamma = -q.background * g.grad_background_beta * scale / p.gamma;
+    // nothing, so both count from the largest slot, where the gradients are: from elsewhere their errors would be
+    // multiplied by the distance.
+    const float to_alpha = -q.inverse_alpha * q.inverse_alpha;
+    grad_gamma = (q.depth_origin - q.background) * g.grad_background_beta * scale / p.gamma;
+    grad_alpha = -q.log_origin * g.grad_background_beta * scale * to_alpha;
     for (uint i = q.first; i < q.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] * scale, grad_beta = grad_depth[k] * scale;
@@ -299,8 +313,8 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
       grad_blue[k] = weight * grad.z;
       grad_depth[k] = -grad_beta * q.depth_scale;
       grad_log_occupancy[k] = grad_beta * q.inverse_alpha + grad.w * alpha_sensitivity(f, k, transparency);
-      grad_gamma -= grad_beta * depth_beta(q, depth[k]) / p.gamma;
-      grad_alpha -= grad_beta * log_occupancy[k] * q.inverse_alpha * q.inverse_alpha;
+      grad_gamma += grad_beta * (q.depth_origin - depth_beta(q, depth[k])) / p.gamma;
+      if (log_occupancy[k] > DPR_LOG_ZERO) grad_alpha += grad_beta * (log_occupancy[k] - q.log_origin) * to_alpha;
     }
   }
   channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;

@@ -134,21 +134,25 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
   const uint only = f.list[c.first];
   if (c.last == c.first + 1) return f.occupancy[only] * fragment_color(f, only);
   float3 sum = 0.0f;
+  float mass = 0.0f;
   for (uint block = 0; block < c.blocks; ++block) {
     const realn t = block_nodes(c, block);
-    realn product = 1.0f, red = 0.0f, green = 0.0f, blue = 0.0f;
+    realn product = 1.0f, all = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f;
     for (uint i = c.first; i < c.last; ++i) {
       const uint k = f.list[i];
       realn passing, ratio, cdf;
       slot_terms(c, f, k, t, &passing, &ratio, &cdf);
       product *= passing;
+      all += ratio;
       red += ratio * f.red[k];
       green += ratio * f.green[k];
       blue += ratio * f.blue[k];
     }
+    mass += sum_lanes(product * all);
     sum += (float3)(sum_lanes(product * red), sum_lanes(product * green), sum_lanes(product * blue));
   }
-  return sum * c.step;
+  // The weights sum to the cluster's coverage: dividing by their own sum gives back what the nodes left out.
+  return mass > 0.0f ? sum * (run_coverage(f, c.first, c.last) / mass) : sum;
 }
 
 /// One work-item per pixel. Deterministic. Buffers as in aggregate.cl; `list` is sorted by depth.

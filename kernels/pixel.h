@@ -43,6 +43,13 @@ static inline float run_transparency(const Fragments f, uint first, uint last) {
   return product;
 }
 
+/// 1 - prod (1 - p) over a run, added up so that coverages far below 1 keep their digits.
+static inline float run_coverage(const Fragments f, uint first, uint last) {
+  float covered = 0.0f;
+  for (uint i = first; i < last; ++i) covered += (1.0f - covered) * f.occupancy[f.list[i]];
+  return covered;
+}
+
 /// d alpha / d ln p of one fragment: p prod of the others' transparencies.
 static inline float alpha_sensitivity(const Fragments f, uint fragment, float transparency) {
   return f.occupancy[fragment] * transparency / fragment_transparency(f, fragment);

@@ -179,7 +179,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
 
 #endif
 
-/// 24 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1.
+/// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1.
 static inline realn uniform_from_bits(uintn bits) { return mad(convert_realn(bits >> 9), 0x1p-23f, 0x1p-24f); }
 
 #endif

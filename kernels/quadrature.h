@@ -10,14 +10,16 @@
 
 /// With more slots than this near the front the integrand narrows, and the rule is refined.
 #define DPR_CROWD 6
+/// And with more than this, once more.
+#define DPR_THRONG 40
 
 #if DPR_PRIOR == DPR_GAUSSIAN
 /// Barrier composition: the range of t relative to the largest beta, for few slots and for a crowd; numbers of nodes;
 /// and how far below the largest a slot still counts: F(9.5 - 4.6) differs from 1 by 5e-7.
-#define DPR_BARRIER_LOW (-4.2f)
-#define DPR_BARRIER_HIGH 5.4f
+#define DPR_BARRIER_LOW (-4.6f)
+#define DPR_BARRIER_HIGH 5.2f
 #define DPR_BARRIER_NODES 16
-#define DPR_CROWD_LOW (-4.6f)
+#define DPR_CROWD_LOW (-5.2f)
 #define DPR_CROWD_HIGH 6.2f
 #define DPR_CROWD_NODES 32
 #define DPR_BARRIER_REACH 9.5f
@@ -28,10 +30,10 @@
 #define DPR_JOINT_STEP 0.67f
 #define DPR_JOINT_CROWD_STEP 0.335f
 #elif DPR_PRIOR == DPR_LOGISTIC
-#define DPR_BARRIER_LOW (-11.0f)
+#define DPR_BARRIER_LOW (-17.0f)
 #define DPR_BARRIER_HIGH 20.0f
 #define DPR_BARRIER_NODES 48
-#define DPR_CROWD_LOW (-12.0f)
+#define DPR_CROWD_LOW (-18.0f)
 #define DPR_CROWD_HIGH 22.0f
 #define DPR_CROWD_NODES 64
 #define DPR_BARRIER_REACH 26.0f
@@ -49,27 +51,24 @@
 #define DPR_BARRIER_REACH INFINITY
 /// Slots within this distance of a cluster's head share its nodes.
 #define DPR_CLUSTER 1.0f
-/// How far the outermost nodes lie: the mass beyond is 1 / (pi 1e5) a slot.
-#define DPR_CAUCHY_REACH 1e5f
-#define DPR_CLUSTER_NODES 48
+/// How far the outermost nodes lie: the mass beyond is 1 / (pi 1e6) a slot.
+#define DPR_CAUCHY_REACH 1e6f
+#define DPR_CLUSTER_NODES 64
 
-/// Gauss-Legendre on [-1, 1], 48 nodes.
-constant float k_gauss_nodes[DPR_CLUSTER_NODES] = {
-    -0.998771007f,  -0.993530172f,  -0.984124584f, -0.970591593f, -0.952987703f, -0.931386691f, -0.905879137f,
-    -0.87657202f,   -0.843588262f,  -0.807066204f, -0.767159033f, -0.724034131f, -0.67787238f,  -0.628867397f,
-    -0.577224726f,  -0.523160975f,  -0.466902905f, -0.408686482f, -0.348755886f, -0.287362487f, -0.22476379f,
-    -0.161222356f,  -0.0970046992f, -0.032380171f, 0.032380171f,  0.0970046992f, 0.161222356f,  0.22476379f,
-    0.287362487f,   0.348755886f,   0.408686482f,  0.466902905f,  0.523160975f,  0.577224726f,  0.628867397f,
-    0.67787238f,    0.724034131f,   0.767159033f,  0.807066204f,  0.843588262f,  0.87657202f,   0.905879137f,
-    0.931386691f,   0.952987703f,   0.970591593f,  0.984124584f,  0.993530172f,  0.998771007f};
-constant float k_gauss_weights[DPR_CLUSTER_NODES] = {
-    0.00315334605f, 0.0073275539f, 0.0114772346f, 0.0155793157f, 0.0196161605f, 0.0235707608f, 0.0274265097f,
-    0.0311672278f,  0.0347772226f, 0.0382413511f, 0.0415450829f, 0.0446745609f, 0.0476166585f, 0.0503590356f,
-    0.0528901895f,  0.0551995037f, 0.0572772921f, 0.0591148397f, 0.0607044392f, 0.0620394232f, 0.0631141923f,
-    0.0639242386f,  0.0644661644f, 0.0647376968f, 0.0647376968f, 0.0644661644f, 0.0639242386f, 0.0631141923f,
-    0.0620394232f,  0.0607044392f, 0.0591148397f, 0.0572772921f, 0.0551995037f, 0.0528901895f, 0.0503590356f,
-    0.0476166585f,  0.0446745609f, 0.0415450829f, 0.0382413511f, 0.0347772226f, 0.0311672278f, 0.0274265097f,
-    0.0235707608f,  0.0196161605f, 0.0155793157f, 0.0114772346f, 0.0073275539f, 0.00315334605f};
+/// Gauss-Legendre on [-1, 1], 32 nodes: for either half of a segment. Splitting at the cluster, where the integrand
+/// bends, lets the rule converge twice over: its nodes crowd at the ends of an interval.
+constant float k_gauss_nodes[DPR_CLUSTER_NODES / 2] = {
+    -0.997263862f, -0.985611512f, -0.964762256f, -0.934906076f, -0.896321156f, -0.849367614f, -0.794483796f,
+    -0.732182119f, -0.663044267f, -0.587715757f, -0.506899909f, -0.421351276f, -0.331868602f, -0.239287362f,
+    -0.144471962f, -0.0483076657f, 0.0483076657f, 0.144471962f, 0.239287362f, 0.331868602f, 0.421351276f,
+    0.506899909f, 0.587715757f, 0.663044267f, 0.732182119f, 0.794483796f, 0.849367614f, 0.896321156f,
+    0.934906076f, 0.964762256f, 0.985611512f, 0.997263862f};
+constant float k_gauss_weights[DPR_CLUSTER_NODES / 2] = {
+    0.00701861001f, 0.0162743947f, 0.0253920653f, 0.0342738629f, 0.042835898f, 0.0509980593f, 0.0586840935f,
+    0.0658222228f, 0.0723457941f, 0.0781938958f, 0.0833119242f, 0.087652093f, 0.0911738787f, 0.0938443991f,
+    0.0956387201f, 0.0965400885f, 0.0965400885f, 0.0956387201f, 0.0938443991f, 0.0911738787f, 0.087652093f,
+    0.0833119242f, 0.0781938958f, 0.0723457941f, 0.0658222228f, 0.0586840935f, 0.0509980593f, 0.042835898f,
+    0.0342738629f, 0.0253920653f, 0.0162743947f, 0.00701861001f};
 #endif
 
 /// A stretch of the line of integration: t = centre + u for an equally spaced rule, centre + sinh(u) for Cauchy.
@@ -81,11 +80,14 @@ typedef struct {
 /// Nodes and weights of a block of a segment.
 static inline void segment_nodes(const Segment s, uint block, realn* t, realn* weight) {
 #if DPR_PRIOR == DPR_CAUCHY
-  const float radius = 0.5f * (s.high - s.low);
-  const realn u = 0.5f * (s.high + s.low) + radius * load_n(DPR_WIDTH * block, k_gauss_nodes);
+  // The first half of the blocks lies below the centre, the second above.
+  const uint node = DPR_WIDTH * block % (DPR_CLUSTER_NODES / 2);
+  const float end = DPR_WIDTH * block < DPR_CLUSTER_NODES / 2 ? s.low : s.high;
+  const float radius = 0.5f * fabs(end);
+  const realn u = 0.5f * end + radius * load_n(node, k_gauss_nodes);
   const realn e = exp_n(u), inverse = 1.0f / e;
   *t = s.centre + 0.5f * (e - inverse);
-  *weight = radius * load_n(DPR_WIDTH * block, k_gauss_weights) * 0.5f * (e + inverse);
+  *weight = radius * load_n(node, k_gauss_weights) * 0.5f * (e + inverse);
 #else
   const float step = (s.high - s.low) / (float)(DPR_WIDTH * s.blocks - 1);
   *t = s.centre + s.low + step * (convert_realn(DPR_LANE_INDEX) + (float)(DPR_WIDTH * block));

@@ -34,7 +34,8 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   const uint2 rows = tile_range(high.y * scale.y + centre.y, low.y * scale.y + centre.y, p.height);
 
   // Written so that a NaN fails.
-  const int kept = fabs(area) > DPR_MIN_AREA && fabs(area) < INFINITY && nearest >= views[view].znear &&
+  const float znear = views[view].znear;
+  const int kept = fabs(area) > DPR_MIN_AREA && fabs(area) < INFINITY && a.z >= znear && b.z >= znear && c.z >= znear &&
                    nearest < views[view].zfar && furthest < INFINITY && columns.x <= columns.y && rows.x <= rows.y;
   Triangle t;
   t.x0 = a.x;

@@ -87,8 +87,9 @@ class Buffer {
   void release() {
     if (device_ != nullptr) {
       device_->allocated_bytes -= capacity_bytes();
-      device_->release(std::move(buffer_));
+      device_->before_release(buffer_);
     }
+    buffer_ = cl::Buffer();
     device_ = nullptr;
     capacity_ = size_ = 0;
   }

@@ -33,11 +33,10 @@ struct Device::Impl {
   /// work-group size.
   std::size_t local_size() const { return info.type == "cpu" ? 32 : 128; }
 
-  /// Lets go of a buffer. oclgrind 21.10 gives a new buffer the initialisation state of an old one of another size, so
-  /// there buffers live as long as the device.
-  void release(cl::Buffer&& buffer) {
-    if (info.platform == "Oclgrind") released_.push_back(std::move(buffer));
-    buffer = cl::Buffer();
+  /// To be called before a buffer is let go. oclgrind 21.10 takes a new buffer for initialised as far as an old one of
+  /// the same number was, so there none is ever released.
+  void before_release(const cl::Buffer& buffer) const {
+    if (info.platform == "Oclgrind") clRetainMemObject(buffer());
   }
 
   std::size_t allocated_bytes = 0, peak_allocated_bytes = 0;
@@ -45,7 +44,6 @@ struct Device::Impl {
  private:
   std::mutex mutex_;
   std::map<std::string, cl::Program> programs_;
-  std::vector<cl::Buffer> released_;
 };
 
 /// Describes a device of a platform; index, default and lanes are filled in by list_devices().

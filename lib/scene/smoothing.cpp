@@ -178,6 +178,10 @@ void validate(const Smoothing& smoothing) {
                           "a finite number >= 0");
   }
   checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
+  validate_stage(smoothing.occupancy_estimator, "occupancy", smoothing.occupancy_prior,
+                 smoothing.composition);
+  validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
+                 smoothing.composition);
   if (smoothing.depth_prior == Prior::uniform) {
     throw InvalidArgument("depth_prior (smoothing)", "uniform", "gaussian, cauchy, logistic or gumbel");
   }
@@ -185,10 +189,6 @@ void validate(const Smoothing& smoothing) {
     throw InvalidArgument("depth_prior (smoothing)", "cauchy with the joint composition",
                           "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
   }
-  validate_stage(smoothing.occupancy_estimator, "occupancy", smoothing.occupancy_prior,
-                 smoothing.composition);
-  validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
-                 smoothing.composition);
 }
 
 float blur_radius(const Smoothing& smoothing) {

@@ -28,16 +28,15 @@ struct PriorCase {
 
 /// Measured over gamma 1e-7, 1e-2 and 1, up to 40 fragments:
 ///   prior     weight  colour  depth   ln p    gamma   wanted for the weights
-///   gaussian  1.2e-6  1.8e-5  1.8e-5  1.7e-5  1.5e-5  5e-6
-///   logistic  1.8e-6  2.1e-5  2.2e-5  4.7e-5  1.4e-5  2e-5
-///   gumbel    9.4e-7  2.1e-5  4.4e-6  2.1e-5  2.3e-5  2e-5
-/// The colour's error grows with the number of fragments, 8e-7 of the weight for each that shares a cluster:
-/// what its nodes leave out. With 300 it is 6.3e-5, that of ln p 1.1e-4.
+///   gaussian  1.2e-6  4.2e-7  1.8e-5  1.7e-5  1.5e-5  5e-6
+///   logistic  1.8e-6  2.5e-7  2.2e-5  4.7e-5  1.4e-5  2e-5
+///   gumbel    9.4e-7  1.7e-7  4.4e-6  2.1e-5  2.3e-5  2e-5
+/// With 300 fragments the error of ln p is 1.1e-4: each that shares a cluster leaves out 8e-7 of its mass.
 constexpr std::array<PriorCase, 3> k_cases{
-    {{Prior::gaussian, "gaussian", 2.4e-6, 3.6e-5, 3.6e-5, 3.4e-5, 3e-5},
-     {Prior::logistic, "logistic", 3.6e-6, 4.2e-5, 4.4e-5, 9.4e-5, 3e-5},
-     {Prior::gumbel, "gumbel", 1.9e-6, 4.2e-5, 9e-6, 4.2e-5, 4.6e-5}}};
-constexpr double k_crowd_color = 1.3e-4, k_crowd_log_occupancy = 2.2e-4;
+    {{Prior::gaussian, "gaussian", 2.4e-6, 8.4e-7, 3.6e-5, 3.4e-5, 3e-5},
+     {Prior::logistic, "logistic", 3.6e-6, 5e-7, 4.4e-5, 9.4e-5, 3e-5},
+     {Prior::gumbel, "gumbel", 1.9e-6, 3.4e-7, 9e-6, 4.2e-5, 4.6e-5}}};
+constexpr double k_crowd_color = 5e-7, k_crowd_log_occupancy = 2.2e-4;
 constexpr double k_alpha = 2e-7;  // of the image; measured 9.5e-8
 
 Smoothing joint(Prior prior, float gamma) {

@@ -279,7 +279,8 @@ TEST_SUITE("unit") {
       if (c.prior == Prior::uniform) continue;  // no depth prior
       CAPTURE(std::string(c.name));
       Probe probe({"shared_types.h", "lanes.h", "priors.h"}, R"(
-kernel void probe(global const float* restrict in, global float* restrict cdfs, global float* restrict ratios) {
+kernel void probe(global const float* restrict in, global float* restrict cdfs,
+                  global float* restrict ratios) {
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
   realn cdf, ratio;
   prior_cdf_ratio(load_n(i, in), &cdf, &ratio);

@@ -126,7 +126,7 @@ TransformErrors backward_errors(bool lit, double flip) {
   dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
   poison(m.transform.channels, DPR_POSE_CHANNELS * count);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
-  m.transform.backward(m.frame, m.device_views, *m.geometry, true, lit, ndc_buffer, world_buffer);
+  m.transform.backward(m.frame, m.device_views, *m.geometry, lit, ndc_buffer, world_buffer);
   m.transform.backward_positions(m.frame, m.device_views, *m.geometry, world_buffer);
   const std::vector<cl_float4> found_world = world_buffer.download(),
                                found_positions = m.transform.grad_positions.download();
@@ -220,7 +220,7 @@ TEST_SUITE("gradient") {
     const std::vector<cl_float4> zeros(3, cl_float4{});
     const dpr::Buffer<cl_float4> grad_ndc(m.device.impl(), std::span<const cl_float4>(zeros));
     dpr::Buffer<cl_float4> grad_world(m.device.impl(), std::span<const cl_float4>(zeros));
-    m.transform.backward(m.frame, m.device_views, *m.geometry, true, true, grad_ndc, grad_world);
+    m.transform.backward(m.frame, m.device_views, *m.geometry, true, grad_ndc, grad_world);
     CHECK(m.transform.channels.download() == std::vector<float>(DPR_POSE_CHANNELS * 3, 0.0F));
     for (const cl_float4& g : grad_world.download()) CHECK(g.s[0] == 0.0F);
   }
