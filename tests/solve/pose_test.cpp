@@ -37,6 +37,7 @@ dpr::Pose turned(double degrees) { return {dpr::rotation_from_vector(glm::radian
 dpr::PoseOptions options(unsigned iterations) {
   dpr::PoseOptions result;
   result.iterations = iterations;
+  if (reduced()) result.restarts = 0;
   return result;
 }
 
