@@ -277,9 +277,5 @@ kernel void aggregate_joint_backward(const AggregateParams p, global const ViewP
     }
     last = c.first;
   }
-  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
-  channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = 0.0f;
-  channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = transparency * grad.x;
-  channels[(DPR_CHANNEL_BACKGROUND + 1) * p.pixels + pixel] = transparency * grad.y;
-  channels[(DPR_CHANNEL_BACKGROUND + 2) * p.pixels + pixel] = transparency * grad.z;
+  write_channels(p, pixel, grad_gamma, 0.0f, transparency, grad, channels);
 }

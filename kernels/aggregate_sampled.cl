@@ -193,9 +193,5 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
       grad_alpha -= grad_beta * log_occupancy[k] * q.inverse_alpha * q.inverse_alpha;
     }
   }
-  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
-  channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = grad_alpha;
-  channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = background_weight * grad.x;
-  channels[(DPR_CHANNEL_BACKGROUND + 1) * p.pixels + pixel] = background_weight * grad.y;
-  channels[(DPR_CHANNEL_BACKGROUND + 2) * p.pixels + pixel] = background_weight * grad.z;
+  write_channels(p, pixel, grad_gamma, grad_alpha, background_weight, grad, channels);
 }

@@ -1,0 +1,174 @@
+// The public face of the renderer: checks what it is given and hands it to the pipeline.
+#include "dpr/renderer.hpp"
+
+#include "dpr/opencl.hpp"
+#include "loss/image_loss_impl.hpp"
+#include "renderer_impl.hpp"
+#include "scene/checks.hpp"
+
+namespace dpr {
+
+Renderer::Renderer(Device device) : impl_(std::make_unique<Impl>(std::move(device))) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+void Renderer::set_scene(const Scene& scene) {
+  validate(scene);
+  Impl& m = *impl_;
+  m.scene = scene;
+  m.views.clear();
+  m.rendered = false;
+  m.geometry.emplace(m.device.impl(), scene);
+  m.shade.set_lights(scene.lights);
+  m.set_smoothing(scene.smoothing);
+  View view{scene.camera, {}};
+  for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
+  m.set_views(std::span(&view, 1));
+}
+
+void Renderer::set_views(std::span<const View> views) {
+  impl_->require_scene("Renderer::set_views");
+  impl_->set_views(views);
+}
+
+void Renderer::set_smoothing(const Smoothing& smoothing) {
+  impl_->require_scene("Renderer::set_smoothing");
+  validate(smoothing);
+  impl_->set_smoothing(smoothing);
+}
+
+namespace {
+
+/// Replaces a mesh's part of a joined buffer.
+void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
+                 std::span<const glm::vec3> values) {
+  if (values.empty()) return;
+  std::vector<cl_float4> rows;
+  rows.reserve(values.size());
+  for (const glm::vec3& v : values) rows.push_back(to_cl(v));
+  check_cl(device.queue.enqueueWriteBuffer(buffer.cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
+                                           rows.size() * sizeof(cl_float4), rows.data()),
+           "clEnqueueWriteBuffer");
+}
+
+void check_values(const std::string& name, std::span<const glm::vec3> values, std::size_t expected) {
+  if (values.size() != expected) {
+    throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) checks::require_finite(values[i], checks::element(name, i));
+}
+
+}  // namespace
+
+void Renderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_positions");
+  if (mesh >= m.scene.meshes.size()) {
+    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
+  }
+  check_values("positions", positions, m.scene.meshes[mesh].mesh.positions.size());
+  m.scene.meshes[mesh].mesh.positions.assign(positions.begin(), positions.end());
+  write_range(m.device.impl(), m.geometry->positions, m.geometry->meshes[mesh].first_vertex, positions);
+  m.rendered = false;
+}
+
+void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_colors");
+  if (mesh >= m.scene.meshes.size()) {
+    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
+  }
+  Mesh& target = m.scene.meshes[mesh].mesh;
+  std::vector<glm::vec3>& values = target.vertex_colors.empty() ? target.face_colors : target.vertex_colors;
+  check_values("colors", colors, values.size());
+  values.assign(colors.begin(), colors.end());
+  write_range(m.device.impl(), m.geometry->color_values, m.geometry->meshes[mesh].first_color, colors);
+  m.rendered = false;
+}
+
+const Scene& Renderer::scene() const { return impl_->scene; }
+std::span<const View> Renderer::views() const { return impl_->views; }
+const Device& Renderer::device() const { return impl_->device; }
+
+void Renderer::forward() { impl_->forward(); }
+
+Image Renderer::image(std::size_t view) const {
+  const Impl& m = *impl_;
+  m.require_forward("Renderer::image");
+  if (view >= m.views.size()) {
+    throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views.size()));
+  }
+  Image image(m.scene.width, m.scene.height);
+  std::vector<cl_float4> values(image.pixels.size());
+  m.aggregate.image.download(values, view * values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    image.pixels[i] = glm::vec4(values[i].s[0], values[i].s[1], values[i].s[2], values[i].s[3]);
+  }
+  return image;
+}
+
+SceneGradient Renderer::backward(std::span<const Image> grad_images) {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::backward");
+  if (grad_images.size() != m.views.size()) {
+    throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
+                          "one for each of the " + std::to_string(m.views.size()) + " views");
+  }
+  std::vector<cl_float4> values;
+  for (const Image& image : grad_images) {
+    if (image.width != m.scene.width || image.height != m.scene.height) {
+      throw InvalidArgument("size (grad_images)", std::to_string(image.width) + "x" + std::to_string(image.height),
+                            std::to_string(m.scene.width) + "x" + std::to_string(m.scene.height));
+    }
+    checks::require_pixels(image, "grad_images");
+    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  m.host_grad_images.upload(m.device.impl(), values);
+  return m.backward(m.host_grad_images);
+}
+
+SceneGradient Renderer::backward(const ImageLoss& loss) {
+  impl_->require_forward("Renderer::backward");
+  if (loss.impl().frame_number != impl_->frame_number) {
+    throw InvalidArgument("loss (Renderer::backward)", "the gradient of other images",
+                          "a loss evaluated on this renderer's last forward()");
+  }
+  return impl_->backward(loss.impl().grad_image);
+}
+
+RenderStatistics Renderer::statistics() const {
+  const Impl& m = *impl_;
+  m.require_forward("Renderer::statistics");
+  RenderStatistics s;
+  s.faces = std::size_t{m.frame.views} * m.frame.faces;
+  for (const shared::Triangle& triangle : m.setup.triangles.download()) {
+    if (triangle.orientation == 0.0F) ++s.faces_dropped;
+  }
+  s.pairs = m.bin.pairs;
+  s.fragments = m.rasterize.listed_fragments;
+  s.device_bytes = m.bytes();
+  return s;
+}
+
+cl::Buffer image_buffer(const Renderer& renderer) {
+  renderer.impl().require_forward("image_buffer");
+  return renderer.impl().aggregate.image.cl_buffer();
+}
+
+SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_forward("backward");
+  const std::size_t count = m.aggregate.image.size();
+  const std::size_t bytes = grad_images.getInfo<CL_MEM_SIZE>();
+  if (bytes < count * sizeof(cl_float4)) {
+    throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes", std::to_string(count * sizeof(cl_float4)));
+  }
+  m.host_grad_images.resize(m.device.impl(), count);
+  check_cl(m.device.impl().queue.enqueueCopyBuffer(grad_images, m.host_grad_images.cl_buffer(), 0, 0,
+                                                   count * sizeof(cl_float4)),
+           "clEnqueueCopyBuffer");
+  return m.backward(m.host_grad_images);
+}
+
+}  // namespace dpr
