@@ -8,7 +8,8 @@
 
 namespace dpr {
 
-/// Linear RGBA in floats, row 0 on top; the alpha channel is the silhouette, not premultiplied.
+/// Linear RGBA in floats, row 0 on top; colour is what is seen over the background, and alpha is the
+/// silhouette: the colour is not to be blended by it again.
 struct Image {
   int width = 0, height = 0;
   std::vector<glm::vec4> pixels;  ///< [height * width], row-major

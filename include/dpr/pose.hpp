@@ -57,6 +57,7 @@ struct PoseResult {
   double loss = 0;          ///< at the finest level
   unsigned iterations = 0;  ///< of all descents
   unsigned descent = 0;     ///< the one that found the pose
+  bool explained = false;   ///< the loss fell below PoseOptions::explained of the initial pose's
   double seconds = 0;
   std::vector<PoseIteration> history;
 };

@@ -19,7 +19,7 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   add("--preset", s.preset, "Take all values from a named member of the family",
       "softras|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
   add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
-  add("--depth-prior", s.depth_prior, "Noise of the depth", priors);
+  add("--depth-prior", s.depth_prior, "Noise of the depth", "gaussian|cauchy|logistic|gumbel");
   add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");
   add("--gamma", s.gamma, "Scale of the depth noise; depth is 1 at znear, 0 at zfar", "FLOAT");
   add("--alpha", s.alpha, "Weight of the barrier", "FLOAT");

@@ -55,6 +55,10 @@ void run(PoseCommandOptions& options, const CommonOptions& common) {
   if (!common.quiet) {
     std::printf("%s: %s loss %.6g after %u iterations, %.1f s\n", options.output.c_str(),
                 options.loss.c_str(), result.loss, result.iterations, result.seconds);
+    if (!result.explained) {
+      std::printf("The target is not explained: the loss stayed above %g of the initial pose's.\n",
+                  options.solver.explained);
+    }
   }
 }
 

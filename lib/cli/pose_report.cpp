@@ -109,6 +109,7 @@ Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& tru
   json["rotation_matrix"] = rows_to_json(result.pose.rotation);
   json["translation"] = to_json(result.pose.translation);
   json["loss"] = result.loss;
+  json["explained"] = result.explained;
   json["iterations"] = result.iterations;
   json["seconds"] = result.seconds;
   if (truth) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "cli/commands.hpp"
@@ -83,15 +84,24 @@ void run(const RenderOptions& options, CommonOptions& common) {
   Renderer renderer(open_device(common));
   renderer.set_scene(scene);
   renderer.forward();
-  write_image(options.output, renderer.image());
+  Image image = renderer.image();
+  // Colours are those over the background already: with the silhouette as alpha, viewers would blend once more.
+  if (std::filesystem::path(options.output).extension() != ".exr") {
+    for (glm::vec4& pixel : image.pixels) pixel.a = 1;
+  }
+  write_image(options.output, image);
   const RenderStatistics statistics = renderer.statistics();
   if (!common.quiet) {
-    std::printf("%s: %dx%d, %zu triangles\n", options.output.c_str(), scene.width, scene.height,
-                statistics.faces);
+    std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height, statistics.faces);
+    if (statistics.faces_dropped > 0) {
+      std::printf(", %zu of them dropped: outside the image, nearer than znear, beyond zfar or without area",
+                  statistics.faces_dropped);
+    }
+    std::printf("\n");
   }
   if (common.verbose) {
-    std::printf("%zu triangles dropped, %zu tile pairs, %zu fragments, %zu bytes on the device\n",
-                statistics.faces_dropped, statistics.pairs, statistics.fragments, statistics.device_bytes);
+    std::printf("%zu tile pairs, %zu fragments, %zu bytes on the device\n", statistics.pairs, statistics.fragments,
+                statistics.device_bytes);
   }
 }
 

@@ -219,7 +219,8 @@ PoseResult PoseSolver::solve(const Pose& initial, const Callback& callback) cons
     if (descent == 0 || loss < result.loss) {
       std::tie(result.pose, result.loss, result.descent) = std::tie(found.pose, loss, descent);
     }
-    if (found.stopped || result.loss <= enough) break;
+    result.explained = result.loss <= enough;
+    if (found.stopped || result.explained) break;
   }
   result.iterations = static_cast<unsigned>(result.history.size());
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
