@@ -73,7 +73,8 @@ std::vector<Workload> make_workloads(std::string_view name) {
   const auto d = std::ranges::find(definitions(), name, &Definition::name);
   if (d == definitions().end()) {
     std::string names;
-    for (const std::string_view known : workload_names()) names += (names.empty() ? "" : ", ") + std::string(known);
+    for (const std::string_view known : workload_names())
+      names += (names.empty() ? "" : ", ") + std::string(known);
     throw InvalidArgument("workload", "'" + std::string(name) + "'", "one of " + names);
   }
   std::vector<Workload> list;

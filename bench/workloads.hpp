@@ -12,8 +12,8 @@ namespace dpr::bench {
 
 /// One row of the results: a scene rendered one way.
 struct Workload {
-  std::string name;         ///< "sphere256"
-  std::string preset;       ///< "gaussian" or "softras": the priors
+  std::string name;    ///< "sphere256"
+  std::string preset;  ///< "gaussian" or "softras": the priors
   Scene scene;
   std::vector<View> views;  ///< one, or a batch
 };
@@ -21,8 +21,8 @@ struct Workload {
 /// The names that make_workloads knows, small scenes first.
 std::vector<std::string_view> workload_names();
 
-/// Every way in which a workload is measured: estimators, samples, priors, compositions. Throws InvalidArgument for an
-/// unknown name.
+/// Every way in which a workload is measured: estimators, samples, priors, compositions. Throws
+/// InvalidArgument for an unknown name.
 std::vector<Workload> make_workloads(std::string_view name);
 
 }  // namespace dpr::bench

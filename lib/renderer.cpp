@@ -51,7 +51,8 @@ void check_frame_size(const shared::FrameParams& p) {
   const double pixels = views * p.width * p.height;
   const double corners = views * std::max(p.vertices * double{DPR_POSE_CHANNELS}, p.faces * 3.0);
   if (std::max(pixels * DPR_PIXEL_CHANNELS, corners) < largest) return;
-  throw InvalidArgument("views (frame)", std::to_string(p.views), "fewer, so that pixels and vertices can be counted");
+  throw InvalidArgument("views (frame)", std::to_string(p.views),
+                        "fewer, so that pixels and vertices can be counted");
 }
 
 /// Frames of all renderers, so that a loss knows which one it was evaluated on.
@@ -76,7 +77,8 @@ void Renderer::Impl::require_scene(const char* caller) const {
 }
 
 void Renderer::Impl::require_forward(const char* caller) const {
-  if (!rendered) throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
+  if (!rendered)
+    throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views) {
@@ -88,12 +90,14 @@ void Renderer::Impl::set_views(std::span<const View> new_views) {
     const View& view = new_views[v];
     validate(view.camera);
     if (view.transforms.size() != scene.meshes.size()) {
-      throw InvalidArgument(checks::element("views", v) + ".transforms", std::to_string(view.transforms.size()),
+      throw InvalidArgument(checks::element("views", v) + ".transforms",
+                            std::to_string(view.transforms.size()),
                             "one for each of the " + std::to_string(scene.meshes.size()) + " meshes");
     }
     cameras.push_back(view_params(view.camera, scene.width, scene.height));
     for (std::size_t m = 0; m < view.transforms.size(); ++m) {
-      checks::require_affine(view.transforms[m], checks::element(checks::element("views", v) + ".transforms", m));
+      checks::require_affine(view.transforms[m],
+                             checks::element(checks::element("views", v) + ".transforms", m));
       for (int row = 0; row < 3; ++row) models.push_back(matrix_row(view.transforms[m], row));
       starts.push_back(starts.back() + static_cast<cl_uint>(geometry->meshes[m].vertices));
     }
@@ -145,9 +149,10 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
   if (geometric || wanted.smoothing) occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
   if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
   if (geometric) {
-    rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth, shade.grad_bary1,
-                       shade.grad_bary2);
-    gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners, grad_ndc);
+    rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth,
+                       shade.grad_bary1, shade.grad_bary2);
+    gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
+                    grad_ndc);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
     transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
   }
@@ -159,9 +164,10 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
 }
 
 std::size_t Renderer::Impl::bytes() const {
-  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() + rasterize.bytes() +
-         shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() + device_views.cameras.capacity_bytes() +
-         device_views.models.capacity_bytes() + view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes() +
+  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
+         rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
+         device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
+         view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes() +
          host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
          grad_colors.capacity_bytes();
 }

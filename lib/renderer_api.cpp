@@ -118,7 +118,8 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
   std::vector<cl_float4> values;
   for (const Image& image : grad_images) {
     if (image.width != m.scene.width || image.height != m.scene.height) {
-      throw InvalidArgument("size (grad_images)", std::to_string(image.width) + "x" + std::to_string(image.height),
+      throw InvalidArgument("size (grad_images)",
+                            std::to_string(image.width) + "x" + std::to_string(image.height),
                             std::to_string(m.scene.width) + "x" + std::to_string(m.scene.height));
     }
     checks::require_pixels(image, "grad_images");
@@ -162,7 +163,8 @@ SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
   const std::size_t count = m.aggregate.image.size();
   const std::size_t bytes = grad_images.getInfo<CL_MEM_SIZE>();
   if (bytes < count * sizeof(cl_float4)) {
-    throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes", std::to_string(count * sizeof(cl_float4)));
+    throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
+                          std::to_string(count * sizeof(cl_float4)));
   }
   m.host_grad_images.resize(m.device.impl(), count);
   check_cl(m.device.impl().queue.enqueueCopyBuffer(grad_images, m.host_grad_images.cl_buffer(), 0, 0,

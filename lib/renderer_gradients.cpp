@@ -11,7 +11,8 @@ using glm::dvec3;
 void Renderer::Impl::read_smoothing_gradients(SceneGradient& gradient) {
   if (scene.gradients.smoothing || scene.gradients.background) {
     const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
-    const std::vector<float> sums = reduce.read(pixels, DPR_PIXEL_CHANNELS, 1, 1, all_pixels, aggregate.channels);
+    const std::vector<float> sums =
+        reduce.read(pixels, DPR_PIXEL_CHANNELS, 1, 1, all_pixels, aggregate.channels);
     if (scene.gradients.smoothing) {
       gradient.gamma = sums[DPR_CHANNEL_GAMMA];
       gradient.alpha = sums[DPR_CHANNEL_ALPHA];
@@ -44,7 +45,8 @@ std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t f
 void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
   if (scene.gradients.colors) {
-    gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors, grad_colors);
+    gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+                      grad_colors);
   }
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const MeshRange& range = geometry->meshes[m];
@@ -78,8 +80,8 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
 
 void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
   const std::size_t segments = views.size() * scene.meshes.size();
-  const std::vector<float> sums = reduce.read(std::size_t{frame.views} * frame.vertices, DPR_POSE_CHANNELS, segments, 1,
-                                              view_vertex_starts, transform.channels);
+  const std::vector<float> sums = reduce.read(std::size_t{frame.views} * frame.vertices, DPR_POSE_CHANNELS,
+                                              segments, 1, view_vertex_starts, transform.channels);
   const auto sum = [&](std::size_t channel, std::size_t segment) {
     return static_cast<double>(sums[channel * segments + segment]);
   };
@@ -92,7 +94,8 @@ void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
     for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
       const std::size_t segment = v * scene.meshes.size() + m;
       if (scene.gradients.transform) {
-        gradient.views[v].transforms[m] = {sum3(DPR_CHANNEL_MODEL, segment), sum3(DPR_CHANNEL_MODEL + 3, segment)};
+        gradient.views[v].transforms[m] = {sum3(DPR_CHANNEL_MODEL, segment),
+                                           sum3(DPR_CHANNEL_MODEL + 3, segment)};
       }
       camera.view.rotation += sum3(DPR_CHANNEL_VIEW, segment);
       camera.view.translation += sum3(DPR_CHANNEL_VIEW + 3, segment);
@@ -104,7 +107,8 @@ void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
   if (scene.gradients.camera && shade.lit()) add_eye_gradients(gradient);
 }
 
-/// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a translation.
+/// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
+/// translation.
 void Renderer::Impl::add_eye_gradients(SceneGradient& gradient) {
   const std::vector<float> sums =
       reduce.read(bin.pairs, 3, views.size(), frame.faces, bin.pair_starts, shade.grad_eye);
@@ -126,7 +130,9 @@ void Renderer::Impl::read_light_gradients(SceneGradient& gradient) {
     shade.backward_light(shade_inputs(), aggregate.grad_color, light);
     const std::vector<float> sums =
         reduce.read(bin.pairs, k_light_channels, 1, stride, bin.pair_starts, shade.light_channels);
-    const auto sum3 = [&](std::size_t channel) { return dvec3(sums[channel], sums[channel + 1], sums[channel + 2]); };
+    const auto sum3 = [&](std::size_t channel) {
+      return dvec3(sums[channel], sums[channel + 1], sums[channel + 2]);
+    };
     gradient.ambient = sum3(9);
     if (light < shade.lights()) gradient.lights[light] = {sum3(0), sum3(3), sum3(6)};
   }

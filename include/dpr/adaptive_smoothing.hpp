@@ -9,26 +9,26 @@ namespace dpr {
 
 /// The published schedule by default (MATHS of the paper's experiments).
 struct AdaptiveSchedule {
-  unsigned start = 100;          ///< first iteration at which the smoothing may change
-  unsigned interval = 50;        ///< iterations between two checks
-  float rate = 1.1F;             ///< > 1: sigma and gamma are divided by it
-  float sigma_floor = 5e-5F;     ///< > 0
-  float gamma_floor = 5e-4F;     ///< > 0
-  std::uint32_t max_samples = 128;    ///< samples double up to this
+  unsigned start = 100;                ///< first iteration at which the smoothing may change
+  unsigned interval = 50;              ///< iterations between two checks
+  float rate = 1.1F;                   ///< > 1: sigma and gamma are divided by it
+  float sigma_floor = 5e-5F;           ///< > 0
+  float gamma_floor = 5e-4F;           ///< > 0
+  std::uint32_t max_samples = 128;     ///< samples double up to this
   float learning_rate_divisor = 1.5F;  ///< >= 1, applied with each change
   float learning_rate_floor = 1e-4F;
-  float memory = 0.9F;           ///< v <- memory v + (1 - memory) d loss / d gamma
+  float memory = 0.9F;  ///< v <- memory v + (1 - memory) d loss / d gamma
 };
 
-/// Watches d loss / d gamma and shrinks sigma and gamma while less smoothing means less loss. Works with any member of
-/// the family. A blur radius given explicitly shrinks with sigma.
+/// Watches d loss / d gamma and shrinks sigma and gamma while less smoothing means less loss. Works with any
+/// member of the family. A blur radius given explicitly shrinks with sigma.
 class AdaptiveSmoothing {
  public:
   /// Throws InvalidArgument for a schedule out of range.
   explicit AdaptiveSmoothing(const AdaptiveSchedule& schedule = {});
 
-  /// To be called once an iteration. Returns true if it changed `smoothing`; then the optimizer should be restarted
-  /// with `learning_rate`, which it divides too. Until the first check only the average is formed.
+  /// To be called once an iteration. Returns true if it changed `smoothing`; then the optimizer should be
+  /// restarted with `learning_rate`, which it divides too. Until the first check only the average is formed.
   bool update(unsigned iteration, double grad_gamma, Smoothing& smoothing, double& learning_rate);
 
   double average() const { return average_; }

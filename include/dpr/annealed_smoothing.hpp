@@ -13,16 +13,16 @@ struct AnnealSchedule {
   double learning_rate_end = 5e-4;  ///< > 0
 };
 
-/// Lets sigma, gamma and the learning rate fall geometrically to their end values, one level after another. What starts
-/// below its end value stays. A blur radius given explicitly shrinks with sigma.
+/// Lets sigma, gamma and the learning rate fall geometrically to their end values, one level after another.
+/// What starts below its end value stays. A blur radius given explicitly shrinks with sigma.
 class AnnealedSmoothing {
  public:
   /// For a descent of that many iterations. Throws InvalidArgument for a schedule out of range.
   AnnealedSmoothing(const AnnealSchedule& schedule, unsigned iterations, const Smoothing& start,
                     double learning_rate);
 
-  /// To be called once an iteration. Returns true if the next iteration belongs to another level; `smoothing` and
-  /// `learning_rate` are then that level's.
+  /// To be called once an iteration. Returns true if the next iteration belongs to another level; `smoothing`
+  /// and `learning_rate` are then that level's.
   bool update(unsigned iteration, Smoothing& smoothing, double& learning_rate) const;
 
  private:

@@ -13,8 +13,8 @@ struct Intrinsics {
 
 /// An OpenGL camera: right-handed, looks down -z, y up. Column vectors.
 struct Camera {
-  glm::mat4 view{1.0F};                  ///< world to camera; affine and invertible
-  float fov_y_degrees = 60.0F;           ///< full vertical field of view, in (0, 180); ignored if intrinsics are given
+  glm::mat4 view{1.0F};         ///< world to camera; affine and invertible
+  float fov_y_degrees = 60.0F;  ///< full vertical field of view, in (0, 180); ignored if intrinsics are given
   std::optional<Intrinsics> intrinsics;  ///< instead of fov_y_degrees
   float znear = 1.0F;                    ///< > 0, distance along the view direction
   float zfar = 100.0F;                   ///< > znear
@@ -29,12 +29,14 @@ struct Projection {
 /// The projection of a camera for an image of that many pixels.
 Projection projection(const Camera& camera, int width, int height);
 
-/// Throws InvalidArgument if the view is singular, not affine or not finite, or a parameter is out of its range.
+/// Throws InvalidArgument if the view is singular, not affine or not finite, or a parameter is out of its
+/// range.
 void validate(const Camera& camera);
 
-/// A camera on a sphere about `target`, looking at it, up is +y. At elevation 0 and azimuth 0 it stands on +z;
-/// azimuth turns it towards +x, elevation lifts it. Degrees; elevation strictly between -90 and 90.
-Camera orbit_camera(float distance, float elevation_degrees, float azimuth_degrees, glm::vec3 target = glm::vec3(0));
+/// A camera on a sphere about `target`, looking at it, up is +y. At elevation 0 and azimuth 0 it stands on
+/// +z; azimuth turns it towards +x, elevation lifts it. Degrees; elevation strictly between -90 and 90.
+Camera orbit_camera(float distance, float elevation_degrees, float azimuth_degrees,
+                    glm::vec3 target = glm::vec3(0));
 
 /// World to camera in OpenCV axes (x right, y down, z forward): the rows y and z change sign.
 glm::mat4 to_opencv_view(const glm::mat4& view);

@@ -15,16 +15,17 @@ struct DeviceInfo {
   unsigned compute_units = 0;
   std::size_t memory_bytes = 0;
   std::size_t max_allocation_bytes = 0;
-  unsigned lanes = 1;        ///< width of the vectors the kernels are built with
-  bool is_default = false;   ///< what open_device("") takes
+  unsigned lanes = 1;          ///< width of the vectors the kernels are built with
+  bool is_default = false;     ///< what open_device("") takes
   std::string default_reason;  ///< why it is the default; empty for the others
 };
 
 /// Every OpenCL device of every platform, in the order of the ICD loader. Empty where there is none.
 std::vector<DeviceInfo> list_devices();
 
-/// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them, and they
-/// live as long as the last copy. One Device may serve several renderers of one thread; use one a thread.
+/// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them,
+/// and they live as long as the last copy. One Device may serve several renderers of one thread; use one a
+/// thread.
 class Device {
  public:
   /// The device's state; lib/device/context.hpp, and opencl.hpp for embedding.
@@ -44,8 +45,10 @@ class Device {
 };
 
 /// Opens a device: "" takes the environment variable DPR_DEVICE, or else the default (the first CPU, or
-/// else the first device: every machine has a CPU, so a program gives the same result everywhere unless told to differ); "cpu" and "gpu" the first of that type; a number the index in list_devices(); anything else the first whose
-/// platform or name contains it, ignoring case. Throws InvalidArgument if none matches, DeviceError if none exists.
+/// else the first device: every machine has a CPU, so a program gives the same result everywhere unless told
+/// to differ); "cpu" and "gpu" the first of that type; a number the index in list_devices(); anything else
+/// the first whose platform or name contains it, ignoring case. Throws InvalidArgument if none matches,
+/// DeviceError if none exists.
 Device open_device(const std::string& selector = "");
 
 }  // namespace dpr

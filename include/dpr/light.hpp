@@ -16,8 +16,9 @@ struct PointLight {
   glm::vec3 specular{0.2F};
 };
 
-/// colour = base * (ambient + sum_l diffuse_l max(n.l, 0)) + sum_l specular_l [n.l > 0] max(v.r, 0)^shininess,
-/// r = 2 (n.l) n - l (Phong 1975). Normals follow the winding of the faces and are not turned to the viewer.
+/// colour = base * (ambient + sum_l diffuse_l max(n.l, 0)) + sum_l specular_l [n.l > 0] max(v.r,
+/// 0)^shininess, r = 2 (n.l) n - l (Phong 1975). Normals follow the winding of the faces and are not turned
+/// to the viewer.
 struct Lights {
   glm::vec3 ambient{0.5F};
   std::vector<PointLight> point;

@@ -12,7 +12,8 @@ namespace dpr {
 
 class Renderer;
 
-/// mse, l1: means over pixels and the three colour channels. silhouette: 1 - IoU of the alpha channel, eq. (75).
+/// mse, l1: means over pixels and the three colour channels. silhouette: 1 - IoU of the alpha channel, eq.
+/// (75).
 enum class LossKind { mse, l1, silhouette };
 
 std::string_view to_string(LossKind);
@@ -28,15 +29,15 @@ struct LossWeights {
 /// Weighted sum of losses against fixed targets, mean over the views.
 class ImageLoss {
  public:
-  /// One target a view, all of the same size. Throws InvalidArgument for sizes that differ, values that are not
-  /// finite, negative weights or none above zero.
+  /// One target a view, all of the same size. Throws InvalidArgument for sizes that differ, values that are
+  /// not finite, negative weights or none above zero.
   ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets);
   ~ImageLoss();
   ImageLoss(ImageLoss&&) noexcept;
   ImageLoss& operator=(ImageLoss&&) noexcept;
 
-  /// The loss of the renderer's last images; keeps d loss / d image on the device for Renderer::backward. Blocks.
-  /// Throws InvalidArgument if number or size of the images differ from the targets'.
+  /// The loss of the renderer's last images; keeps d loss / d image on the device for Renderer::backward.
+  /// Blocks. Throws InvalidArgument if number or size of the images differ from the targets'.
   double evaluate(const Renderer& renderer);
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;

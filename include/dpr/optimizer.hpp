@@ -22,8 +22,8 @@ class Optimizer {
   /// Throws InvalidArgument for options out of range.
   explicit Optimizer(const OptimizerOptions& options);
 
-  /// The step to add to the parameters for this gradient. Throws InvalidArgument if its length changes between steps
-  /// or it is not finite.
+  /// The step to add to the parameters for this gradient. Throws InvalidArgument if its length changes
+  /// between steps or it is not finite.
   std::span<const double> step(std::span<const double> gradient);
   void set_learning_rate(double learning_rate);
   double learning_rate() const { return options_.learning_rate; }

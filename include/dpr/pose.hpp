@@ -31,12 +31,14 @@ double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
 struct PoseOptions {
   unsigned iterations = 200;
   OptimizerOptions optimizer;
-  /// How the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has it.
+  /// How the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has
+  /// it.
   std::variant<AnnealSchedule, AdaptiveSchedule> schedule;
   LossWeights loss = LossWeights::only(LossKind::mse);
   bool solve_translation = false;
-  /// Further descents, each from a rotation turned away from the initial one, as long as the target is not explained:
-  /// as long as the loss is above that part of the initial pose's loss, both under the finest smoothing reached.
+  /// Further descents, each from a rotation turned away from the initial one, as long as the target is not
+  /// explained: as long as the loss is above that part of the initial pose's loss, both under the finest
+  /// smoothing reached.
   unsigned restarts = 6;
   float explained = 0.1F;  ///< in (0, 1)
 };
@@ -68,8 +70,8 @@ class PoseSolver {
   /// Called once an iteration; false stops the solver, which then returns the best so far.
   using Callback = std::function<bool(const PoseIteration&)>;
 
-  /// Throws InvalidArgument if the scene has not exactly one mesh, its transform is singular, or the target's size
-  /// differs from the scene's.
+  /// Throws InvalidArgument if the scene has not exactly one mesh, its transform is singular, or the target's
+  /// size differs from the scene's.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.

@@ -1,4 +1,5 @@
-// The differentiable renderer: a scene in, images out; gradients of the images in, gradients of the scene out.
+// The differentiable renderer: a scene in, images out; gradients of the images in, gradients of the scene
+// out.
 #pragma once
 
 #include <array>
@@ -20,15 +21,15 @@ struct View {
   std::vector<glm::mat4> transforms;  ///< [mesh] object to world
 };
 
-/// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r = 0 (radians,
-/// the translation column left alone), and for the translation column.
+/// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r =
+/// 0 (radians, the translation column left alone), and for the translation column.
 struct PoseGradient {
   glm::dvec3 rotation{0.0}, translation{0.0};
 };
 
 struct CameraGradient {
-  PoseGradient view;         ///< of the world-to-camera matrix
-  double fov_y_degrees = 0;  ///< 0 where the camera has intrinsics
+  PoseGradient view;                   ///< of the world-to-camera matrix
+  double fov_y_degrees = 0;            ///< 0 where the camera has intrinsics
   std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy; 0 where the camera has a field of view
 };
 
@@ -39,7 +40,8 @@ struct ViewGradient {
 
 struct MeshGradient {
   std::vector<glm::vec3> positions;  ///< [vertex] object space; empty if not requested
-  std::vector<glm::vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
+  std::vector<glm::vec3>
+      colors;  ///< [vertex] or [face], as the mesh has them; empty if not requested or white
 };
 
 struct PointLightGradient {
@@ -57,11 +59,12 @@ struct SceneGradient {
 };
 
 struct RenderStatistics {
-  std::size_t faces = 0;            ///< triangles times views
-  std::size_t faces_dropped = 0;    ///< of those: nearer than znear, beyond zfar, without area, or outside the image
-  std::size_t pairs = 0;            ///< (8x8 tile, triangle) pairs
-  std::size_t fragments = 0;        ///< (pixel, triangle) pairs within the blur radius
-  std::size_t device_bytes = 0;     ///< held by this renderer
+  std::size_t faces = 0;  ///< triangles times views
+  std::size_t faces_dropped =
+      0;                  ///< of those: nearer than znear, beyond zfar, without area, or outside the image
+  std::size_t pairs = 0;  ///< (8x8 tile, triangle) pairs
+  std::size_t fragments = 0;     ///< (pixel, triangle) pairs within the blur radius
+  std::size_t device_bytes = 0;  ///< held by this renderer
 };
 
 class ImageLoss;
@@ -92,8 +95,9 @@ class Renderer {
   /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
   Image image(std::size_t view = 0) const;
 
-  /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the background).
-  /// One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise again.
+  /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the
+  /// background). One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise
+  /// again.
   SceneGradient backward(std::span<const Image> grad_images);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   SceneGradient backward(const ImageLoss& loss);

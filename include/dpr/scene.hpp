@@ -43,11 +43,13 @@ struct Scene {
   GradientRequest gradients;
 };
 
-/// Throws InvalidArgument where the scene cannot be rendered: size, camera, meshes, transforms, lights, smoothing.
+/// Throws InvalidArgument where the scene cannot be rendered: size, camera, meshes, transforms, lights,
+/// smoothing.
 void validate(const Scene& scene);
 
-/// Reads the scene format of the README. Mesh files are relative to the scene file. An unknown key is an error that
-/// names it. Throws IoError where the file cannot be read or is not JSON (with the line), InvalidArgument else.
+/// Reads the scene format of the README. Mesh files are relative to the scene file. An unknown key is an
+/// error that names it. Throws IoError where the file cannot be read or is not JSON (with the line),
+/// InvalidArgument else.
 Scene read_scene(const std::filesystem::path& file);
 
 }  // namespace dpr

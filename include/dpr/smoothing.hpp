@@ -11,7 +11,8 @@ namespace dpr {
 enum class Prior { gaussian, cauchy, logistic, gumbel, uniform };
 
 /// How occupancy and depth combine. barrier: the paper's b = zeta + (gamma / alpha) ln p, eq. (7), (10).
-/// joint: the expectation of the rigid image when distances and depths are both perturbed; alpha has no part in it.
+/// joint: the expectation of the rigid image when distances and depths are both perturbed; alpha has no part
+/// in it.
 enum class Composition { barrier, joint };
 
 /// exact: closed form or quadrature, no variance. monte_carlo: `samples` draws, eq. (11)-(16).
@@ -34,28 +35,30 @@ struct Smoothing {
   Estimator aggregation_estimator = Estimator::exact;
   std::uint32_t samples = 8;  ///< 1 to 2^20, of Monte Carlo
   VarianceReduction variance_reduction = VarianceReduction::rigid;
-  std::uint64_t seed = 1;             ///< the noise is a pure function of seed, view, pixel, face, sample and stage
+  std::uint64_t seed = 1;  ///< the noise is a pure function of seed, view, pixel, face, sample and stage
   float occupancy_threshold = 1e-4F;  ///< in (0, 0.5): sets the blur radius where none is given
-  std::optional<float> blur_radius;   ///< >= 0, in the unit of the metric: triangles further away are not there
-  float background_depth = 1e-10F;    ///< normalised depth of the background slot (barrier only)
+  std::optional<float>
+      blur_radius;                  ///< >= 0, in the unit of the metric: triangles further away are not there
+  float background_depth = 1e-10F;  ///< normalised depth of the background slot (barrier only)
   DistanceMetric distance = DistanceMetric::squared;
 };
 
-/// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform prior
-/// (its density is no exp(-nu), so it has no score), sampling the joint composition, uniform depths, and Cauchy depths
-/// in the joint composition.
+/// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform
+/// prior (its density is no exp(-nu), so it has no score), sampling the joint composition, uniform depths,
+/// and Cauchy depths in the joint composition.
 void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to
 /// `occupancy_threshold`: sigma times the prior's quantile at 1 - threshold. The Cauchy prior's tail is so
-/// heavy that its radius is capped at 100 sigma, where p = 1/2 - atan(100)/pi = 3.18e-3: a threshold below that
-/// has no effect there.
+/// heavy that its radius is capped at 100 sigma, where p = 1/2 - atan(100)/pi = 3.18e-3: a threshold below
+/// that has no effect there.
 float blur_radius(const Smoothing& smoothing);
 
 /// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins.
 Smoothing rigid_smoothing();
 
-/// A named member of the family; throws InvalidArgument for another name. What is not said is the default above.
+/// A named member of the family; throws InvalidArgument for another name. What is not said is the default
+/// above.
 /// - "softras": logistic occupancy, Gumbel depth, exact; blur radius 9.21 sigma, where the logistic p is 1e-4
 /// - "paper_gaussian", "paper_cauchy": both stages of one prior, sampled 8 times, rigid variance reduction,
 ///   blur radius 9.21 sigma: the published program

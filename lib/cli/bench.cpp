@@ -84,9 +84,10 @@ Json measure(const Device& device, const bench::Workload& workload, unsigned rep
 void print(const Json& result) {
   std::printf("%-10s %-8s %-7s %-11s %4u   forward %9.2f ms   backward %9.2f ms   %9zu fragments\n",
               result["workload"].get<std::string>().c_str(), result["preset"].get<std::string>().c_str(),
-              result["composition"].get<std::string>().c_str(), result["estimator"].get<std::string>().c_str(),
-              result["samples"].get<unsigned>(), result["forward_ms"]["median"].get<double>(),
-              result["backward_ms"]["median"].get<double>(), result["fragments"].get<std::size_t>());
+              result["composition"].get<std::string>().c_str(),
+              result["estimator"].get<std::string>().c_str(), result["samples"].get<unsigned>(),
+              result["forward_ms"]["median"].get<double>(), result["backward_ms"]["median"].get<double>(),
+              result["fragments"].get<std::size_t>());
   std::fflush(stdout);
 }
 
@@ -120,7 +121,8 @@ void add_bench_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand("bench", "Measures forward and backward passes");
   const auto options = std::make_shared<BenchOptions>();
   for (const std::string_view name : bench::workload_names()) options->workloads.emplace_back(name);
-  command->add_option("--workload", options->workloads, "Workload to measure, may be repeated; all if left out");
+  command->add_option("--workload", options->workloads,
+                      "Workload to measure, may be repeated; all if left out");
   command->add_option("-o,--output", options->output, "Results as JSON");
   command->add_option("--repetitions", options->repetitions, "Timed runs of each, after one to warm up")
       ->check(CLI::Range(1, 1000))

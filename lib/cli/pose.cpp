@@ -13,8 +13,8 @@ namespace dpr::cli {
 namespace {
 
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
-                              output, report;
+  std::string scene, target, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
+                                               report;
   PoseOptions solver;
 };
 
@@ -68,7 +68,9 @@ void add_solver_options(CLI::App& command, PoseCommandOptions& options) {
   command.add_option("--loss", options.loss, "What is made small; mse by default")
       ->type_name("mse|l1|silhouette");
   command.add_option("--iterations", solver.iterations, "How many steps; 200 by default")->type_name("N");
-  command.add_option("--restarts", solver.restarts, "Further descents while the target is not explained; 6 by default")
+  command
+      .add_option("--restarts", solver.restarts,
+                  "Further descents while the target is not explained; 6 by default")
       ->type_name("N");
   command.add_option("--optimizer", options.optimizer, "How steps are made; adam by default")
       ->type_name("adam|sgd");

@@ -97,8 +97,8 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);
   return [progress, iterations](const PoseIteration& step) {
     char text[96];
-    std::snprintf(text, sizeof text, "descent %u  loss %.4e  sigma %.1e  gamma %.1e", step.descent + 1, step.loss,
-                  number(step.sigma), number(step.gamma));
+    std::snprintf(text, sizeof text, "descent %u  loss %.4e  sigma %.1e  gamma %.1e", step.descent + 1,
+                  step.loss, number(step.sigma), number(step.gamma));
     progress->update(step.iteration % iterations + 1, text);
     return true;
   };
@@ -118,12 +118,8 @@ Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& tru
   }
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) {
-    Json entry{{"iteration", step.iteration},
-               {"descent", step.descent},
-               {"loss", step.loss},
-               {"sigma", number(step.sigma)},
-               {"gamma", number(step.gamma)},
-               {"samples", step.samples}};
+    Json entry{{"iteration", step.iteration}, {"descent", step.descent},     {"loss", step.loss},
+               {"sigma", number(step.sigma)}, {"gamma", number(step.gamma)}, {"samples", step.samples}};
     if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
     history.push_back(entry);
   }

@@ -85,14 +85,16 @@ void run(const RenderOptions& options, CommonOptions& common) {
   renderer.set_scene(scene);
   renderer.forward();
   Image image = renderer.image();
-  // Colours are those over the background already: with the silhouette as alpha, viewers would blend once more.
+  // Colours are those over the background already: with the silhouette as alpha, viewers would blend once
+  // more.
   if (std::filesystem::path(options.output).extension() != ".exr") {
     for (glm::vec4& pixel : image.pixels) pixel.a = 1;
   }
   write_image(options.output, image);
   const RenderStatistics statistics = renderer.statistics();
   if (!common.quiet) {
-    std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height, statistics.faces);
+    std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,
+                statistics.faces);
     if (statistics.faces_dropped > 0) {
       std::printf(", %zu of them dropped: outside the image, nearer than znear, beyond zfar or without area",
                   statistics.faces_dropped);
@@ -100,8 +102,8 @@ void run(const RenderOptions& options, CommonOptions& common) {
     std::printf("\n");
   }
   if (common.verbose) {
-    std::printf("%zu tile pairs, %zu fragments, %zu bytes on the device\n", statistics.pairs, statistics.fragments,
-                statistics.device_bytes);
+    std::printf("%zu tile pairs, %zu fragments, %zu bytes on the device\n", statistics.pairs,
+                statistics.fragments, statistics.device_bytes);
   }
 }
 

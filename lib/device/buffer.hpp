@@ -10,8 +10,8 @@
 
 namespace dpr {
 
-/// Elements of T on a device. Movable. Capacity is rounded up so that a kernel may load a whole vector of lanes at the
-/// last element; what lies behind size() is never read as a result.
+/// Elements of T on a device. Movable. Capacity is rounded up so that a kernel may load a whole vector of
+/// lanes at the last element; what lies behind size() is never read as a result.
 template <class T>
 class Buffer {
  public:
@@ -25,8 +25,8 @@ class Buffer {
     return *this;
   }
 
-  /// Makes room for `count` elements and forgets the content if it has to grow; growth leaves headroom, so that sizes
-  /// that vary from frame to frame settle.
+  /// Makes room for `count` elements and forgets the content if it has to grow; growth leaves headroom, so
+  /// that sizes that vary from frame to frame settle.
   void resize(Device::Impl& device, std::size_t count) {
     if (count > capacity_) {
       const std::size_t headroom = capacity_ == 0 ? 0 : count / 4;
@@ -45,7 +45,8 @@ class Buffer {
   /// Blocks until everything enqueued before has run.
   void download(std::span<T> values, std::size_t first = 0) const {
     if (values.empty()) return;
-    check_cl(device_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(), values.data()),
+    check_cl(device_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
+                                              values.data()),
              "clEnqueueReadBuffer");
   }
   std::vector<T> download() const {
@@ -62,7 +63,8 @@ class Buffer {
   /// Copies everything on the device; `other` must be as large.
   void copy_to(Buffer& other) const {
     if (size_ == 0) return;
-    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, 0, size_ * sizeof(T)), "clEnqueueCopyBuffer");
+    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, 0, size_ * sizeof(T)),
+             "clEnqueueCopyBuffer");
   }
 
   std::size_t size() const { return size_; }

@@ -29,12 +29,12 @@ struct Device::Impl {
   /// The program of one kernel file, built once for each set of options. Throws BuildError.
   const cl::Program& program(std::string_view kernel_file, const std::string& options);
 
-  /// Work-items of a work-group, for kernels without barriers. Constant, because PoCL compiles a kernel anew for each
-  /// work-group size.
+  /// Work-items of a work-group, for kernels without barriers. Constant, because PoCL compiles a kernel anew
+  /// for each work-group size.
   std::size_t local_size() const { return info.type == "cpu" ? 32 : 128; }
 
-  /// To be called before a buffer is let go. oclgrind 21.10 takes a new buffer for initialised as far as an old one of
-  /// the same number was, so there none is ever released.
+  /// To be called before a buffer is let go. oclgrind 21.10 takes a new buffer for initialised as far as an
+  /// old one of the same number was, so there none is ever released.
   void before_release(const cl::Buffer& buffer) const {
     if (info.platform == "Oclgrind") clRetainMemObject(buffer());
   }

@@ -53,8 +53,8 @@ std::vector<FoundDevice> find_devices() {
   const auto cpu = std::ranges::find(found, "cpu", [](const FoundDevice& entry) { return entry.info.type; });
   FoundDevice& preferred = cpu != found.end() ? *cpu : found.front();
   preferred.info.is_default = true;
-  preferred.info.default_reason =
-      cpu != found.end() ? "the first CPU: the same result on every machine" : "the first device: there is no CPU";
+  preferred.info.default_reason = cpu != found.end() ? "the first CPU: the same result on every machine"
+                                                     : "the first device: there is no CPU";
   return found;
 }
 
@@ -117,7 +117,8 @@ Device open_device(const std::string& selector) {
   const char* environment = std::getenv("DPR_DEVICE");
   const std::string wanted = selector.empty() && environment != nullptr ? environment : selector;
   const std::vector<FoundDevice> found = find_devices();
-  if (found.empty()) throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
+  if (found.empty())
+    throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
   const auto chosen =
       std::ranges::find_if(found, [&](const FoundDevice& entry) { return matches(entry.info, wanted); });
   if (chosen == found.end()) throw InvalidArgument("device", "'" + wanted + "'", "one of " + names(found));

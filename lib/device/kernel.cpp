@@ -9,8 +9,9 @@ namespace {
 
 /// What a device needs beside the standard options.
 std::string quirks(const DeviceInfo& info) {
-  // oclgrind 21.10 stops at LLVM intrinsics that only optimised code holds (llvm.experimental.noalias.scope.decl), and
-  // takes vectors of 64 bytes for uninitialised when they are function arguments.
+  // oclgrind 21.10 stops at LLVM intrinsics that only optimised code holds
+  // (llvm.experimental.noalias.scope.decl), and takes vectors of 64 bytes for uninitialised when they are
+  // function arguments.
   return info.platform == "Oclgrind" ? " -cl-opt-disable -DDPR_NODE_LANES=8" : "";
 }
 
@@ -18,7 +19,8 @@ std::string quirks(const DeviceInfo& info) {
 
 std::string build_options(const Device::Impl& device, const std::string& more) {
   // -w: compilers remark on vectors wider than the registers; what is worth a warning, the lint test finds.
-  return "-cl-std=CL1.2 -cl-kernel-arg-info -w -DDPR_LANES=" + std::to_string(device.info.lanes) + quirks(device.info) + more;
+  return "-cl-std=CL1.2 -cl-kernel-arg-info -w -DDPR_LANES=" + std::to_string(device.info.lanes) +
+         quirks(device.info) + more;
 }
 
 namespace detail {
@@ -42,7 +44,8 @@ ArgumentType argument_in_source(const cl::Kernel& kernel, unsigned index) {
 
 }  // namespace
 
-void check_signature(const cl::Kernel& kernel, const std::string& name, std::span<const ArgumentType> expected) {
+void check_signature(const cl::Kernel& kernel, const std::string& name,
+                     std::span<const ArgumentType> expected) {
   const auto count = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
   if (count != expected.size()) {
     throw std::logic_error("kernel " + name + " has " + std::to_string(count) + " arguments, its signature " +

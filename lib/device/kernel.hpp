@@ -1,5 +1,5 @@
-// Typed kernel launches: a wrong number, order or type of arguments does not compile; a signature that differs from the
-// kernel's source fails by name when the kernel is made, before its first launch.
+// Typed kernel launches: a wrong number, order or type of arguments does not compile; a signature that
+// differs from the kernel's source fails by name when the kernel is made, before its first launch.
 #pragma once
 
 #include <array>
@@ -73,7 +73,8 @@ struct Argument<Out<T>> : BufferArgument<T> {
 };
 
 /// Throws std::logic_error naming kernel and argument where the source differs from the signature.
-void check_signature(const cl::Kernel& kernel, const std::string& name, std::span<const ArgumentType> expected);
+void check_signature(const cl::Kernel& kernel, const std::string& name,
+                     std::span<const ArgumentType> expected);
 
 }  // namespace detail
 
@@ -93,17 +94,19 @@ class Kernel {
     detail::check_signature(kernel_, name_, expected);
   }
 
-  /// Enqueues `items` work-items, rounded up to whole work-groups: kernels guard their range. Nothing for 0 items.
+  /// Enqueues `items` work-items, rounded up to whole work-groups: kernels guard their range. Nothing for 0
+  /// items.
   void operator()(std::size_t items, const typename detail::Argument<Args>::Value&... args) {
     if (items == 0) return;
     unsigned index = 0;
     (check_cl(detail::Argument<Args>::set(kernel_, index++, args), "clSetKernelArg " + name_), ...);
     const std::size_t local = device_->local_size();
     const std::size_t global = (items + local - 1) / local * local;
-    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(global), cl::NDRange(local));
+    const int error =
+        device_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(global), cl::NDRange(local));
     if (error != CL_SUCCESS) {
-      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) + " work-items in groups of " +
-                                   std::to_string(local));
+      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) +
+                                   " work-items in groups of " + std::to_string(local));
     }
   }
 

@@ -29,7 +29,8 @@ std::string size_text(int width, int height) { return std::to_string(width) + "x
 void check_targets(std::span<const Image> targets) {
   if (targets.empty()) throw InvalidArgument("targets (loss)", "none", "one image a view");
   for (const Image& image : targets) {
-    if (image.width < 1 || image.height < 1 || image.width != targets[0].width || image.height != targets[0].height) {
+    if (image.width < 1 || image.height < 1 || image.width != targets[0].width ||
+        image.height != targets[0].height) {
       throw InvalidArgument("target size (loss)", size_text(image.width, image.height),
                             "images of one size, " + size_text(targets[0].width, targets[0].height));
     }
@@ -118,7 +119,8 @@ double ImageLoss::evaluate(const Renderer& renderer) {
     const auto sum = [&](std::size_t channel) { return static_cast<double>(sums[channel * m.views + view]); };
     const double count = 3.0 * static_cast<double>(pixels_per_view);
     const double iou = sum(3) > 0 ? sum(2) / sum(3) : 1.0;  // two empty images agree
-    m.per_view[view] = m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count + m.weights.silhouette * (1 - iou);
+    m.per_view[view] =
+        m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count + m.weights.silhouette * (1 - iou);
     total += m.per_view[view] / static_cast<double>(m.views);
   }
   return total;

@@ -16,14 +16,16 @@ double fall(double start, double end, double fraction) {
 
 }  // namespace
 
-AnnealedSmoothing::AnnealedSmoothing(const AnnealSchedule& schedule, unsigned iterations, const Smoothing& start,
-                                     double learning_rate)
+AnnealedSmoothing::AnnealedSmoothing(const AnnealSchedule& schedule, unsigned iterations,
+                                     const Smoothing& start, double learning_rate)
     : schedule_(schedule), iterations_(iterations), start_(start), learning_rate_(learning_rate) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   require(iterations > 0, "iterations (annealing)", iterations, "at least 1");
   require(schedule.levels > 0, "levels (annealing)", schedule.levels, "at least 1");
-  require(positive(schedule.sigma_end), "sigma_end (annealing)", schedule.sigma_end, "a finite number above 0");
-  require(positive(schedule.gamma_end), "gamma_end (annealing)", schedule.gamma_end, "a finite number above 0");
+  require(positive(schedule.sigma_end), "sigma_end (annealing)", schedule.sigma_end,
+          "a finite number above 0");
+  require(positive(schedule.gamma_end), "gamma_end (annealing)", schedule.gamma_end,
+          "a finite number above 0");
   require(positive(schedule.learning_rate_end), "learning_rate_end (annealing)", schedule.learning_rate_end,
           "a finite number above 0");
 }

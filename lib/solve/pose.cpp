@@ -115,8 +115,8 @@ class Schedule {
   std::optional<AdaptiveSmoothing> adaptive_;
 };
 
-/// Where a descent starts: the initial pose, then that pose turned by a fixed angle about axes spread evenly over the
-/// sphere (a Fibonacci lattice).
+/// Where a descent starts: the initial pose, then that pose turned by a fixed angle about axes spread evenly
+/// over the sphere (a Fibonacci lattice).
 Pose restart_pose(const Pose& initial, unsigned descent) {
   if (descent == 0) return initial;
   constexpr double k_turn_degrees = 60;  // out of the valley, not out of the neighbourhood
@@ -136,7 +136,8 @@ struct Descent {
 };
 
 Descent descend_from(Objective& objective, const PoseOptions& options, Pose pose, const Smoothing& start,
-                     unsigned descent, const PoseSolver::Callback& callback, std::vector<PoseIteration>& history) {
+                     unsigned descent, const PoseSolver::Callback& callback,
+                     std::vector<PoseIteration>& history) {
   Optimizer optimizer(options.optimizer);
   Schedule schedule(options, start);
   Descent best{pose, start};
@@ -209,8 +210,8 @@ PoseResult PoseSolver::solve(const Pose& initial, const Callback& callback) cons
   Smoothing finest = scene_.smoothing;
   double enough = 0;
   for (unsigned descent = 0; descent <= options_.restarts; ++descent) {
-    const Descent found = descend_from(objective, options_, restart_pose(first, descent), scene_.smoothing, descent,
-                                       callback, result.history);
+    const Descent found = descend_from(objective, options_, restart_pose(first, descent), scene_.smoothing,
+                                       descent, callback, result.history);
     // Descents may end at different levels: they are compared at that of the first.
     if (descent == 0) finest = found.smoothing;
     objective.set_smoothing(finest);

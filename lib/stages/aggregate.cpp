@@ -13,8 +13,10 @@ Aggregate::Exact::Exact(Device::Impl& device, Composition composition, const std
     : forward(device, file_of(composition),
               composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
       backward(device, file_of(composition),
-               composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward", options) {
-  if (composition == Composition::joint) sort.emplace(device, file_of(composition), "aggregate_joint_sort", options);
+               composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward",
+               options) {
+  if (composition == Composition::joint)
+    sort.emplace(device, file_of(composition), "aggregate_joint_sort", options);
 }
 
 Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
@@ -61,16 +63,18 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   Rasterize& r = in.rasterize;
   if (exact_) {
     if (exact_->sort) (*exact_->sort)(a.pixels, a.pixels, r.pixel_starts, r.depth, r.list);
-    exact_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, image);
+    exact_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
+                    in.shade.blue, image);
   } else {
-    sampled_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                      in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair,
-                      in.bin.pair_face, image);
+    sampled_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                      in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
+                      in.shade.blue, r.fragment_pair, in.bin.pair_face, image);
   }
 }
 
-void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image) {
+void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
+                         const Buffer<cl_float4>& grad_image) {
   const shared::AggregateParams a = params(in.p, background);
   for (Buffer<float>* buffer :
        {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
@@ -79,14 +83,15 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
   channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
   const Rasterize& r = in.rasterize;
   if (exact_) {
-    exact_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, grad_image, grad_depth,
-                     grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
+    exact_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                     in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
+                     in.shade.blue, grad_image, grad_depth, grad_log_occupancy, grad_color.red,
+                     grad_color.green, grad_color.blue, channels);
   } else {
-    sampled_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                       in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair,
-                       in.bin.pair_face, grad_image, grad_depth, grad_log_occupancy, grad_color.red, grad_color.green,
-                       grad_color.blue, channels);
+    sampled_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                       in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
+                       in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_depth,
+                       grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
   }
 }
 

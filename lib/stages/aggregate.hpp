@@ -33,7 +33,7 @@ class Aggregate {
   /// `grad_image` is [view][height][width].
   void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
 
-  Buffer<cl_float4> image;  ///< [view][height][width] RGBA
+  Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
   Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
   ColorGradients grad_color;                     ///< [fragment]
   Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
@@ -41,12 +41,13 @@ class Aggregate {
   std::size_t bytes() const;
 
  private:
-  using ForwardKernel = Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>,
-                               In<float>, In<float>, In<float>, In<float>, In<float>, Out<cl_float4>>;
+  using ForwardKernel =
+      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+             In<float>, In<float>, In<float>, In<float>, Out<cl_float4>>;
   using BackwardKernel =
-      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
-             In<float>, In<float>, In<float>, In<cl_float4>, Out<float>, Out<float>, Out<float>, Out<float>,
-             Out<float>, Out<float>>;
+      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+             In<float>, In<float>, In<float>, In<float>, In<cl_float4>, Out<float>, Out<float>, Out<float>,
+             Out<float>, Out<float>, Out<float>>;
   /// Exact kernels of either composition; the joint one sorts first.
   struct Exact {
     Exact(Device::Impl& device, Composition composition, const std::string& options);
@@ -56,12 +57,12 @@ class Aggregate {
   };
   struct Sampled {
     Sampled(Device::Impl& device, const std::string& options);
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
         forward;
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>, Out<float>, Out<float>,
-           Out<float>, Out<float>, Out<float>>
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>,
+           Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
         backward;
   };
 

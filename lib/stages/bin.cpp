@@ -16,7 +16,8 @@ void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& 
   scan_(faces, counts_, pair_starts);
   pairs = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
 
-  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &order, &sorted_tiles_}) buffer->resize(device_, pairs);
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &order, &sorted_tiles_})
+    buffer->resize(device_, pairs);
   fill_(faces, p, triangles, pair_starts, pair_face, pair_tile, order);
   pair_tile.copy_to(sorted_tiles_);
   sort_(pairs, std::size_t{p.views} * p.tiles_x * p.tiles_y, sorted_tiles_, order, tile_starts);

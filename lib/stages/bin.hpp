@@ -1,4 +1,5 @@
-// (tile, triangle) pairs: in face order, which gathers gradients, and by tile, which lists a pixel's fragments.
+// (tile, triangle) pairs: in face order, which gathers gradients, and by tile, which lists a pixel's
+// fragments.
 #pragma once
 
 #include "device/kernel.hpp"
@@ -26,7 +27,8 @@ class Bin {
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::Triangle>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> fill_;
+  Kernel<shared::FrameParams, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
+      fill_;
   Scan scan_;
   Sort sort_;
   Buffer<cl_uint> counts_, sorted_tiles_;

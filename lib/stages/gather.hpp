@@ -15,12 +15,13 @@ class Gather {
   void per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
                 const Buffer<float>& partial, Buffer<cl_float4>& grad);
   /// grad[target], the views added up.
-  void over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
-                  const Buffer<float>& partial, Buffer<cl_float4>& grad);
+  void over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
+                  const Incidence& incidence, const Buffer<float>& partial, Buffer<cl_float4>& grad);
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<cl_float4>>
+  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
+         Out<cl_float4>>
       corners_;
 };
 

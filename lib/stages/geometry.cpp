@@ -80,8 +80,9 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
 }
 
 std::size_t Geometry::bytes() const {
-  std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() + face_vertices.capacity_bytes() +
-                      face_colors.capacity_bytes() + color_values.capacity_bytes();
+  std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() +
+                      face_vertices.capacity_bytes() + face_colors.capacity_bytes() +
+                      color_values.capacity_bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

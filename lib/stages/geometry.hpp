@@ -1,4 +1,5 @@
-// The scene's geometry on the device: all meshes in one set of buffers, with what gathers gradients without atomics.
+// The scene's geometry on the device: all meshes in one set of buffers, with what gathers gradients without
+// atomics.
 #pragma once
 
 #include <vector>
@@ -26,8 +27,8 @@ struct Geometry {
   std::size_t vertices = 0, faces = 0, colors = 0;
   std::vector<MeshRange> meshes;
 
-  Buffer<cl_float4> positions;   ///< [vertex] object space
-  Buffer<cl_uint> vertex_mesh;   ///< [vertex]
+  Buffer<cl_float4> positions;     ///< [vertex] object space
+  Buffer<cl_uint> vertex_mesh;     ///< [vertex]
   Buffer<cl_uint4> face_vertices;  ///< [face] vertex indices; w = mesh
   Buffer<cl_uint4> face_colors;    ///< [face] colour of each corner
   Buffer<cl_float4> color_values;  ///< [color]

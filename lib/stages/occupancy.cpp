@@ -48,11 +48,11 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   if (exact_) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    exact_->forward((rasterize.fragments + width - 1) / width, params(p), static_cast<cl_uint>(rasterize.fragments),
-                    rasterize.distance, log_occupancy, occupancy);
+    exact_->forward((rasterize.fragments + width - 1) / width, params(p),
+                    static_cast<cl_uint>(rasterize.fragments), rasterize.distance, log_occupancy, occupancy);
   } else {
-    sampled_->forward(pairs, params(p), pairs, bin.pair_face, rasterize.fragment_starts, rasterize.fragment_pixel,
-                      rasterize.distance, log_occupancy, occupancy);
+    sampled_->forward(pairs, params(p), pairs, bin.pair_face, rasterize.fragment_starts,
+                      rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);
   }
 }
 
@@ -66,8 +66,8 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
                      grad_log_occupancy, grad_distance, grad_sigma);
   } else {
     sampled_->backward(pairs, params(p), pairs, bin.pair_face, rasterize.masks, rasterize.fragment_starts,
-                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, grad_log_occupancy, grad_distance,
-                       grad_sigma);
+                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, grad_log_occupancy,
+                       grad_distance, grad_sigma);
   }
 }
 

@@ -11,7 +11,8 @@ Rasterize::Rasterize(Device::Impl& device)
       backward_(device, "rasterize.cl", "rasterize_backward"),
       scan_(device) {}
 
-void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin) {
+void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                        const Bin& bin) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
   masks.resize(device_, pairs);
@@ -34,8 +35,8 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
            fragment_pixel, distance, depth, bary1, bary2);
 }
 
-void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
-                         const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
+void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                         const Bin& bin, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   grad_corners.resize(device_, std::size_t{9} * pairs);

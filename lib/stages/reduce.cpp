@@ -19,13 +19,14 @@ void Reduce::operator()(std::size_t count, std::size_t channels, std::size_t seg
   const auto c = static_cast<cl_uint>(channels), s = static_cast<cl_uint>(segments);
   partial_.resize(device_, channels * segments * k_slots);
   sums.resize(device_, channels * segments);
-  partial_sums_(channels * segments * k_slots, static_cast<cl_uint>(count), c, s, static_cast<cl_uint>(stride), starts,
-                values, partial_);
+  partial_sums_(channels * segments * k_slots, static_cast<cl_uint>(count), c, s,
+                static_cast<cl_uint>(stride), starts, values, partial_);
   final_sums_(channels * segments, c, s, partial_, sums);
 }
 
-std::vector<float> Reduce::read(std::size_t count, std::size_t channels, std::size_t segments, std::size_t stride,
-                                const Buffer<cl_uint>& starts, const Buffer<float>& values) {
+std::vector<float> Reduce::read(std::size_t count, std::size_t channels, std::size_t segments,
+                                std::size_t stride, const Buffer<cl_uint>& starts,
+                                const Buffer<float>& values) {
   (*this)(count, channels, segments, stride, starts, values, sums_);
   return sums_.download();
 }

@@ -11,8 +11,8 @@ class Reduce {
  public:
   explicit Reduce(Device::Impl& device);
 
-  /// Sums values[channel][starts[s * stride] .. starts[(s + 1) * stride]) for every channel and segment s, of `count`
-  /// values a channel, into sums[channel][segment].
+  /// Sums values[channel][starts[s * stride] .. starts[(s + 1) * stride]) for every channel and segment s, of
+  /// `count` values a channel, into sums[channel][segment].
   void operator()(std::size_t count, std::size_t channels, std::size_t segments, std::size_t stride,
                   const Buffer<cl_uint>& starts, const Buffer<float>& values, Buffer<float>& sums);
   /// The same, read back.

@@ -17,7 +17,8 @@ class Scan {
   std::size_t bytes() const;
 
  private:
-  void scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets, std::size_t level);
+  void scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
+                  std::size_t level);
 
   /// The sums of a level's chunks, and their scan.
   struct Level {

@@ -20,7 +20,8 @@ class Setup {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<shared::Triangle>> forward_;
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<shared::Triangle>>
+      forward_;
 };
 
 }  // namespace dpr

@@ -19,7 +19,9 @@ LitShading::LitShading(Device::Impl& device, Shading model)
       backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_option(model)) {}
 
 Shade::Shade(Device::Impl& device)
-    : device_(device), forward_(device, "shade.cl", "shade_forward"), backward_(device, "shade.cl", "shade_backward") {}
+    : device_(device),
+      forward_(device, "shade.cl", "shade_forward"),
+      backward_(device, "shade.cl", "shade_backward") {}
 
 void Shade::set_lights(const std::optional<Lights>& lights) {
   if (!lights) {
@@ -54,8 +56,9 @@ void Shade::forward(const ShadeInputs& in) {
                           in.geometry.vertex_corners.corners, in.transform.world, normals_);
   }
   lit_->forward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
-                in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_, in.bin.pair_face,
-                in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
+                in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_,
+                in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red,
+                green, blue);
 }
 
 void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
@@ -64,25 +67,27 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   grad_corner_colors.resize(device_, std::size_t{9} * pairs);
   if (!lit_) {
     backward_(pairs, in.p, pairs, in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
-              in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, grad.red,
-              grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
+              in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2,
+              grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
     return;
   }
   grad_corner_positions_.resize(device_, std::size_t{9} * pairs);
   grad_corner_normals_.resize(device_, std::size_t{9} * pairs);
   grad_eye.resize(device_, std::size_t{3} * pairs);
   lit_->backward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
-                 in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_, in.bin.pair_face,
-                 in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
-                 grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors, grad_corner_positions_,
-                 grad_corner_normals_, grad_eye);
+                 in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_,
+                 in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
+                 in.rasterize.bary2, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
+                 grad_corner_colors, grad_corner_positions_, grad_corner_normals_, grad_eye);
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
-  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_, grad_world);
+  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_,
+                  grad_world);
   if (lit_->shading == Shading::flat) return;
-  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_, grad_normals_);
+  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_,
+                  grad_normals_);
   lit_->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
   lit_->normals_backward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
                          in.geometry.vertex_corners.corners, in.transform.world, grad_normals_, grad_world);
@@ -94,14 +99,15 @@ void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, st
   lit_->backward_lights(pairs, in.p, lighting_, pairs, static_cast<cl_uint>(light), in.views.cameras, lights_,
                         in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
                         in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
-                        in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green,
-                        grad.blue, light_channels);
+                        in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
+                        grad.green, grad.blue, light_channels);
 }
 
 std::size_t Shade::bytes() const {
   std::size_t bytes = lights_.capacity_bytes() + normals_.capacity_bytes() + grad_normals_.capacity_bytes();
-  for (const Buffer<float>* buffer : {&red, &green, &blue, &grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye,
-                                      &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
+  for (const Buffer<float>* buffer :
+       {&red, &green, &blue, &grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye, &light_channels,
+        &grad_corner_positions_, &grad_corner_normals_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

@@ -26,22 +26,25 @@ class LitShading {
   LitShading(Device::Impl& device, Shading shading);
 
   Shading shading;
-  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> normals_forward;
+  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
+      normals_forward;
   Kernel<shared::FrameParams, In<cl_float4>, Out<cl_float4>> normals_backward_normalize;
-  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>, Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
+         Out<cl_float4>>
       normals_backward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>, In<cl_uint4>,
-         In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-         Out<float>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
+         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>,
+         In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       forward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>, In<cl_uint4>,
-         In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>,
-         Out<float>>
-      backward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>, In<shared::Light>,
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
          In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint2>,
-         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
+         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>,
+         Out<float>, Out<float>, Out<float>, Out<float>>
+      backward;
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
+         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
+         In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
+         Out<float>>
       backward_lights;
 };
 
@@ -65,33 +68,35 @@ class Shade {
   std::size_t lights() const { return lighting_.lights; }
 
   void forward(const ShadeInputs& in);
-  /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and the eye.
+  /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and
+  /// the eye.
   void backward(const ShadeInputs& in, const ColorGradients& grad);
-  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if lit.
+  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
+  /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
   /// The gradients of one light and of the ambient light, per pair: k_light_channels channels.
   void backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light);
 
-  Buffer<float> red, green, blue;          ///< [fragment]
-  Buffer<float> grad_bary1, grad_bary2;    ///< [fragment] relative to corner 0's
-  Buffer<float> grad_corner_colors;        ///< [pair][9]
-  Buffer<float> grad_eye;                  ///< [3][pair]
-  Buffer<float> light_channels;            ///< [k_light_channels][pair]
+  Buffer<float> red, green, blue;        ///< [fragment]
+  Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
+  Buffer<float> grad_corner_colors;      ///< [pair][9]
+  Buffer<float> grad_eye;                ///< [3][pair]
+  Buffer<float> light_channels;          ///< [k_light_channels][pair]
 
   std::size_t bytes() const;
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>, In<float>,
-         Out<float>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
+         In<float>, Out<float>, Out<float>, Out<float>>
       forward_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
+         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       backward_;
   std::optional<LitShading> lit_;
   shared::LightingParams lighting_{};
   Buffer<shared::Light> lights_;
-  Buffer<cl_float4> normals_, grad_normals_;             // [view][vertex]
+  Buffer<cl_float4> normals_, grad_normals_;                   // [view][vertex]
   Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
 };
 

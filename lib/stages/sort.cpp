@@ -20,8 +20,8 @@ Sort::Sort(Device::Impl& device)
       scatter_(device, "sort.cl", "sort_scatter", options()),
       ranges_(device, "sort.cl", "sort_ranges", options()) {}
 
-void Sort::operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys, Buffer<cl_uint>& values,
-                      Buffer<cl_uint>& starts) {
+void Sort::operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys,
+                      Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
   const std::size_t blocks = (count + k_block - 1) / k_block;
   const auto n = static_cast<cl_uint>(count);
   counts_.resize(device_, k_digits * blocks);

@@ -10,7 +10,8 @@ class Sort {
  public:
   explicit Sort(Device::Impl& device);
 
-  /// Sorts keys below `key_count`, and values with them, in place. `starts` gets the run of every key: [key_count + 1].
+  /// Sorts keys below `key_count`, and values with them, in place. `starts` gets the run of every key:
+  /// [key_count + 1].
   void operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys, Buffer<cl_uint>& values,
                   Buffer<cl_uint>& starts);
 

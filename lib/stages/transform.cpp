@@ -20,11 +20,12 @@ void Transform::backward(const shared::FrameParams& p, const DeviceViews& views,
   const std::size_t count = std::size_t{p.views} * p.vertices;
   grad_world.resize(device_, count);
   channels.resize(device_, DPR_POSE_CHANNELS * count);
-  backward_(count, p, lit ? 1 : 0, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc, grad_world, channels);
+  backward_(count, p, lit ? 1 : 0, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc,
+            grad_world, channels);
 }
 
-void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                                   const Buffer<cl_float4>& grad_world) {
+void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,
+                                   const Geometry& geometry, const Buffer<cl_float4>& grad_world) {
   grad_positions.resize(device_, p.vertices);
   backward_positions_(p.vertices, p, views.models, geometry.vertex_mesh, grad_world, grad_positions);
 }

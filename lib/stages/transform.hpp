@@ -17,7 +17,8 @@ class Transform {
   explicit Transform(Device::Impl& device);
 
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
-  /// `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient. Fills `channels`.
+  /// `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient. Fills
+  /// `channels`.
   void backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry, bool lit,
                 const Buffer<cl_float4>& grad_ndc, Buffer<cl_float4>& grad_world);
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
@@ -29,13 +30,14 @@ class Transform {
   Buffer<cl_float4> grad_positions;  ///< [vertex] object space
 
   std::size_t bytes() const {
-    return world.capacity_bytes() + ndc.capacity_bytes() + channels.capacity_bytes() + grad_positions.capacity_bytes();
+    return world.capacity_bytes() + ndc.capacity_bytes() + channels.capacity_bytes() +
+           grad_positions.capacity_bytes();
   }
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>, Out<cl_float4>,
-         Out<cl_float4>>
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>,
+         Out<cl_float4>, Out<cl_float4>>
       forward_;
   Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>, In<cl_float4>,
          In<cl_float4>, Out<cl_float4>, Out<float>>

@@ -1,5 +1,5 @@
-// Images and gradients against the cases in ../shared/conformance, computed in double precision by other software.
-// Runs where that folder is; elsewhere there is nothing to compare with.
+// Images and gradients against the cases in ../shared/conformance, computed in double precision by other
+// software. Runs where that folder is; elsewhere there is nothing to compare with.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ std::vector<fs::path> cases() {
   const char* shared = std::getenv("DPR_SHARED_DIR");
   if (shared == nullptr || !fs::exists(fs::path(shared) / "conformance/scenes")) return found;
   for (const auto& entry : fs::directory_iterator(fs::path(shared) / "conformance/scenes")) {
-    if (entry.path().extension() == ".json" && entry.path().stem().extension() != ".grad") found.push_back(entry.path());
+    if (entry.path().extension() == ".json" && entry.path().stem().extension() != ".grad")
+      found.push_back(entry.path());
   }
   std::ranges::sort(found);
   return found;
@@ -40,7 +41,9 @@ void flatten(const json& node, std::vector<double>& values) {
 void flatten(const std::vector<glm::vec3>& rows, std::vector<double>& values) {
   for (const glm::vec3& v : rows) values.insert(values.end(), {v.x, v.y, v.z});
 }
-void flatten(const glm::dvec3& v, std::vector<double>& values) { values.insert(values.end(), {v.x, v.y, v.z}); }
+void flatten(const glm::dvec3& v, std::vector<double>& values) {
+  values.insert(values.end(), {v.x, v.y, v.z});
+}
 void flatten(double v, std::vector<double>& values) { values.push_back(v); }
 
 double norm(const std::vector<double>& values) {
@@ -49,7 +52,8 @@ double norm(const std::vector<double>& values) {
   return std::sqrt(sum);
 }
 
-/// Euclidean norm of the difference, relative to the reference's; or absolute, over 1e-7, where the reference is tiny.
+/// Euclidean norm of the difference, relative to the reference's; or absolute, over 1e-7, where the reference
+/// is tiny.
 template <class Found>
 double block_error(const json& expected, const Found& found, double relative) {
   if (expected.is_null()) return 0;
@@ -91,8 +95,9 @@ TEST_SUITE("pipeline") {
       CHECK(largest < 1e-4 * slack);
       CHECK(mean < 1e-6 * slack);
 
-      dpr::ImageLoss loss(device, dpr::LossWeights::only(dpr::parse_loss(grad["loss_kind"].get<std::string>(), "loss")),
-                          std::span(&target, 1));
+      dpr::ImageLoss loss(
+          device, dpr::LossWeights::only(dpr::parse_loss(grad["loss_kind"].get<std::string>(), "loss")),
+          std::span(&target, 1));
       const double loss_error = std::abs(loss.evaluate(renderer) / grad["loss"].get<double>() - 1);
       CHECK(loss_error < 1e-5 * slack);
 
@@ -107,14 +112,16 @@ TEST_SUITE("pipeline") {
           {"rotation", block_error(mesh["rotation"], pose.rotation, block) / block},
           {"translation", block_error(mesh["translation"], pose.translation, block) / block},
           {"camera rotation", block_error(grad["camera"]["rotation"], camera.view.rotation, block) / block},
-          {"camera translation", block_error(grad["camera"]["translation"], camera.view.translation, block) / block},
+          {"camera translation",
+           block_error(grad["camera"]["translation"], camera.view.translation, block) / block},
           {"fov", block_error(grad["camera"]["fov_y_degrees"], camera.fov_y_degrees, block) / block},
           {"background", block_error(grad["background"], found.background, block) / block},
           {"sigma", block_error(grad["sigma"], found.sigma, sensitivity) / sensitivity},
           {"gamma", block_error(grad["gamma"], found.gamma, sensitivity) / sensitivity},
           {"alpha", block_error(grad["alpha"], found.alpha, sensitivity) / sensitivity}};
-      std::string report = path.stem().string() + ": image " + std::to_string(largest / (1e-4 * slack)) + ", mean " +
-                           std::to_string(mean / (1e-6 * slack)) + ", loss " + std::to_string(loss_error / (1e-5 * slack));
+      std::string report = path.stem().string() + ": image " + std::to_string(largest / (1e-4 * slack)) +
+                           ", mean " + std::to_string(mean / (1e-6 * slack)) + ", loss " +
+                           std::to_string(loss_error / (1e-5 * slack));
       for (const auto& [name, error] : errors) {
         CAPTURE(name);
         CHECK(error < 1);

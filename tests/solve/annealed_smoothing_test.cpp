@@ -56,8 +56,8 @@ TEST_SUITE("unit") {
 TEST_SUITE("robustness") {
   TEST_CASE("annealing refuses a schedule out of range") {
     for (const dpr::AnnealSchedule& schedule :
-         {dpr::AnnealSchedule{.levels = 0}, dpr::AnnealSchedule{.sigma_end = 0}, dpr::AnnealSchedule{.gamma_end = -1},
-          dpr::AnnealSchedule{.learning_rate_end = 0}}) {
+         {dpr::AnnealSchedule{.levels = 0}, dpr::AnnealSchedule{.sigma_end = 0},
+          dpr::AnnealSchedule{.gamma_end = -1}, dpr::AnnealSchedule{.learning_rate_end = 0}}) {
       CHECK_THROWS_AS(dpr::AnnealedSmoothing(schedule, 10, start(), 1e-2), dpr::InvalidArgument);
     }
     CHECK_THROWS_AS(dpr::AnnealedSmoothing({}, 0, start(), 1e-2), dpr::InvalidArgument);
