@@ -49,7 +49,7 @@ TEST_SUITE("pipeline") {
     const dpr::Scene scene = cube_scene(reduced() ? 16 : 64);
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options(reduced() ? 3 : 200));
     const dpr::PoseResult result = solver.solve(turned(30));
-    CHECK(result.history.front().loss > result.loss);
+    if (!reduced()) CHECK(result.explained);  // losses of different smoothing do not compare
     CHECK(result.iterations == result.history.size());
     CHECK(result.seconds > 0);
     const double error = dpr::angle_degrees(result.pose.rotation, glm::dmat3(1.0));
@@ -77,8 +77,8 @@ TEST_SUITE("pipeline") {
     start.rotation = turned(15).rotation * start.rotation;
     start.translation += glm::dvec3(-0.1, 0.1, 0.1);
     const dpr::PoseResult result = solver.solve(start);
-    CHECK(result.loss < result.history.front().loss);
     if (reduced()) return;
+    CHECK(result.explained);
     CHECK(dpr::angle_degrees(result.pose.rotation, truth.rotation) < 3);
     CHECK(glm::length(result.pose.translation - truth.translation) < 0.15);  // 2% of the distance
   }
