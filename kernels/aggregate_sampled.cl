@@ -52,7 +52,7 @@ static inline float slot_beta(const Pixel q, const Fragments f, uint k) {
 }
 
 static inline realn draw_noise(const AggregateParams p, const Pixel q, uint face, uint block) {
-  const uint4 counter = (uint4)(q.in_view, face, block, q.view << 1 | DPR_STAGE_AGGREGATE);
+  const uint4 counter = (uint4)(q.in_view, face, block, (p.first_view + q.view) << 1 | DPR_STAGE_AGGREGATE);
   return prior_sample(uniform_from_bits(philox4x32_10(counter, (uint2)(p.seed_low, p.seed_high))));
 }
 

@@ -6,7 +6,7 @@
 
 /// The samples 4 * block ... 4 * block + 3 of a fragment.
 static inline realn draw_noise(const OccupancyParams p, uint view, uint pixel, uint face, uint block) {
-  const uint4 counter = (uint4)(pixel, face, block, view << 1 | DPR_STAGE_OCCUPANCY);
+  const uint4 counter = (uint4)(pixel, face, block, (p.first_view + view) << 1 | DPR_STAGE_OCCUPANCY);
   return prior_sample(uniform_from_bits(philox4x32_10(counter, (uint2)(p.seed_low, p.seed_high))));
 }
 

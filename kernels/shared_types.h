@@ -59,6 +59,7 @@ using float4 = cl_float4;
 typedef struct FrameParams {
   DPR_SHARED_NAME(FrameParams)
   uint views, meshes, vertices, faces;
+  uint first_view;       /* of a larger batch, which names the noise; 0 otherwise */
   uint width, height;    /* pixels */
   uint tiles_x, tiles_y; /* tiles of one view */
   float pixel_size;      /* NDC: 2 / min(width, height) */
@@ -113,6 +114,7 @@ typedef struct OccupancyParams {
   uint width;           /* pixels, to name a pixel's noise */
   uint faces;           /* of one view */
   uint pixels_per_view; /* width * height */
+  uint first_view;      /* of the batch that names the noise */
 } OccupancyParams;
 
 /// The perturbation of depths, and what a pixel's colour is made of.
@@ -126,7 +128,8 @@ typedef struct AggregateParams {
   uint pixels_per_view;
   uint pixels; /* of all views */
   uint faces;  /* of one view */
-  uint unused0, unused1;
+  uint first_view; /* of the batch that names the noise */
+  uint unused;
 } AggregateParams;
 
 /// Weights of the losses, and the sizes to average over.

@@ -27,9 +27,11 @@ shared::ViewParams view_params(const Camera& camera, int width, int height) {
   return v;
 }
 
-shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views) {
+shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
+                                 std::size_t first_view) {
   shared::FrameParams p{};
   p.views = static_cast<cl_uint>(views);
+  p.first_view = static_cast<cl_uint>(first_view);
   p.meshes = static_cast<cl_uint>(scene.meshes.size());
   p.vertices = static_cast<cl_uint>(geometry.vertices);
   p.faces = static_cast<cl_uint>(geometry.faces);
@@ -46,6 +48,12 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
 }
 
 void check_frame_size(const shared::FrameParams& p) {
+  // The noise of a view is named by its number, in what the counter has left for it.
+  constexpr cl_uint most_views = 1U << 30U;
+  if (p.first_view > most_views - p.views) {
+    throw InvalidArgument("first_view (Renderer::set_views)", std::to_string(p.first_view),
+                          "at most " + std::to_string(most_views - p.views));
+  }
   const double largest = 4294967295.0;
   const auto views = static_cast<double>(p.views);
   const double pixels = views * p.width * p.height;
@@ -81,7 +89,7 @@ void Renderer::Impl::require_forward(const char* caller) const {
     throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
 }
 
-void Renderer::Impl::set_views(std::span<const View> new_views) {
+void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
   if (new_views.empty()) throw InvalidArgument("views", "none", "at least one");
   std::vector<shared::ViewParams> cameras;
   std::vector<cl_float4> models;
@@ -102,7 +110,7 @@ void Renderer::Impl::set_views(std::span<const View> new_views) {
       starts.push_back(starts.back() + static_cast<cl_uint>(geometry->meshes[m].vertices));
     }
   }
-  const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size());
+  const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size(), first_view);
   check_frame_size(wanted);
 
   frame = wanted;
@@ -119,7 +127,7 @@ void Renderer::Impl::set_smoothing(const Smoothing& smoothing) {
   occupancy.set_smoothing(smoothing);
   aggregate.set_smoothing(smoothing);
   scene.smoothing = smoothing;
-  if (!views.empty()) frame = frame_params(scene, *geometry, views.size());
+  if (!views.empty()) frame = frame_params(scene, *geometry, views.size(), frame.first_view);
   rendered = false;
 }
 

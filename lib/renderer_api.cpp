@@ -24,12 +24,12 @@ void Renderer::set_scene(const Scene& scene) {
   m.set_smoothing(scene.smoothing);
   View view{scene.camera, {}};
   for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
-  m.set_views(std::span(&view, 1));
+  m.set_views(std::span(&view, 1), 0);
 }
 
-void Renderer::set_views(std::span<const View> views) {
+void Renderer::set_views(std::span<const View> views, std::size_t first_view) {
   impl_->require_scene("Renderer::set_views");
-  impl_->set_views(views);
+  impl_->set_views(views, first_view);
 }
 
 void Renderer::set_smoothing(const Smoothing& smoothing) {

@@ -23,7 +23,7 @@ namespace dpr {
 struct Renderer::Impl {
   explicit Impl(Device device);
 
-  void set_views(std::span<const View> views);
+  void set_views(std::span<const View> views, std::size_t first_view);
   void set_smoothing(const Smoothing& smoothing);
   void forward();
   SceneGradient backward(const Buffer<cl_float4>& grad_images);

@@ -10,6 +10,7 @@
 #include "dpr/light.hpp"
 #include "dpr/loss.hpp"
 #include "dpr/mesh.hpp"
+#include "dpr/multi_device.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"

@@ -80,7 +80,9 @@ class Renderer {
   /// Validates and uploads a scene; its camera and transforms become the only view. Throws InvalidArgument.
   void set_scene(const Scene& scene);
   /// Replaces the views (at least one); geometry stays on the device. The same launches render all of them.
-  void set_views(std::span<const View> views);
+  /// `first_view` counts the views of a larger batch that come before these: sampled noise is that of the
+  /// larger batch then.
+  void set_views(std::span<const View> views, std::size_t first_view = 0);
   void set_smoothing(const Smoothing& smoothing);
   /// New positions, object space, for a mesh of the scene: [vertex], as many as it has.
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);

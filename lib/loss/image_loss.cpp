@@ -40,6 +40,11 @@ void check_targets(std::span<const Image> targets) {
 
 }  // namespace
 
+void check_loss(const LossWeights& weights, std::span<const Image> targets) {
+  check_weights(weights);
+  check_targets(targets);
+}
+
 std::string_view to_string(LossKind kind) { return k_names[static_cast<std::size_t>(kind)]; }
 
 LossKind parse_loss(std::string_view word, std::string_view where) {
@@ -79,8 +84,7 @@ ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<con
 }
 
 ImageLoss::ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets) {
-  check_weights(weights);
-  check_targets(targets);
+  check_loss(weights, targets);
   impl_ = std::make_unique<Impl>(device, weights, targets);
 }
 

@@ -9,6 +9,9 @@
 
 namespace dpr {
 
+/// Throws InvalidArgument for what an ImageLoss refuses.
+void check_loss(const LossWeights& weights, std::span<const Image> targets);
+
 struct ImageLoss::Impl {
   Impl(const Device& device, LossWeights weights, std::span<const Image> targets);
 

@@ -54,6 +54,7 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   a.pixels_per_view = p.width * p.height;
   a.pixels = p.views * a.pixels_per_view;
   a.faces = p.faces;
+  a.first_view = p.first_view;
   return a;
 }
 

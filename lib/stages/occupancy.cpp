@@ -39,6 +39,7 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   o.width = p.width;
   o.faces = p.faces;
   o.pixels_per_view = p.width * p.height;
+  o.first_view = p.first_view;
   return o;
 }
 

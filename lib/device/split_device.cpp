@@ -1,0 +1,35 @@
+// Parts of a device as devices of their own.
+#include <array>
+#include <string>
+
+#include "device/context.hpp"
+#include "dpr/multi_device.hpp"
+
+namespace dpr {
+
+std::vector<Device> split_device(const Device& device, unsigned compute_units) {
+  const DeviceInfo& info = device.info();
+  if (compute_units < 1 || compute_units > info.compute_units) {
+    throw InvalidArgument("compute_units (split_device)", std::to_string(compute_units),
+                          "1 to " + std::to_string(info.compute_units) + ", the units of " + info.name);
+  }
+  const std::array<cl_device_partition_property, 3> properties{
+      CL_DEVICE_PARTITION_EQUALLY, static_cast<cl_device_partition_property>(compute_units), 0};
+  cl::Device whole = device.impl().device;
+  std::vector<cl::Device> parts;
+  check_cl(whole.createSubDevices(properties.data(), &parts), "clCreateSubDevices of " + info.name);
+
+  std::vector<Device> devices;
+  for (const cl::Device& part : parts) {
+    int error = CL_SUCCESS;
+    const cl::Context context(part, nullptr, nullptr, nullptr, &error);
+    check_cl(error, "clCreateContext");
+    const cl::CommandQueue queue(context, part, cl_command_queue_properties{0}, &error);
+    check_cl(error, "clCreateCommandQueue");
+    devices.push_back(make_device(part, context, queue));
+    devices.back().impl().info.index = info.index;
+  }
+  return devices;
+}
+
+}  // namespace dpr

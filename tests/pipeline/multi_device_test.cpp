@@ -1,0 +1,201 @@
+// Views on several devices: the same bits whoever renders them, the same values as one renderer with all of
+// them.
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numeric>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/comparison.hpp"
+#include "pipeline/scenes.hpp"
+#include "support/messages.hpp"
+#include "support/reduced.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+using dpr::test::reduced;
+
+namespace {
+
+Scene small_scene() {
+  const int size = reduced(24, 6);
+  Scene scene = cube_scene(size, size + 1);
+  scene.lights = two_lights(Shading::phong);
+  scene.gradients.lights = true;
+  return scene;
+}
+
+/// A ring of cameras around the scene; more views than chunks, and not a multiple of them.
+std::vector<View> ring(const Scene& scene, std::size_t count) {
+  std::vector<View> views;
+  for (std::size_t v = 0; v < count; ++v) {
+    Camera camera = scene.camera;
+    const float turn = 6.2831853F * static_cast<float>(v) / static_cast<float>(count);
+    camera.view = camera.view * glm::rotate(glm::mat4(1.0F), turn, glm::vec3(0.1F, 1.0F, 0.2F));
+    views.push_back({camera, {scene.meshes[0].transform}});
+  }
+  return views;
+}
+
+std::vector<Image> random_images(const Scene& scene, std::size_t count) {
+  std::vector<Image> images;
+  for (std::size_t v = 0; v < count; ++v)
+    images.push_back(random_image(scene.width, scene.height, 0.0F, 1.0F, 40 + static_cast<unsigned>(v)));
+  return images;
+}
+
+struct Result {
+  std::vector<double> values;  // images, losses, gradients
+  std::vector<std::size_t> views_rendered;
+};
+
+void append(const SceneGradient& gradient, std::vector<double>& values) {
+  for (const Block& block : blocks_of(gradient)) {
+    for (const double value : block.found) values.push_back(value);
+  }
+}
+
+Result render(std::vector<Device> devices, const Scene& scene, std::size_t views) {
+  MultiDeviceRenderer renderer(std::move(devices));
+  renderer.set_scene(scene);
+  renderer.set_views(ring(scene, views));
+  const std::vector<Image> targets = random_images(scene, views);
+  renderer.set_loss({.mse = 1.0F, .silhouette = 0.5F}, targets);
+  Result result;
+  for (const Image& image : renderer.render()) {
+    for (const glm::vec4& p : image.pixels) {
+      for (int k = 0; k < 4; ++k) result.values.push_back(static_cast<double>(p[k]));
+    }
+  }
+  const MultiDeviceRenderer::Evaluation evaluation = renderer.evaluate();
+  result.values.push_back(evaluation.loss);
+  result.values.insert(result.values.end(), evaluation.per_view.begin(), evaluation.per_view.end());
+  append(evaluation.gradient, result.values);
+  append(renderer.gradient(targets), result.values);
+  result.views_rendered = renderer.views_rendered();
+  return result;
+}
+
+bool same_bits(const Result& a, const Result& b) {
+  return a.values.size() == b.values.size() &&
+         std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(double)) == 0;
+}
+
+std::size_t total(const std::vector<std::size_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
+}
+
+/// Halves of the default device where it can be divided.
+std::vector<Device> halves() {
+  const Device whole = open_device();
+  if (whole.info().compute_units < 2) return {};
+  try {
+    return split_device(whole, whole.info().compute_units / 2);
+  } catch (const DeviceError&) {
+    return {};
+  }
+}
+
+Scene sampled(Scene scene) {
+  scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
+  return scene;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("several devices: the same bits as one") {
+    const std::size_t views = reduced(29, 3);
+    for (const Scene& scene : {small_scene(), sampled(small_scene())}) {
+      const Result one = render({open_device()}, scene, views);
+      REQUIRE(one.values.size() > views);
+      CHECK(same_bits(one, render({open_device()}, scene, views)));
+      const Result three = render({open_device(), open_device(), open_device()}, scene, views);
+      CHECK(same_bits(one, three));
+      CHECK(total(three.views_rendered) == 3 * views);
+      Scene other = scene;
+      other.background.x += 1e-3F;
+      CHECK_FALSE(same_bits(one, render({open_device()}, other, views)));
+    }
+  }
+
+  TEST_CASE("several devices: parts of one device give the bits of the whole") {
+    const std::vector<Device> parts = halves();
+    if (parts.empty()) {
+      MESSAGE("the default device cannot be divided");
+      return;
+    }
+    REQUIRE(parts.size() >= 2);
+    CHECK(parts[0].info().compute_units == open_device().info().compute_units / 2);
+    const std::size_t views = reduced(29, 3);
+    const Scene scene = small_scene();
+    const Result one = render({parts[0]}, scene, views);
+    const Result all = render(parts, scene, views);
+    CHECK(same_bits(one, all));
+    CHECK(same_bits(one, render({open_device()}, scene, views)));
+    CHECK(total(all.views_rendered) == 3 * views);
+  }
+
+  TEST_CASE("several devices: images of one renderer, its loss and its gradients but for rounding") {
+    const std::size_t views = reduced(17, 3);
+    for (const Scene& scene : {small_scene(), sampled(small_scene())}) {
+      const Device device = open_device();
+      const std::vector<Image> targets = random_images(scene, views);
+      const LossWeights weights{.mse = 1.0F, .l1 = 0.3F, .silhouette = 0.5F};
+      MultiDeviceRenderer several({device, open_device()});
+      several.set_scene(scene);
+      several.set_views(ring(scene, views));
+      several.set_loss(weights, targets);
+      const std::vector<Image> images = several.render();
+      const MultiDeviceRenderer::Evaluation evaluation = several.evaluate();
+
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      renderer.set_views(ring(scene, views));
+      renderer.forward();
+      ImageLoss loss(device, weights, targets);
+      CHECK(evaluation.loss == doctest::Approx(loss.evaluate(renderer)).epsilon(1e-6));
+      for (std::size_t v = 0; v < views; ++v) {
+        CHECK(evaluation.per_view[v] == loss.per_view()[v]);
+        CHECK(images[v].pixels == renderer.image(v).pixels);
+      }
+      const std::vector<Block> found = blocks_of(evaluation.gradient);
+      const SceneGradient expected_gradient = renderer.backward(loss);
+      const std::vector<Block> expected = blocks_of(expected_gradient);
+      REQUIRE(found.size() == expected.size());
+      for (std::size_t b = 0; b < found.size(); ++b) {
+        REQUIRE(found[b].found.size() == expected[b].found.size());
+        std::vector<double> difference = found[b].found;
+        for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= expected[b].found[i];
+        CAPTURE(expected[b].name);
+        CHECK(norm(difference) <= 1e-5 * norm(expected[b].found));
+      }
+    }
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("several devices: wrong input is one clear error, and the renderer works on") {
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, MultiDeviceRenderer({}), "devices");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 0), "compute_units");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 100000), "compute_units");
+
+    const Scene scene = small_scene();
+    MultiDeviceRenderer renderer({open_device(), open_device()});
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.render(), "set_scene");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views(ring(scene, 2)), "set_scene");
+    renderer.set_scene(scene);
+    renderer.set_views(ring(scene, 3));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "targets");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.gradient(random_images(scene, 2)), "grad_images");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views({}), "views");
+    renderer.set_loss(LossWeights::only(LossKind::l1), random_images(scene, 2));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "2 images");
+    // An error of one chunk, here a target of another size, is the error of the call.
+    renderer.set_loss(LossWeights::only(LossKind::l1), std::vector<Image>(3, Image(5, 4)));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "target size");
+    CHECK(renderer.render().size() == 3);
+  }
+}
