@@ -22,13 +22,13 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
 
   const std::size_t vectors = std::size_t{p.views} * p.tiles_x * p.tiles_y * DPR_TILE * DPR_TILE /
                               std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-  count_(vectors, p, bin.tile_starts, bin.order, masks, counts_);
+  count_(vectors, p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
   fragments = read_total(fragment_starts, pairs, "fragments (frame)");
   listed_fragments = read_total(pixel_starts, pixels, "fragments (frame)");
 
   list.resize(device_, listed_fragments);
-  list_(vectors, p, bin.tile_starts, bin.order, masks, fragment_starts, pixel_starts, list);
+  list_(vectors, p, bin.tile_starts, masks, fragment_starts, pixel_starts, list);
   for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel}) buffer->resize(device_, fragments);
   for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->resize(device_, fragments);
   forward_(pairs, p, pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts, fragment_pair,

@@ -37,9 +37,8 @@ class Rasterize {
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, Out<cl_uint2>,
          Out<cl_uint>>
       cover_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
-      list_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>> list_;
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint2>,
          In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
       forward_;
