@@ -93,17 +93,43 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   for (uint lane = 0; lane < DPR_WIDTH && column + lane < p.width; ++lane) counts[pixel + lane] = lanes[lane];
 }
 
-/// Lists the fragments of every pixel, in the order of the faces. One work-item per vector of pixels of a tile's row.
+/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
+/// more.
 /// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
 /// in   pixel_starts     uint[pixel + 1]  exclusive scan of the counts
+/// out  rows  uint4[view * tiles_y + 1]   the first pair, fragment and list entry; w = 0
+kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
+                           global const uint* restrict fragment_starts, global const uint* restrict pixel_starts,
+                           global uint4* restrict rows) {
+  const uint row = (uint)get_global_id(0);
+  if (row > p.views * p.tiles_y) return;
+  const uint pair = tile_starts[row * p.tiles_x];
+  const uint pixel = (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
+  rows[row] = (uint4)(pair, fragment_starts[pair], pixel_starts[pixel], 0u);
+}
+
+/// Counts runs from a band's first element; those before and behind the band are empty. One work-item per run.
+/// in   starts       uint[count]  of the frame
+/// out  band_starts  uint[count]
+kernel void rasterize_rebase(const uint count, const uint first, const uint last, global const uint* restrict starts,
+                             global uint* restrict band_starts) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= count) return;
+  band_starts[i] = clamp(starts[i], first, last) - first;
+}
+
+/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of pixels of a
+/// tile's row, up to `last_vector`.
+/// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
+/// in   pixel_starts     uint[pixel + 1]  runs of the lists
 /// out  lists            uint[...]        fragments, by pixel
-kernel void rasterize_list(const FrameParams p, global const uint* restrict tile_starts,
+kernel void rasterize_list(const FrameParams p, const uint last_vector, global const uint* restrict tile_starts,
                            global const uint2* restrict masks, global const uint* restrict fragment_starts,
                            global const uint* restrict pixel_starts, global uint* restrict lists) {
   const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
   const uint tiles = p.tiles_x * p.tiles_y;
   const uint i = (uint)get_global_id(0);
-  if (i >= p.views * tiles * parts) return;
+  if (i >= last_vector) return;
   const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
   const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
   const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
@@ -136,20 +162,20 @@ static inline void list_pixels(uint2 mask, uint first_column, uint first_row, ui
   while (fragment < last) pixels[fragment++] = packed;
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per pair.
+/// What a fragment is: distance, depth, barycentrics. One work-item per pair, up to `last_pair`.
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
 /// out  distance  float[fragment]  signed, positive inside; NDC^2, or NDC if the metric is Euclidean
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
-kernel void rasterize_forward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+kernel void rasterize_forward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
                               global float* restrict distance, global float* restrict depth,
                               global float* restrict bary1, global float* restrict bary2) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
   const Triangle t = triangles[pair_face[pair]];
@@ -245,18 +271,18 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, flo
   }
 }
 
-/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair.
+/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
 /// in   masks          uint2[pair]      says which fragments are padding
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
-kernel void rasterize_backward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
                                global const uint* restrict pair_face, global const uint2* restrict masks,
                                global const uint* restrict fragment_starts, global const uint* restrict pixels,
                                global const float* restrict grad_distance, global const float* restrict grad_depth,
                                global const float* restrict grad_bary1, global const float* restrict grad_bary2,
                                global float* restrict grad_corners) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   CornerGradients g;
   for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
   const Triangle t = triangles[pair_face[pair]];
