@@ -1,4 +1,5 @@
-// (tile, triangle) pairs in face order: counted, then listed. sort.cl orders them by tile.
+// (tile, triangle) pairs: counted, then listed in face order, sorted by tile (sort.cl), then linked. Pairs are numbered
+// by tile, so that what belongs to a tile lies together; faces list theirs, so that gradients are gathered in order.
 #include "shared_types.h"
 
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge.
@@ -33,27 +34,40 @@ kernel void bin_count(const FrameParams p, global const Triangle* restrict trian
   counts[i] = count;
 }
 
-/// Lists the pairs of every triangle. One work-item per (view, face).
-/// in   offsets    uint[view * face + 1]  exclusive scan of the counts
-/// out  pair_face  uint[pair]             view * faces + face
-/// out  pair_tile  uint[pair]             view * tiles + tile
-/// out  order      uint[pair]             the pair itself: what sorting permutes
+/// Lists the tiles of every triangle, each at a place of its own. One work-item per (view, face).
+/// in   offsets     uint[view * face + 1]  exclusive scan of the counts
+/// out  place_face  uint[place]           view * faces + face
+/// out  place_tile  uint[place]           view * tiles + tile
+/// out  places      uint[place]           the place itself: what sorting permutes
 kernel void bin_fill(const FrameParams p, global const Triangle* restrict triangles,
-                     global const uint* restrict offsets, global uint* restrict pair_face,
-                     global uint* restrict pair_tile, global uint* restrict order) {
+                     global const uint* restrict offsets, global uint* restrict place_face,
+                     global uint* restrict place_tile, global uint* restrict places) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const Triangle t = triangles[i];
   if (t.orientation == 0.0f) return;
   const uint first_tile = i / p.faces * p.tiles_x * p.tiles_y;
-  uint pair = offsets[i];
+  uint place = offsets[i];
   for (uint y = t.first_tile >> 16; y <= t.last_tile >> 16; ++y) {
     for (uint x = t.first_tile & 0xffffu; x <= (t.last_tile & 0xffffu); ++x) {
       if (!tile_overlaps(p, t, x, y)) continue;
-      pair_face[pair] = i;
-      pair_tile[pair] = first_tile + y * p.tiles_x + x;
-      order[pair] = pair;
-      ++pair;
+      place_face[place] = i;
+      place_tile[place] = first_tile + y * p.tiles_x + x;
+      places[place] = place;
+      ++place;
     }
   }
+}
+
+/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item per pair.
+/// in   places      uint[pair]   where the pair's face lists it
+/// in   place_face  uint[place]
+/// out  pair_face   uint[pair]   view * faces + face
+/// out  face_pairs  uint[place]  the pairs of every face, by tile
+kernel void bin_link(const uint pairs, global const uint* restrict places, global const uint* restrict place_face,
+                     global uint* restrict pair_face, global uint* restrict face_pairs) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= pairs) return;
+  pair_face[pair] = place_face[places[pair]];
+  face_pairs[places[pair]] = pair;
 }

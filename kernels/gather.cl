@@ -3,16 +3,17 @@
 #include "shared_types.h"
 
 /// One work-item per (view, target), or per target where the views are summed.
-/// in   pair_starts    uint[view * face + 1]  pairs of a face of a view
+/// in   pair_starts    uint[view * face + 1]  runs of `face_pairs`
+/// in   face_pairs     uint[...]              pairs of a face of a view
 /// in   corner_starts  uint[target + 1]
 /// in   corners        uint[corner]           face * 3 + corner, by target
 /// in   partial        float[pair][9]         gradients of the three corners
 /// in   sum_views      0: out is per view; else the views are added up
 /// out  grad           float4[view][target] or float4[target]; w = 0
 kernel void gather_corners(const FrameParams p, const uint targets, const uint sum_views,
-                           global const uint* restrict pair_starts, global const uint* restrict corner_starts,
-                           global const uint* restrict corners, global const float* restrict partial,
-                           global float4* restrict grad) {
+                           global const uint* restrict pair_starts, global const uint* restrict face_pairs,
+                           global const uint* restrict corner_starts, global const uint* restrict corners,
+                           global const float* restrict partial, global float4* restrict grad) {
   const uint i = (uint)get_global_id(0);
   if (i >= (sum_views ? targets : p.views * targets)) return;
   const uint target = i % targets;
@@ -21,8 +22,8 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
   for (uint view = first_view; view < last_view; ++view) {
     for (uint k = corner_starts[target]; k < corner_starts[target + 1]; ++k) {
       const uint face = view * p.faces + corners[k] / 3, corner = corners[k] % 3;
-      for (uint pair = pair_starts[face]; pair < pair_starts[face + 1]; ++pair) {
-        sum += vload3(0, partial + 9 * pair + 3 * corner);
+      for (uint place = pair_starts[face]; place < pair_starts[face + 1]; ++place) {
+        sum += vload3(0, partial + 9 * face_pairs[place] + 3 * corner);
       }
     }
   }

@@ -14,6 +14,8 @@
 /// A row of a mask: bit k is column k of the tile.
 static inline uint mask_row(uint2 mask, uint row) { return ((row < 4 ? mask.x : mask.y) >> (8 * (row & 3))) & DPR_ROW_MASK; }
 
+static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
 /// Lanes of truth as bits.
 static inline uint lane_bits(intn condition) {
 #if DPR_WIDTH == 1
@@ -24,6 +26,17 @@ static inline uint lane_bits(intn condition) {
   const uint2 b = a.lo | a.hi;
   return b.x | b.y;
 #endif
+}
+
+/// The rows [x, y) of a tile that the triangle's blurred bounds may touch. Rounding outwards to whole rows is a slack far
+/// above the arithmetic's error.
+static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint first_row) {
+  const float high = max(max(t.y0, t.y1), t.y2) + p.blur_distance, low = min(min(t.y0, t.y1), t.y2) - p.blur_distance;
+  const float centre = 0.5f * (float)p.height - 0.5f - (float)first_row;
+  const float end = min((float)DPR_TILE, (float)(p.height - first_row));
+  const float first = clamp(floor(centre - high / p.pixel_size), 0.0f, end);
+  const float last = clamp(ceil(centre - low / p.pixel_size) + 1.0f, 0.0f, end);
+  return (uint2)((uint)first, (uint)last);
 }
 
 /// Which pixels of its tile a triangle's blurred area covers: centre inside, or closer than the blur distance.
@@ -39,8 +52,9 @@ kernel void rasterize_cover(const FrameParams p, const uint pairs, global const 
   const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
   const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
   const float limit = p.blur_distance * p.blur_distance;
+  const uint2 rows = blurred_rows(p, t, first_row);
   uint halves[2] = {0, 0};
-  for (uint row = 0; row < DPR_TILE && first_row + row < p.height; ++row) {
+  for (uint row = rows.x; row < rows.y; ++row) {
     const realn y = pixel_y(p, (realn)((float)(first_row + row)));
     for (uint part = 0; part < DPR_TILE; part += DPR_WIDTH) {
       const intn column = (int)(first_column + part) + DPR_LANE_INDEX;
@@ -55,12 +69,10 @@ kernel void rasterize_cover(const FrameParams p, const uint pairs, global const 
 }
 
 /// Counts the fragments of every pixel. One work-item per vector of pixels of a tile's row.
-/// in   tile_starts  uint[view * tile + 1]  runs of `order`
-/// in   order        uint[pair]             pairs by tile, then by face
+/// in   tile_starts  uint[view * tile + 1]  runs of pairs
 /// out  counts       uint[view][height][width]
 kernel void rasterize_count(const FrameParams p, global const uint* restrict tile_starts,
-                            global const uint* restrict order, global const uint2* restrict masks,
-                            global uint* restrict counts) {
+                            global const uint2* restrict masks, global uint* restrict counts) {
   const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
   const uint tiles = p.tiles_x * p.tiles_y;
   const uint i = (uint)get_global_id(0);
@@ -71,8 +83,8 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   if (row >= p.height) return;
 
   uintn sum = 0;
-  for (uint k = tile_starts[tile]; k < tile_starts[tile + 1]; ++k) {
-    const uint bits = mask_row(masks[order[k]], part / DPR_TILE) >> (part % DPR_TILE);
+  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
+    const uint bits = mask_row(masks[pair], part / DPR_TILE) >> (part % DPR_TILE);
     sum += ((uintn)(bits) >> convert_uintn(DPR_LANE_INDEX)) & 1u;
   }
   uint lanes[DPR_WIDTH];
@@ -81,18 +93,43 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   for (uint lane = 0; lane < DPR_WIDTH && column + lane < p.width; ++lane) counts[pixel + lane] = lanes[lane];
 }
 
-/// Lists the fragments of every pixel, in the order of the faces. One work-item per vector of pixels of a tile's row.
+/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
+/// more.
 /// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
 /// in   pixel_starts     uint[pixel + 1]  exclusive scan of the counts
-/// out  lists            uint[...]        fragments, by pixel
-kernel void rasterize_list(const FrameParams p, global const uint* restrict tile_starts,
-                           global const uint* restrict order, global const uint2* restrict masks,
+/// out  rows  uint4[view * tiles_y + 1]   the first pair, fragment and list entry; w = 0
+kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
                            global const uint* restrict fragment_starts, global const uint* restrict pixel_starts,
-                           global uint* restrict lists) {
+                           global uint4* restrict rows) {
+  const uint row = (uint)get_global_id(0);
+  if (row > p.views * p.tiles_y) return;
+  const uint pair = tile_starts[row * p.tiles_x];
+  const uint pixel = (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
+  rows[row] = (uint4)(pair, fragment_starts[pair], pixel_starts[pixel], 0u);
+}
+
+/// Counts runs from a band's first element; those before and behind the band are empty. One work-item per run.
+/// in   starts       uint[count]  of the frame
+/// out  band_starts  uint[count]
+kernel void rasterize_rebase(const uint count, const uint first, const uint last, global const uint* restrict starts,
+                             global uint* restrict band_starts) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= count) return;
+  band_starts[i] = clamp(starts[i], first, last) - first;
+}
+
+/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of pixels of a
+/// tile's row, up to `last_vector`.
+/// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
+/// in   pixel_starts     uint[pixel + 1]  runs of the lists
+/// out  lists            uint[...]        fragments, by pixel
+kernel void rasterize_list(const FrameParams p, const uint last_vector, global const uint* restrict tile_starts,
+                           global const uint2* restrict masks, global const uint* restrict fragment_starts,
+                           global const uint* restrict pixel_starts, global uint* restrict lists) {
   const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
   const uint tiles = p.tiles_x * p.tiles_y;
   const uint i = (uint)get_global_id(0);
-  if (i >= p.views * tiles * parts) return;
+  if (i >= last_vector) return;
   const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
   const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
   const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
@@ -103,14 +140,12 @@ kernel void rasterize_list(const FrameParams p, global const uint* restrict tile
   for (uint lane = 0; lane < DPR_WIDTH; ++lane) next[lane] = column + lane < p.width ? pixel_starts[pixel + lane] : 0;
   // The pixels of the tile before this vector: their bits say how many of a pair's fragments come first.
   const uint2 before = (uint2)(part < 32 ? (1u << part) - 1u : 0xffffffffu, part < 32 ? 0u : (1u << (part - 32)) - 1u);
-  for (uint k = tile_starts[tile]; k < tile_starts[tile + 1]; ++k) {
-    const uint pair = order[k];
+  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint2 mask = masks[pair];
+    uint bits = mask_row(mask, part / DPR_TILE) >> (part % DPR_TILE) & ((1u << DPR_WIDTH) - 1u);
+    if (bits == 0) continue;
     uint fragment = fragment_starts[pair] + popcount(mask.x & before.x) + popcount(mask.y & before.y);
-    const uint bits = mask_row(mask, part / DPR_TILE) >> (part % DPR_TILE);
-    for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-      if ((bits >> lane & 1u) != 0) lists[next[lane]++] = fragment++;
-    }
+    for (; bits != 0; bits &= bits - 1) lists[next[lowest_bit(bits)]++] = fragment++;
   }
 }
 
@@ -120,28 +155,27 @@ static inline void list_pixels(uint2 mask, uint first_column, uint first_row, ui
   uint fragment = first, packed = 0;
   for (uint row = 0; row < DPR_TILE; ++row) {
     for (uint bits = mask_row(mask, row); bits != 0; bits &= bits - 1) {
-      const uint column = 31 - clz(bits & -bits);
-      packed = (first_column + column) | (first_row + row) << 16;
+      packed = (first_column + lowest_bit(bits)) | (first_row + row) << 16;
       pixels[fragment++] = packed;
     }
   }
   while (fragment < last) pixels[fragment++] = packed;
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per pair.
+/// What a fragment is: distance, depth, barycentrics. One work-item per pair, up to `last_pair`.
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
 /// out  distance  float[fragment]  signed, positive inside; NDC^2, or NDC if the metric is Euclidean
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
-kernel void rasterize_forward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+kernel void rasterize_forward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
                               global float* restrict distance, global float* restrict depth,
                               global float* restrict bary1, global float* restrict bary2) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
   const Triangle t = triangles[pair_face[pair]];
@@ -237,18 +271,18 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, flo
   }
 }
 
-/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair.
+/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
 /// in   masks          uint2[pair]      says which fragments are padding
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
-kernel void rasterize_backward(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
+kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
                                global const uint* restrict pair_face, global const uint2* restrict masks,
                                global const uint* restrict fragment_starts, global const uint* restrict pixels,
                                global const float* restrict grad_distance, global const float* restrict grad_depth,
                                global const float* restrict grad_bary1, global const float* restrict grad_bary2,
                                global float* restrict grad_corners) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   CornerGradients g;
   for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
   const Triangle t = triangles[pair_face[pair]];

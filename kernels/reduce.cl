@@ -1,48 +1,51 @@
 // Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a plain sum
 // would lose what is left. The order of additions is fixed, so the result is the same from run to run.
+#include "lanes.h"
 
-/// Partial sums of a segment.
-#ifndef DPR_REDUCE_SLOTS
-#define DPR_REDUCE_SLOTS 64
-#endif
-
-/// Adds x to the sum s.x with running error s.y (Neumaier 1974).
-static inline float2 compensated_add(float2 s, float x) {
-  const float t = s.x + x;
-  const float error = fabs(s.x) >= fabs(x) ? (s.x - t) + x : (x - t) + s.x;
-  return (float2)(t, s.y + error);
+/// Adds x to a sum and its running error where the mask says so (Neumaier 1974). Lanes left out keep their bits.
+static inline void compensated_add(realn* sum, realn* error, realn x, intn counts) {
+  const realn t = *sum + x;
+  const realn lost = choose(fabs(*sum) >= fabs(x), (*sum - t) + x, (x - t) + *sum);
+  *error = choose(counts, *error + lost, *error);
+  *sum = choose(counts, t, *sum);
 }
 
-/// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel, segment, slot).
+/// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel, segment, vector of
+/// slots); `slots` is a multiple of the widest vector.
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
 /// in   values   float[channel][count]
-/// out  partial  float2[channel][segment][slot]  sum and compensation
+/// out  partial  float[channel][segment][2][slot]  sums, and their compensations
 kernel void reduce_partial(const uint count, const uint channels, const uint segments, const uint stride,
-                           global const uint* restrict starts, global const float* restrict values,
-                           global float2* restrict partial) {
+                           const uint slots, global const uint* restrict starts, global const float* restrict values,
+                           global float* restrict partial) {
   const uint i = (uint)get_global_id(0);
-  if (i >= channels * segments * DPR_REDUCE_SLOTS) return;
-  const uint slot = i % DPR_REDUCE_SLOTS, segment = i / DPR_REDUCE_SLOTS % segments;
-  const uint channel = i / DPR_REDUCE_SLOTS / segments;
+  const uint vectors = slots / DPR_WIDTH;
+  if (i >= channels * segments * vectors) return;
+  const uint slot = i % vectors * DPR_WIDTH, segment = i / vectors % segments, channel = i / vectors / segments;
   const uint last = starts[(segment + 1) * stride];
-  float2 sum = (float2)(0.0f, 0.0f);
-  for (uint k = starts[segment * stride] + slot; k < last; k += DPR_REDUCE_SLOTS) {
-    sum = compensated_add(sum, values[channel * count + k]);
+  global const float* of_channel = values + (size_t)channel * count;
+  realn sum = 0.0f, error = 0.0f;
+  for (uint k = starts[segment * stride] + slot; k < last; k += slots) {
+    const intn counts = DPR_LANE_INDEX < (intn)((int)min(last - k, (uint)DPR_WIDTH));
+    compensated_add(&sum, &error, load_n(k, of_channel), counts);
   }
-  partial[i] = sum;
+  global float* out = partial + (size_t)2 * slots * (channel * segments + segment) + slot;
+  store_n(sum, 0, out);
+  store_n(error, slots, out);
 }
 
 /// Sums the slots in order. One work-item per (channel, segment).
-/// out  sums  float[channel][segment]
-kernel void reduce_final(const uint channels, const uint segments, global const float2* restrict partial,
+/// out  sums  float[channel][segment], from `first` on
+kernel void reduce_final(const uint count, const uint slots, const uint first, global const float* restrict partial,
                          global float* restrict sums) {
   const uint i = (uint)get_global_id(0);
-  if (i >= channels * segments) return;
-  float2 sum = (float2)(0.0f, 0.0f);
-  for (uint slot = 0; slot < DPR_REDUCE_SLOTS; ++slot) {
-    const float2 part = partial[i * DPR_REDUCE_SLOTS + slot];
-    sum = compensated_add(sum, part.x);
-    sum.y += part.y;
+  if (i >= count) return;
+  global const float* slot_sums = partial + (size_t)2 * slots * i;
+  float sum = 0.0f, error = 0.0f;
+  for (uint slot = 0; slot < slots; ++slot) {
+    const float x = slot_sums[slot], t = sum + x;
+    error += (fabs(sum) >= fabs(x) ? (sum - t) + x : (x - t) + sum) + slot_sums[slots + slot];
+    sum = t;
   }
-  sums[i] = sum.x + sum.y;
+  sums[first + i] = sum + error;
 }

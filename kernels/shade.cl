@@ -7,18 +7,18 @@
 #include "lanes.h"
 #include "shared_types.h"
 
-/// One work-item per pair.
+/// One work-item per pair, up to `last_pair`.
 /// in   face_colors  uint4[face]         indices into colors, by corner
 /// in   colors       float4[color]       linear RGB; w unused
 /// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
-kernel void shade_forward(const FrameParams p, const uint pairs, global const uint* restrict pair_face,
+kernel void shade_forward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
                           global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
                           global const float4* restrict colors, global const float* restrict bary1,
                           global const float* restrict bary2, global float* restrict red,
                           global float* restrict green, global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const uint4 corners = face_colors[pair_face[pair] % p.faces];
   const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; i += DPR_WIDTH) {
@@ -29,11 +29,11 @@ kernel void shade_forward(const FrameParams p, const uint pairs, global const ui
   }
 }
 
-/// One work-item per pair.
+/// One work-item per pair, up to `last_pair`.
 /// in   grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's fragments
-kernel void shade_backward(const FrameParams p, const uint pairs, global const uint* restrict pair_face,
+kernel void shade_backward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
                            global const uint2* restrict masks, global const uint* restrict fragment_starts,
                            global const uint4* restrict face_colors, global const float4* restrict colors,
                            global const float* restrict bary1, global const float* restrict bary2,
@@ -41,7 +41,7 @@ kernel void shade_backward(const FrameParams p, const uint pairs, global const u
                            global const float* restrict grad_blue, global float* restrict grad_bary1,
                            global float* restrict grad_bary2, global float* restrict grad_colors) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const uint4 corners = face_colors[pair_face[pair] % p.faces];
   const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
   const uint first = fragment_starts[pair];

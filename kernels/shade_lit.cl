@@ -79,10 +79,10 @@ static inline Shaded shade_fragment(const Surface s, const LightingParams lp, gl
   return f;
 }
 
-/// One work-item per pair.
+/// One work-item per pair, up to `last_pair`.
 /// in   world, normals  float4[view][vertex]; normals are not read by flat shading
 /// out  red, green, blue  float[fragment]
-kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, const uint pairs,
+kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, const uint last_pair,
                               global const ViewParams* restrict views, global const Light* restrict lights,
                               global const uint4* restrict faces, global const uint4* restrict face_colors,
                               global const float4* restrict colors, global const float4* restrict world,
@@ -91,7 +91,7 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
                               global const float* restrict bary2, global float* restrict red,
                               global float* restrict green, global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; i += DPR_WIDTH) {
@@ -180,12 +180,12 @@ static inline void corners_backward(const Surface s, const LightingParams lp, gl
   }
 }
 
-/// One work-item per pair.
+/// One work-item per pair, up to `last_pair`.
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors, grad_positions, grad_normals  float[pair][9]  of the corners; positions in world space.
 ///      grad_normals is not written by flat shading
 /// out  grad_eye     float[3][pair]    of the camera centre
-kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, const uint pairs,
+kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, const uint pairs, const uint last_pair,
                                global const ViewParams* restrict views, global const Light* restrict lights,
                                global const uint4* restrict faces, global const uint4* restrict face_colors,
                                global const float4* restrict colors, global const float4* restrict world,
@@ -198,7 +198,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
                                global float* restrict grad_positions, global float* restrict grad_normals,
                                global float* restrict grad_eye) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
   const Vec3n zero3 = splat3((float4)(0.0f));
@@ -249,9 +249,11 @@ static inline void add_light_gradient(const LightingParams lp, const Light light
   sum[2] = mad3n(grad_specular, t.highlight, sum[2]);
 }
 
-/// Gradients of one light and of the ambient light, per pair. One work-item per pair; one launch per light.
-/// out  channels  float[DPR_LIGHT_CHANNELS + 3][pair]  position, diffuse, specular, ambient
-kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams lp, const uint pairs, const uint light,
+/// Gradients of one light and of the ambient light, per pair. One work-item per pair, up to `last_pair`; one launch per
+/// light.
+/// out  channels  float[light][DPR_LIGHT_CHANNELS + 3][pair]  position, diffuse, specular, ambient
+kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams lp, const uint pairs,
+                                      const uint last_pair, const uint light,
                                       global const ViewParams* restrict views, global const Light* restrict lights,
                                       global const uint4* restrict faces, global const uint4* restrict face_colors,
                                       global const float4* restrict colors, global const float4* restrict world,
@@ -261,7 +263,7 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
                                       global const float* restrict grad_red, global const float* restrict grad_green,
                                       global const float* restrict grad_blue, global float* restrict channels) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
   const Vec3n zero3 = splat3((float4)(0.0f));
@@ -289,10 +291,11 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
                          scale3n(grad, c[k]), sum);
     }
   }
-  for (int k = 0; k < 4; ++k) {
+  global float* of_light = channels + (size_t)light * (DPR_LIGHT_CHANNELS + 3) * pairs;
+  for (uint k = 0; k < 4; ++k) {
     const float4 v = sum_vec3n(sum[k]);
-    channels[(3 * k) * pairs + pair] = v.x;
-    channels[(3 * k + 1) * pairs + pair] = v.y;
-    channels[(3 * k + 2) * pairs + pair] = v.z;
+    of_light[(3 * k) * pairs + pair] = v.x;
+    of_light[(3 * k + 1) * pairs + pair] = v.y;
+    of_light[(3 * k + 2) * pairs + pair] = v.z;
   }
 }

@@ -63,6 +63,15 @@ void check_frame_size(const shared::FrameParams& p) {
                         "fewer, so that pixels and vertices can be counted");
 }
 
+/// Gradients that come by way of the vertices.
+bool is_geometric(const GradientRequest& wanted) {
+  return wanted.positions || wanted.transform || wanted.camera;
+}
+
+/// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
+constexpr std::size_t k_fragment_bytes = Rasterize::k_fragment_bytes + Shade::k_fragment_bytes +
+                                         Occupancy::k_fragment_bytes + Aggregate::k_fragment_bytes;
+
 /// Frames of all renderers, so that a loss knows which one it was evaluated on.
 std::atomic<std::uint64_t> frames_rendered = 0;
 
@@ -137,38 +146,56 @@ void Renderer::Impl::forward() {
   transform.forward(frame, device_views, *geometry);
   setup.forward(frame, device_views, *geometry, transform.ndc);
   bin.forward(frame, setup.triangles);
-  rasterize.forward(frame, setup.triangles, bin);
-  shade.forward(shade_inputs());
-  occupancy.forward(frame, bin, rasterize);
-  aggregate.forward(aggregate_inputs(), scene.background);
+  rasterize.cover(frame, setup.triangles, bin);
+  bands = rasterize.cut(frame, device.memory_budget(), k_fragment_bytes);
+  for (const Band& band : bands) render(band);
   rendered = true;
   frame_number = ++frames_rendered;
 }
 
+void Renderer::Impl::render(const Band& band) {
+  rasterize.forward(frame, setup.triangles, bin, band);
+  shade.forward(shade_inputs());
+  occupancy.forward(frame, bin, rasterize);
+  aggregate.forward(aggregate_inputs(), scene.background);
+}
+
 SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
-  const bool geometric = wanted.positions || wanted.transform || wanted.camera;
+  for (const Band& band : bands) {
+    if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
+    differentiate(grad_images);
+  }
+  if (is_geometric(wanted)) {
+    gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
+                    grad_ndc);
+    if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
+    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
+  }
   SceneGradient gradient;
   gradient.meshes.resize(scene.meshes.size());
   gradient.views.resize(views.size());
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
+  read_summed_gradients(gradient);
+  read_mesh_gradients(gradient);
+  return gradient;
+}
 
+void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
+  const GradientRequest& wanted = scene.gradients;
+  const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
   if (geometric || wanted.smoothing) occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
   if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
   if (geometric) {
     rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth,
                        shade.grad_bary1, shade.grad_bary2);
-    gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
-                    grad_ndc);
-    if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
-    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
   }
-  read_smoothing_gradients(gradient);
-  read_mesh_gradients(gradient);
-  if (wanted.transform || wanted.camera) read_pose_gradients(gradient);
-  if (wanted.lights && shade.lit()) read_light_gradients(gradient);
-  return gradient;
+  if (wanted.lights && shade.lit()) {
+    for (std::size_t light = 0; light < shade.light_sets(); ++light) {
+      shade.backward_light(shade_inputs(), aggregate.grad_color, light);
+    }
+  }
 }
 
 std::size_t Renderer::Impl::bytes() const {

@@ -148,6 +148,7 @@ RenderStatistics Renderer::statistics() const {
   }
   s.pairs = m.bin.pairs;
   s.fragments = m.rasterize.listed_fragments;
+  s.bands = m.bands.size();
   s.device_bytes = m.bytes();
   return s;
 }

@@ -1,4 +1,5 @@
 // From what the stages' backward passes left on the device to the gradients on the host.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -7,26 +8,6 @@
 namespace dpr {
 
 using glm::dvec3;
-
-void Renderer::Impl::read_smoothing_gradients(SceneGradient& gradient) {
-  if (scene.gradients.smoothing || scene.gradients.background) {
-    const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
-    const std::vector<float> sums =
-        reduce.read(pixels, DPR_PIXEL_CHANNELS, 1, 1, all_pixels, aggregate.channels);
-    if (scene.gradients.smoothing) {
-      gradient.gamma = sums[DPR_CHANNEL_GAMMA];
-      gradient.alpha = sums[DPR_CHANNEL_ALPHA];
-    }
-    if (scene.gradients.background) {
-      gradient.background = dvec3(sums[DPR_CHANNEL_BACKGROUND], sums[DPR_CHANNEL_BACKGROUND + 1],
-                                  sums[DPR_CHANNEL_BACKGROUND + 2]);
-    }
-  }
-  if (scene.gradients.smoothing) {
-    const std::size_t stride = std::size_t{frame.views} * frame.faces;
-    gradient.sigma = reduce.read(bin.pairs, 1, 1, stride, bin.pair_starts, occupancy.grad_sigma)[0];
-  }
-}
 
 namespace {
 
@@ -40,11 +21,16 @@ std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t f
   return result;
 }
 
+/// A mesh without colours of its own is white.
+bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
+
 }  // namespace
 
 void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
-  if (scene.gradients.colors) {
+  const bool colors = scene.gradients.colors &&
+                      std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
+  if (colors) {
     gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
                       grad_colors);
   }
@@ -54,7 +40,7 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
     if (scene.gradients.positions) {
       gradient.meshes[m].positions = read_range(transform.grad_positions, range.first_vertex, range.vertices);
     }
-    if (scene.gradients.colors && !(mesh.vertex_colors.empty() && mesh.face_colors.empty())) {
+    if (scene.gradients.colors && has_colors(mesh)) {
       gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
     }
   }
@@ -76,12 +62,10 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
   out.fov_y_degrees = (grad[0] + grad[1]) * scale_by_half_angle * glm::radians(0.5);
 }
 
-}  // namespace
-
-void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
-  const std::size_t segments = views.size() * scene.meshes.size();
-  const std::vector<float> sums = reduce.read(std::size_t{frame.views} * frame.vertices, DPR_POSE_CHANNELS,
-                                              segments, 1, view_vertex_starts, transform.channels);
+/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS][view][mesh].
+void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std::span<const View> views,
+                        SceneGradient& gradient) {
+  const std::size_t meshes = scene.meshes.size(), segments = views.size() * meshes;
   const auto sum = [&](std::size_t channel, std::size_t segment) {
     return static_cast<double>(sums[channel * segments + segment]);
   };
@@ -91,8 +75,8 @@ void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     CameraGradient camera;
     std::array<double, 4> projected{};
-    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-      const std::size_t segment = v * scene.meshes.size() + m;
+    for (std::size_t m = 0; m < meshes; ++m) {
+      const std::size_t segment = v * meshes + m;
       if (scene.gradients.transform) {
         gradient.views[v].transforms[m] = {sum3(DPR_CHANNEL_MODEL, segment),
                                            sum3(DPR_CHANNEL_MODEL + 3, segment)};
@@ -104,14 +88,11 @@ void Renderer::Impl::read_pose_gradients(SceneGradient& gradient) {
     add_projection_gradient(projected, views[v].camera, scene.width, scene.height, camera);
     if (scene.gradients.camera) gradient.views[v].camera = camera;
   }
-  if (scene.gradients.camera && shade.lit()) add_eye_gradients(gradient);
 }
 
 /// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
-/// translation.
-void Renderer::Impl::add_eye_gradients(SceneGradient& gradient) {
-  const std::vector<float> sums =
-      reduce.read(bin.pairs, 3, views.size(), frame.faces, bin.pair_starts, shade.grad_eye);
+/// translation. From sums by [3][view].
+void add_eye_gradients(const std::vector<float>& sums, std::span<const View> views, SceneGradient& gradient) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const dvec3 grad_eye(sums[v], sums[views.size() + v], sums[2 * views.size() + v]);
     const glm::dmat4 view(views[v].camera.view);
@@ -122,20 +103,50 @@ void Renderer::Impl::add_eye_gradients(SceneGradient& gradient) {
   }
 }
 
-void Renderer::Impl::read_light_gradients(SceneGradient& gradient) {
-  gradient.lights.resize(shade.lights());
-  const std::size_t stride = std::size_t{frame.views} * frame.faces;
-  // Without point lights one launch still finds the ambient light's gradient.
-  for (std::size_t light = 0; light < std::max<std::size_t>(shade.lights(), 1); ++light) {
-    shade.backward_light(shade_inputs(), aggregate.grad_color, light);
-    const std::vector<float> sums =
-        reduce.read(bin.pairs, k_light_channels, 1, stride, bin.pair_starts, shade.light_channels);
-    const auto sum3 = [&](std::size_t channel) {
-      return dvec3(sums[channel], sums[channel + 1], sums[channel + 2]);
-    };
-    gradient.ambient = sum3(9);
-    if (light < shade.lights()) gradient.lights[light] = {sum3(0), sum3(3), sum3(6)};
+/// From sums by [light][k_light_channels].
+void add_light_gradients(const std::vector<float>& sums, std::size_t lights, SceneGradient& gradient) {
+  const auto sum3 = [&](std::size_t at) { return dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  gradient.lights.resize(lights);
+  for (std::size_t light = 0; light < lights; ++light) {
+    const std::size_t at = light * k_light_channels;
+    gradient.lights[light] = {sum3(at), sum3(at + 3), sum3(at + 6)};
   }
+  gradient.ambient = sum3(k_light_channels - 3);  // the same in every light's channels
+}
+
+}  // namespace
+
+void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
+  const GradientRequest& wanted = scene.gradients;
+  const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
+  const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
+  const std::size_t faces = std::size_t{frame.views} * frame.faces;
+  const bool poses = wanted.transform || wanted.camera, eye = wanted.camera && shade.lit(),
+             lights = wanted.lights && shade.lit();
+  const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
+  // One wait for all of them.
+  const std::vector<std::vector<float>> sums = reduce.read(
+      {{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1, all_pixels,
+        aggregate.channels},
+       {bin.pairs, channels(wanted.smoothing, 1), 1, faces, bin.pair_starts, occupancy.grad_sigma},
+       {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
+        view_vertex_starts, transform.channels},
+       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
+       {bin.pairs, channels(lights, k_light_channels * shade.light_sets()), 1, faces, bin.pair_starts,
+        shade.light_channels}});
+  const std::vector<float>& pixel_sums = sums[0];
+  if (wanted.smoothing) {
+    gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
+    gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
+    gradient.sigma = sums[1][0];
+  }
+  if (wanted.background) {
+    gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],
+                                pixel_sums[DPR_CHANNEL_BACKGROUND + 2]);
+  }
+  if (poses) add_pose_gradients(sums[2], scene, views, gradient);
+  if (eye) add_eye_gradients(sums[3], views, gradient);
+  if (lights) add_light_gradients(sums[4], shade.lights(), gradient);
 }
 
 }  // namespace dpr

@@ -45,6 +45,7 @@ struct Renderer::Impl {
   Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
   Buffer<cl_uint> all_pixels;          // [2]: one segment
   shared::FrameParams frame{};
+  std::vector<Band> bands;  // of the last forward()
 
   Transform transform;
   Setup setup;
@@ -63,11 +64,12 @@ struct Renderer::Impl {
   ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
-  void read_smoothing_gradients(SceneGradient& gradient);
+  /// The stages from the fragments on: of a band, and backward of the one rendered last.
+  void render(const Band& band);
+  void differentiate(const Buffer<cl_float4>& grad_images);
+
   void read_mesh_gradients(SceneGradient& gradient);
-  void read_pose_gradients(SceneGradient& gradient);
-  void add_eye_gradients(SceneGradient& gradient);
-  void read_light_gradients(SceneGradient& gradient);
+  void read_summed_gradients(SceneGradient& gradient);
 };
 
 }  // namespace dpr

@@ -64,6 +64,7 @@ struct RenderStatistics {
       0;                  ///< of those: nearer than znear, beyond zfar, without area, or outside the image
   std::size_t pairs = 0;  ///< (8x8 tile, triangle) pairs
   std::size_t fragments = 0;     ///< (pixel, triangle) pairs within the blur radius
+  std::size_t bands = 0;         ///< that the device's memory budget made of the frame
   std::size_t device_bytes = 0;  ///< held by this renderer
 };
 
@@ -92,7 +93,8 @@ class Renderer {
   const Scene& scene() const;
   std::span<const View> views() const;
 
-  /// Renders every view. Blocks only to read the two sizes it needs to allocate.
+  /// Renders every view. Blocks only to read the sizes it needs to allocate: of the pairs, and of the
+  /// fragments. Throws InvalidArgument where they do not fit the device's memory budget.
   void forward();
   /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
   Image image(std::size_t view = 0) const;

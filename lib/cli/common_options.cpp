@@ -96,13 +96,20 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
   command
       .add_option("--device", options.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
+  command
+      .add_option("--memory-budget", options.memory_budget,
+                  "Device memory for fragments; larger frames are rendered in bands (default: a quarter)")
+      ->check(CLI::Range(1, 1 << 30))
+      ->type_name("MiB");
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
   command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N");
   add_smoothing_options(command, options.smoothing);
 }
 
 Device open_device(const CommonOptions& options) {
+  constexpr std::size_t k_mebibyte = 1024 * 1024;
   Device device = dpr::open_device(options.device);
+  if (options.memory_budget) device.set_memory_budget(*options.memory_budget * k_mebibyte);
   if (options.verbose) {
     const DeviceInfo& info = device.info();
     std::printf("device %zu: %s, %s, %u lanes\n", info.index, info.platform.c_str(), info.name.c_str(),

@@ -23,6 +23,7 @@ struct CommonOptions {
   std::string device;
   std::optional<std::string> size;
   std::optional<std::uint64_t> seed;
+  std::optional<std::size_t> memory_budget;  // MiB
   SmoothingOptions smoothing;
   bool verbose = false, quiet = false;
 };

@@ -102,8 +102,8 @@ void run(const RenderOptions& options, CommonOptions& common) {
     std::printf("\n");
   }
   if (common.verbose) {
-    std::printf("%zu tile pairs, %zu fragments, %zu bytes on the device\n", statistics.pairs,
-                statistics.fragments, statistics.device_bytes);
+    std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
+                statistics.fragments, statistics.bands, statistics.device_bytes);
   }
 }
 

@@ -10,6 +10,9 @@
 
 namespace dpr {
 
+/// Room to make for elements that may become more from frame to frame.
+constexpr std::size_t with_headroom(std::size_t count) { return count + count / 4; }
+
 /// Elements of T on a device. Movable. Capacity is rounded up so that a kernel may load a whole vector of
 /// lanes at the last element; what lies behind size() is never read as a result.
 template <class T>
@@ -29,8 +32,7 @@ class Buffer {
   /// that sizes that vary from frame to frame settle.
   void resize(Device::Impl& device, std::size_t count) {
     if (count > capacity_) {
-      const std::size_t headroom = capacity_ == 0 ? 0 : count / 4;
-      allocate(device, count + headroom);
+      allocate(device, capacity_ == 0 ? count : with_headroom(count));
     }
     size_ = count;
   }

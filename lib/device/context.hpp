@@ -40,6 +40,7 @@ struct Device::Impl {
   }
 
   std::size_t allocated_bytes = 0, peak_allocated_bytes = 0;
+  std::size_t memory_budget = 0;
 
  private:
   std::mutex mutex_;

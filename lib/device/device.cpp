@@ -110,6 +110,7 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   impl->context = context;
   impl->queue = queue;
   impl->info = describe(cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()), device);
+  impl->memory_budget = impl->info.memory_bytes / 4;
   return Device(std::move(impl));
 }
 
@@ -141,5 +142,11 @@ Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
 const DeviceInfo& Device::info() const { return impl_->info; }
 std::size_t Device::allocated_bytes() const { return impl_->allocated_bytes; }
 std::size_t Device::peak_allocated_bytes() const { return impl_->peak_allocated_bytes; }
+std::size_t Device::memory_budget() const { return impl_->memory_budget; }
+
+void Device::set_memory_budget(std::size_t bytes) {
+  if (bytes == 0) throw InvalidArgument("memory budget (device)", "0 bytes", "at least 1");
+  impl_->memory_budget = bytes;
+}
 
 }  // namespace dpr

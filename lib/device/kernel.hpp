@@ -81,6 +81,15 @@ void check_signature(const cl::Kernel& kernel, const std::string& name,
 /// The options every kernel of a device is built with.
 std::string build_options(const Device::Impl& device, const std::string& more = "");
 
+/// Work-items [first, first + count) of a launch; a count alone starts at 0.
+struct Range {
+  Range(std::size_t count_) : count(count_) {}
+  Range(std::size_t first_, std::size_t count_) : first(first_), count(count_) {}
+  cl_uint last() const { return static_cast<cl_uint>(first + count); }
+
+  std::size_t first = 0, count = 0;
+};
+
 /// One kernel of one program. `Args` are In<T>, Out<T> or value types, in the order of the source.
 template <class... Args>
 class Kernel {
@@ -94,16 +103,16 @@ class Kernel {
     detail::check_signature(kernel_, name_, expected);
   }
 
-  /// Enqueues `items` work-items, rounded up to whole work-groups: kernels guard their range. Nothing for 0
-  /// items.
-  void operator()(std::size_t items, const typename detail::Argument<Args>::Value&... args) {
-    if (items == 0) return;
+  /// Enqueues a range of work-items, rounded up to whole work-groups: kernels guard their range. Nothing for
+  /// an empty one.
+  void operator()(const Range& range, const typename detail::Argument<Args>::Value&... args) {
+    if (range.count == 0) return;
     unsigned index = 0;
     (check_cl(detail::Argument<Args>::set(kernel_, index++, args), "clSetKernelArg " + name_), ...);
     const std::size_t local = device_->local_size();
-    const std::size_t global = (items + local - 1) / local * local;
-    const int error =
-        device_->queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(global), cl::NDRange(local));
+    const std::size_t global = (range.count + local - 1) / local * local;
+    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NDRange(range.first),
+                                                          cl::NDRange(global), cl::NDRange(local));
     if (error != CL_SUCCESS) {
       throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) +
                                    " work-items in groups of " + std::to_string(local));

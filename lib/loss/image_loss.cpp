@@ -113,7 +113,7 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   p.views = static_cast<cl_uint>(m.views);
   p.pixels_per_view = static_cast<cl_uint>(pixels_per_view);
   m.forward(pixels, p, r.aggregate.image, m.target, m.channels);
-  m.reduce(pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels, m.sums);
+  m.reduce({pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
   m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.grad_image);
   m.frame_number = r.frame_number;
 

@@ -61,14 +61,14 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
   const shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
+  const Range pixels = in.rasterize.pixels(in.p);
   Rasterize& r = in.rasterize;
   if (exact_) {
-    if (exact_->sort) (*exact_->sort)(a.pixels, a.pixels, r.pixel_starts, r.depth, r.list);
-    exact_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
-                    in.shade.blue, image);
+    if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
+    exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, image);
   } else {
-    sampled_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+    sampled_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                       in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
                       in.shade.blue, r.fragment_pair, in.bin.pair_face, image);
   }
@@ -82,14 +82,15 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
     buffer->resize(device_, in.rasterize.fragments);
   }
   channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
+  const Range pixels = in.rasterize.pixels(in.p);
   const Rasterize& r = in.rasterize;
   if (exact_) {
-    exact_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                     in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
-                     in.shade.blue, grad_image, grad_depth, grad_log_occupancy, grad_color.red,
-                     grad_color.green, grad_color.blue, channels);
+    exact_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, grad_image,
+                     grad_depth, grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue,
+                     channels);
   } else {
-    sampled_->backward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+    sampled_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                        in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
                        in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_depth,
                        grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);

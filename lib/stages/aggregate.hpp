@@ -33,6 +33,8 @@ class Aggregate {
   /// `grad_image` is [view][height][width].
   void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
 
+  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
+
   Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
   Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
   ColorGradients grad_color;                     ///< [fragment]

@@ -6,6 +6,7 @@ Bin::Bin(Device::Impl& device)
     : device_(device),
       count_(device, "bin.cl", "bin_count"),
       fill_(device, "bin.cl", "bin_fill"),
+      link_(device, "bin.cl", "bin_link"),
       scan_(device),
       sort_(device) {}
 
@@ -16,17 +17,17 @@ void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& 
   scan_(faces, counts_, pair_starts);
   pairs = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
 
-  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &order, &sorted_tiles_})
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
     buffer->resize(device_, pairs);
-  fill_(faces, p, triangles, pair_starts, pair_face, pair_tile, order);
-  pair_tile.copy_to(sorted_tiles_);
-  sort_(pairs, std::size_t{p.views} * p.tiles_x * p.tiles_y, sorted_tiles_, order, tile_starts);
+  fill_(faces, p, triangles, pair_starts, place_face_, pair_tile, places_);
+  sort_(pairs, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places_, tile_starts);
+  link_(pairs, static_cast<cl_uint>(pairs), places_, place_face_, pair_face, face_pairs);
 }
 
 std::size_t Bin::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
   for (const Buffer<cl_uint>* buffer :
-       {&pair_starts, &pair_face, &pair_tile, &order, &tile_starts, &counts_, &sorted_tiles_}) {
+       {&pair_face, &pair_tile, &tile_starts, &face_pairs, &pair_starts, &counts_, &place_face_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

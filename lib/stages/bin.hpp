@@ -1,5 +1,5 @@
-// (tile, triangle) pairs: in face order, which gathers gradients, and by tile, which lists a pixel's
-// fragments.
+// (tile, triangle) pairs, numbered by tile and, within a tile, by face; and every face's list of its pairs,
+// by which gradients are gathered.
 #pragma once
 
 #include "device/kernel.hpp"
@@ -16,11 +16,11 @@ class Bin {
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
 
   std::size_t pairs = 0;
-  Buffer<cl_uint> pair_starts;  ///< [view * face + 1] pairs of a face of a view
   Buffer<cl_uint> pair_face;    ///< [pair] view * faces + face
   Buffer<cl_uint> pair_tile;    ///< [pair] view * tiles + tile
-  Buffer<cl_uint> order;        ///< [pair] pairs by tile, then by face
-  Buffer<cl_uint> tile_starts;  ///< [view * tile + 1] runs of `order`
+  Buffer<cl_uint> tile_starts;  ///< [view * tile + 1] runs of pairs
+  Buffer<cl_uint> face_pairs;   ///< the pairs of every face of every view
+  Buffer<cl_uint> pair_starts;  ///< [view * face + 1] runs of `face_pairs`
 
   std::size_t bytes() const;
 
@@ -29,9 +29,11 @@ class Bin {
   Kernel<shared::FrameParams, In<shared::Triangle>, Out<cl_uint>> count_;
   Kernel<shared::FrameParams, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       fill_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Scan scan_;
   Sort sort_;
-  Buffer<cl_uint> counts_, sorted_tiles_;
+  Buffer<cl_uint> counts_;               // [view * face]
+  Buffer<cl_uint> place_face_, places_;  // [pair] before sorting, in face order; and what sorting permutes
 };
 
 }  // namespace dpr

@@ -20,7 +20,7 @@ class Gather {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
+  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
          Out<cl_float4>>
       corners_;
 };

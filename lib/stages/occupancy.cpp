@@ -46,29 +46,29 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
 void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize) {
   log_occupancy.resize(device_, rasterize.fragments);
   occupancy.resize(device_, rasterize.fragments);
-  const auto pairs = static_cast<cl_uint>(bin.pairs);
+  const Range pairs = rasterize.pairs(bin);
   if (exact_) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
     exact_->forward((rasterize.fragments + width - 1) / width, params(p),
                     static_cast<cl_uint>(rasterize.fragments), rasterize.distance, log_occupancy, occupancy);
   } else {
-    sampled_->forward(pairs, params(p), pairs, bin.pair_face, rasterize.fragment_starts,
+    sampled_->forward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);
   }
 }
 
 void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                          const Buffer<float>& grad_log_occupancy) {
-  const auto pairs = static_cast<cl_uint>(bin.pairs);
+  const Range pairs = rasterize.pairs(bin);
   grad_distance.resize(device_, rasterize.fragments);
-  grad_sigma.resize(device_, pairs);
+  grad_sigma.resize(device_, bin.pairs);
   if (exact_) {
-    exact_->backward(pairs, params(p), pairs, rasterize.masks, rasterize.fragment_starts, rasterize.distance,
-                     grad_log_occupancy, grad_distance, grad_sigma);
+    exact_->backward(pairs, params(p), pairs.last(), rasterize.masks, rasterize.fragment_starts,
+                     rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
   } else {
-    sampled_->backward(pairs, params(p), pairs, bin.pair_face, rasterize.masks, rasterize.fragment_starts,
-                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, grad_log_occupancy,
-                       grad_distance, grad_sigma);
+    sampled_->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.masks,
+                       rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, log_occupancy,
+                       grad_log_occupancy, grad_distance, grad_sigma);
   }
 }
 

@@ -21,6 +21,8 @@ class Occupancy {
   void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                 const Buffer<float>& grad_log_occupancy);
 
+  static constexpr std::size_t k_fragment_bytes = 3 * sizeof(float);  ///< of those below
+
   Buffer<float> log_occupancy, occupancy;  ///< [fragment]
   Buffer<float> grad_distance;             ///< [fragment]
   Buffer<float> grad_sigma;                ///< [pair]

@@ -1,53 +1,135 @@
 #include "stages/rasterize.hpp"
 
+#include <utility>
+
 namespace dpr {
 
 Rasterize::Rasterize(Device::Impl& device)
     : device_(device),
       cover_(device, "rasterize.cl", "rasterize_cover"),
       count_(device, "rasterize.cl", "rasterize_count"),
+      rows_(device, "rasterize.cl", "rasterize_rows"),
+      rebase_(device, "rasterize.cl", "rasterize_rebase"),
       list_(device, "rasterize.cl", "rasterize_list"),
       forward_(device, "rasterize.cl", "rasterize_forward"),
       backward_(device, "rasterize.cl", "rasterize_backward"),
       scan_(device) {}
 
-void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                        const Bin& bin) {
+namespace {
+
+/// Work-items of the listing kernels for a tile: vectors of pixels.
+std::size_t vectors_of_tile(const Device::Impl& device) {
+  return std::size_t{DPR_TILE} * DPR_TILE / std::min<std::size_t>(device.info.lanes, DPR_TILE);
+}
+
+}  // namespace
+
+void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                      const Bin& bin) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
   masks.resize(device_, pairs);
   counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
   cover_(pairs, p, pairs, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
   scan_(pairs, counts_, fragment_starts);
-
-  const std::size_t vectors = std::size_t{p.views} * p.tiles_x * p.tiles_y * DPR_TILE * DPR_TILE /
-                              std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-  count_(vectors, p, bin.tile_starts, bin.order, masks, counts_);
+  const std::size_t tiles = std::size_t{p.views} * p.tiles_x * p.tiles_y;
+  count_(tiles * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
-  fragments = read_total(fragment_starts, pairs, "fragments (frame)");
-  listed_fragments = read_total(pixel_starts, pixels, "fragments (frame)");
 
-  list.resize(device_, listed_fragments);
-  list_(vectors, p, bin.tile_starts, bin.order, masks, fragment_starts, pixel_starts, list);
+  const std::size_t rows = std::size_t{p.views} * p.tiles_y;
+  device_rows_.resize(device_, rows + 1);
+  rows_(rows + 1, p, bin.tile_starts, fragment_starts, pixel_starts, device_rows_);
+  row_starts_.clear();
+  for (const cl_uint4& row : device_rows_.download()) row_starts_.push_back({row.s[0], row.s[1], row.s[2]});
+  check_total(row_starts_.back().fragment, "fragments (frame)");
+  listed_fragments = row_starts_.back().listed;
+  in_bands_ = false;
+}
+
+Band Rasterize::make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const {
+  const auto first_pixel = [&](std::size_t row) {
+    return (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
+  };
+  const auto between = [](std::size_t first, std::size_t last) { return Range(first, last - first); };
+  const RowStart &first = row_starts_[first_row], &last = row_starts_[last_row];
+  return {between(first_row * p.tiles_x, last_row * p.tiles_x), between(first.pair, last.pair),
+          between(first_pixel(first_row), first_pixel(last_row)), between(first.fragment, last.fragment),
+          between(first.listed, last.listed)};
+}
+
+std::vector<Band> Rasterize::cut(const shared::FrameParams& p, std::size_t budget,
+                                 std::size_t fragment_bytes) const {
+  const auto bytes = [&](std::size_t first_row, std::size_t last_row) {
+    return with_headroom(row_starts_[last_row].fragment - row_starts_[first_row].fragment) * fragment_bytes;
+  };
+  std::vector<Band> bands;
+  const std::size_t rows = row_starts_.size() - 1;
+  for (std::size_t first = 0, last = 0; first < rows; first = last) {
+    while (last < rows && bytes(first, last + 1) <= budget) ++last;
+    if (first == last) {
+      throw InvalidArgument(
+          "memory budget (frame)", std::to_string(budget) + " bytes",
+          "at least " + std::to_string(bytes(first, first + 1)) + " for the fragments of one row of tiles");
+    }
+    bands.push_back(make_band(p, first, last));
+  }
+  return bands;
+}
+
+/// The runs of a band, counted from its first element. Work-groups reach beyond its last pixel: there the
+/// runs must be empty.
+void Rasterize::rebase(const Band& next) {
+  if (!in_bands_) {
+    std::swap(fragment_starts, frame_fragment_starts_);
+    std::swap(pixel_starts, frame_pixel_starts_);
+    in_bands_ = true;
+  }
+  const auto rebase = [&](const Range& runs, const Range& elements, const Buffer<cl_uint>& frame_starts,
+                          Buffer<cl_uint>& starts) {
+    starts.resize(device_, frame_starts.size());
+    rebase_(Range(runs.first, runs.count + 1 + device_.local_size()),
+            static_cast<cl_uint>(frame_starts.size()), static_cast<cl_uint>(elements.first), elements.last(),
+            frame_starts, starts);
+  };
+  rebase(next.pairs, next.fragments, frame_fragment_starts_, fragment_starts);
+  rebase(next.pixels, next.listed, frame_pixel_starts_, pixel_starts);
+}
+
+void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                        const Bin& bin, const Band& next) {
+  if (next.tiles.count < std::size_t{p.views} * p.tiles_x * p.tiles_y) rebase(next);
+  band = next;
+  fragments = next.fragments.count;
+  list.resize(device_, next.listed.count);
   for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel}) buffer->resize(device_, fragments);
   for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->resize(device_, fragments);
-  forward_(pairs, p, pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts, fragment_pair,
-           fragment_pixel, distance, depth, bary1, bary2);
+  const std::size_t vectors = vectors_of_tile(device_);
+  const Range listing(next.tiles.first * vectors, next.tiles.count * vectors);
+  list_(listing, p, listing.last(), bin.tile_starts, masks, fragment_starts, pixel_starts, list);
+  forward_(next.pairs, p, next.pairs.last(), triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,
+           fragment_pair, fragment_pixel, distance, depth, bary1, bary2);
+}
+
+void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                        const Bin& bin) {
+  cover(p, triangles, bin);
+  forward(p, triangles, bin, make_band(p, 0, row_starts_.size() - 1));
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                          const Bin& bin, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
-  const auto pairs = static_cast<cl_uint>(bin.pairs);
-  grad_corners.resize(device_, std::size_t{9} * pairs);
-  backward_(pairs, p, pairs, triangles, bin.pair_face, masks, fragment_starts, fragment_pixel, grad_distance,
-            grad_depth, grad_bary1, grad_bary2, grad_corners);
+  const Range range = pairs(bin);
+  grad_corners.resize(device_, std::size_t{9} * bin.pairs);
+  backward_(range, p, range.last(), triangles, bin.pair_face, masks, fragment_starts, fragment_pixel,
+            grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
 }
 
 std::size_t Rasterize::bytes() const {
-  std::size_t bytes = scan_.bytes() + masks.capacity_bytes();
+  std::size_t bytes = scan_.bytes() + masks.capacity_bytes() + device_rows_.capacity_bytes();
   for (const Buffer<cl_uint>* buffer :
-       {&fragment_starts, &pixel_starts, &list, &fragment_pair, &fragment_pixel, &counts_}) {
+       {&fragment_starts, &pixel_starts, &list, &fragment_pair, &fragment_pixel, &counts_,
+        &frame_fragment_starts_, &frame_pixel_starts_}) {
     bytes += buffer->capacity_bytes();
   }
   for (const Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2, &grad_corners}) {

@@ -2,25 +2,53 @@
 // own.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "device/kernel.hpp"
 #include "stages/bin.hpp"
 #include "stages/scan.hpp"
 
 namespace dpr {
 
+/// A stretch of tile rows, all views' one after the other, whose fragments are on the device at the same
+/// time.
+struct Band {
+  Range tiles, pairs, pixels;
+  Range fragments, listed;  ///< of the frame's; the former with the padding of the pairs' runs
+};
+
 class Rasterize {
  public:
   explicit Rasterize(Device::Impl& device);
 
-  /// Blocks to read the number of fragments.
+  /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
+  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Throws
+  /// InvalidArgument if one row of tiles does not fit.
+  std::vector<Band> cut(const shared::FrameParams& p, std::size_t budget, std::size_t fragment_bytes) const;
+  /// The fragments of a band; their numbers, and those of the list's entries, count from the band's first.
+  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+               const Band& band);
+  /// All of it: cover() and forward() of the whole frame.
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
-  /// From the gradients of distance, depth and barycentrics to `grad_corners`.
+  /// From the gradients of distance, depth and barycentrics to `grad_corners` of the band's pairs.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                 const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
 
-  std::size_t fragments = 0;                    ///< with the padding of the pairs' runs
-  std::size_t listed_fragments = 0;             ///< without
+  /// What the stages behind this one work on: the band, or everything where none was cut.
+  Range pairs(const Bin& bin) const { return band ? band->pairs : Range(bin.pairs); }
+  Range pixels(const shared::FrameParams& p) const {
+    return band ? band->pixels : Range(std::size_t{p.views} * p.width * p.height);
+  }
+
+  static constexpr std::size_t k_fragment_bytes =
+      3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
+
+  std::optional<Band> band;                     ///< whose fragments these are
+  std::size_t fragments = 0;                    ///< of the band, with the padding of the pairs' runs
+  std::size_t listed_fragments = 0;             ///< of the frame, without
   Buffer<cl_uint2> masks;                       ///< [pair] pixels of its tile that a pair covers
   Buffer<cl_uint> fragment_starts;              ///< [pair + 1]
   Buffer<cl_uint> pixel_starts;                 ///< [view * height * width + 1] runs of `list`
@@ -33,12 +61,22 @@ class Rasterize {
   std::size_t bytes() const;
 
  private:
+  /// Where a row of tiles begins.
+  struct RowStart {
+    std::size_t pair, fragment, listed;
+  };
+
+  Band make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const;
+  void rebase(const Band& next);
+
   Device::Impl& device_;
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, Out<cl_uint2>,
          Out<cl_uint>>
       cover_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
       list_;
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint2>,
          In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
@@ -48,6 +86,10 @@ class Rasterize {
       backward_;
   Scan scan_;
   Buffer<cl_uint> counts_;
+  Buffer<cl_uint4> device_rows_;
+  std::vector<RowStart> row_starts_;  // [view * tiles_y + 1]
+  bool in_bands_ = false;             // the starts above are a band's, those below the frame's
+  Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };
 
 }  // namespace dpr

@@ -1,34 +1,58 @@
 #include "stages/reduce.hpp"
 
+#include <algorithm>
+#include <bit>
+
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_slots = 64;  // DPR_REDUCE_SLOTS
-
-std::string options() { return " -DDPR_REDUCE_SLOTS=" + std::to_string(k_slots); }
+/// Partial sums of a segment: enough to keep a device busy, of enough elements each to be worth a work-item.
+std::size_t slots_of(std::size_t elements_of_segment) {
+  constexpr std::size_t k_elements_of_slot = 64, k_least = 16, k_most = 1024;
+  return std::clamp(std::bit_floor(elements_of_segment / k_elements_of_slot), k_least, k_most);
+}
 
 }  // namespace
 
 Reduce::Reduce(Device::Impl& device)
     : device_(device),
-      partial_sums_(device, "reduce.cl", "reduce_partial", options()),
-      final_sums_(device, "reduce.cl", "reduce_final", options()) {}
+      partial_sums_(device, "reduce.cl", "reduce_partial"),
+      final_sums_(device, "reduce.cl", "reduce_final") {}
 
-void Reduce::operator()(std::size_t count, std::size_t channels, std::size_t segments, std::size_t stride,
-                        const Buffer<cl_uint>& starts, const Buffer<float>& values, Buffer<float>& sums) {
-  const auto c = static_cast<cl_uint>(channels), s = static_cast<cl_uint>(segments);
-  partial_.resize(device_, channels * segments * k_slots);
-  sums.resize(device_, channels * segments);
-  partial_sums_(channels * segments * k_slots, static_cast<cl_uint>(count), c, s,
-                static_cast<cl_uint>(stride), starts, values, partial_);
-  final_sums_(channels * segments, c, s, partial_, sums);
+void Reduce::enqueue(const Summation& what, Buffer<float>& sums, std::size_t first_sum) {
+  const std::size_t count = what.channels * what.segments;
+  if (count == 0) return;
+  const auto slots = static_cast<cl_uint>(slots_of(what.count / what.segments));
+  partial_.resize(device_, 2 * count * slots);
+  partial_sums_(count * slots / device_.info.lanes, static_cast<cl_uint>(what.count),
+                static_cast<cl_uint>(what.channels), static_cast<cl_uint>(what.segments),
+                static_cast<cl_uint>(what.stride), slots, what.starts, what.values, partial_);
+  final_sums_(count, static_cast<cl_uint>(count), slots, static_cast<cl_uint>(first_sum), partial_, sums);
 }
 
-std::vector<float> Reduce::read(std::size_t count, std::size_t channels, std::size_t segments,
-                                std::size_t stride, const Buffer<cl_uint>& starts,
-                                const Buffer<float>& values) {
-  (*this)(count, channels, segments, stride, starts, values, sums_);
-  return sums_.download();
+void Reduce::operator()(const Summation& what, Buffer<float>& sums) {
+  sums.resize(device_, what.channels * what.segments);
+  enqueue(what, sums, 0);
+}
+
+std::vector<std::vector<float>> Reduce::read(std::initializer_list<Summation> all) {
+  std::size_t total = 0;
+  for (const Summation& what : all) total += what.channels * what.segments;
+  sums_.resize(device_, total);
+  std::size_t first = 0;
+  for (const Summation& what : all) {
+    enqueue(what, sums_, first);
+    first += what.channels * what.segments;
+  }
+  const std::vector<float> values = sums_.download();
+  std::vector<std::vector<float>> result;
+  auto at = values.begin();
+  for (const Summation& what : all) {
+    const auto end = at + static_cast<std::ptrdiff_t>(what.channels * what.segments);
+    result.emplace_back(at, end);
+    at = end;
+  }
+  return result;
 }
 
 }  // namespace dpr

@@ -45,12 +45,16 @@ std::size_t Scan::bytes() const {
   return bytes;
 }
 
+void check_total(std::size_t total, const char* what) {
+  if (total >= std::numeric_limits<cl_uint>::max()) {
+    throw InvalidArgument(what, "more than 4294967294", "a smaller image, blur radius or mesh");
+  }
+}
+
 std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what) {
   cl_uint total = 0;
   offsets.download(std::span(&total, 1), count);
-  if (total == std::numeric_limits<cl_uint>::max()) {
-    throw InvalidArgument(what, "more than 4294967294", "a smaller image, blur radius or mesh");
-  }
+  check_total(total, what);
   return total;
 }
 

@@ -32,7 +32,10 @@ class Scan {
   std::vector<Level> levels_;
 };
 
-/// The last element, read back. Throws InvalidArgument if the sum saturated: `what` were too many.
+/// Throws InvalidArgument if a sum saturated: `what` were too many.
+void check_total(std::size_t total, const char* what);
+
+/// The last element, read back and checked.
 std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what);
 
 }  // namespace dpr

@@ -42,11 +42,12 @@ void Shade::set_lights(const std::optional<Lights>& lights) {
 }
 
 void Shade::forward(const ShadeInputs& in) {
-  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
+  const Range pairs = in.rasterize.pairs(in.bin);
   for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragments);
   if (!lit_) {
-    forward_(pairs, in.p, pairs, in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors,
-             in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
+    forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
+             in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, red,
+             green, blue);
     return;
   }
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
@@ -55,30 +56,31 @@ void Shade::forward(const ShadeInputs& in) {
     lit_->normals_forward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
                           in.geometry.vertex_corners.corners, in.transform.world, normals_);
   }
-  lit_->forward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
+  lit_->forward(pairs, in.p, lighting_, pairs.last(), in.views.cameras, lights_, in.geometry.face_vertices,
                 in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_,
                 in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red,
                 green, blue);
 }
 
 void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
-  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
+  const Range pairs = in.rasterize.pairs(in.bin);
   for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
-  grad_corner_colors.resize(device_, std::size_t{9} * pairs);
+  grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
   if (!lit_) {
-    backward_(pairs, in.p, pairs, in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
+    backward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
               in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
     return;
   }
-  grad_corner_positions_.resize(device_, std::size_t{9} * pairs);
-  grad_corner_normals_.resize(device_, std::size_t{9} * pairs);
-  grad_eye.resize(device_, std::size_t{3} * pairs);
-  lit_->backward(pairs, in.p, lighting_, pairs, in.views.cameras, lights_, in.geometry.face_vertices,
-                 in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_,
-                 in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
-                 in.rasterize.bary2, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
-                 grad_corner_colors, grad_corner_positions_, grad_corner_normals_, grad_eye);
+  grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
+  grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
+  grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
+  lit_->backward(pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(), in.views.cameras,
+                 lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
+                 in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
+                 in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green,
+                 grad.blue, grad_bary1, grad_bary2, grad_corner_colors, grad_corner_positions_,
+                 grad_corner_normals_, grad_eye);
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
@@ -94,13 +96,13 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
 }
 
 void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light) {
-  const auto pairs = static_cast<cl_uint>(in.bin.pairs);
-  light_channels.resize(device_, k_light_channels * pairs);
-  lit_->backward_lights(pairs, in.p, lighting_, pairs, static_cast<cl_uint>(light), in.views.cameras, lights_,
-                        in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
-                        in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
-                        in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
-                        grad.green, grad.blue, light_channels);
+  const Range pairs = in.rasterize.pairs(in.bin);
+  light_channels.resize(device_, light_sets() * k_light_channels * in.bin.pairs);
+  lit_->backward_lights(
+      pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
+      in.views.cameras, lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
+      in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
+      in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green, grad.blue, light_channels);
 }
 
 std::size_t Shade::bytes() const {

@@ -36,12 +36,12 @@ class LitShading {
          In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>,
          In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       forward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
-         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint2>,
-         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>, Out<float>>
-      backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
+         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
+         In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
+         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+      backward;
+  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, cl_uint, In<shared::ViewParams>,
          In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
          In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
          Out<float>>
@@ -66,6 +66,8 @@ class Shade {
   void set_lights(const std::optional<Lights>& lights);
   bool lit() const { return lit_.has_value(); }
   std::size_t lights() const { return lighting_.lights; }
+  /// Of light_channels: without point lights one launch still finds the ambient light's gradient.
+  std::size_t light_sets() const { return std::max<std::size_t>(lighting_.lights, 1); }
 
   void forward(const ShadeInputs& in);
   /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and
@@ -74,14 +76,16 @@ class Shade {
   /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
-  /// The gradients of one light and of the ambient light, per pair: k_light_channels channels.
+  /// The gradients of one light and of the ambient light, per pair: a set of `light_channels`.
   void backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light);
+
+  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
 
   Buffer<float> red, green, blue;        ///< [fragment]
   Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
   Buffer<float> grad_corner_colors;      ///< [pair][9]
   Buffer<float> grad_eye;                ///< [3][pair]
-  Buffer<float> light_channels;          ///< [k_light_channels][pair]
+  Buffer<float> light_channels;          ///< [light][k_light_channels][pair]
 
   std::size_t bytes() const;
 

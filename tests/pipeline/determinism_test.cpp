@@ -1,5 +1,6 @@
 // The same input gives the same bits: from run to run, from renderer to renderer, alone or in a batch, set
-// piece by piece or at once. And memory: independent of the samples, and settled after the first iteration.
+// piece by piece or at once, in one band or in many. And memory: independent of the samples, settled after
+// the first iteration, within the budget.
 #include <doctest/doctest.h>
 
 #include <cstring>
@@ -8,6 +9,8 @@
 #include "dpr/dpr.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
+#include "renderer_impl.hpp"
+#include "support/messages.hpp"
 #include "support/reduced.hpp"
 
 using namespace dpr;
@@ -64,6 +67,24 @@ bool is_finite(const Result& result) {
     if (!std::isfinite(norm(block.found))) return false;
   }
   return true;
+}
+
+/// What a renderer holds that grows with the fragments of a band.
+std::size_t fragment_memory(const Renderer::Impl& m) {
+  std::size_t bytes = 0;
+  for (const Buffer<cl_uint>* buffer :
+       {&m.rasterize.list, &m.rasterize.fragment_pair, &m.rasterize.fragment_pixel}) {
+    bytes += buffer->capacity_bytes();
+  }
+  for (const Buffer<float>* buffer :
+       {&m.rasterize.distance, &m.rasterize.depth, &m.rasterize.bary1, &m.rasterize.bary2, &m.shade.red,
+        &m.shade.green, &m.shade.blue, &m.shade.grad_bary1, &m.shade.grad_bary2, &m.occupancy.log_occupancy,
+        &m.occupancy.occupancy, &m.occupancy.grad_distance, &m.aggregate.grad_depth,
+        &m.aggregate.grad_log_occupancy, &m.aggregate.grad_color.red, &m.aggregate.grad_color.green,
+        &m.aggregate.grad_color.blue}) {
+    bytes += buffer->capacity_bytes();
+  }
+  return bytes;
 }
 
 Scene test_scene() {
@@ -246,6 +267,54 @@ TEST_SUITE("pipeline") {
       CHECK(block_error({"sigma", {together.sigma}, {sigma}}, 1e-5) < 1e-4);
       CHECK(block_error({"gamma", {together.gamma}, {gamma}}, 1e-5) < 1e-4);
     }
+  }
+
+  TEST_CASE("determinism: the memory budget changes no bit of images and gradients") {
+    const int count = reduced(3, 2);
+    for (Scene scene : {test_scene(), sampled_scene(), joint_scene()}) {
+      scene.meshes.push_back({make_cube(), placed(70.0F, 0.4F, {0.9F, 0.4F, 0.2F})});
+      Device device = open_device();
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      const std::vector<View> views(static_cast<std::size_t>(count), renderer.views()[0]);
+      renderer.set_views(views);
+      const std::vector<Image> grads(views.size(), random_image(scene.width, scene.height, -1.0F, 1.0F));
+      renderer.forward();
+      CHECK(renderer.statistics().bands == 1);
+      const Image whole = renderer.image(views.size() - 1);
+      const SceneGradient gradient = renderer.backward(grads);
+
+      std::size_t most_bands = 1, least_bytes = device.peak_allocated_bytes();
+      std::string refusal;
+      for (std::size_t budget = std::size_t{1} << 30; refusal.empty(); budget -= budget / 3) {
+        device.set_memory_budget(budget);
+        Renderer banded(device);
+        banded.set_scene(scene);
+        banded.set_views(views);
+        try {
+          banded.forward();
+        } catch (const InvalidArgument& error) {
+          refusal = error.what();
+          continue;
+        }
+        CHECK(same_bits(banded.image(views.size() - 1), whole));
+        CHECK(same_bits(banded.backward(grads), gradient));
+        CHECK(same_bits(banded.backward(grads), gradient));
+        CHECK(same_bits(banded.image(views.size() - 1), whole));
+        CHECK(fragment_memory(banded.impl()) <= budget);
+        most_bands = std::max(most_bands, banded.statistics().bands);
+        least_bytes = std::min(least_bytes, banded.statistics().device_bytes);
+      }
+      CHECK(most_bands > 4);
+      CHECK(least_bytes < renderer.statistics().device_bytes);
+      CHECK(dpr::test::contains(refusal, "memory budget (frame)"));
+      CHECK(dpr::test::contains(refusal, "for the fragments of one row of tiles"));
+      // A renderer that was refused renders again once it may.
+      device.set_memory_budget(std::size_t{1} << 30);
+      renderer.forward();
+      CHECK(same_bits(renderer.image(views.size() - 1), whole));
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, open_device().set_memory_budget(0), "memory budget");
   }
 
   TEST_CASE("determinism: pieces replaced one by one equal a fresh scene") {

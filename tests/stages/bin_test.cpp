@@ -182,28 +182,32 @@ TEST_SUITE("unit") {
     CHECK_FALSE(includes(listed, needed));
   }
 
-  TEST_CASE("bin: pairs are in face order, tiles list theirs by face, completely") {
+  TEST_CASE(
+      "bin: pairs are in tile order, tiles hold theirs by face, faces list theirs by tile, completely") {
     const NdcFrame frame{33, 20, 0.02F, false, true, 1, 100, 2};
     const auto count = static_cast<std::size_t>(reduced(200, 10));
     NdcStages s(frame, dpr::test::random_triangles(2 * count, 0.5F, 4));
     s.list_pairs();
     const std::vector<cl_uint> faces = s.bin.pair_face.download(), tiles = s.bin.pair_tile.download(),
-                               order = s.bin.order.download(), face_starts = s.bin.pair_starts.download(),
+                               face_pairs = s.bin.face_pairs.download(),
+                               face_starts = s.bin.pair_starts.download(),
                                tile_starts = s.bin.tile_starts.download();
-    CHECK(std::ranges::is_sorted(faces));
+    CHECK(std::ranges::is_sorted(tiles));
     REQUIRE(face_starts.size() == 2 * count + 1);
     CHECK(face_starts.back() == s.bin.pairs);
     std::size_t wrong = 0;
     for (std::size_t face = 0; face < 2 * count; ++face) {
-      for (cl_uint pair = face_starts[face]; pair < face_starts[face + 1]; ++pair)
-        wrong += faces[pair] != face;
+      for (cl_uint at = face_starts[face]; at < face_starts[face + 1]; ++at) {
+        wrong += faces[face_pairs[at]] != face;
+        if (at > face_starts[face]) wrong += face_pairs[at] <= face_pairs[at - 1];
+      }
     }
     REQUIRE(tile_starts.size() == std::size_t{2} * s.params.tiles_x * s.params.tiles_y + 1);
     CHECK(tile_starts.back() == s.bin.pairs);
     for (std::size_t tile = 0; tile + 1 < tile_starts.size(); ++tile) {
-      for (cl_uint at = tile_starts[tile]; at < tile_starts[tile + 1]; ++at) {
-        wrong += tiles[order[at]] != tile;
-        if (at > tile_starts[tile]) wrong += order[at] <= order[at - 1];
+      for (cl_uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
+        wrong += tiles[pair] != tile;
+        if (pair > tile_starts[tile]) wrong += faces[pair] <= faces[pair - 1];
       }
     }
     CHECK(wrong == 0);

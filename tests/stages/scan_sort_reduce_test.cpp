@@ -103,10 +103,10 @@ std::vector<float> reduce(const Reduction& r) {
   poison(values, std::max<std::size_t>(r.values.size(), 1));
   values.upload(device_impl(), r.values);
   poison(sums, r.channels * r.segments);
-  operation(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values, sums);
+  const dpr::Summation what{r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values};
+  operation(what, sums);
   std::vector<float> found = sums.download();
-  CHECK(operation.read(r.values.size() / r.channels, r.channels, r.segments, r.stride, starts, values) ==
-        found);
+  CHECK(operation.read({what, what}) == std::vector<std::vector<float>>{found, found});
   return found;
 }
 
@@ -246,6 +246,6 @@ TEST_SUITE("unit") {
     dpr::Reduce operation(device_impl());
     values[7] = dpr::test::k_poison;
     const Buffer<float> poisoned(device_impl(), std::span<const float>(values));
-    CHECK(std::isnan(operation.read(values.size(), 1, 1, 1, on_device(r.starts), poisoned)[0]));
+    CHECK(std::isnan(operation.read({{values.size(), 1, 1, 1, on_device(r.starts), poisoned}})[0][0]));
   }
 }

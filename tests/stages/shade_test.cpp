@@ -255,13 +255,13 @@ ShadeErrors all_errors(const Model& model) {
   }
   for (std::size_t v = 0; v < views; ++v) errors.eye.add(eye_sums[v], totals[v].camera);
   for (std::size_t l = 0; l < m.shade.lights(); ++l) {
-    poison(m.shade.light_channels, dpr::k_light_channels * m.bin.pairs);
+    poison(m.shade.light_channels, m.shade.light_sets() * dpr::k_light_channels * m.bin.pairs);
     m.shade.backward_light(s.inputs(), device_grad, l);
     const std::vector<float> channels = m.shade.light_channels.download();
     std::array<ref::Vec3d, 4> sums{};  // position, diffuse, specular, ambient
     for (std::size_t k = 0; k < dpr::k_light_channels; ++k) {
       for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
-        sums[k / 3][k % 3] += number(channels[k * m.bin.pairs + pair]);
+        sums[k / 3][k % 3] += number(channels[(l * dpr::k_light_channels + k) * m.bin.pairs + pair]);
       }
     }
     ref::PointLight wanted{{}, {}, {}};
