@@ -1,6 +1,9 @@
 #include "resident_memory.hpp"
 
 #include <sys/resource.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <fstream>
 #include <string>
@@ -8,6 +11,9 @@
 namespace dpr::bench {
 
 void reset_peak_resident_bytes() {
+#ifdef __GLIBC__
+  malloc_trim(0);  // what earlier work has freed is not this one's
+#endif
   std::ofstream("/proc/self/clear_refs") << "5";  // proc(5): sets the peak to what is held
 }
 

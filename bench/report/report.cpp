@@ -118,6 +118,11 @@ std::string curves(std::span<const Json> files, const Axis& axis,
   return index == 0 ? "" : data.str() + "set xlabel " + gnuplot_quote(axis.label) + "\n" + plots.str() + "\n";
 }
 
+/// Long titles have no place on the curves.
+std::string key_place(std::span<const Json> files) {
+  return files.size() > 1 ? "outside bottom center vertical" : "top left";
+}
+
 double median(const Json& timing) { return timing["median"].get<double>(); }
 
 Plot scaling_plot(std::span<const Json> files) {
@@ -133,10 +138,10 @@ Plot scaling_plot(std::span<const Json> files) {
   }
   if (count == 0) return {};
   const int lines = (count + 1) / 2;
-  return {1200, 400 * lines,
+  return {1200, 400 * lines + 60 * static_cast<int>(files.size() - 1),
           "set multiplot layout " + std::to_string(lines) + "," + (count > 1 ? "2" : "1") +
-              "\nset grid\nset logscale xy\nset key top left\nset ylabel 'milliseconds'\n" + panels +
-              "unset multiplot\n"};
+              "\nset grid\nset logscale xy\nset key " + key_place(files) + "\nset ylabel 'milliseconds'\n" +
+              panels + "unset multiplot\n"};
 }
 
 Plot memory_plot(std::span<const Json> files) {
@@ -146,7 +151,9 @@ Plot memory_plot(std::span<const Json> files) {
       {{"device", [](const Json& row) { return row["peak_device_bytes"].get<double>() / k_mebibyte; }},
        {"resident", [](const Json& row) { return row["peak_rss_bytes"].get<double>() / k_mebibyte; }}});
   if (panel.empty()) return {};
-  return {700, 450, "set grid\nset logscale x\nset yrange [0:*]\nset ylabel 'peak memory, MiB'\n" + panel};
+  return {700, 450,
+          "set grid\nset key " + key_place(files) +
+              "\nset logscale x\nset yrange [0:*]\nset ylabel 'peak memory, MiB'\n" + panel};
 }
 
 /// Time of every row that the first file has, one mark a file.
