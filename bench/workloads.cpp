@@ -16,21 +16,41 @@ struct Definition {
   int size;
   float sigma, gamma;
   std::vector<std::uint32_t> samples;
-  bool softras, joint;
+  bool softras, own;  // rows of SoftRas' priors; of the joint composition and of the library's defaults
   unsigned views;
 };
 
+constexpr std::string_view k_sweep = "sweep-";
+
+void add_sweeps(std::vector<Definition>& list) {
+  constexpr float k_sigma = 1e-4F, k_gamma = 1e-3F;
+  for (const unsigned subdivisions : {1U, 2U, 3U, 4U, 5U, 6U, 7U}) {
+    list.push_back({"sweep-triangles", subdivisions, 256, k_sigma, k_gamma, {k_exact}, false, false, 1});
+  }
+  for (const int size : {64, 128, 256, 512, 1024}) {
+    list.push_back({"sweep-pixels", 3, size, k_sigma, k_gamma, {k_exact}, false, false, 1});
+  }
+  list.push_back(
+      {"sweep-samples", 3, 128, k_sigma, k_gamma, {1, 2, 4, 8, 16, 32, 64, 128, 256}, false, false, 1});
+  for (const unsigned views : {1U, 2U, 4U, 8U, 16U, 32U, 64U}) {
+    list.push_back({"sweep-views", 3, 128, k_sigma, k_gamma, {k_exact}, false, false, views});
+  }
+}
+
 const std::vector<Definition>& definitions() {
-  static const std::vector<Definition> list{
-      {"cube128", 0, 128, 1e-3F, 1e-2F, {k_exact, 8, 32, 128}, false, true, 1},
-      {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-      {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-      {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-      {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact}, false, false, 24},
-      {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
-      {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
-      {"million", 8, 1024, 1e-6F, 1e-3F, {k_exact}, false, false, 1}};
-  return list;
+  static const std::vector<Definition> all = [] {
+    std::vector<Definition> list{{"cube128", 0, 128, 1e-3F, 1e-2F, {k_exact, 8, 32, 128}, false, true, 1},
+                                 {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
+                                 {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
+                                 {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
+                                 {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
+                                 {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
+                                 {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
+                                 {"million", 8, 1024, 1e-6F, 1e-3F, {k_exact, 8}, false, true, 1}};
+    add_sweeps(list);
+    return list;
+  }();
+  return all;
 }
 
 Scene make_scene(const Definition& d) {
@@ -61,46 +81,86 @@ std::vector<View> make_views(const Definition& d, const Scene& scene) {
   return views;
 }
 
-}  // namespace
-
-std::vector<std::string_view> workload_names() {
-  std::vector<std::string_view> names;
-  for (const Definition& d : definitions()) names.push_back(d.name);
-  return names;
-}
-
-std::vector<Workload> make_workloads(std::string_view name) {
-  const auto d = std::ranges::find(definitions(), name, &Definition::name);
-  if (d == definitions().end()) {
-    std::string names;
-    for (const std::string_view known : workload_names())
-      names += (names.empty() ? "" : ", ") + std::string(known);
-    throw InvalidArgument("workload", "'" + std::string(name) + "'", "one of " + names);
-  }
-  std::vector<Workload> list;
-  const Scene scene = make_scene(*d);
-  const auto add = [&](const std::string& preset, const Smoothing& smoothing) {
-    list.push_back({std::string(name), preset, scene, make_views(*d, scene)});
-    list.back().scene.smoothing = smoothing;
-  };
-  for (const std::uint32_t samples : d->samples) {
-    Smoothing smoothing = scene.smoothing;
+std::vector<Variant> make_variants(const Definition& d, const Smoothing& published) {
+  std::vector<Variant> list;
+  for (const std::uint32_t samples : d.samples) {
+    Smoothing smoothing = published;
     if (samples != k_exact) {
       smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
       smoothing.samples = samples;
     }
-    add("gaussian", smoothing);
+    list.push_back({"gaussian", smoothing});
   }
-  if (d->softras) {
-    Smoothing smoothing = scene.smoothing;
+  if (d.softras) {
+    Smoothing smoothing = published;
     smoothing.occupancy_prior = Prior::logistic;
     smoothing.depth_prior = Prior::gumbel;
-    add("softras", smoothing);
+    list.push_back({"softras", smoothing});
   }
-  if (d->joint) {
-    Smoothing smoothing = scene.smoothing;
+  if (d.own) {
+    Smoothing smoothing = published;
     smoothing.composition = Composition::joint;
-    add("gaussian", smoothing);
+    list.push_back({"gaussian", smoothing});
+    // The scales are the scene's; all else is the library's choice.
+    Smoothing defaults;
+    defaults.sigma = d.sigma;
+    defaults.gamma = d.gamma;
+    list.push_back({"default", defaults});
+  }
+  return list;
+}
+
+std::vector<std::string_view> names_where(bool sweeps) {
+  std::vector<std::string_view> names;
+  for (const Definition& d : definitions()) {
+    if (d.name.starts_with(k_sweep) != sweeps) continue;
+    if (names.empty() || names.back() != d.name) names.push_back(d.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string_view> workload_names() { return names_where(false); }
+std::vector<std::string_view> sweep_names() { return names_where(true); }
+
+std::string_view describe(std::string_view name) {
+  struct Line {
+    std::string_view name, text;
+  };
+  static constexpr Line k_lines[] = {
+      {"cube128", "coloured cube, 12 triangles, 128x128; exact, M = 8, 32, 128"},
+      {"sphere64", "1,280 triangles, 64x64; exact, M = 8, 32, SoftRas"},
+      {"sphere128", "the same, 128x128"},
+      {"sphere256", "the same, 256x256"},
+      {"views24", "sphere128 from 24 cameras in one batch"},
+      {"sphere20k", "20,480 triangles, 256x256; exact, M = 8"},
+      {"sphere80k", "81,920 triangles, 512x512; exact, M = 8"},
+      {"million", "1,310,720 triangles, 1024x1024; exact, M = 8"},
+      {"sweep-triangles", "spheres of 80 to 327,680 triangles, 256x256, exact"},
+      {"sweep-pixels", "1,280 triangles, 64x64 to 1024x1024, exact"},
+      {"sweep-samples", "sphere128, M = 1 to 256"},
+      {"sweep-views", "sphere128, exact, 1 to 64 views in a batch"}};
+  const auto* const line = std::ranges::find(k_lines, name, &Line::name);
+  return line == std::end(k_lines) ? std::string_view() : line->text;
+}
+
+void require_workload(std::string_view name) {
+  std::string names;
+  for (const Definition& d : definitions()) {
+    if (d.name == name) return;
+    if (!names.ends_with(d.name)) names += (names.empty() ? "" : ", ") + std::string(d.name);
+  }
+  throw InvalidArgument("workload", "'" + std::string(name) + "'", "one of " + names);
+}
+
+std::vector<Workload> make_workloads(std::string_view name) {
+  require_workload(name);
+  std::vector<Workload> list;
+  for (const Definition& d : definitions()) {
+    if (d.name != name) continue;
+    const Scene scene = make_scene(d);
+    list.push_back({std::string(name), scene, make_views(d, scene), make_variants(d, scene.smoothing)});
   }
   return list;
 }

@@ -1,4 +1,5 @@
-// The benchmark workloads by name: the published program's scenes and settings, and the library's own.
+// The benchmark workloads by name: the published program's scenes and settings, the library's own, and
+// sweeps.
 #pragma once
 
 #include <string>
@@ -10,19 +11,31 @@
 
 namespace dpr::bench {
 
-/// One row of the results: a scene rendered one way.
-struct Workload {
-  std::string name;    ///< "sphere256"
-  std::string preset;  ///< "gaussian" or "softras": the priors
-  Scene scene;
-  std::vector<View> views;  ///< one, or a batch
+/// One way in which a workload is rendered.
+struct Variant {
+  std::string preset;  ///< "gaussian" and "softras": the priors; "default": what Smoothing{} says
+  Smoothing smoothing;
 };
 
-/// The names that make_workloads knows, small scenes first.
-std::vector<std::string_view> workload_names();
+/// A scene, its views, and every way in which it is measured: estimators, samples, priors, compositions.
+struct Workload {
+  std::string name;  ///< "sphere256"
+  Scene scene;
+  std::vector<View> views;  ///< one, or a batch
+  std::vector<Variant> variants;
+};
 
-/// Every way in which a workload is measured: estimators, samples, priors, compositions. Throws
-/// InvalidArgument for an unknown name.
+/// The names of the fixed workloads, small scenes first, and of the sweeps: of one thing, all else fixed.
+std::vector<std::string_view> workload_names();
+std::vector<std::string_view> sweep_names();
+
+/// What a workload is, in a line.
+std::string_view describe(std::string_view name);
+
+/// Throws InvalidArgument for a name that is none of them.
+void require_workload(std::string_view name);
+
+/// The scenes of a name: one, or those of a sweep. Throws InvalidArgument for an unknown name.
 std::vector<Workload> make_workloads(std::string_view name);
 
 }  // namespace dpr::bench

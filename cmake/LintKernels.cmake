@@ -1,5 +1,6 @@
 # Compiles every kernel with clang as strict OpenCL C 1.2, in every width, and fails with all that it reports.
-# Arguments: CLANG, the compiler (or ...-NOTFOUND); KERNELS, the folder.
+# Arguments: CLANG, the compiler (or ...-NOTFOUND); KERNELS, the folder, whose headers
+# are included; MORE_KERNELS, another one.
 if(NOT CLANG)
   message(STATUS "skipped: no clang")
   return()
@@ -8,7 +9,7 @@ endif()
 set(flags -x cl -cl-std=CL1.2 -Xclang -finclude-default-header -fsyntax-only
           -Wall -Wextra -Wdouble-promotion -Werror -I ${KERNELS})
 set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16)
-file(GLOB sources ${KERNELS}/*.cl)
+file(GLOB sources ${KERNELS}/*.cl ${MORE_KERNELS}/*.cl)
 set(failures 0)
 foreach(source IN LISTS sources)
   foreach(options IN LISTS option_sets)

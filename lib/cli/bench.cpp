@@ -1,135 +1,103 @@
-// dpr bench: times forward and backward passes over the workloads.
-#include <sys/resource.h>
-
-#include <algorithm>
-#include <chrono>
+// dpr bench: measures the workloads, compares files of results, draws them.
 #include <cstdio>
 #include <memory>
 
+#include "cli/bench_measure.hpp"
 #include "cli/commands.hpp"
-#include "cli/json.hpp"
-#include "dpr/loss.hpp"
-#include "dpr/renderer.hpp"
-#include "workloads.hpp"
+#include "compare.hpp"
+#include "dpr/error.hpp"
+#include "report/report.hpp"
 
 namespace dpr::cli {
 namespace {
 
-constexpr int k_results_schema = 1;
-
 struct BenchOptions {
-  std::vector<std::string> workloads;
-  std::string output;
-  unsigned repetitions = 15;
+  BenchMeasureOptions measure;
+  std::vector<std::string> compared, files;
+  std::string report;
 };
 
-/// Median and quartiles, milliseconds.
-Json to_json(std::vector<double> milliseconds) {
-  std::ranges::sort(milliseconds);
-  const std::size_t n = milliseconds.size();
-  return {{"median", milliseconds[n / 2]},
-          {"q1", milliseconds[n / 4]},
-          {"q3", milliseconds[std::min(n - 1, 3 * n / 4)]},
-          {"n", n}};
+void run_compare(const BenchOptions& options, const CommonOptions& common) {
+  const Json comparison =
+      bench::compare(bench::read_results(options.compared[0]), bench::read_results(options.compared[1]));
+  if (!common.quiet) std::printf("%s", bench::to_lines(comparison).c_str());
+  if (!options.measure.output.empty()) write_json(options.measure.output, comparison);
 }
 
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-std::size_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
-}
-
-/// Forward: until the image is on the host. Backward: loss, and every gradient of the scene on the host.
-Json measure(const Device& device, const bench::Workload& workload, unsigned repetitions) {
-  Renderer renderer(device);
-  renderer.set_scene(workload.scene);
-  renderer.set_views(workload.views);
-  const std::vector<Image> targets(workload.views.size(),
-                                   Image(workload.scene.width, workload.scene.height, glm::vec4(0.3F)));
-  ImageLoss loss(device, LossWeights::only(LossKind::mse), targets);
-  std::vector<double> forward, backward;
-  for (unsigned i = 0; i <= repetitions; ++i) {  // the first warms up: kernels are compiled, buffers grow
-    const auto start = std::chrono::steady_clock::now();
-    renderer.forward();
-    for (std::size_t view = 0; view < workload.views.size(); ++view) renderer.image(view);
-    const double forward_ms = milliseconds_since(start);
-    const auto middle = std::chrono::steady_clock::now();
-    loss.evaluate(renderer);
-    renderer.backward(loss);
-    if (i == 0) continue;
-    forward.push_back(forward_ms);
-    backward.push_back(milliseconds_since(middle));
+void run_report(const BenchOptions& options, const CommonOptions& common) {
+  if (options.files.empty()) {
+    throw InvalidArgument("files (command line)", "none", "one or more files of results after --report DIR");
   }
-  const Smoothing& smoothing = workload.scene.smoothing;
-  const bool exact = smoothing.aggregation_estimator == Estimator::exact;
-  const RenderStatistics statistics = renderer.statistics();
-  return {{"workload", workload.name},
-          {"preset", workload.preset},
-          {"composition", to_string(smoothing.composition)},
-          {"estimator", to_string(smoothing.aggregation_estimator)},
-          {"samples", exact ? 0 : smoothing.samples},
-          {"forward_ms", to_json(forward)},
-          {"backward_ms", to_json(backward)},
-          {"fragments", statistics.fragments},
-          {"peak_device_bytes", statistics.device_bytes},
-          {"peak_rss_bytes", peak_resident_bytes()},
-          {"status", "ok"},
-          {"reason", ""}};
-}
-
-void print(const Json& result) {
-  std::printf("%-10s %-8s %-7s %-11s %4u   forward %9.2f ms   backward %9.2f ms   %9zu fragments\n",
-              result["workload"].get<std::string>().c_str(), result["preset"].get<std::string>().c_str(),
-              result["composition"].get<std::string>().c_str(),
-              result["estimator"].get<std::string>().c_str(), result["samples"].get<unsigned>(),
-              result["forward_ms"]["median"].get<double>(), result["backward_ms"]["median"].get<double>(),
-              result["fragments"].get<std::size_t>());
-  std::fflush(stdout);
+  std::vector<Json> results;
+  for (const std::string& file : options.files) results.push_back(bench::read_results(file));
+  for (const std::string& picture : bench::write_report(options.report, results)) {
+    if (!common.quiet) std::printf("%s\n", picture.c_str());
+  }
 }
 
 void run(const BenchOptions& options, const CommonOptions& common) {
-  const Device device = open_device(common);
-  const DeviceInfo& info = device.info();
-  Json results = Json::array();
-  for (const std::string& name : options.workloads) {
-    for (const bench::Workload& workload : bench::make_workloads(name)) {
-      results.push_back(measure(device, workload, options.repetitions));
-      if (!common.quiet) print(results.back());
+  if (!options.compared.empty()) return run_compare(options, common);
+  if (!options.report.empty()) return run_report(options, common);
+  if (!options.files.empty()) {
+    throw InvalidArgument("files (command line)", "\"" + options.files.front() + "\"",
+                          "none without --report");
+  }
+  run_bench(options.measure, common);
+}
+
+/// What --help says after the options.
+std::string footer() {
+  std::string text = "Workloads:\n";
+  for (const auto& names : {bench::workload_names(), bench::sweep_names()}) {
+    for (const std::string_view name : names) {
+      const std::string pad(18 - name.size(), ' ');
+      text += "  " + std::string(name) + pad + std::string(bench::describe(name)) + "\n";
     }
   }
-  if (options.output.empty()) return;
-  write_json(options.output, {{"schema", k_results_schema},
-                              {"commit", DPR_COMMIT},
-                              {"device",
-                               {{"platform", info.platform},
-                                {"name", info.name},
-                                {"type", info.type},
-                                {"version", info.version},
-                                {"driver", info.driver},
-                                {"compute_units", info.compute_units},
-                                {"lanes", info.lanes}}},
-                              {"results", results}});
+  return text +
+         "--compare calls a row faster or slower where the medians differ by more than 5% and the middle "
+         "halves of the\n"
+         "runs do not overlap; unclear with fewer than 5 runs; the same else.\n"
+         "Example: dpr bench --workload sphere256 -o results.json";
+}
+
+void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
+  command
+      .add_option("--workload", options.workloads,
+                  "What to measure, may be repeated; all but sweeps if left out")
+      ->type_name("NAME");
+  command.add_flag("--sweeps", options.sweeps, "Measure the sweeps too");
+  command
+      .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")
+      ->type_name("NAME");
+  command.add_option("-o,--output", options.output, "Results, or the comparison, as JSON")->type_name("FILE");
+  command
+      .add_option("--repetitions", options.each.repetitions, "Timed runs of each row, after one to warm up")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--max-seconds", options.each.max_seconds, "A slow row stops repeating after that")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
 }
 
 }  // namespace
 
 void add_bench_command(CLI::App& application, CommonOptions& common) {
-  CLI::App* command = application.add_subcommand("bench", "Measures forward and backward passes");
+  CLI::App* command = application.add_subcommand(
+      "bench", "Measures forward and backward passes, compares results, draws them");
   const auto options = std::make_shared<BenchOptions>();
-  for (const std::string_view name : bench::workload_names()) options->workloads.emplace_back(name);
-  command->add_option("--workload", options->workloads,
-                      "Workload to measure, may be repeated; all if left out");
-  command->add_option("-o,--output", options->output, "Results as JSON");
-  command->add_option("--repetitions", options->repetitions, "Timed runs of each, after one to warm up")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_measure_options(*command, options->measure);
+  auto* compare =
+      command->add_option("--compare", options->compared, "Two files of results, the earlier first")
+          ->expected(2)
+          ->type_name("A.json B.json");
+  command->add_option("--report", options->report, "Folder for plots of the files of results that follow")
+      ->type_name("DIR")
+      ->excludes(compare);
+  command->add_option("files", options->files, "Files of results, for --report")->type_name("R.json");
   command->add_option("--device", common.device, "cpu, gpu, an index or a part of the name");
   add_output_options(*command, common);
-  command->footer("Example: dpr bench --workload sphere256 -o results.json");
+  command->footer(footer());
   command->callback([options, &common] { run(*options, common); });
 }
 

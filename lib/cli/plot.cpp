@@ -8,19 +8,13 @@
 
 #include <fstream>
 #include <limits>
+#include <sstream>
 
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {
-
-/// A string of gnuplot's: in single quotes, which are doubled inside.
-std::string quote(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? "''" : std::string(1, c);
-  return quoted + "'";
-}
 
 void write_data(std::ostream& script, std::size_t index, const std::vector<double>& x,
                 const std::vector<double>& y) {
@@ -34,11 +28,12 @@ void write_panel(std::ostream& script, const Panel& panel, const std::vector<dou
   for (const Curve& curve : panel.curves) {
     write_data(script, index, x, curve.y);
     if (&curve != &panel.curves.front()) command += ", ";
-    command += "$data" + std::to_string(index) + " with lines linewidth 2 title " + quote(curve.title);
+    command +=
+        "$data" + std::to_string(index) + " with lines linewidth 2 title " + gnuplot_quote(curve.title);
     ++index;
   }
   script << (panel.log_scale ? "set" : "unset") << " logscale y\n"
-         << "set ylabel " << quote(panel.y_label) << "\n"
+         << "set ylabel " << gnuplot_quote(panel.y_label) << "\n"
          << command << "\n";
 }
 
@@ -62,27 +57,40 @@ int run_gnuplot(const std::string& script) {
 
 }  // namespace
 
-bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
-          const std::vector<Panel>& panels) {
+std::string gnuplot_quote(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? "''" : std::string(1, c);
+  return quoted + "'";
+}
+
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& script) {
   const TemporaryFile script_file(std::filesystem::path(file).replace_extension(".gp"));
   TemporaryFile picture(file);
-  std::ofstream script(script_file.path());
-  script.precision(std::numeric_limits<double>::max_digits10);
-  script << "set terminal pngcairo size 900," << 260 * panels.size() << "\n"
-         << "set output " << quote(picture.path().string()) << "\n"
-         << "set multiplot layout " << panels.size() << ",1\n"
-         << "set grid\nset lmargin 12\nset format y '%g'\nset xlabel " << quote(x_label) << "\n";
-  std::size_t index = 0;
-  for (const Panel& panel : panels) write_panel(script, panel, x, index);
-  script << "unset multiplot\n";
-  script.close();
-  if (!script) throw IoError(file, "the script for gnuplot cannot be written");
+  std::ofstream stream(script_file.path());
+  stream << "set terminal pngcairo noenhanced size " << width << ',' << height << "\n"
+         << "set output " << gnuplot_quote(picture.path().string()) << "\n"
+         << script;
+  stream.close();
+  if (!stream) throw IoError(file, "the script for gnuplot cannot be written");
 
   const int status = run_gnuplot(script_file.path().string());
   if (status < 0) return false;
   if (status > 0) throw IoError(file, "gnuplot failed with status " + std::to_string(status));
   picture.commit();
   return true;
+}
+
+bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
+          const std::vector<Panel>& panels) {
+  constexpr int k_width = 900, k_panel_height = 260;
+  std::ostringstream script;
+  script.precision(std::numeric_limits<double>::max_digits10);
+  script << "set multiplot layout " << panels.size() << ",1\n"
+         << "set grid\nset lmargin 12\nset format y '%g'\nset xlabel " << gnuplot_quote(x_label) << "\n";
+  std::size_t index = 0;
+  for (const Panel& panel : panels) write_panel(script, panel, x, index);
+  script << "unset multiplot\n";
+  return draw(file, k_width, k_panel_height * static_cast<int>(panels.size()), script.str());
 }
 
 }  // namespace dpr::cli

@@ -1,4 +1,4 @@
-// Line plots by way of gnuplot.
+// Plots by way of gnuplot.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +19,14 @@ struct Panel {
   std::vector<Curve> curves;
 };
 
-/// Draws the panels below each other over a common x into a PNG file. Returns false, having done nothing,
-/// where no gnuplot is installed. Throws IoError if gnuplot fails.
+/// A string of gnuplot's: in single quotes, which are doubled inside.
+std::string gnuplot_quote(const std::string& text);
+
+/// Runs a script that draws into a PNG file of that many pixels: terminal and output are set before it.
+/// Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot fails.
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& script);
+
+/// Draws the panels below each other over a common x into a PNG file; else as draw().
 bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
           const std::vector<Panel>& panels);
 

@@ -15,6 +15,8 @@
 
 namespace dpr {
 
+class Profile;
+
 /// Throws DeviceError unless `code` is CL_SUCCESS. `where` is the call, or the kernel with its sizes.
 inline void check_cl(int code, std::string_view where) {
   if (code != CL_SUCCESS) throw DeviceError(code, std::string(where));
@@ -25,6 +27,7 @@ struct Device::Impl {
   cl::Context context;
   cl::CommandQueue queue;
   DeviceInfo info;
+  Profile* profile = nullptr;  ///< where launches are timed
 
   /// The program of one kernel file, built once for each set of options. Throws BuildError.
   const cl::Program& program(std::string_view kernel_file, const std::string& options);

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "device/buffer.hpp"
+#include "device/profile.hpp"
 #include "shared_types.h"
 
 namespace dpr {
@@ -95,7 +96,7 @@ template <class... Args>
 class Kernel {
  public:
   Kernel(Device::Impl& device, std::string_view file, const char* name, const std::string& options = "")
-      : device_(&device), name_(name) {
+      : device_(&device), file_(file), name_(name) {
     int error = CL_SUCCESS;
     kernel_ = cl::Kernel(device.program(file, build_options(device, options)), name, &error);
     check_cl(error, "clCreateKernel " + name_);
@@ -111,17 +112,20 @@ class Kernel {
     (check_cl(detail::Argument<Args>::set(kernel_, index++, args), "clSetKernelArg " + name_), ...);
     const std::size_t local = device_->local_size();
     const std::size_t global = (range.count + local - 1) / local * local;
-    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NDRange(range.first),
-                                                          cl::NDRange(global), cl::NDRange(local));
+    cl::Event finished;
+    const int error = device_->queue.enqueueNDRangeKernel(
+        kernel_, cl::NDRange(range.first), cl::NDRange(global), cl::NDRange(local), nullptr,
+        device_->profile != nullptr ? &finished : nullptr);
     if (error != CL_SUCCESS) {
       throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) +
                                    " work-items in groups of " + std::to_string(local));
     }
+    if (device_->profile != nullptr) device_->profile->record(file_, name_, finished);
   }
 
  private:
   Device::Impl* device_;
-  std::string name_;
+  std::string file_, name_;
   cl::Kernel kernel_;
 };
 

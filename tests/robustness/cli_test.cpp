@@ -1,20 +1,19 @@
 // The command when something is wrong: its exit status, one line on stderr, and no output left behind. Runs
 // where the environment variable DPR_CLI names the command.
 #include <doctest/doctest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
+#include "support/command.hpp"
 #include "support/messages.hpp"
-#include "support/reduced.hpp"
-#include "support/temp_dir.hpp"
 
+using dpr::test::is_error_line;
+using dpr::test::Outcome;
 using dpr::test::TempDir;
 
 namespace {
@@ -22,51 +21,12 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The command's path, or empty where it cannot be run.
-std::string command_path() {
-  const char* path = std::getenv("DPR_CLI");
-  if (path == nullptr || dpr::test::reduced(1, 0) == 0) return {};
-  return path;
-}
-
-/// A word of a shell's command line.
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) {
-    if (c == '\'') {
-      text += "'\\''";
-    } else {
-      text += c;
-    }
-  }
-  return text + "'";
-}
-
-struct Outcome {
-  int status = -1;
-  std::string out, err;
-};
+std::string command_path() { return dpr::test::program_path("DPR_CLI"); }
 
 /// Runs the command in the folder. `environment` is NAME=VALUE or empty.
 Outcome run(const TempDir& folder, const std::vector<std::string>& arguments,
             const std::string& environment = "") {
-  const TempDir streams;
-  std::string line = "cd " + quoted(folder.path().string()) + " && env " +
-                     (environment.empty() ? "" : quoted(environment) + " ") + quoted(command_path());
-  for (const std::string& argument : arguments) line += " " + quoted(argument);
-  line +=
-      " >" + quoted((streams / "out").string()) + " 2>" + quoted((streams / "err").string()) + " </dev/null";
-  const int result = std::system(line.c_str());
-  Outcome outcome;
-  if (WIFEXITED(result)) outcome.status = WEXITSTATUS(result);
-  outcome.out = streams.read("out");
-  outcome.err = streams.read("err");
-  return outcome;
-}
-
-/// "dpr: error: WHAT (WHERE): got ..., expected ...": one line and nothing else.
-bool is_error_line(const std::string& text) {
-  return text.starts_with("dpr: error: ") && text.size() > 13 && text.ends_with('\n') &&
-         std::ranges::count(text, '\n') == 1;
+  return dpr::test::run_program(command_path(), folder, arguments, environment);
 }
 
 /// A mesh, a scene that shows it, and an image of another size than the scene's.

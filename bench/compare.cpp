@@ -1,0 +1,105 @@
+#include "compare.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace dpr::bench {
+namespace {
+
+constexpr double k_least_change = 1.05;
+constexpr unsigned k_least_runs = 5;
+
+double ratio(const Json& first, const Json& second) {
+  return second["median"].get<double>() / first["median"].get<double>();
+}
+
+Json compare_timings(const Json& first, const Json& second) {
+  return {{"a_ms", first["median"]},
+          {"b_ms", second["median"]},
+          {"ratio", ratio(first, second)},
+          {"verdict", verdict(first, second)}};
+}
+
+Json where_from(const Json& results) {
+  return {{"commit", results["commit"]}, {"device", results["device"]}};
+}
+
+std::map<std::string, const Json*> measured_rows(const Json& results) {
+  std::map<std::string, const Json*> rows;
+  for (const Json& row : results["results"]) {
+    if (is_measured(row)) rows.emplace(row_name(row), &row);
+  }
+  return rows;
+}
+
+/// The names in the order of the file.
+Json names_without_partner(const Json& results, const std::map<std::string, const Json*>& others) {
+  Json names = Json::array();
+  for (const Json& row : results["results"]) {
+    if (is_measured(row) && !others.contains(row_name(row))) names.push_back(row_name(row));
+  }
+  return names;
+}
+
+std::string line(const char* format, const std::string& name, const Json& timing) {
+  char text[160];
+  std::snprintf(text, sizeof text, format, name.c_str(), timing["a_ms"].get<double>(),
+                timing["b_ms"].get<double>(), timing["ratio"].get<double>(),
+                timing["verdict"].get<std::string>().c_str());
+  return text;
+}
+
+}  // namespace
+
+std::string verdict(const Json& first, const Json& second) {
+  const double change = ratio(first, second);
+  if (std::fmax(change, 1 / change) <= k_least_change) return "same";
+  for (const Json* timing : {&first, &second}) {
+    if ((*timing)["n"].get<unsigned>() < k_least_runs) return "unclear";
+  }
+  if (second["q3"].get<double>() < first["q1"].get<double>()) return "faster";
+  return second["q1"].get<double>() > first["q3"].get<double>() ? "slower" : "same";
+}
+
+Json compare(const Json& a, const Json& b) {
+  const auto in_a = measured_rows(a), in_b = measured_rows(b);
+  Json rows = Json::array();
+  for (const Json& row : a["results"]) {
+    const auto partner = in_b.find(row_name(row));
+    if (!is_measured(row) || partner == in_b.end()) continue;
+    rows.push_back({{"row", row_name(row)},
+                    {"forward", compare_timings(row["forward_ms"], (*partner->second)["forward_ms"])},
+                    {"backward", compare_timings(row["backward_ms"], (*partner->second)["backward_ms"])}});
+  }
+  return {{"a", where_from(a)},
+          {"b", where_from(b)},
+          {"rows", rows},
+          {"only_in_a", names_without_partner(a, in_b)},
+          {"only_in_b", names_without_partner(b, in_a)}};
+}
+
+std::string to_lines(const Json& comparison) {
+  std::string text;
+  for (const char* const side : {"a", "b"}) {
+    text += std::string(side) + ": " + comparison[side]["commit"].get<std::string>() + ", " +
+            comparison[side]["device"]["name"].get<std::string>() + "\n";
+  }
+  std::map<std::string, unsigned> verdicts;
+  for (const Json& row : comparison["rows"]) {
+    for (const char* const pass : {"forward", "backward"}) {
+      const std::string name = row["row"].get<std::string>() + ", " + pass;
+      text += line("%-58s %10.3f ms %10.3f ms  x %5.2f  %s\n", name, row[pass]);
+      ++verdicts[row[pass]["verdict"].get<std::string>()];
+    }
+  }
+  for (const char* const side : {"a", "b"}) {
+    for (const Json& name : comparison["only_in_" + std::string(side)]) {
+      text += "only in " + std::string(side) + ": " + name.get<std::string>() + "\n";
+    }
+  }
+  for (const auto& [name, count] : verdicts) text += std::to_string(count) + " " + name + "  ";
+  return text + "\n";
+}
+
+}  // namespace dpr::bench

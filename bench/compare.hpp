@@ -1,0 +1,24 @@
+// Two results files against each other.
+#pragma once
+
+#include <string>
+
+#include "results_file.hpp"
+
+namespace dpr::bench {
+
+/// What two timings {"median", "q1", "q3", "n"} say of each other. "faster" or "slower" (the second than the
+/// first) if the medians differ by more than 5% and the middle halves of the runs do not overlap: the
+/// second's q3 lies below the first's q1, or its q1 above the first's q3. "unclear" if the medians differ by
+/// more than 5% but either timing has fewer than 5 runs, whose quartiles say little. "same" else.
+std::string verdict(const Json& first, const Json& second);
+
+/// {"a", "b": provenance; "rows": [{"row", "forward", "backward": {"a_ms", "b_ms", "ratio", "verdict"}}],
+/// "only_in_a", "only_in_b": row names}. A ratio is second to first. Rows that were not measured in one of
+/// the files count as not in it.
+Json compare(const Json& a, const Json& b);
+
+/// The comparison as lines of text, with the number of rows of each verdict at the end.
+std::string to_lines(const Json& comparison);
+
+}  // namespace dpr::bench

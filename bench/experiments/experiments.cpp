@@ -1,0 +1,46 @@
+// The list of the experiments, and what they share.
+#include <cstdio>
+
+#include "cli/plot.hpp"
+#include "dpr/error.hpp"
+#include "experiment.hpp"
+
+namespace dpr::experiments {
+
+void run_operators(const Settings& settings);
+void run_gradient_noise(const Settings& settings);
+void run_gallery(const Settings& settings);
+void run_estimators(const Settings& settings);
+
+std::span<const Experiment> experiments() {
+  static constexpr Experiment k_experiments[] = {
+      {"operators", "The smoothed Heaviside and arg-max, and their derivatives, for each prior (Figure 8)",
+       run_operators},
+      {"gradient-noise", "The operators' gradients as M samples estimate them, and their spread (Figure 3)",
+       run_gradient_noise},
+      {"gallery", "Renders for growing sigma and gamma, each composition (Figure 2)", run_gallery},
+      {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators}};
+  return k_experiments;
+}
+
+void announce(const Settings& settings, const std::string& file) {
+  if (!settings.quiet) std::printf("%s\n", (settings.folder / file).c_str());
+}
+
+void write_data(const Settings& settings, const std::string& name, const Json& data) {
+  Json file{{"experiment", name}};
+  file.update(bench::provenance(settings.device));
+  file["smoke"] = settings.smoke;
+  file.update(data);
+  cli::write_json(settings.folder / (name + ".json"), file);
+  announce(settings, name + ".json");
+}
+
+void draw_figure(const Settings& settings, const std::string& name, int width, int height,
+                 const std::string& script) {
+  const std::filesystem::path file = settings.folder / (name + ".png");
+  if (!cli::draw(file, width, height, script)) throw IoError(file, "gnuplot is not installed");
+  announce(settings, name + ".png");
+}
+
+}  // namespace dpr::experiments

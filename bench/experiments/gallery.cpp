@@ -1,0 +1,109 @@
+// The paper's Figure 2: what growing sigma and gamma do to an image, for each composition.
+#include <memory>
+#include <sstream>
+
+#include "cli/plot.hpp"
+#include "dpr/image.hpp"
+#include "dpr/renderer.hpp"
+#include "experiment.hpp"
+#include "scene/temporary_file.hpp"
+
+namespace dpr::experiments {
+namespace {
+
+constexpr float k_sigmas[] = {1e-5F, 1e-4F, 1e-3F, 1e-2F};
+constexpr float k_gammas[] = {1e-4F, 1e-3F, 1e-2F, 1e-1F};  // rows, from the top
+constexpr const char* k_presets[] = {"softras", "barrier", "joint_gaussian"};
+constexpr int k_gap = 2;
+
+Smoothing make_smoothing(const std::string& preset, float sigma, float gamma) {
+  Smoothing smoothing = preset == "barrier" ? Smoothing{} : smoothing_preset(preset);
+  if (smoothing.blur_radius) *smoothing.blur_radius *= sigma / smoothing.sigma;
+  smoothing.sigma = sigma;
+  smoothing.gamma = gamma;
+  return smoothing;
+}
+
+/// Colours as they are seen over the background.
+Image opaque(Image image) {
+  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
+  return image;
+}
+
+/// Rows below each other; all of one width.
+Image vstack(const std::vector<Image>& rows) {
+  Image sheet;
+  sheet.width = rows.front().width;
+  for (const Image& row : rows) {
+    if (sheet.height > 0) {
+      sheet.pixels.insert(sheet.pixels.end(), static_cast<std::size_t>(k_gap * sheet.width), glm::vec4(1));
+      sheet.height += k_gap;
+    }
+    sheet.pixels.insert(sheet.pixels.end(), row.pixels.begin(), row.pixels.end());
+    sheet.height += row.height;
+  }
+  return sheet;
+}
+
+Image contact_sheet(const Device& device, Scene scene, const std::string& preset) {
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  std::vector<Image> rows;
+  for (const float gamma : k_gammas) {
+    std::vector<Image> row;
+    for (const float sigma : k_sigmas) {
+      renderer.set_smoothing(make_smoothing(preset, sigma, gamma));
+      renderer.forward();
+      row.push_back(opaque(renderer.image()));
+    }
+    rows.push_back(hstack(row, k_gap));
+  }
+  return vstack(rows);
+}
+
+/// Labels in the middle of tiles.
+std::string tics(std::span<const float> values, int size, bool from_top) {
+  std::ostringstream text;
+  const int count = static_cast<int>(values.size());
+  for (int i = 0; i < count; ++i) {
+    const int tile = from_top ? count - 1 - i : i;
+    text << (i > 0 ? ", '" : "('") << values[static_cast<std::size_t>(i)] << "' "
+         << tile * (size + k_gap) + size / 2;
+  }
+  return text.str() + ")";
+}
+
+}  // namespace
+
+void run_gallery(const Settings& settings) {
+  const int size = settings.smoke ? 24 : 128;
+  Scene scene;
+  scene.width = scene.height = size;
+  scene.background = glm::vec3(0.15F);
+  scene.meshes.push_back({make_cube()});
+  scene.camera = orbit_camera(/*distance=*/5.0F, /*elevation_degrees=*/30.0F, /*azimuth_degrees=*/35.0F);
+  std::ostringstream script;
+  script << "set multiplot layout 1," << std::size(k_presets)
+         << "\nset size ratio -1\nunset key\nset tics out nomirror\n"
+         << "set xlabel 'sigma'\nset ylabel 'gamma'\nset xtics " << tics(k_sigmas, size, false)
+         << "\nset ytics " << tics(k_gammas, size, true) << "\n";
+  std::vector<std::unique_ptr<TemporaryFile>> sheets;
+  Json means = Json::object();
+  for (const char* const preset : k_presets) {
+    const Image sheet = contact_sheet(settings.device, scene, preset);
+    sheets.push_back(std::make_unique<TemporaryFile>(settings.folder / "sheet.png"));
+    write_image(sheets.back()->path(), sheet);
+    script << "set title " << cli::gnuplot_quote(preset) << "\nplot [0:" << sheet.width
+           << "][0:" << sheet.height << "] " << cli::gnuplot_quote(sheets.back()->path().string())
+           << " binary filetype=png with rgbimage\n";
+    glm::dvec3 sum(0);
+    for (const glm::vec4& pixel : sheet.pixels) sum += glm::dvec3(pixel);
+    means[preset] = cli::to_json(sum / static_cast<double>(sheet.pixels.size()));
+  }
+  write_data(settings, "gallery",
+             {{"sigmas", k_sigmas}, {"gammas", k_gammas}, {"size", size}, {"mean_color_of_sheet", means}});
+  const int tile = 4 * (size + k_gap);
+  draw_figure(settings, "gallery", 3 * (tile + 130), tile + 110, script.str() + "unset multiplot\n");
+}
+
+}  // namespace dpr::experiments

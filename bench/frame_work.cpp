@@ -1,0 +1,124 @@
+#include "frame_work.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "renderer_impl.hpp"
+
+namespace dpr::bench {
+namespace {
+
+// The Gaussian rule, as kernels/quadrature.h has it.
+constexpr double k_reach = 9.5;                         // DPR_BARRIER_REACH
+constexpr std::size_t k_crowd = 6, k_throng = 40;       // DPR_CROWD, DPR_THRONG
+constexpr double k_nodes = 16, k_crowd_nodes = 32;      // DPR_BARRIER_NODES, DPR_CROWD_NODES
+constexpr double k_joint_reach = 9.6;                   // DPR_JOINT_BELOW + DPR_JOINT_ABOVE
+constexpr double k_step = 0.67, k_crowd_step = 0.335;   // DPR_JOINT_STEP, DPR_JOINT_CROWD_STEP
+constexpr double k_block = 16;                          // DPR_NODE_LANES
+constexpr double k_opaque = 1e-9, k_negligible = 1e-8;  // DPR_OPAQUE, DPR_NEGLIGIBLE
+
+/// The fragments of a frame, on the host.
+struct Fragments {
+  std::vector<cl_uint> starts, list;
+  std::vector<float> depth, log_occupancy, occupancy;
+
+  explicit Fragments(const Renderer::Impl& r)
+      : starts(r.rasterize.pixel_starts.download()),
+        list(r.rasterize.list.download()),
+        depth(r.rasterize.depth.download()),
+        log_occupancy(r.occupancy.log_occupancy.download()),
+        occupancy(r.occupancy.occupancy.download()) {}
+
+  std::span<const cl_uint> pixel(std::size_t i) const {
+    return std::span(list).subspan(starts[i], starts[i + 1] - starts[i]);
+  }
+  bool is_there(cl_uint k) const { return log_occupancy[k] > DPR_LOG_ZERO; }
+};
+
+struct Evaluations {
+  double forward = 0, backward = 0;
+};
+
+double present(const Fragments& f, std::span<const cl_uint> run) {
+  return static_cast<double>(std::ranges::count_if(run, [&](cl_uint k) { return f.is_there(k); }));
+}
+
+/// Barrier: all slots within reach of the largest beta, at the nodes that their number asks for.
+Evaluations barrier_pixel(const Fragments& f, std::span<const cl_uint> run, const Smoothing& s,
+                          const Camera& camera) {
+  const auto beta = [&](cl_uint k) {
+    const double zeta = (static_cast<double>(camera.zfar) - f.depth[k]) / (camera.zfar - camera.znear);
+    return zeta / s.gamma + static_cast<double>(f.log_occupancy[k]) / s.alpha;
+  };
+  double largest = static_cast<double>(s.background_depth / s.gamma);
+  const double background = largest;
+  for (const cl_uint k : run) largest = f.is_there(k) ? std::max(largest, beta(k)) : largest;
+  std::size_t crowd = background > largest - k_reach ? 1 : 0;
+  for (const cl_uint k : run) crowd += f.is_there(k) && beta(k) > largest - k_reach ? 1U : 0U;
+  const double nodes = (crowd > k_crowd ? k_crowd_nodes : k_nodes) * (crowd > k_throng ? 2 : 1);
+  return {nodes * static_cast<double>(crowd), nodes * static_cast<double>(crowd)};
+}
+
+/// Joint: front to back, clusters of two and more at nodes that cover their depths.
+Evaluations joint_pixel(const Fragments& f, std::span<const cl_uint> run, const Smoothing& s,
+                        const Camera& camera) {
+  const double scale = 1.0 / (static_cast<double>(camera.zfar - camera.znear) * static_cast<double>(s.gamma));
+  Evaluations sum;
+  double transparency = 1;
+  for (std::size_t first = 0; first < run.size() && transparency > k_opaque;) {
+    std::size_t last = first + 1;
+    const auto depth = [&](std::size_t i) { return static_cast<double>(f.depth[run[i]]); };
+    while (last < run.size() && (depth(last) - depth(last - 1)) * scale < k_joint_reach) ++last;
+    const double span = (depth(last - 1) - depth(first)) * scale + k_joint_reach;
+    const double step = last - first > k_crowd ? k_crowd_step : k_step;
+    const double nodes = std::ceil(span / (step * k_block)) * k_block;
+    for (std::size_t i = first; i < last; ++i) {
+      const double p = static_cast<double>(f.occupancy[run[i]]);
+      transparency *= std::max(1 - p, k_opaque);
+      if (last - first < 2) continue;
+      sum.forward += nodes;
+      sum.backward += p < k_negligible ? 0 : nodes;
+    }
+    first = last;
+  }
+  return sum;
+}
+
+Evaluations count_pixel(const Fragments& f, std::span<const cl_uint> run, const Smoothing& s,
+                        const Camera& camera) {
+  if (s.aggregation_estimator == Estimator::monte_carlo) {
+    const double draws = (present(f, run) + 1) * s.samples;
+    return {draws, draws};
+  }
+  if (s.composition == Composition::barrier && s.depth_prior == Prior::gumbel) {
+    return {static_cast<double>(run.size()) + 1, static_cast<double>(run.size()) + 1};  // softmax
+  }
+  if (s.depth_prior != Prior::gaussian) return {};
+  return s.composition == Composition::joint ? joint_pixel(f, run, s, camera)
+                                             : barrier_pixel(f, run, s, camera);
+}
+
+}  // namespace
+
+FrameWork count_work(const Renderer& renderer) {
+  const Renderer::Impl& r = renderer.impl();
+  r.require_forward("count_work");
+  const std::size_t pixels_per_view = std::size_t{r.frame.width} * r.frame.height;
+  FrameWork work;
+  work.pairs = static_cast<double>(r.bin.pairs);
+  work.fragments = static_cast<double>(r.rasterize.listed_fragments);
+  work.padded = static_cast<double>(r.rasterize.fragments);
+  work.pixels = static_cast<double>(pixels_per_view * r.views.size());
+  const Fragments f(r);
+  for (std::size_t i = 0; i < pixels_per_view * r.views.size(); ++i) {
+    const std::span<const cl_uint> run = f.pixel(i);
+    if (run.empty()) continue;
+    const Evaluations pixel = count_pixel(f, run, r.scene.smoothing, r.views[i / pixels_per_view].camera);
+    work.forward_evaluations += pixel.forward;
+    work.backward_evaluations += pixel.backward;
+  }
+  return work;
+}
+
+}  // namespace dpr::bench

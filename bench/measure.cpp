@@ -1,0 +1,193 @@
+#include "measure.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <span>
+
+#include "costs.hpp"
+#include "device/context.hpp"
+#include "dpr/loss.hpp"
+#include "resident_memory.hpp"
+#include "stages.hpp"
+
+namespace dpr::bench {
+namespace {
+
+constexpr unsigned k_profiled_runs = 5;
+constexpr double k_giga = 1e9, k_milli = 1e-3;
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// A renderer of a row, and the loss whose gradient goes backward.
+struct Row {
+  Row(const Device& device, const Workload& workload, const Variant& variant)
+      : renderer(device), loss(device, LossWeights::only(LossKind::mse), targets(workload)) {
+    Scene scene = workload.scene;
+    scene.smoothing = variant.smoothing;
+    renderer.set_scene(scene);
+    renderer.set_views(workload.views);
+  }
+
+  /// Until the images are on the host.
+  void forward() {
+    renderer.forward();
+    for (std::size_t view = 0; view < renderer.views().size(); ++view) renderer.image(view);
+  }
+
+  /// The loss, and every gradient of the scene, on the host.
+  void backward() {
+    loss.evaluate(renderer);
+    renderer.backward(loss);
+  }
+
+  static std::vector<Image> targets(const Workload& workload) {
+    const Image grey(workload.scene.width, workload.scene.height, glm::vec4(0.3F));
+    return std::vector<Image>(workload.views.size(), grey);
+  }
+
+  Renderer renderer;
+  ImageLoss loss;
+};
+
+/// Stops repeating after a number of runs or a time.
+class Budget {
+ public:
+  Budget(unsigned runs, double seconds) : runs_(runs), seconds_(seconds) {}
+  bool next() {
+    if (done_ == runs_ || (done_ > 0 && k_milli * milliseconds_since(start_) > seconds_)) return false;
+    ++done_;
+    return true;
+  }
+
+ private:
+  unsigned runs_, done_ = 0;
+  double seconds_;
+  Clock::time_point start_ = Clock::now();
+};
+
+void measure_passes(Row& row, const MeasureOptions& options, Json& result) {
+  std::vector<double> forward, backward;
+  Budget budget(options.repetitions, options.max_seconds);
+  while (budget.next()) {
+    const auto start = Clock::now();
+    row.forward();
+    forward.push_back(milliseconds_since(start));
+    const auto middle = Clock::now();
+    row.backward();
+    backward.push_back(milliseconds_since(middle));
+  }
+  result["forward_ms"] = quartiles(forward);
+  result["backward_ms"] = quartiles(backward);
+}
+
+using StageRuns = std::map<std::string, std::vector<double>>;
+
+void append(const std::map<std::string, double>& run, std::size_t index, StageRuns& all) {
+  for (const auto& [stage, milliseconds] : run) {
+    all[stage].resize(index + 1);
+    all[stage][index] = milliseconds;
+  }
+}
+
+double median(std::vector<double> values) {
+  return values.empty() ? 0.0 : quartiles(std::move(values))["median"].get<double>();
+}
+
+void add_rates(const StageCost& cost, double milliseconds, const Peaks& peaks, Json& stage) {
+  if (milliseconds <= 0) return;
+  const Cost total = cost.forward + cost.backward;
+  stage["gflops"] = total.flops / (k_milli * milliseconds) / k_giga;
+  stage["gbytes_per_s"] = total.bytes / (k_milli * milliseconds) / k_giga;
+  stage["fraction_of_peak"] = stage["gflops"].get<double>() / peaks.gflops;
+  stage["fraction_of_bandwidth"] = stage["gbytes_per_s"].get<double>() / peaks.gbytes_per_s;
+}
+
+void measure_stages(Row& row, const Device& device, const Peaks& peaks, const MeasureOptions& options,
+                    Json& result) {
+  StageRuns forward, backward;
+  {
+    Profile profile(device);
+    Budget budget(std::min(options.repetitions, k_profiled_runs), options.max_seconds);
+    for (std::size_t run = 0; budget.next(); ++run) {
+      row.forward();
+      append(milliseconds_by_stage(profile.take()), run, forward);
+      row.backward();
+      append(milliseconds_by_stage(profile.take()), run, backward);
+    }
+  }
+  const FrameWork work = count_work(row.renderer);
+  Json& stages = result["stages"] = Json::object();
+  for (const std::string_view name : k_stages) {
+    const std::string stage(name);
+    if (!forward.contains(stage) && !backward.contains(stage)) continue;
+    const double forward_ms = median(forward[stage]), backward_ms = median(backward[stage]);
+    stages[stage] = {{"forward_ms", forward_ms}, {"backward_ms", backward_ms}};
+    if (const auto cost = stage_cost(stage, work, row.renderer.scene().smoothing)) {
+      add_rates(*cost, forward_ms + backward_ms, peaks, stages[stage]);
+    }
+  }
+}
+
+Json describe_row(const Workload& workload, const Variant& variant) {
+  const Smoothing& s = variant.smoothing;
+  const bool exact = s.occupancy_estimator == Estimator::exact && s.aggregation_estimator == Estimator::exact;
+  return {{"workload", workload.name},
+          {"preset", variant.preset},
+          {"composition", to_string(s.composition)},
+          {"estimator", to_string(exact ? Estimator::exact : Estimator::monte_carlo)},
+          {"samples", exact ? 0 : s.samples},
+          {"seed", s.seed},
+          {"triangles", workload.scene.meshes[0].mesh.faces.size()},
+          {"width", workload.scene.width},
+          {"height", workload.scene.height},
+          {"views", workload.views.size()}};
+}
+
+void measure_into(Json& result, const Device& device, const Peaks& peaks, const Workload& workload,
+                  const Variant& variant, const MeasureOptions& options) {
+  Device::Impl& impl = device.impl();
+  impl.peak_allocated_bytes = impl.allocated_bytes;
+  reset_peak_resident_bytes();
+  Row row(device, workload, variant);
+  row.forward();  // kernels are compiled, buffers grow
+  row.backward();
+  measure_passes(row, options, result);
+  const std::size_t device_bytes = device.peak_allocated_bytes(), resident_bytes = peak_resident_bytes();
+  measure_stages(row, device, peaks, options, result);
+  result["fragments"] = row.renderer.statistics().fragments;
+  result["peak_device_bytes"] = device_bytes;
+  result["peak_rss_bytes"] = resident_bytes;
+}
+
+}  // namespace
+
+Json quartiles(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  return {{"median", values[n / 2]}, {"q1", values[n / 4]}, {"q3", values[3 * n / 4]}, {"n", n}};
+}
+
+Json measure(const Device& device, const Peaks& peaks, const Workload& workload, const Variant& variant,
+             const MeasureOptions& options) {
+  const Json row = describe_row(workload, variant);
+  Json result = row;
+  std::string reason;
+  try {
+    measure_into(result, device, peaks, workload, variant, options);
+  } catch (const Error& error) {
+    reason = error.what();
+  } catch (const std::bad_alloc&) {
+    reason = "the host's memory is full";
+  }
+  if (!reason.empty()) result = row;
+  result["status"] = reason.empty() ? "ok" : "failed";
+  result["reason"] = reason;
+  return result;
+}
+
+}  // namespace dpr::bench

@@ -1,0 +1,23 @@
+// Times a workload: wall clock of the passes, device time of the stages, memory.
+#pragma once
+
+#include "peaks.hpp"
+#include "provenance.hpp"
+#include "workloads.hpp"
+
+namespace dpr::bench {
+
+struct MeasureOptions {
+  unsigned repetitions = 15;  ///< timed runs of a row, after one to warm up
+  double max_seconds = 30;    ///< a slow row stops repeating after that; at least one run is timed
+};
+
+/// One row of the results, as INTERFACES of the results file have it. A row that fails or does not fit is a
+/// row too: its "status" is "failed", "reason" says why, and there are no figures.
+Json measure(const Device& device, const Peaks& peaks, const Workload& workload, const Variant& variant,
+             const MeasureOptions& options);
+
+/// {"median", "q1", "q3", "n"}; at least one value.
+Json quartiles(std::vector<double> values);
+
+}  // namespace dpr::bench

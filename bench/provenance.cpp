@@ -1,0 +1,21 @@
+#include "provenance.hpp"
+
+#include "device/kernel.hpp"
+
+namespace dpr::bench {
+
+Json provenance(const Device& device) {
+  const DeviceInfo& info = device.info();
+  return {{"commit", DPR_COMMIT},
+          {"device",
+           {{"platform", info.platform},
+            {"name", info.name},
+            {"type", info.type},
+            {"version", info.version},
+            {"driver", info.driver},
+            {"compute_units", info.compute_units},
+            {"lanes", info.lanes}}},
+          {"build_options", build_options(device.impl())}};
+}
+
+}  // namespace dpr::bench

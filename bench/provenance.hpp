@@ -1,0 +1,14 @@
+// What a file of results says about where they come from.
+#pragma once
+
+#include "cli/json.hpp"
+#include "dpr/device.hpp"
+
+namespace dpr::bench {
+
+using cli::Json;
+
+/// {"commit", "device": {...}, "build_options"}.
+Json provenance(const Device& device);
+
+}  // namespace dpr::bench

@@ -1,0 +1,209 @@
+#include "report/report.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <set>
+#include <sstream>
+
+#include "cli/plot.hpp"
+#include "cli/pose_report.hpp"
+#include "dpr/error.hpp"
+#include "stages.hpp"
+
+namespace dpr::bench {
+namespace {
+
+using cli::gnuplot_quote;
+
+/// A plot's size in pixels and its script; none where there are no rows for it.
+struct Plot {
+  int width = 0, height = 0;
+  std::string script;
+};
+
+std::vector<const Json*> rows_where(const Json& results, const std::function<bool(const Json&)>& wanted) {
+  std::vector<const Json*> rows;
+  for (const Json& row : results["results"]) {
+    if (is_measured(row) && wanted(row)) rows.push_back(&row);
+  }
+  return rows;
+}
+
+bool is_sweep(const Json& row) { return row["workload"].get<std::string>().starts_with("sweep-"); }
+
+/// What a legend calls a file: its device, and its commit where there are several files.
+std::string label_of(const Json& results, std::size_t files) {
+  const std::string device = results["device"]["name"].get<std::string>();
+  return files > 1 ? device + ", " + results["commit"].get<std::string>() : device;
+}
+
+double stage_ms(const Json& row, const std::string& stage) {
+  if (!row["stages"].contains(stage)) return 0;
+  const Json& times = row["stages"][stage];
+  return times["forward_ms"].get<double>() + times["backward_ms"].get<double>();
+}
+
+/// Horizontal bars, one a row, each 100% long: milliseconds differ by five orders of magnitude and stand
+/// beside.
+Plot stage_plot(const Json& results) {
+  const auto rows =
+      rows_where(results, [](const Json& row) { return row.contains("stages") && !is_sweep(row); });
+  if (rows.empty()) return {};
+  std::ostringstream script;
+  script << "$data << EOD\n";
+  for (const Json* row : rows) {
+    double sum = 0;
+    for (const std::string_view stage : k_stages) sum += stage_ms(*row, std::string(stage));
+    std::ostringstream label;
+    label.precision(3);
+    label << row_name(*row) << ", " << total_ms(*row) << " ms";
+    script << '"' << label.str() << '"';
+    double end = 0;
+    for (const std::string_view stage : k_stages) {
+      script << ' ' << end;
+      end += sum > 0 ? 100 * stage_ms(*row, std::string(stage)) / sum : 0;
+      script << ' ' << end;
+    }
+    script << '\n';
+  }
+  constexpr int k_row_height = 20, k_margins = 130, k_width = 1300;
+  script << "EOD\nset yrange [" << rows.size() << ":-1]\nset xrange [0:100]\n"
+         << "set xlabel 'device time by stage, forward and backward, %'\n"
+         << "set style fill solid 0.9 noborder\nset key outside top center horizontal\nset lmargin 58\n"
+         << "set palette defined (0 '#4477aa', 1 '#66ccee', 2 '#228833', 3 '#ccbb44', 4 '#ee6677', 5 "
+            "'#aa3377')\n"
+         << "unset colorbox\nplot ";
+  const std::size_t count = std::size(k_stages);
+  for (std::size_t i = 0; i < count; ++i) {
+    script << (i > 0 ? ", " : "") << "$data using " << 2 * i + 2 << ":0:" << 2 * i + 2 << ':' << 2 * i + 3
+           << ":($0-0.4):($0+0.4):yticlabels(1) with boxxyerror lc palette frac "
+           << static_cast<double>(i) / static_cast<double>(count - 1) << " title "
+           << gnuplot_quote(std::string(k_stages[i]));
+  }
+  script << '\n';
+  return {k_width, k_margins + k_row_height * static_cast<int>(rows.size()), script.str()};
+}
+
+/// What a sweep varies, and how its axis is called.
+struct Axis {
+  const char *workload, *label;
+  double (*value)(const Json& row);
+};
+
+const Axis k_axes[] = {
+    {"sweep-triangles", "triangles", [](const Json& row) { return row["triangles"].get<double>(); }},
+    {"sweep-pixels", "pixels",
+     [](const Json& row) { return row["width"].get<double>() * row["height"].get<double>(); }},
+    {"sweep-samples", "samples", [](const Json& row) { return row["samples"].get<double>(); }},
+    {"sweep-views", "views", [](const Json& row) { return row["views"].get<double>(); }}};
+
+/// One curve a file and figure, over an axis; empty where no file has the sweep.
+std::string curves(std::span<const Json> files, const Axis& axis,
+                   const std::vector<std::pair<std::string, std::function<double(const Json&)>>>& figures) {
+  std::ostringstream data, plots;
+  std::size_t index = 0;
+  for (const Json& file : files) {
+    const auto rows = rows_where(file, [&](const Json& row) { return row["workload"] == axis.workload; });
+    if (rows.empty()) continue;
+    for (const auto& [name, figure] : figures) {
+      data << "$" << axis.label << index << " << EOD\n";
+      for (const Json* row : rows) data << axis.value(*row) << ' ' << figure(*row) << '\n';
+      data << "EOD\n";
+      const std::string title = files.size() > 1 ? name + ", " + label_of(file, files.size()) : name;
+      plots << (index > 0 ? ", " : "plot ") << "$" << axis.label << index
+            << " with linespoints lw 2 pt 7 title " << gnuplot_quote(title);
+      ++index;
+    }
+  }
+  return index == 0 ? "" : data.str() + "set xlabel " + gnuplot_quote(axis.label) + "\n" + plots.str() + "\n";
+}
+
+/// Long titles have no place on the curves.
+std::string key_place(std::span<const Json> files) {
+  return files.size() > 1 ? "outside bottom center vertical" : "top left";
+}
+
+double median(const Json& timing) { return timing["median"].get<double>(); }
+
+Plot scaling_plot(std::span<const Json> files) {
+  std::string panels;
+  int count = 0;
+  for (const Axis& axis : k_axes) {
+    const std::string panel =
+        curves(files, axis,
+               {{"forward", [](const Json& row) { return median(row["forward_ms"]); }},
+                {"backward", [](const Json& row) { return median(row["backward_ms"]); }}});
+    panels += panel;
+    count += panel.empty() ? 0 : 1;
+  }
+  if (count == 0) return {};
+  const int lines = (count + 1) / 2;
+  return {1200, 400 * lines + 60 * static_cast<int>(files.size() - 1),
+          "set multiplot layout " + std::to_string(lines) + "," + (count > 1 ? "2" : "1") +
+              "\nset grid\nset logscale xy\nset key " + key_place(files) + "\nset ylabel 'milliseconds'\n" +
+              panels + "unset multiplot\n"};
+}
+
+Plot memory_plot(std::span<const Json> files) {
+  constexpr double k_mebibyte = 1024.0 * 1024.0;
+  const std::string panel = curves(
+      files, k_axes[2],
+      {{"device", [](const Json& row) { return row["peak_device_bytes"].get<double>() / k_mebibyte; }},
+       {"resident", [](const Json& row) { return row["peak_rss_bytes"].get<double>() / k_mebibyte; }}});
+  if (panel.empty()) return {};
+  return {700, 450,
+          "set grid\nset key " + key_place(files) +
+              "\nset logscale x\nset yrange [0:*]\nset ylabel 'peak memory, MiB'\n" + panel};
+}
+
+/// Time of every row that the first file has, one mark a file.
+Plot device_plot(std::span<const Json> files) {
+  if (files.size() < 2) return {};
+  std::vector<std::string> names;
+  for (const Json* row : rows_where(files[0], [](const Json& r) { return !is_sweep(r); })) {
+    names.push_back(row_name(*row));
+  }
+  if (names.empty()) return {};
+  std::ostringstream data, plots;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    data << "$file" << i << " << EOD\n";
+    for (const Json* row : rows_where(files[i], [](const Json&) { return true; })) {
+      const auto name = std::ranges::find(names, row_name(*row));
+      if (name != names.end())
+        data << total_ms(*row) << ' ' << name - names.begin() << " \"" << *name << "\"\n";
+    }
+    data << "EOD\n";
+    plots << (i > 0 ? ", " : "plot ") << "$file" << i
+          << " using 1:2:yticlabels(3) with points pt 7 ps 1.2 title "
+          << gnuplot_quote(label_of(files[i], files.size()));
+  }
+  constexpr int k_row_height = 20, k_margins = 130, k_width = 1200;
+  return {k_width, k_margins + k_row_height * static_cast<int>(names.size()),
+          data.str() + "set grid\nset logscale x\nset lmargin 48\nset key outside top center\nset yrange [" +
+              std::to_string(names.size()) + ":-1]\nset xlabel 'forward and backward, milliseconds'\n" +
+              plots.str() + "\n"};
+}
+
+}  // namespace
+
+std::vector<std::string> write_report(const std::filesystem::path& folder, std::span<const Json> results) {
+  const std::pair<const char*, Plot> plots[] = {{"stages.png", stage_plot(results.front())},
+                                                {"scaling.png", scaling_plot(results)},
+                                                {"memory.png", memory_plot(results)},
+                                                {"devices.png", device_plot(results)}};
+  if (std::ranges::all_of(plots, [](const auto& plot) { return plot.second.script.empty(); })) {
+    throw InvalidArgument("results (report)", "no measured rows", "rows of the workloads, or of --sweeps");
+  }
+  cli::make_folder(folder);
+  std::vector<std::string> written;
+  for (const auto& [name, plot] : plots) {
+    if (plot.script.empty()) continue;
+    const std::filesystem::path file = folder / name;
+    if (!cli::draw(file, plot.width, plot.height, plot.script))
+      throw IoError(file, "gnuplot is not installed");
+    written.push_back(file.string());
+  }
+  return written;
+}
+
+}  // namespace dpr::bench

@@ -1,0 +1,109 @@
+// The experiments in small: each runs, leaves its figure, and its numbers are what theory says where theory
+// says it.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "cli/json.hpp"
+#include "scene/json_node.hpp"
+#include "support/command.hpp"
+
+using dpr::cli::Json;
+using dpr::test::TempDir;
+
+namespace {
+
+/// Runs one; its numbers, or null where it cannot be run.
+Json run(const TempDir& folder, const std::string& name) {
+  const std::string program = dpr::test::program_path("DPR_EXPERIMENTS");
+  if (program.empty()) {
+    MESSAGE("skipped: DPR_EXPERIMENTS is not set, or DPR_TEST_REDUCED is");
+    return {};
+  }
+  const auto outcome = dpr::test::run_program(program, folder, {name, "--smoke", "-o", "out"});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.status == 0);
+  CHECK(std::filesystem::file_size(folder / ("out/" + name + ".png")) > 1000);
+  CHECK(std::filesystem::directory_iterator(folder / "out") != std::filesystem::directory_iterator());
+  return Json(dpr::read_json(folder / ("out/" + name + ".json")));
+}
+
+double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
+double normal_density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::acos(-1.0)); }
+
+}  // namespace
+
+TEST_SUITE("bench-smoke") {
+  TEST_CASE(
+      "operators: the Heaviside curves are the priors' distribution functions, and weights are softmax") {
+    const TempDir folder;
+    const Json data = run(folder, "operators");
+    if (data.is_null()) return;
+    CHECK(data["heaviside"].size() == 5);
+    CHECK(data["arg_max"].size() >= 4);
+    for (std::size_t i = 0; i < data["x"].size(); ++i) {
+      const auto x = data["x"][i].get<double>();
+      const auto figure = [&](const char* op, const char* prior, const char* kind) {
+        return data[op][prior][kind][i].get<double>();
+      };
+      CAPTURE(x);
+      CHECK(figure("heaviside", "gaussian", "value") == doctest::Approx(normal_cdf(x)).epsilon(1e-4));
+      CHECK(std::fabs(figure("heaviside", "gaussian", "derivative") - normal_density(x)) < 1e-4);
+      const double logistic = 1 / (1 + std::exp(-x));
+      CHECK(figure("heaviside", "logistic", "value") == doctest::Approx(logistic).epsilon(1e-4));
+      CHECK(std::fabs(figure("heaviside", "logistic", "derivative") - logistic * (1 - logistic)) < 1e-4);
+      const double softmax = std::exp(x) / (std::exp(x) + 1 + std::exp(-2.0));
+      CHECK(figure("arg_max", "gumbel", "value") == doctest::Approx(softmax).epsilon(1e-3));
+      CHECK(std::fabs(figure("arg_max", "gumbel", "derivative") - softmax * (1 - softmax)) < 1e-3);
+    }
+  }
+
+  TEST_CASE("gradient-noise: means agree with the exact derivative, and more samples spread less") {
+    const TempDir folder;
+    const Json data = run(folder, "gradient-noise");
+    if (data.is_null()) return;
+    const double repeats = data["repeats"].get<double>();
+    for (const Json& op : data["operators"]) {
+      CHECK(op["estimates"].size() >= 2);
+      for (const auto& [name, rows] : op["estimates"].items()) {
+        CAPTURE(name);
+        const double few = rows["deviation"].front().get<double>(),
+                     many = rows["deviation"].back().get<double>();
+        CHECK(many < few);
+        const double error = std::fabs(rows["mean"].back().get<double>() - op["exact"].get<double>());
+        CHECK(error < 4 * many / std::sqrt(repeats));
+      }
+    }
+  }
+
+  TEST_CASE("gallery: every composition is drawn, and none is black") {
+    const TempDir folder;
+    const Json data = run(folder, "gallery");
+    if (data.is_null()) return;
+    CHECK(data["mean_color_of_sheet"].size() == 3);
+    for (const auto& [name, mean] : data["mean_color_of_sheet"].items()) {
+      CAPTURE(name);
+      CHECK(mean[0].get<double>() > 0.15);
+    }
+  }
+
+  TEST_CASE("estimators: every row has its figures, errors fall with M, and there is a winner") {
+    const TempDir folder;
+    const Json data = run(folder, "estimators");
+    if (data.is_null()) return;
+    CHECK(data["rows"].size() >= 8);
+    for (std::size_t i = 0; i + 1 < data["rows"].size(); ++i) {
+      const Json &row = data["rows"][i], &next = data["rows"][i + 1];
+      CHECK(row["gradient_cost"].get<double>() ==
+            doctest::Approx(std::pow(row["gradient_error"].get<double>(), 2) *
+                            row["milliseconds"].get<double>()));
+      if (row["estimate"] == next["estimate"] && row["scene"] == next["scene"] &&
+          row["member"] == next["member"]) {
+        CHECK(next["image_error"].get<double>() < row["image_error"].get<double>());
+      }
+    }
+    CHECK(data["ranking"].front()["estimate"] == data["winner"]);
+    CHECK(data["ranking"].front()["gradient_cost_relative"].get<double>() <= 1);
+  }
+}

@@ -1,0 +1,64 @@
+// Runs a program of this project as a user would: in a folder, with arguments, and looks at what it printed.
+#pragma once
+
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "support/reduced.hpp"
+#include "support/temp_dir.hpp"
+
+namespace dpr::test {
+
+/// The path that an environment variable names, or empty where programs cannot be run.
+inline std::string program_path(const char* variable) {
+  const char* path = std::getenv(variable);
+  if (path == nullptr || is_reduced()) return {};
+  return path;
+}
+
+/// A word of a shell's command line.
+inline std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) {
+    if (c == '\'') {
+      text += "'\\''";
+    } else {
+      text += c;
+    }
+  }
+  return text + "'";
+}
+
+struct Outcome {
+  int status = -1;
+  std::string out, err;
+};
+
+/// Runs a program in the folder. `environment` is NAME=VALUE or empty.
+inline Outcome run_program(const std::string& program, const TempDir& folder,
+                           const std::vector<std::string>& arguments, const std::string& environment = "") {
+  const TempDir streams;
+  std::string line = "cd " + quoted(folder.path().string()) + " && env " +
+                     (environment.empty() ? "" : quoted(environment) + " ") + quoted(program);
+  for (const std::string& argument : arguments) line += " " + quoted(argument);
+  line +=
+      " >" + quoted((streams / "out").string()) + " 2>" + quoted((streams / "err").string()) + " </dev/null";
+  const int result = std::system(line.c_str());
+  Outcome outcome;
+  if (WIFEXITED(result)) outcome.status = WEXITSTATUS(result);
+  outcome.out = streams.read("out");
+  outcome.err = streams.read("err");
+  return outcome;
+}
+
+/// "dpr: error: WHAT (WHERE): got ..., expected ...": one line and nothing else.
+inline bool is_error_line(const std::string& text) {
+  return text.starts_with("dpr: error: ") && text.size() > 13 && text.ends_with('\n') &&
+         std::ranges::count(text, '\n') == 1;
+}
+
+}  // namespace dpr::test
