@@ -1,4 +1,5 @@
-// A pixel's run of the fragment lists, and what aggregation reads of a fragment.
+// A pixel's run of the fragment lists, what aggregation reads of a fragment, and the slots that the exact estimator makes
+// of them.
 #ifndef DPR_PIXEL_H
 #define DPR_PIXEL_H
 
@@ -54,6 +55,42 @@ static inline float run_coverage(const Fragments f, uint first, uint last) {
 static inline float alpha_sensitivity(const Fragments f, uint fragment, float transparency) {
   return f.occupancy[fragment] * transparency / fragment_transparency(f, fragment);
 }
+
+/// What the slots of a pixel have in common in the barrier composition.
+typedef struct {
+  uint first, last;     // the pixel's run of the fragment lists
+  float nearest;        // view depth of the nearest fragment
+  float depth_scale;    // d beta / d (nearest - depth)
+  float inverse_alpha;
+  float background;     // beta of the background slot
+} BarrierPixel;
+
+static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
+                                              global const ViewParams* restrict views,
+                                              global const uint* restrict starts, const Fragments f) {
+  global const ViewParams* view = views + pixel / p.pixels_per_view;
+  BarrierPixel q;
+  q.first = starts[pixel];
+  q.last = starts[pixel + 1];
+  q.nearest = INFINITY;
+  for (uint i = q.first; i < q.last; ++i) q.nearest = min(q.nearest, f.depth[f.list[i]]);
+  q.depth_scale = view->inverse_range / p.gamma;
+  q.inverse_alpha = 1.0f / p.alpha;
+  q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
+  return q;
+}
+
+/// b / gamma, eq. (7): relative to the pixel's nearest fragment, since zeta / gamma itself would waste its bits.
+static inline float barrier_beta(const BarrierPixel q, float depth, float log_occupancy) {
+  return (q.nearest - depth) * q.depth_scale + log_occupancy * q.inverse_alpha;
+}
+
+/// Slots whose integral is to be evaluated: all of a pixel that count, or a cluster.
+typedef struct {
+  global Slot* slot;
+  uint count;
+  float covering;  // joint: the sum of their occupancies
+} Slots;
 
 /// What a pixel adds to the gradients of gamma, alpha and the background colour, which had that weight in it.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,

@@ -27,6 +27,9 @@ using float4 = cl_float4;
 /// millionths of a pixel at 4096x4096.
 #define DPR_MIN_AREA 1e-12f
 
+/// The fragment of a slot that is the background.
+#define DPR_BACKGROUND_SLOT 0xffffffffu
+
 /// Priors, in the order of dpr::Prior.
 #define DPR_GAUSSIAN 0
 #define DPR_CAUCHY 1
@@ -131,6 +134,15 @@ typedef struct AggregateParams {
   uint first_view; /* of the batch that names the noise */
   uint unused;
 } AggregateParams;
+
+/// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward pass.
+typedef struct Slot {
+  DPR_SHARED_NAME(Slot)
+  float beta;      /* relative to the largest of its pixel (barrier) or to the nearest of its cluster (joint) */
+  float occupancy; /* joint composition */
+  float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
+  uint fragment;   /* or DPR_BACKGROUND_SLOT */
+} Slot;
 
 /// Weights of the losses, and the sizes to average over.
 typedef struct LossParams {

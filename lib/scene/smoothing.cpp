@@ -182,13 +182,6 @@ void validate(const Smoothing& smoothing) {
                  smoothing.composition);
   validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
                  smoothing.composition);
-  if (smoothing.depth_prior == Prior::uniform) {
-    throw InvalidArgument("depth_prior (smoothing)", "uniform", "gaussian, cauchy, logistic or gumbel");
-  }
-  if (smoothing.composition == Composition::joint && smoothing.depth_prior == Prior::cauchy) {
-    throw InvalidArgument("depth_prior (smoothing)", "cauchy with the joint composition",
-                          "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
-  }
 }
 
 float blur_radius(const Smoothing& smoothing) {

@@ -64,9 +64,12 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   const Range pixels = in.rasterize.pixels(in.p);
   Rasterize& r = in.rasterize;
   if (exact_) {
+    slots_.resize(device_, r.listed_fragments + a.pixels);
+    slot_counts_.resize(device_, a.pixels);
     if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
     exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, image);
+                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_,
+                    image);
   } else {
     sampled_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                       in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
@@ -86,9 +89,9 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
   const Rasterize& r = in.rasterize;
   if (exact_) {
     exact_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, grad_image,
-                     grad_depth, grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue,
-                     channels);
+                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_,
+                     slot_counts_, grad_image, grad_depth, grad_log_occupancy, grad_color.red,
+                     grad_color.green, grad_color.blue, channels);
   } else {
     sampled_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                        in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
@@ -98,7 +101,7 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
 }
 
 std::size_t Aggregate::bytes() const {
-  std::size_t bytes = image.capacity_bytes();
+  std::size_t bytes = image.capacity_bytes() + slots_.capacity_bytes() + slot_counts_.capacity_bytes();
   for (const Buffer<float>* buffer :
        {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue, &channels}) {
     bytes += buffer->capacity_bytes();

@@ -45,12 +45,13 @@ class Aggregate {
  private:
   using ForwardKernel =
       Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-             In<float>, In<float>, In<float>, In<float>, Out<cl_float4>>;
+             In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, Out<cl_uint>, Out<cl_float4>>;
   using BackwardKernel =
       Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-             In<float>, In<float>, In<float>, In<float>, In<cl_float4>, Out<float>, Out<float>, Out<float>,
-             Out<float>, Out<float>, Out<float>>;
-  /// Exact kernels of either composition; the joint one sorts first.
+             In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, In<cl_uint>, In<cl_float4>,
+             Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>;
+  /// Exact kernels of either composition; the joint one sorts first. The forward pass leaves the pixels' slots for the
+  /// backward pass.
   struct Exact {
     Exact(Device::Impl& device, Composition composition, const std::string& options);
     std::optional<Kernel<cl_uint, In<cl_uint>, In<float>, Out<cl_uint>>> sort;
@@ -73,6 +74,8 @@ class Aggregate {
   Device::Impl& device_;
   Smoothing smoothing_;
   std::string built_;
+  Buffer<shared::Slot> slots_;   // [listed fragment + pixel]
+  Buffer<cl_uint> slot_counts_;  // [pixel]
   std::optional<Exact> exact_;
   std::optional<Sampled> sampled_;
 };

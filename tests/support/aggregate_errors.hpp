@@ -82,7 +82,7 @@ inline std::vector<SyntheticPixel> make_pixels(float gamma, unsigned seed) {
   return pixels;
 }
 
-/// Pixels of 300 fragments: coincident, in one heap, far apart.
+/// Pixels of 300 fragments, coincident, in one heap, far apart; and fewer where the rules change their nodes.
 inline std::vector<SyntheticPixel> make_crowds(float gamma, unsigned seed) {
   RandomFloat random(seed);
   std::vector<SyntheticPixel> pixels;
@@ -90,6 +90,12 @@ inline std::vector<SyntheticPixel> make_crowds(float gamma, unsigned seed) {
     pixels.push_back(make_pixel(reduced(300, 20), spread, gamma, Occupancies::any, random));
   }
   pixels.push_back(make_pixel(reduced(300, 20), 5, gamma, Occupancies::decades, random));
+  for (const int count : {reduced(64, 9), reduced(65, 10), reduced(120, 11)}) {
+    for (const float spread : {0.0F, 2.0F}) {
+      pixels.push_back(make_pixel(count, spread, gamma, Occupancies::any, random));
+      pixels.push_back(make_pixel(count, spread, gamma, Occupancies::solid, random));
+    }
+  }
   return pixels;
 }
 

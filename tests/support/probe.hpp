@@ -2,7 +2,9 @@
 #pragma once
 
 #include <initializer_list>
+#include <functional>
 #include <limits>
+#include <set>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -31,15 +33,22 @@ void poison(Buffer<T>& buffer, std::size_t count, const T& value) {
 }
 inline void poison(Buffer<float>& buffer, std::size_t count) { poison(buffer, count, k_poison); }
 
-/// A kernel file without its includes.
-inline std::string header_text(std::string_view name) {
+/// A kernel file with what it includes in place, but for what `included` names: each file once.
+inline std::string header_text(std::string_view name, std::set<std::string, std::less<>>& included) {
+  if (!included.emplace(name).second) return {};
   std::string_view text = kernel_file(name);
+  constexpr std::string_view k_include = "#include \"";
   std::string out;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size() - 1);
     const std::string_view line = text.substr(0, end + 1);
     text.remove_prefix(end + 1);
-    if (!line.starts_with("#include \"")) out += line;
+    if (!line.starts_with(k_include)) {
+      out += line;
+    } else {
+      const std::size_t quote = line.find('"', k_include.size());
+      out += header_text(line.substr(k_include.size(), quote - k_include.size()), included);
+    }
   }
   return out;
 }
@@ -50,7 +59,8 @@ class Probe {
   Probe(std::initializer_list<std::string_view> headers, const std::string& text,
         const std::string& options = "") {
     std::string source;
-    for (const std::string_view header : headers) source += header_text(header);
+    std::set<std::string, std::less<>> included;
+    for (const std::string_view header : headers) source += header_text(header, included);
     Device::Impl& device = device_impl();
     const std::string all_options = build_options(device, options);
     const cl::Program program(device.context, source + text, false);

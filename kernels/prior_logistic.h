@@ -1,0 +1,42 @@
+// The logistic distribution: F = 1 / (1 + exp(-x)) (21), nu' = tanh(z / 2).
+#ifndef DPR_PRIOR_LOGISTIC_H
+#define DPR_PRIOR_LOGISTIC_H
+
+#include "lanes.h"
+
+#define DPR_RULE DPR_RULE_SMOOTH
+/// As in prior_gaussian.h; 1 - F = 5e-7 at the upper end.
+#define DPR_BARRIER_HIGH 14.5f
+#define DPR_BARRIER_HIGH_PER_LOG 1.0f
+#define DPR_BARRIER_LOG_FLOOR 16.0f
+#define DPR_BARRIER_NODES 32
+#define DPR_BARRIER_REACH 26.0f
+#define DPR_JOINT_BELOW 14.0f
+#define DPR_JOINT_ABOVE 14.0f
+#define DPR_JOINT_STEP 0.95f
+#define DPR_JOINT_CROWD_STEP 0.475f
+
+static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
+  const realn e = exp_n(-fabs(x));
+  const realn large = 1.0f / (1.0f + e), small = e * large;
+  *cdf = choose(x < 0.0f, small, large);
+  *density = small * large;
+}
+
+/// A bound from above of ln F(x), negated, and its derivative: -ln F >= max(-x, 0).
+static inline float prior_log_cdf_bound(float x, float* slope) {
+  *slope = x < 0.0f ? 1.0f : 0.0f;
+  return max(-x, 0.0f);
+}
+
+static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
+  const realn e = exp_n(-fabs(x));
+  *log_p = min(x, 0.0f) - log1p(e);
+  *hazard = choose(x < 0.0f, 1.0f / (1.0f + e), e / (1.0f + e));
+}
+
+static inline realn prior_sample(realn u) { return log_n(u) - log_n(1.0f - u); }
+
+static inline realn prior_score(realn z) { return tanh(0.5f * z); }
+
+#endif
