@@ -140,22 +140,27 @@ void Renderer::Impl::forward() {
   bin.forward(frame, setup.triangles);
   rasterize.cover(frame, setup.triangles, bin);
   bands = rasterize.cut(frame, device.memory_budget(), k_fragment_bytes);
-  for (const Band& band : bands) render(band);
+  for (const Band& band : bands) {
+    list_fragments(band);
+    aggregate.forward(aggregate_inputs(), scene.background);
+  }
   rendered = true;
   frame_number = ++frames_rendered;
 }
 
-void Renderer::Impl::render(const Band& band) {
+void Renderer::Impl::list_fragments(const Band& band) {
   rasterize.forward(frame, setup.triangles, bin, band);
   shade.forward(shade_inputs());
   occupancy.forward(frame, bin, rasterize);
-  aggregate.forward(aggregate_inputs(), scene.background);
 }
 
 SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   for (const Band& band : bands) {
-    if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
+    if (bands.size() > 1) {  // the band's fragments have made room for the next one's
+      list_fragments(band);
+      aggregate.prepare(aggregate_inputs());
+    }
     differentiate(grad_images);
   }
   if (is_geometric(wanted)) {

@@ -64,8 +64,8 @@ struct Renderer::Impl {
   ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
-  /// The stages from the fragments on: of a band, and backward of the one rendered last.
-  void render(const Band& band);
+  /// The fragments of a band; and the stages from fragments on backward, for the band listed last.
+  void list_fragments(const Band& band);
   void differentiate(const Buffer<cl_float4>& grad_images);
 
   void read_mesh_gradients(SceneGradient& gradient);

@@ -57,13 +57,20 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   return a;
 }
 
+void Aggregate::prepare(const AggregateInputs& in) {
+  if (!exact_ || !exact_->sort) return;
+  const Range pixels = in.rasterize.pixels(in.p);
+  Rasterize& r = in.rasterize;
+  (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
+}
+
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
+  prepare(in);
   const shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
   const Range pixels = in.rasterize.pixels(in.p);
-  Rasterize& r = in.rasterize;
+  const Rasterize& r = in.rasterize;
   if (exact_) {
-    if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
     exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, image);
   } else {

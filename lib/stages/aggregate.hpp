@@ -29,6 +29,9 @@ class Aggregate {
   /// Builds what the smoothing needs; cheap where that is there already.
   void set_smoothing(const Smoothing& smoothing);
 
+  /// Sorts the lists by depth for the joint composition. Part of forward(); for backward() alone where the
+  /// fragments have been listed again.
+  void prepare(const AggregateInputs& in);
   void forward(const AggregateInputs& in, const glm::vec3& background);
   /// `grad_image` is [view][height][width].
   void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
