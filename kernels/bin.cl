@@ -5,8 +5,10 @@
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge.
 #define DPR_BIN_SLACK 1e-5f
 
-/// False only if no pixel centre of the tile is within the blur distance of the triangle: one of the edges, pushed
-/// out by the blur, has the whole tile outside.
+/// False only if no pixel centre of the tile is within the blur distance of the triangle. Either one of the edges, pushed
+/// out by the blur, has the whole tile outside; or a vertex v is the triangle's nearest point: with n from v to the
+/// nearest point of the tile, further than the blur, and dot(n, y - v) <= 0 for the other vertices y, every point x of
+/// the tile has dot(n, x - y) >= |n|^2, hence |x - y| >= |n|.
 static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
   const float half_extent = 0.5f * (DPR_TILE - 1) * p.pixel_size;
   const float cx = ((float)(tile_x * DPR_TILE) + 0.5f * DPR_TILE - 0.5f * (float)p.width) * p.pixel_size;
@@ -15,8 +17,12 @@ static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile
   const float4 ex = ax.yzxw - ax, ey = ay.yzxw - ay;
   const float4 inside = (ex * (cy - ay) - ey * (cx - ax)) * t.orientation;
   const float4 reach = half_extent * (fabs(ex) + fabs(ey));
-  const float4 blur = (p.blur_distance + DPR_BIN_SLACK) * sqrt(ex * ex + ey * ey);
-  return !any((inside + reach < -blur).xyz);
+  const float blur = p.blur_distance + DPR_BIN_SLACK;
+  if (any((inside + reach < -blur * sqrt(ex * ex + ey * ey)).xyz)) return 0;
+  const float4 nx = clamp(ax, cx - half_extent, cx + half_extent) - ax;
+  const float4 ny = clamp(ay, cy - half_extent, cy + half_extent) - ay;
+  const int4 behind = nx * ex + ny * ey <= 0.0f && nx * ex.zxyw + ny * ey.zxyw >= 0.0f;
+  return !any((behind && nx * nx + ny * ny > blur * blur).xyz);
 }
 
 /// Counts the pairs of every triangle. One work-item per (view, face).

@@ -2,8 +2,8 @@
 #ifndef DPR_GEOMETRY_H
 #define DPR_GEOMETRY_H
 
-#include "lanes.h"
 #include "shared_types.h"
+#include "tile_lanes.h"
 
 /// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up.
 static inline realn pixel_x(const FrameParams p, realn column) {

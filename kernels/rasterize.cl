@@ -2,11 +2,6 @@
 // triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel has the list of
 // its own. A pair's run of fragments is padded to whole vectors; the padding repeats the last fragment, no pixel lists
 // it, and backward passes take its gradients as zero.
-#ifdef DPR_LANES
-#if DPR_LANES == 16
-#define DPR_WIDTH 8 /* a row of a tile */
-#endif
-#endif
 #include "geometry.h"
 
 #define DPR_ROW_MASK 0xffu

@@ -1,6 +1,6 @@
 // Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a plain sum
 // would lose what is left. The order of additions is fixed, so the result is the same from run to run.
-#include "lanes.h"
+#include "tile_lanes.h"
 
 /// Adds x to a sum and its running error where the mask says so (Neumaier 1974). Lanes left out keep their bits.
 static inline void compensated_add(realn* sum, realn* error, realn x, intn counts) {

@@ -1,10 +1,6 @@
 // Exclusive prefix sums of counts, in chunks, level by level. Sums saturate, so that a total that does not fit is seen
 // as the largest number instead of wrapping around.
-
-/// Counts a work-item adds in order.
-#ifndef DPR_SCAN_CHUNK
-#define DPR_SCAN_CHUNK 256
-#endif
+#include "shared_types.h"
 
 /// Sums of chunks. One work-item per chunk.
 kernel void scan_sum(const uint count, global const uint* restrict values, global uint* restrict sums) {

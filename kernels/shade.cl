@@ -1,11 +1,6 @@
 // Fragment colours without lights: the corners' colours, interpolated. A face colour is three equal corners.
-#ifdef DPR_LANES
-#if DPR_LANES == 16
-#define DPR_WIDTH 8 /* runs of fragments are padded to the width of the rasterizer's vectors */
-#endif
-#endif
-#include "lanes.h"
 #include "shared_types.h"
+#include "tile_lanes.h"
 
 /// One work-item per pair, up to `last_pair`.
 /// in   face_colors  uint4[face]         indices into colors, by corner

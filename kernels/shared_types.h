@@ -20,6 +20,14 @@ using float4 = cl_float4;
 /// Tiles are 8x8 pixels: a tile's coverage by a triangle is one 64-bit mask.
 #define DPR_TILE 8
 
+/// Counts that a work-item of a prefix sum adds in order, and elements that one of a sort handles.
+#ifndef DPR_SCAN_CHUNK
+#define DPR_SCAN_CHUNK 256
+#endif
+#ifndef DPR_SORT_BLOCK
+#define DPR_SORT_BLOCK 1024
+#endif
+
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 

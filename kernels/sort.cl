@@ -1,10 +1,7 @@
 // A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a tile, still by
 // face. Nothing depends on the order in which work-items run.
+#include "shared_types.h"
 
-/// Elements of a block, which one work-item handles in order.
-#ifndef DPR_SORT_BLOCK
-#define DPR_SORT_BLOCK 1024
-#endif
 #define DPR_SORT_DIGITS 256
 
 static inline uint sort_digit(uint key, uint shift) { return (key >> shift) & (DPR_SORT_DIGITS - 1); }

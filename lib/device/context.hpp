@@ -29,8 +29,8 @@ struct Device::Impl {
   DeviceInfo info;
   Profile* profile = nullptr;  ///< where launches are timed
 
-  /// The program of one kernel file, built once for each set of options. Throws BuildError.
-  const cl::Program& program(std::string_view kernel_file, const std::string& options);
+  /// The program that holds a kernel file, built once for each set of options. Throws BuildError.
+  const cl::Program& program(std::string_view name, const std::string& options);
 
   /// Work-items of a work-group, for kernels without barriers. Constant, because PoCL compiles a kernel anew
   /// for each work-group size.

@@ -110,7 +110,7 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   impl->context = context;
   impl->queue = queue;
   impl->info = describe(cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()), device);
-  impl->memory_budget = impl->info.memory_bytes / 4;
+  impl->memory_budget = impl->info.memory_bytes / (impl->info.type == "cpu" ? 8 : 4);
   return Device(std::move(impl));
 }
 

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "device/context.hpp"
+#include "device/kernel.hpp"
 #include "device/kernel_sources.hpp"
 
 namespace dpr {
@@ -29,6 +30,13 @@ void append_source(std::string_view name, std::set<std::string, std::less<>>& in
   }
 }
 
+/// The file to build for a kernel file: those that frame.cl includes share a program.
+std::string_view program_file(std::string_view name) {
+  constexpr std::string_view k_frame = "frame.cl";
+  const std::string include = "#include \"" + std::string(name) + "\"";
+  return kernel_file(k_frame).find(include) != std::string_view::npos ? k_frame : name;
+}
+
 std::string build_log(const cl::Program& program, const cl::Device& device) {
   std::string log;
   program.getBuildInfo(device, CL_PROGRAM_BUILD_LOG, &log);
@@ -37,20 +45,22 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
 
 }  // namespace
 
-const cl::Program& Device::Impl::program(std::string_view kernel_file, const std::string& options) {
+const cl::Program& Device::Impl::program(std::string_view name, const std::string& options) {
   const std::scoped_lock lock(mutex_);
-  const std::string key = std::string(kernel_file) + " " + options;
+  // Options of its own make a file a program of its own.
+  const std::string_view file = options == build_options(*this) ? program_file(name) : name;
+  const std::string key = std::string(file) + " " + options;
   const auto known = programs_.find(key);
   if (known != programs_.end()) return known->second;
 
   std::string source;
   std::set<std::string, std::less<>> included;
-  append_source(kernel_file, included, source);
+  append_source(file, included, source);
   int error = CL_SUCCESS;
   const cl::Program program(context, source, false, &error);
   check_cl(error, "clCreateProgramWithSource");
   if (program.build(device, options.c_str()) != CL_SUCCESS) {
-    throw BuildError(std::string(kernel_file), info.name, options, build_log(program, device));
+    throw BuildError(std::string(file), info.name, options, build_log(program, device));
   }
   return programs_.emplace(key, program).first->second;
 }

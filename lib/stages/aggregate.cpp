@@ -64,9 +64,9 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   const Range pixels = in.rasterize.pixels(in.p);
   Rasterize& r = in.rasterize;
   if (exact_) {
+    if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
     slots_.resize(device_, r.listed_fragments + a.pixels);
     slot_counts_.resize(device_, a.pixels);
-    if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
     exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_,
                     image);

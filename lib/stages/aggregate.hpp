@@ -29,11 +29,13 @@ class Aggregate {
   /// Builds what the smoothing needs; cheap where that is there already.
   void set_smoothing(const Smoothing& smoothing);
 
+  /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
   void forward(const AggregateInputs& in, const glm::vec3& background);
   /// `grad_image` is [view][height][width].
   void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
 
-  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
+  /// Of the buffers below and the slots.
+  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
 
   Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
   Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written

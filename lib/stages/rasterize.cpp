@@ -59,19 +59,27 @@ Band Rasterize::make_band(const shared::FrameParams& p, std::size_t first_row, s
 
 std::vector<Band> Rasterize::cut(const shared::FrameParams& p, std::size_t budget,
                                  std::size_t fragment_bytes) const {
-  const auto bytes = [&](std::size_t first_row, std::size_t last_row) {
-    return with_headroom(row_starts_[last_row].fragment - row_starts_[first_row].fragment) * fragment_bytes;
+  const std::size_t rows = row_starts_.size() - 1, total = row_starts_.back().fragment;
+  const auto count = [&](std::size_t first, std::size_t last) {
+    return row_starts_[last].fragment - row_starts_[first].fragment;
   };
+  std::size_t largest_row = 0;
+  for (std::size_t row = 0; row < rows; ++row) largest_row = std::max(largest_row, count(row, row + 1));
+  if (with_headroom(largest_row) * fragment_bytes > budget) {
+    throw InvalidArgument("memory budget (frame)", std::to_string(budget) + " bytes",
+                          "at least " + std::to_string(with_headroom(largest_row) * fragment_bytes) +
+                              " for the fragments of one row of tiles");
+  }
+  // Of equal size rather than as large as may be; and none larger than the first, so that buffers do not
+  // grow.
+  const std::size_t least_bands = with_headroom(total) * fragment_bytes / budget + 1;
+  std::size_t most = least_bands == 1 ? total : std::max(total / least_bands, largest_row);
   std::vector<Band> bands;
-  const std::size_t rows = row_starts_.size() - 1;
   for (std::size_t first = 0, last = 0; first < rows; first = last) {
-    while (last < rows && bytes(first, last + 1) <= budget) ++last;
-    if (first == last) {
-      throw InvalidArgument(
-          "memory budget (frame)", std::to_string(budget) + " bytes",
-          "at least " + std::to_string(bytes(first, first + 1)) + " for the fragments of one row of tiles");
-    }
+    last = first + 1;
+    while (last < rows && count(first, last + 1) <= most) ++last;
     bands.push_back(make_band(p, first, last));
+    most = std::max(bands.front().fragments.count, largest_row);
   }
   return bands;
 }

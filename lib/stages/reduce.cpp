@@ -24,9 +24,10 @@ void Reduce::enqueue(const Summation& what, Buffer<float>& sums, std::size_t fir
   if (count == 0) return;
   const auto slots = static_cast<cl_uint>(slots_of(what.count / what.segments));
   partial_.resize(device_, 2 * count * slots);
-  partial_sums_(count * slots / device_.info.lanes, static_cast<cl_uint>(what.count),
-                static_cast<cl_uint>(what.channels), static_cast<cl_uint>(what.segments),
-                static_cast<cl_uint>(what.stride), slots, what.starts, what.values, partial_);
+  const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
+  partial_sums_(count * slots / width, static_cast<cl_uint>(what.count), static_cast<cl_uint>(what.channels),
+                static_cast<cl_uint>(what.segments), static_cast<cl_uint>(what.stride), slots, what.starts,
+                what.values, partial_);
   final_sums_(count, static_cast<cl_uint>(count), slots, static_cast<cl_uint>(first_sum), partial_, sums);
 }
 

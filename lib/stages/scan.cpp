@@ -3,16 +3,8 @@
 #include <limits>
 
 namespace dpr {
-namespace {
-
-constexpr std::size_t k_chunk = 256;  // DPR_SCAN_CHUNK
-
-}  // namespace
-
 Scan::Scan(Device::Impl& device)
-    : device_(device),
-      sum_(device, "scan.cl", "scan_sum", " -DDPR_SCAN_CHUNK=" + std::to_string(k_chunk)),
-      apply_(device, "scan.cl", "scan_apply", " -DDPR_SCAN_CHUNK=" + std::to_string(k_chunk)) {
+    : device_(device), sum_(device, "scan.cl", "scan_sum"), apply_(device, "scan.cl", "scan_apply") {
   const cl_uint zero = 0;
   zero_.upload(device, std::span(&zero, 1));
   levels_.resize(4);  // 256^4 = 2^32 counts
@@ -25,7 +17,7 @@ void Scan::operator()(std::size_t count, const Buffer<cl_uint>& values, Buffer<c
 
 void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
                       std::size_t level) {
-  const std::size_t chunks = std::max<std::size_t>((count + k_chunk - 1) / k_chunk, 1);
+  const std::size_t chunks = std::max<std::size_t>((count + DPR_SCAN_CHUNK - 1) / DPR_SCAN_CHUNK, 1);
   const auto n = static_cast<cl_uint>(count);
   if (chunks == 1) {
     apply_(1, n, values, zero_, offsets);

@@ -5,24 +5,21 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_block = 1024;  // DPR_SORT_BLOCK
 constexpr unsigned k_digit_bits = 8;
 constexpr std::size_t k_digits = std::size_t{1} << k_digit_bits;
-
-std::string options() { return " -DDPR_SORT_BLOCK=" + std::to_string(k_block); }
 
 }  // namespace
 
 Sort::Sort(Device::Impl& device)
     : device_(device),
       scan_(device),
-      histogram_(device, "sort.cl", "sort_histogram", options()),
-      scatter_(device, "sort.cl", "sort_scatter", options()),
-      ranges_(device, "sort.cl", "sort_ranges", options()) {}
+      histogram_(device, "sort.cl", "sort_histogram"),
+      scatter_(device, "sort.cl", "sort_scatter"),
+      ranges_(device, "sort.cl", "sort_ranges") {}
 
 void Sort::operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys,
                       Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
-  const std::size_t blocks = (count + k_block - 1) / k_block;
+  const std::size_t blocks = (count + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
   const auto n = static_cast<cl_uint>(count);
   counts_.resize(device_, k_digits * blocks);
   other_keys_.resize(device_, count);

@@ -98,6 +98,22 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_image(folder / "a.png").width == 20);
   }
 
+  TEST_CASE("cli: a memory budget makes bands, and the same image") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const std::vector<std::string> render{"render", "cube.ply", "--size", "256x256", "-o"};
+    const auto with = [&](std::vector<std::string> more) {
+      more.insert(more.begin(), render.begin(), render.end());
+      return run(folder, more);
+    };
+    CHECK(dpr::test::contains(with({"whole.exr", "--verbose"}).out, "in 1 bands"));
+    const Outcome banded = with({"banded.exr", "--verbose", "--memory-budget", "1"});
+    CHECK(dpr::test::contains(banded.out, " bands, "));
+    CHECK_FALSE(dpr::test::contains(banded.out, "in 1 bands"));
+    CHECK(dpr::read_image(folder / "whole.exr").pixels == dpr::read_image(folder / "banded.exr").pixels);
+  }
+
   TEST_CASE("cli: wrong files") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -154,6 +170,7 @@ TEST_SUITE("robustness") {
     check_fails(folder, 1, "samples", render({"--samples", "0"}));
     check_fails(folder, 1, "sigma", render({"--sigma", "nan"}));
     check_fails(folder, 1, "--size", render({"--size", "0x16"}));
+    check_fails(folder, 1, "--memory-budget", render({"--memory-budget", "0"}));
     check_fails(folder, 1, "nonsense", render({"--depth-prior", "nonsense"}));
     check_fails(folder, 1, "--nonsense", render({"--nonsense"}));
     check_fails(folder, 1, "nonsense", {"nonsense"});

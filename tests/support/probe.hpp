@@ -53,6 +53,11 @@ inline std::string header_text(std::string_view name, std::set<std::string, std:
   return out;
 }
 
+inline std::string header_text(std::string_view name) {
+  std::set<std::string, std::less<>> included;
+  return header_text(name, included);
+}
+
 /// One kernel, `probe`, of a program made of headers and a text. Arguments are not checked.
 class Probe {
  public:

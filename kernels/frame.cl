@@ -1,0 +1,11 @@
+// The kernels of every frame as one program: starting a compiler takes longer than compiling them.
+#include "transform.cl"
+#include "setup.cl"
+#include "bin.cl"
+#include "scan.cl"
+#include "sort.cl"
+#include "rasterize.cl"
+#include "shade.cl"
+#include "gather.cl"
+#include "reduce.cl"
+#include "loss.cl"
