@@ -11,6 +11,7 @@
 #include "dpr/loss.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/optimizer.hpp"
+#include "dpr/perturbed_pose.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/scene.hpp"

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <string>
 
 #include "scene/checks.hpp"
+#include "scene/prior_functions.hpp"
 
 namespace dpr {
 namespace {
@@ -95,37 +95,11 @@ void validate_stage(Estimator estimator, const std::string& stage, Prior prior, 
   }
 }
 
-// x > 0 with 1 - Phi(x) = tail < 1/2. Newton's method on ln(1 - Phi), which is concave and falls: from the
-// right of the solution it converges monotonically. It starts there, because 1 - Phi(x) <= exp(-x^2 / 2) / 2.
-double gaussian_reach(double tail) {
-  constexpr int k_most_steps = 100;
-  double x = std::sqrt(-2 * std::log(2 * tail));
-  for (int step = 0; step < k_most_steps; ++step) {
-    const double q = 0.5 * std::erfc(x / std::numbers::sqrt2);
-    const double density = std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi);
-    const double change = (std::log(q) - std::log(tail)) * q / density;
-    x += change;
-    if (std::abs(change) <= 1e-14 * x) break;
-  }
-  return x;
-}
-
 // x with P(X > x) = tail, in units of sigma: there the occupancy of a pixel outside by x has fallen to
 // `tail`.
 double reach(Prior prior, double tail) {
-  switch (prior) {
-    case Prior::gaussian:
-      return gaussian_reach(tail);
-    case Prior::cauchy:
-      return std::min(1 / std::tan(std::numbers::pi * tail), k_cauchy_reach);
-    case Prior::logistic:
-      return std::log1p(-tail) - std::log(tail);
-    case Prior::gumbel:
-      return -std::log(-std::log1p(-tail));
-    case Prior::uniform:
-      return 0.5 - tail;
-  }
-  return 0;
+  const double x = upper_quantile(prior, tail);
+  return prior == Prior::cauchy ? std::min(x, k_cauchy_reach) : x;
 }
 
 // The blur radius of SoftRas, of PyTorch3D and of the published program: where the logistic occupancy is
@@ -186,8 +160,9 @@ void validate(const Smoothing& smoothing) {
     throw InvalidArgument("depth_prior (smoothing)", "uniform", "gaussian, cauchy, logistic or gumbel");
   }
   if (smoothing.composition == Composition::joint && smoothing.depth_prior == Prior::cauchy) {
-    throw InvalidArgument("depth_prior (smoothing)", "cauchy with the joint composition",
-                          "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
+    throw InvalidArgument(
+        "depth_prior (smoothing)", "cauchy with the joint composition",
+        "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
   }
 }
 
