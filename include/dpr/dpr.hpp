@@ -3,6 +3,7 @@
 
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/annealed_smoothing.hpp"
+#include "dpr/aov.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
@@ -14,5 +15,6 @@
 #include "dpr/perturbed_pose.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/sampling_error.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/smoothing.hpp"

@@ -272,7 +272,7 @@ TEST_SUITE("unit") {
 TEST_SUITE("statistical") {
   TEST_CASE("value, gradient and sensitivity of every estimator against quadrature, six dimensions") {
     const Product f;
-    const int runs = reduced(4000, 2000);
+    const int runs = 4000;
     double worst = 0;
     for (const Prior prior : k_priors) {
       const std::vector<double> exact = exact_figures(f, prior).all();
@@ -307,7 +307,7 @@ TEST_SUITE("statistical") {
     const double rigid = f(std::vector<double>(f.dimensions()).data());
     NoiseOptions options{Prior::gaussian, Baseline::rigid, Draws::antithetic, 4, 0};
     Statistics wrong_constant, half_pair, right;
-    for (int run = 0; run < reduced(4000, 2000); ++run) {
+    for (int run = 0; run < 4000; ++run) {
       options.seed = static_cast<std::uint64_t>(run);
       const std::vector<double> noise = draw_noise(options, f.dimensions());
       const std::vector<double> values = values_of(f, noise);
@@ -332,7 +332,7 @@ TEST_SUITE("statistical") {
     const Product f;
     const std::vector<double> exact = exact_figures(f, Prior::gaussian).all();
     Statistics biased;
-    for (int run = 0; run < reduced(4000, 2000); ++run) {
+    for (int run = 0; run < 4000; ++run) {
       NoiseOptions options{Prior::gaussian, Baseline::none, Draws::stratified, 4,
                            static_cast<std::uint64_t>(run)};
       const std::vector<double> noise = draw_noise(options, f.dimensions());
@@ -373,7 +373,7 @@ TEST_SUITE("statistical") {
 
   TEST_CASE("the renderer's expected loss and its derivatives against quadrature over one parameter") {
     const Device device = open_device();
-    const Scene scene = cube_scene(16);
+    const Scene scene = cube_scene(reduced(16, 6));
     Scene other = scene;
     other.meshes[0].transform = glm::mat4(glm::dmat4(rotation_from_vector({0.2, 0.3, -0.1})));
     other.camera.view[3].x += 0.3F;
@@ -508,8 +508,9 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("heavy tails on every parameter give finite numbers") {
     const Device device = open_device();
-    Scene scene = cube_scene(16);
+    Scene scene = cube_scene(reduced(16, 4));
     PerturbedPoseOptions options;
+    options.samples = static_cast<std::uint32_t>(reduced(64, 8));
     options.prior = Prior::cauchy;
     options.scale = {glm::dvec3(1), glm::dvec3(1), glm::dvec3(1), glm::dvec3(1), 20, {}};
     for (const bool has_intrinsics : {false, true}) {
@@ -518,7 +519,7 @@ TEST_SUITE("robustness") {
         options.scale.fov_y_degrees = 0;
         options.scale.intrinsics = {10, 10, 10, 10};
       }
-      PerturbedPose perturbed(device, scene, Image(16, 16, glm::vec4(0.5F)), options);
+      PerturbedPose perturbed(device, scene, Image(scene.width, scene.height, glm::vec4(0.5F)), options);
       const PerturbedPoseResult found = perturbed.evaluate(perturbed.scene_view(), 1);
       CHECK(found.dimensions == (has_intrinsics ? 16 : 13));
       CHECK(std::isfinite(found.loss + found.loss_error + found.sensitivity + found.sensitivity_error));
