@@ -44,9 +44,9 @@ struct AuxiliaryOutputs {
 /// the first forward(), and for a view that is not there.
 AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view = 0);
 
-/// One of them as an image: numbers in red, green and blue (uv in red and green, single numbers in all
-/// three), alpha 1 where face_id names a face, 0 on the background. Throws InvalidArgument for uv of meshes
-/// without texture coordinates.
+/// One of them as an image: numbers in red, green and blue (uv in red and green, single numbers in all three;
+/// face_id is exact up to 2^24), alpha 1 where face_id names a face, 0 on the background. Throws
+/// InvalidArgument for uv of meshes without texture coordinates.
 Image aov_image(const AuxiliaryOutputs& outputs, Aov aov);
 
 }  // namespace dpr

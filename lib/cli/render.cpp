@@ -142,7 +142,8 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
           "Auxiliary outputs to write beside the image, as OUT.NAME.exr: depth, normal, face_id, "
           "barycentrics, uv, effective_faces; standard_error and gradient_standard_error of Monte Carlo")
       ->delimiter(',')
-      ->type_name("NAME,...");
+      ->allow_extra_args(false)  // what follows is MESH
+      ->type_name("NAME[,NAME]");
   add_common_options(*command, common);
   command->get_option("--rigid")->excludes(command->get_option("--preset"));
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");

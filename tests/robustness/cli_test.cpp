@@ -155,6 +155,8 @@ TEST_SUITE("robustness") {
       CHECK(dpr::read_image(folder / (std::string("a.") + name + ".exr")).height == 12);
     }
     CHECK(dpr::read_image(folder / "a.face_id.exr").at(8, 6).a == 1);
+    CHECK(run(folder, {"render", "--aov", "depth", "square.obj", "-o", "a.png", "--size", "16x12"}).status ==
+          0);
     const Outcome sampled =
         run(folder, {"render", "--scene", "scene.json", "-o", "b.exr", "--preset", "paper_gaussian",
                      "--verbose", "--aov", "standard_error,gradient_standard_error"});
