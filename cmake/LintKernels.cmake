@@ -8,7 +8,7 @@ endif()
 
 set(flags -x cl -cl-std=CL1.2 -Xclang -finclude-default-header -fsyntax-only
           -Wall -Wextra -Wdouble-promotion -Werror -I ${KERNELS})
-set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16)
+set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16 -DDPR_VARIABLE_WIDTH)
 file(GLOB sources ${KERNELS}/*.cl ${MORE_KERNELS}/*.cl)
 set(failures 0)
 foreach(source IN LISTS sources)

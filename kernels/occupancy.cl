@@ -6,12 +6,46 @@
 #endif
 #include "priors.h"
 
+/// What a fragment's distance becomes: p, ln p, d ln p / ds, and x with d / dsigma = -x d / ds.
+typedef struct {
+  realn p, log_p, slope, ratio;
+} Perturbed;
+
+#ifdef DPR_VARIABLE_WIDTH
+
+/// How far occupancies stay from 0 and 1, where the chain through ln p and the colour behind an opaque triangle would be
+/// lost.
+#define DPR_RIGID_MARGIN 1e-6f
+
+/// The rigid image's occupancy, with the slope of uniform noise whose width is the distance from the pixel to the edge,
+/// |s|: over that distance p changes by 1 (Kato, Ushiku & Harada, "Neural 3D Mesh Renderer", CVPR 2018, section 3.2).
+/// Sigma keeps the slope finite at the edge; the image does not depend on it.
+static inline Perturbed perturb(realn distance, float sigma) {
+  const intn inside = distance > 0.0f;
+  Perturbed v;
+  v.p = choose(inside, (realn)(1.0f - DPR_RIGID_MARGIN), (realn)(DPR_RIGID_MARGIN));
+  v.log_p = choose(inside, (realn)(log1p(-DPR_RIGID_MARGIN)), (realn)(log(DPR_RIGID_MARGIN)));
+  v.slope = 1.0f / ((fabs(distance) + sigma) * v.p);
+  v.ratio = 0.0f;
+  return v;
+}
+
+#else
+
 /// |s / sigma| is clamped here: far outside what any prior resolves, and its square is still a number.
 #define DPR_MAX_RATIO 1e14f
 
-static inline realn distance_ratio(realn distance, float sigma) {
-  return clamp(distance / sigma, -DPR_MAX_RATIO, DPR_MAX_RATIO);
+static inline Perturbed perturb(realn distance, float sigma) {
+  Perturbed v;
+  realn hazard;
+  v.ratio = clamp(distance / sigma, -DPR_MAX_RATIO, DPR_MAX_RATIO);
+  occupancy_log(v.ratio, &v.log_p, &hazard);
+  v.p = exp_n(min(v.log_p, 0.0f));
+  v.slope = hazard / sigma;
+  return v;
 }
+
+#endif
 
 /// One work-item per vector of fragments. Deterministic.
 /// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
@@ -21,13 +55,12 @@ kernel void occupancy_forward(const OccupancyParams p, const uint fragments, glo
                               global float* restrict log_occupancy, global float* restrict occupancy) {
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
   if (i >= fragments) return;
-  realn log_p, hazard;
-  occupancy_log(distance_ratio(load_n(i, distance), p.sigma), &log_p, &hazard);
-  store_n(max(log_p, DPR_LOG_ZERO), i, log_occupancy);
-  store_n(exp_n(min(log_p, 0.0f)), i, occupancy);
+  const Perturbed v = perturb(load_n(i, distance), p.sigma);
+  store_n(max(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
+  store_n(v.p, i, occupancy);
 }
 
-/// dL/ds = dL/dln p * (d ln p / dx) / sigma, and dL/dsigma = -sum x dL/ds. One work-item per pair.
+/// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per pair.
 /// in   masks               uint2[pair]      says which fragments are padding: their gradients become 0
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
@@ -43,12 +76,10 @@ kernel void occupancy_backward(const OccupancyParams p, const uint pairs, global
   realn sum = 0.0f;
   for (uint i = first; i < last; i += DPR_WIDTH) {
     const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const realn x = distance_ratio(load_n(i, distance), p.sigma);
-    realn log_p, hazard;
-    occupancy_log(x, &log_p, &hazard);
-    const realn grad = choose(real_fragment, load_n(i, grad_log_occupancy) * hazard / p.sigma, (realn)(0.0f));
+    const Perturbed v = perturb(load_n(i, distance), p.sigma);
+    const realn grad = choose(real_fragment, load_n(i, grad_log_occupancy) * v.slope, (realn)(0.0f));
     store_n(grad, i, grad_distance);
-    sum -= x * grad;
+    sum -= v.ratio * grad;
   }
   grad_sigma[pair] = sum_lanes(sum);
 }

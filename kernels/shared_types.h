@@ -63,6 +63,14 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_BACKGROUND 2 /* 3 */
 #define DPR_PIXEL_CHANNELS 5
 
+/// Channels of the auxiliary outputs, and the face of a pixel that shows none.
+#define DPR_AOV_DEPTH 0
+#define DPR_AOV_NORMAL 1       /* 3 */
+#define DPR_AOV_BARYCENTRICS 4 /* of corners 1 and 2: 2 */
+#define DPR_AOV_EFFECTIVE_FACES 6
+#define DPR_AOV_CHANNELS 7
+#define DPR_NO_FACE 0xffffffffu
+
 /// Sums of a loss over the pixels of a view: squared error, absolute error, intersection and union of the alphas.
 #define DPR_LOSS_SUMS 4
 

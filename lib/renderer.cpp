@@ -201,10 +201,10 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
-         device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
-         view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes() +
-         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
-         grad_colors.capacity_bytes();
+         (aov ? aov->bytes() : 0) + device_views.cameras.capacity_bytes() +
+         device_views.models.capacity_bytes() + view_vertex_starts.capacity_bytes() +
+         all_pixels.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
+         grad_world.capacity_bytes() + grad_colors.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -8,6 +8,7 @@
 
 #include "dpr/renderer.hpp"
 #include "stages/aggregate.hpp"
+#include "stages/aov.hpp"
 #include "stages/bin.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
@@ -27,6 +28,8 @@ struct Renderer::Impl {
   void set_smoothing(const Smoothing& smoothing);
   void forward();
   SceneGradient backward(const Buffer<cl_float4>& grad_images);
+  /// Fills `aov` for the last frame, if it does not hold that already.
+  void render_aov();
 
   /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it.
   void require_scene(const char* caller) const;
@@ -56,6 +59,8 @@ struct Renderer::Impl {
   Aggregate aggregate;
   Gather gather;
   Reduce reduce;
+  std::optional<AovStage> aov;  // made when first asked for
+  std::uint64_t aov_frame = 0;  // the frame it holds
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]

@@ -3,6 +3,7 @@
 
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/annealed_smoothing.hpp"
+#include "dpr/aov.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
@@ -12,7 +13,9 @@
 #include "dpr/mesh.hpp"
 #include "dpr/multi_device.hpp"
 #include "dpr/optimizer.hpp"
+#include "dpr/perturbed_pose.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/sampling_error.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/smoothing.hpp"

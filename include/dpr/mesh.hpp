@@ -13,29 +13,33 @@ namespace dpr {
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the
 /// mesh is white.
 struct Mesh {
-  std::vector<glm::vec3> positions;      ///< [vertex] object space
-  std::vector<glm::uvec3> faces;         ///< [face] indices into positions
-  std::vector<glm::vec3> vertex_colors;  ///< [vertex] linear RGB, or empty
-  std::vector<glm::vec3> face_colors;    ///< [face] linear RGB, or empty
+  std::vector<glm::vec3> positions;        ///< [vertex] object space
+  std::vector<glm::uvec3> faces;           ///< [face] indices into positions
+  std::vector<glm::vec3> vertex_colors;    ///< [vertex] linear RGB, or empty
+  std::vector<glm::vec3> face_colors;      ///< [face] linear RGB, or empty
+  std::vector<glm::vec2> texcoords;        ///< texture coordinates that corners refer to, or empty
+  std::vector<glm::uvec3> face_texcoords;  ///< [face] indices into texcoords, or empty
 };
 
 /// Throws InvalidArgument unless the mesh can be rendered: at least one face, indices in range, finite
-/// positions and colours, colour arrays of matching length. `name` says in the message which mesh it is.
-/// O(vertices + faces).
+/// positions, colours and texture coordinates, arrays of matching length. `name` says in the message which
+/// mesh it is. O(vertices + faces).
 void validate(const Mesh& mesh, const std::string& name = "mesh");
 
 /// Reads OBJ, PLY, OFF or STL by way of OpenMesh, the vertices in the order of the file. Polygons become
 /// triangle fans; non-manifold, duplicate and degenerate faces are kept. Vertex and face colours are kept, in
 /// a file with both those of the vertices; what has none beside others that have one is white. The diffuse
 /// colours of OBJ materials are face colours, in eight bits, if the material files are there. STL has no
-/// shared vertices: equal positions become one, and facets with two equal corners are left out. Throws
+/// shared vertices: equal positions become one, and facets with two equal corners are left out. The texture
+/// coordinates of an OBJ (u, v; v up) are kept if every corner has some. Throws
 /// IoError where the file is missing, malformed, truncated or loses a face on the way, and InvalidArgument
 /// where its content cannot be rendered. One thread at a time reads.
 Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face
 /// colours: asking for that is an error, not a silent loss. PLY colours are bytes, as other programs expect
-/// them: clamped to [0, 1] and rounded. Throws IoError, and InvalidArgument where the mesh is not valid.
+/// them: clamped to [0, 1] and rounded. Texture coordinates go to OBJ only. Throws IoError, and
+/// InvalidArgument where the mesh is not valid.
 void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

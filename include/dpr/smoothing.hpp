@@ -24,6 +24,12 @@ enum class VarianceReduction { none, rigid };
 /// Unit of the signed distance, of sigma and of the blur radius: NDC^2 with the sign attached, or NDC.
 enum class DistanceMetric { squared, euclidean };
 
+/// Width of the distance noise. fixed: sigma. variable, for the uniform prior: for every pixel the distance
+/// between it and the edge, so that the noise just reaches the pixel. The image is the rigid one (to 1e-6 a
+/// fragment: an occupancy of 0 would have no gradient), dp/ds = 1 / (|s| + sigma), and sigma only keeps that
+/// finite.
+enum class OccupancyWidth { fixed, variable };
+
 struct Smoothing {
   Prior occupancy_prior = Prior::gaussian;
   Prior depth_prior = Prior::gaussian;
@@ -41,11 +47,14 @@ struct Smoothing {
       blur_radius;                  ///< >= 0, in the unit of the metric: triangles further away are not there
   float background_depth = 1e-10F;  ///< normalised depth of the background slot (barrier only)
   DistanceMetric distance = DistanceMetric::squared;
+  OccupancyWidth occupancy_width = OccupancyWidth::fixed;
 };
 
 /// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform
 /// prior (its density is no exp(-nu), so it has no score), sampling the joint composition, uniform depths,
-/// and Cauchy depths in the joint composition.
+/// Cauchy depths in the joint composition, and a variable width with another prior than the uniform one, with
+/// samples, squared distances, the barrier (where an occupancy of nearly 0 still has weight), or no
+/// blur_radius (no occupancy says where such noise ends).
 void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to
@@ -57,20 +66,34 @@ float blur_radius(const Smoothing& smoothing);
 /// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins.
 Smoothing rigid_smoothing();
 
-/// A named member of the family; throws InvalidArgument for another name. What is not said is the default
-/// above.
-/// - "softras": logistic occupancy, Gumbel depth, exact; blur radius 9.21 sigma, where the logistic p is 1e-4
-/// - "paper_gaussian", "paper_cauchy": both stages of one prior, sampled 8 times, rigid variance reduction,
+/// A named member of the family; throws InvalidArgument for another name and for a size below 1x1. What is
+/// not said is the default above. Equations in brackets are the paper's; tests/pipeline/presets_test.cpp
+/// evaluates each formula by itself.
+/// - "softras" (Liu et al. 2019): logistic occupancy, Gumbel depth, exact, which by (21) and (40) is
+///   D_j = sigmoid(s_j / sigma), w_j = D_j exp(zeta_j / gamma) / (sum_k D_k exp(zeta_k / gamma) +
+///   exp(background_depth / gamma)); blur radius 9.21 sigma, where D is 1e-4
+/// - "opendr" (Loper & Black 2014): uniform occupancy one pixel wide, (30): p = clamp(d / pixel + 1/2, 0, 1)
+///   with d in NDC and the pixel of an image of `width` x `height`; rigid depths. Images of other sizes need
+///   another sigma, 2 / min(width, height)
+/// - "nmr" (Kato, Ushiku & Harada 2018, section 3.2): uniform occupancy of variable width, (30). The image is
+///   rigid; moving an edge by the distance d between it and a pixel changes the pixel by delta I, so the
+///   derivative is taken as delta I / d, with the published 1e-3 NDC (sigma) added to |d|; rigid depths;
+///   reaches 0.5 NDC (blur_radius), where the published program goes on to the border. Theirs has two rules
+///   that no perturbation explains, and which are left out: gradients that would raise the loss are dropped,
+///   and delta I at an edge that two triangles share is the difference of the two
+/// - "paper_gaussian" (36), "paper_cauchy" (35): both stages of one prior, sampled 8 times as in (11) and
+/// (14),
 ///   blur radius 9.21 sigma: the published program
-/// - "joint_gaussian": the joint composition, exact
+/// - "joint_gaussian": the joint composition, exact: the expectation of (3) under (8)
 /// - "rigid": rigid_smoothing()
-Smoothing smoothing_preset(std::string_view name);
+Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
 
 std::string_view to_string(Prior);
 std::string_view to_string(Composition);
 std::string_view to_string(Estimator);
 std::string_view to_string(VarianceReduction);
 std::string_view to_string(DistanceMetric);
+std::string_view to_string(OccupancyWidth);
 
 /// The inverse of to_string; `where` names the argument in the InvalidArgument thrown for an unknown word.
 Prior parse_prior(std::string_view word, std::string_view where);
@@ -78,5 +101,6 @@ Composition parse_composition(std::string_view word, std::string_view where);
 Estimator parse_estimator(std::string_view word, std::string_view where);
 VarianceReduction parse_variance_reduction(std::string_view word, std::string_view where);
 DistanceMetric parse_distance_metric(std::string_view word, std::string_view where);
+OccupancyWidth parse_occupancy_width(std::string_view word, std::string_view where);
 
 }  // namespace dpr

@@ -17,7 +17,7 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   const char* const priors = "gaussian|cauchy|logistic|gumbel|uniform";
   const char* const estimators = "exact|monte_carlo";
   add("--preset", s.preset, "Take all values from a named member of the family",
-      "softras|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
+      "softras|opendr|nmr|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
   add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
   add("--depth-prior", s.depth_prior, "Noise of the depth", "gaussian|cauchy|logistic|gumbel");
   add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");
@@ -34,6 +34,8 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   add("--blur-radius", s.blur_radius, "Triangles further from a pixel are not there", "FLOAT");
   add("--background-depth", s.background_depth, "Normalised depth of the background", "FLOAT");
   add("--distance", s.distance, "Unit of the distance: NDC^2 or NDC", "squared|euclidean");
+  add("--occupancy-width", s.occupancy_width, "Width of uniform noise: sigma, or up to the pixel",
+      "fixed|variable");
 }
 
 template <typename Value, typename Parse>
@@ -46,10 +48,11 @@ void apply_value(const std::optional<Value>& given, Value& value) {
   if (given) value = *given;
 }
 
-void apply(const SmoothingOptions& options, Smoothing& smoothing) {
+void apply(const SmoothingOptions& options, Scene& scene) {
+  Smoothing& smoothing = scene.smoothing;
   if (options.preset) {
     const std::uint64_t seed = smoothing.seed;
-    smoothing = smoothing_preset(*options.preset);
+    smoothing = smoothing_preset(*options.preset, scene.width, scene.height);
     smoothing.seed = seed;
   }
   apply_word(options.occupancy_prior, smoothing.occupancy_prior, parse_prior, "--occupancy-prior");
@@ -64,6 +67,7 @@ void apply(const SmoothingOptions& options, Smoothing& smoothing) {
   apply_word(options.variance_reduction, smoothing.variance_reduction, parse_variance_reduction,
              "--variance-reduction");
   apply_word(options.distance, smoothing.distance, parse_distance_metric, "--distance");
+  apply_word(options.occupancy_width, smoothing.occupancy_width, parse_occupancy_width, "--occupancy-width");
   apply_value(options.sigma, smoothing.sigma);
   apply_value(options.gamma, smoothing.gamma);
   apply_value(options.alpha, smoothing.alpha);
@@ -121,9 +125,9 @@ Device open_device(const CommonOptions& options) {
 }
 
 void apply(const CommonOptions& options, Scene& scene) {
-  apply(options.smoothing, scene.smoothing);
-  apply_value(options.seed, scene.smoothing.seed);
   if (options.size) resize(scene, parse_size(*options.size));
+  apply(options.smoothing, scene);
+  apply_value(options.seed, scene.smoothing.seed);
 }
 
 Scene read_scene(const std::string& file, const CommonOptions& options) {

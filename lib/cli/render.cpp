@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -14,6 +15,7 @@ namespace {
 
 struct RenderOptions {
   std::string mesh, scene, output;
+  std::vector<std::string> aovs;
   bool rigid = false;
   float elevation = 25, azimuth = 35;  // degrees: three sides of a box are in sight
 };
@@ -81,6 +83,7 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
 void run(const RenderOptions& options, CommonOptions& common) {
   if (options.rigid) common.smoothing.preset = "rigid";
   const Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  const AovFiles aovs(options.aovs, options.output, scene);
   Renderer renderer(open_device(common));
   renderer.set_scene(scene);
   renderer.forward();
@@ -92,6 +95,7 @@ void run(const RenderOptions& options, CommonOptions& common) {
   }
   write_image(options.output, image);
   const RenderStatistics statistics = renderer.statistics();
+  aovs.write(renderer);
   if (!common.quiet) {
     std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,
                 statistics.faces);
@@ -104,6 +108,7 @@ void run(const RenderOptions& options, CommonOptions& common) {
   if (common.verbose) {
     std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
                 statistics.fragments, statistics.bands, statistics.device_bytes);
+    aovs.print_sampling_error(renderer);
   }
 }
 
@@ -131,6 +136,14 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->add_option("--azimuth", options->azimuth,
                    "Of the camera fitted to MESH, in degrees from +z towards +x")
       ->type_name("FLOAT");
+  command
+      ->add_option(
+          "--aov", options->aovs,
+          "Auxiliary outputs to write beside the image, as OUT.NAME.exr: depth, normal, face_id, "
+          "barycentrics, uv, effective_faces; standard_error and gradient_standard_error of Monte Carlo")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // what follows is MESH
+      ->type_name("NAME[,NAME]");
   add_common_options(*command, common);
   command->get_option("--rigid")->excludes(command->get_option("--preset"));
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");

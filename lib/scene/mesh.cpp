@@ -19,6 +19,29 @@ void validate_colors(const std::vector<glm::vec3>& colors, std::size_t expected,
   }
 }
 
+void validate_texcoords(const Mesh& mesh, const std::string& name) {
+  if (!mesh.face_texcoords.empty() && mesh.face_texcoords.size() != mesh.faces.size()) {
+    throw InvalidArgument(checks::in("face_texcoords", name), std::to_string(mesh.face_texcoords.size()),
+                          std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
+  }
+  for (std::size_t i = 0; i < mesh.texcoords.size(); ++i) {
+    const glm::vec3 uv(mesh.texcoords[i], 0);
+    if (checks::is_finite(uv)) continue;
+    throw InvalidArgument(checks::in(checks::element("texcoords", i), name), checks::text(uv),
+                          "finite numbers");
+  }
+  for (std::size_t i = 0; i < mesh.face_texcoords.size(); ++i) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t index = mesh.face_texcoords[i][corner];
+      if (index < mesh.texcoords.size()) continue;
+      throw InvalidArgument(
+          checks::in(checks::element("face_texcoords", i), name),
+          "texture coordinate " + std::to_string(index),
+          "an index below the number of texcoords, " + std::to_string(mesh.texcoords.size()));
+    }
+  }
+}
+
 void validate_faces(const Mesh& mesh, const std::string& name) {
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     for (int corner = 0; corner < 3; ++corner) {
@@ -48,6 +71,7 @@ void validate(const Mesh& mesh, const std::string& name) {
   }
   validate_colors(mesh.vertex_colors, mesh.positions.size(), "vertex_colors", "vertices", name);
   validate_colors(mesh.face_colors, mesh.faces.size(), "face_colors", "faces", name);
+  validate_texcoords(mesh, name);
 }
 
 }  // namespace dpr

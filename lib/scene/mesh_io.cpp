@@ -217,8 +217,9 @@ void take_scanned_colors(MeshScan& scan, SoupImporter& soup) {
   if (!soup.face_colors.empty()) soup.face_colors.resize(soup.polygons.size(), glm::vec3(1));
 }
 
-Mesh triangulate(SoupImporter soup) {
+Mesh triangulate(SoupImporter soup, MeshScan scan) {
   Mesh mesh;
+  mesh.texcoords = std::move(scan.texcoords);
   mesh.positions = std::move(soup.positions);
   mesh.vertex_colors = std::move(soup.vertex_colors);
   const bool has_face_colors = mesh.vertex_colors.empty() && !soup.face_colors.empty();
@@ -227,6 +228,9 @@ Mesh triangulate(SoupImporter soup) {
     for (std::size_t corner = 2; corner < polygon.size(); ++corner) {
       mesh.faces.emplace_back(polygon[0], polygon[corner - 1], polygon[corner]);
       if (has_face_colors) mesh.face_colors.push_back(soup.face_colors[i]);
+      if (mesh.texcoords.empty()) continue;
+      const Polygon& texcoords = scan.polygon_texcoords[i];
+      mesh.face_texcoords.emplace_back(texcoords[0], texcoords[corner - 1], texcoords[corner]);
     }
   }
   return mesh;
@@ -247,9 +251,15 @@ std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
     if (!mesh.vertex_colors.empty()) append(text, mesh.vertex_colors[i]);
     text += '\n';
   }
-  for (const glm::uvec3& face : mesh.faces) {
+  const bool has_texcoords = !mesh.face_texcoords.empty();
+  for (const glm::vec2& uv : mesh.texcoords)
+    text += "vt " + checks::text(uv.x) + " " + checks::text(uv.y) + "\n";
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     text += "f";
-    for (int i = 0; i < 3; ++i) text += " " + std::to_string(face[i] + 1);
+    for (int i = 0; i < 3; ++i) {
+      text += " " + std::to_string(mesh.faces[f][i] + 1);
+      if (has_texcoords) text += "/" + std::to_string(mesh.face_texcoords[f][i] + 1);
+    }
     text += '\n';
   }
   return text;
@@ -293,7 +303,7 @@ Mesh read_mesh(const std::filesystem::path& file) {
   compare(file, scan, soup);
   if (scan.asks_custom_properties) take_float_colors(soup);
   take_scanned_colors(scan, soup);
-  Mesh mesh = triangulate(std::move(soup));
+  Mesh mesh = triangulate(std::move(soup), std::move(scan));
   validate(mesh, file.string());
   return mesh;
 }

@@ -33,6 +33,9 @@ struct MeshScan {
   bool has_face_colors = false;       ///< PLY: in a form that OpenMesh hands on
   std::vector<glm::vec3> vertex_colors;  ///< OBJ, OFF: read by the scan; empty if there are none
   std::vector<glm::vec3> face_colors;    ///< OFF: [polygon] read by the scan; empty if there are none
+  std::vector<glm::vec2> texcoords;      ///< OBJ: read by the scan; OpenMesh does not hand them on
+  std::vector<Polygon>
+      polygon_texcoords;  ///< OBJ: [polygon] indices into texcoords; empty if a corner has none
   std::map<std::size_t, Polygon>
       repeated_corners;  ///< OBJ: polygons with equal corners, by their number in the file
 };

@@ -38,6 +38,7 @@ class ObjScanner {
     for (const auto& [index, line] : forward_references_) {
       if (index >= vertices_) fail_index(static_cast<std::int64_t>(index) + 1, line);
     }
+    finish_texcoords();
     scan.vertices = vertices_;
     scan.asks_material_colors = library_read_ && !material_unknown_;
     if (!has_vertex_colors_) scan.vertex_colors.clear();
@@ -74,13 +75,16 @@ class ObjScanner {
     ++vertices_;
   }
 
-  void texture_coordinate() const {
-    for (std::size_t i = 1; i <= 2; ++i) number(i);
-  }
+  void texture_coordinate() { scan.texcoords.emplace_back(number(1), number(2)); }
 
   void face() {
     corners_.clear();
-    for (std::size_t i = 1; i < words_.size(); ++i) corners_.push_back(corner(words_[i]));
+    Polygon& texcoords = scan.polygon_texcoords.emplace_back();
+    for (std::size_t i = 1; i < words_.size(); ++i) {
+      corners_.push_back(corner(words_[i]));
+      if (const auto index = corner_texcoord(words_[i])) texcoords.push_back(*index);
+    }
+    if (texcoords.size() < corners_.size()) lacks_texcoords_ = true;
     if (corners_.size() < 3) {
       fail("a face with " + std::to_string(corners_.size()) + " corners: expected at least three");
     }
@@ -106,6 +110,38 @@ class ObjScanner {
     return corner;
   }
 
+  /// The second number of vertex/texture/normal, if there is one.
+  std::optional<std::uint32_t> corner_texcoord(std::string_view word) const {
+    const std::size_t slash = word.find('/');
+    if (slash == std::string_view::npos) return {};
+    const std::string_view text = word.substr(slash + 1, word.find('/', slash + 1) - slash - 1);
+    if (text.empty()) return {};
+    const std::optional<std::int64_t> value = scan::parse<std::int64_t>(text);
+    if (!value) fail("got the corner " + scan::quoted(word) + ", expected vertex/texture or the like");
+    const auto known = static_cast<std::int64_t>(scan.texcoords.size());
+    const std::int64_t index = *value < 0 ? *value + known : *value - 1;
+    if (index < 0 || index > std::numeric_limits<std::int32_t>::max()) fail_texcoord(*value, lines_.number());
+    return static_cast<std::uint32_t>(index);
+  }
+
+  [[noreturn]] void fail_texcoord(std::int64_t index, std::optional<std::size_t> line) const {
+    throw IoError(file_,
+                  "a face with the texture coordinate " + std::to_string(index) + ": expected 1 to " +
+                      std::to_string(scan.texcoords.size()) + ", or a negative number that counts back",
+                  line);
+  }
+
+  /// Texture coordinates may follow the faces that use them; without those of every corner there are none.
+  void finish_texcoords() {
+    if (lacks_texcoords_) scan.polygon_texcoords.clear();
+    for (const Polygon& polygon : scan.polygon_texcoords) {
+      for (const std::uint32_t index : polygon) {
+        if (index >= scan.texcoords.size()) fail_texcoord(std::int64_t{index} + 1, {});
+      }
+    }
+    if (scan.polygon_texcoords.empty()) scan.texcoords.clear();
+  }
+
   void material_library() {
     const std::string_view line = lines_.line();
     const std::size_t begin = line.find("mtllib") + std::string_view("mtllib").size();
@@ -123,7 +159,7 @@ class ObjScanner {
   Polygon corners_;
   std::size_t vertices_ = 0;
   std::vector<std::pair<std::uint32_t, std::size_t>> forward_references_;  // index, line
-  bool has_vertex_colors_ = false, library_read_ = false, material_unknown_ = false;
+  bool has_vertex_colors_ = false, lacks_texcoords_ = false, library_read_ = false, material_unknown_ = false;
 };
 
 }  // namespace

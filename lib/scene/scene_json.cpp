@@ -154,11 +154,13 @@ void take_estimators(const JsonNode& node, Smoothing& smoothing) {
   take_word(node, "aggregation_estimator", smoothing.aggregation_estimator, parse_estimator);
 }
 
-// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius.
+// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius; but not
+// where sigma is no width.
 void take_reach(const JsonNode& node, Smoothing& smoothing) {
   const float preset_sigma = smoothing.sigma;
   take_number(node, "sigma", smoothing.sigma);
-  if (smoothing.blur_radius) *smoothing.blur_radius *= smoothing.sigma / preset_sigma;
+  const bool is_width = smoothing.occupancy_width == OccupancyWidth::fixed;
+  if (smoothing.blur_radius && is_width) *smoothing.blur_radius *= smoothing.sigma / preset_sigma;
   take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
 }
 
@@ -173,7 +175,8 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder) {
   for (const JsonNode& mesh : node.at("meshes").elements())
     scene.meshes.push_back(parse_instance(mesh, folder));
   take(node, "lights", scene.lights, parse_lights);
-  take(node, "smoothing", scene.smoothing, parse_smoothing);
+  take(node, "smoothing", scene.smoothing,
+       [&](const JsonNode& n) { return parse_smoothing(n, scene.width, scene.height); });
   take(node, "perspective_correct", scene.perspective_correct, [](const JsonNode& n) { return n.boolean(); });
   take(node, "gradients", scene.gradients, parse_gradients);
   return scene;
@@ -203,13 +206,14 @@ Camera parse_camera(const JsonNode& node) {
   return camera;
 }
 
-Smoothing parse_smoothing(const JsonNode& node) {
+Smoothing parse_smoothing(const JsonNode& node, int width, int height) {
   node.require_keys({"preset", "occupancy_prior", "depth_prior", "sigma", "gamma", "alpha", "composition",
                      "estimator", "occupancy_estimator", "aggregation_estimator", "samples",
                      "variance_reduction", "seed", "occupancy_threshold", "blur_radius", "background_depth",
-                     "distance"});
+                     "distance", "occupancy_width"});
   Smoothing smoothing;
-  take(node, "preset", smoothing, [](const JsonNode& n) { return smoothing_preset(n.string()); });
+  take(node, "preset", smoothing,
+       [=](const JsonNode& n) { return smoothing_preset(n.string(), width, height); });
   take_word(node, "occupancy_prior", smoothing.occupancy_prior, parse_prior);
   take_word(node, "depth_prior", smoothing.depth_prior, parse_prior);
   take_reach(node, smoothing);
@@ -226,6 +230,7 @@ Smoothing parse_smoothing(const JsonNode& node) {
   take_number(node, "occupancy_threshold", smoothing.occupancy_threshold);
   take_number(node, "background_depth", smoothing.background_depth);
   take_word(node, "distance", smoothing.distance, parse_distance_metric);
+  take_word(node, "occupancy_width", smoothing.occupancy_width, parse_occupancy_width);
   return smoothing;
 }
 

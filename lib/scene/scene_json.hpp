@@ -10,7 +10,8 @@ namespace dpr {
 /// The "camera" object of a scene. What is not given takes its default. Not validated.
 Camera parse_camera(const JsonNode& node);
 
-/// The "smoothing" object of a scene: the preset first, if there is one, then what is given. Not validated.
-Smoothing parse_smoothing(const JsonNode& node);
+/// The "smoothing" object of a scene: the preset first, if there is one, for images of that size, then what
+/// is given. Not validated.
+Smoothing parse_smoothing(const JsonNode& node, int width = 128, int height = 128);
 
 }  // namespace dpr

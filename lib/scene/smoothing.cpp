@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <string>
 
 #include "scene/checks.hpp"
+#include "scene/prior_functions.hpp"
 
 namespace dpr {
 namespace {
@@ -37,6 +37,8 @@ constexpr std::array<Word<VarianceReduction>, 2> k_variance_reductions{
     {{VarianceReduction::none, "none"}, {VarianceReduction::rigid, "rigid"}}};
 constexpr std::array<Word<DistanceMetric>, 2> k_distance_metrics{
     {{DistanceMetric::squared, "squared"}, {DistanceMetric::euclidean, "euclidean"}}};
+constexpr std::array<Word<OccupancyWidth>, 2> k_occupancy_widths{
+    {{OccupancyWidth::fixed, "fixed"}, {OccupancyWidth::variable, "variable"}}};
 
 template <typename Enum>
 std::string choices(std::span<const Word<Enum>> words) {
@@ -80,6 +82,7 @@ void validate_words(const Smoothing& s) {
   require_known<VarianceReduction>(k_variance_reductions, s.variance_reduction,
                                    "variance_reduction (smoothing)");
   require_known<DistanceMetric>(k_distance_metrics, s.distance, "distance (smoothing)");
+  require_known<OccupancyWidth>(k_occupancy_widths, s.occupancy_width, "occupancy_width (smoothing)");
 }
 
 void validate_stage(Estimator estimator, const std::string& stage, Prior prior, Composition composition) {
@@ -95,37 +98,26 @@ void validate_stage(Estimator estimator, const std::string& stage, Prior prior, 
   }
 }
 
-// x > 0 with 1 - Phi(x) = tail < 1/2. Newton's method on ln(1 - Phi), which is concave and falls: from the
-// right of the solution it converges monotonically. It starts there, because 1 - Phi(x) <= exp(-x^2 / 2) / 2.
-double gaussian_reach(double tail) {
-  constexpr int k_most_steps = 100;
-  double x = std::sqrt(-2 * std::log(2 * tail));
-  for (int step = 0; step < k_most_steps; ++step) {
-    const double q = 0.5 * std::erfc(x / std::numbers::sqrt2);
-    const double density = std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi);
-    const double change = (std::log(q) - std::log(tail)) * q / density;
-    x += change;
-    if (std::abs(change) <= 1e-14 * x) break;
-  }
-  return x;
+void validate_width(const Smoothing& s) {
+  if (s.occupancy_width == OccupancyWidth::fixed) return;
+  const auto require_with = [](bool ok, const char* with, const char* expected) {
+    if (!ok) {
+      throw InvalidArgument("occupancy_width (smoothing)", std::string("variable with ") + with,
+                            std::string("variable with ") + expected + ", or fixed");
+    }
+  };
+  require_with(s.occupancy_prior == Prior::uniform, "another prior", "the uniform occupancy_prior");
+  require_with(s.occupancy_estimator == Estimator::exact, "monte_carlo", "the exact occupancy_estimator");
+  require_with(s.distance == DistanceMetric::euclidean, "squared distances", "euclidean distances");
+  require_with(s.composition == Composition::joint, "the barrier", "the joint composition");
+  require_with(s.blur_radius.has_value(), "no blur_radius", "a blur_radius");
 }
 
 // x with P(X > x) = tail, in units of sigma: there the occupancy of a pixel outside by x has fallen to
 // `tail`.
 double reach(Prior prior, double tail) {
-  switch (prior) {
-    case Prior::gaussian:
-      return gaussian_reach(tail);
-    case Prior::cauchy:
-      return std::min(1 / std::tan(std::numbers::pi * tail), k_cauchy_reach);
-    case Prior::logistic:
-      return std::log1p(-tail) - std::log(tail);
-    case Prior::gumbel:
-      return -std::log(-std::log1p(-tail));
-    case Prior::uniform:
-      return 0.5 - tail;
-  }
-  return 0;
+  const double x = upper_quantile(prior, tail);
+  return prior == Prior::cauchy ? std::min(x, k_cauchy_reach) : x;
 }
 
 // The blur radius of SoftRas, of PyTorch3D and of the published program: where the logistic occupancy is
@@ -158,6 +150,28 @@ Smoothing joint_gaussian() {
   return smoothing;
 }
 
+// Rigid depths under uniform noise on the distances.
+Smoothing uniform_edges(float sigma) {
+  Smoothing smoothing = rigid_smoothing();
+  smoothing.occupancy_prior = Prior::uniform;
+  smoothing.distance = DistanceMetric::euclidean;
+  smoothing.sigma = sigma;
+  smoothing.blur_radius.reset();
+  return smoothing;
+}
+
+Smoothing opendr(int width, int height) {
+  return uniform_edges(2.0F / static_cast<float>(std::min(width, height)));
+}
+
+Smoothing nmr() {
+  constexpr float k_published_epsilon = 1e-3F, k_reach = 0.5F;  // NDC
+  Smoothing smoothing = uniform_edges(k_published_epsilon);
+  smoothing.occupancy_width = OccupancyWidth::variable;
+  smoothing.blur_radius = k_reach;
+  return smoothing;
+}
+
 }  // namespace
 
 void validate(const Smoothing& smoothing) {
@@ -178,6 +192,7 @@ void validate(const Smoothing& smoothing) {
                           "a finite number >= 0");
   }
   checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
+  validate_width(smoothing);
   validate_stage(smoothing.occupancy_estimator, "occupancy", smoothing.occupancy_prior,
                  smoothing.composition);
   validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
@@ -199,14 +214,19 @@ Smoothing rigid_smoothing() {
   return smoothing;
 }
 
-Smoothing smoothing_preset(std::string_view name) {
+Smoothing smoothing_preset(std::string_view name, int width, int height) {
+  if (width < 1 || height < 1) {
+    throw InvalidArgument("size (preset)", checks::text(width) + "x" + checks::text(height), "at least 1x1");
+  }
   if (name == "softras") return softras();
+  if (name == "opendr") return opendr(width, height);
+  if (name == "nmr") return nmr();
   if (name == "paper_gaussian") return published(Prior::gaussian);
   if (name == "paper_cauchy") return published(Prior::cauchy);
   if (name == "joint_gaussian") return joint_gaussian();
   if (name == "rigid") return rigid_smoothing();
   throw InvalidArgument("preset (smoothing)", "\"" + std::string(name) + "\"",
-                        "softras, paper_gaussian, paper_cauchy, joint_gaussian or rigid");
+                        "softras, opendr, nmr, paper_gaussian, paper_cauchy, joint_gaussian or rigid");
 }
 
 std::string_view to_string(Prior value) { return find_name<Prior>(k_priors, value); }
@@ -217,6 +237,9 @@ std::string_view to_string(VarianceReduction value) {
 }
 std::string_view to_string(DistanceMetric value) {
   return find_name<DistanceMetric>(k_distance_metrics, value);
+}
+std::string_view to_string(OccupancyWidth value) {
+  return find_name<OccupancyWidth>(k_occupancy_widths, value);
 }
 
 Prior parse_prior(std::string_view word, std::string_view where) {
@@ -233,6 +256,9 @@ VarianceReduction parse_variance_reduction(std::string_view word, std::string_vi
 }
 DistanceMetric parse_distance_metric(std::string_view word, std::string_view where) {
   return find_value<DistanceMetric>(k_distance_metrics, word, where);
+}
+OccupancyWidth parse_occupancy_width(std::string_view word, std::string_view where) {
+  return find_value<OccupancyWidth>(k_occupancy_widths, word, where);
 }
 
 }  // namespace dpr

@@ -14,7 +14,9 @@ Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
 
 void Occupancy::set_smoothing(const Smoothing& smoothing) {
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
-  const std::string options = prior_option(smoothing.occupancy_prior);
+  const bool variable = smoothing.occupancy_width == OccupancyWidth::variable;
+  const std::string options =
+      prior_option(smoothing.occupancy_prior) + (variable ? " -DDPR_VARIABLE_WIDTH" : "");
   const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
   if (wanted != built_) {
     // New kernels first: if they do not build, the old ones stay.

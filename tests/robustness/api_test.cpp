@@ -130,6 +130,7 @@ std::vector<SmoothingMistake> smoothing_mistakes() {
       {"occupancy_threshold", [](Smoothing& s) { s.occupancy_threshold = 0.5F; }},
       {"blur_radius", [](Smoothing& s) { s.blur_radius = -1.0F; }},
       {"background_depth", [](Smoothing& s) { s.background_depth = k_nan; }},
+      {"occupancy_width", [](Smoothing& s) { s.occupancy_width = OccupancyWidth::variable; }},
       {"occupancy_estimator",
        [](Smoothing& s) {
          s.occupancy_prior = Prior::uniform;

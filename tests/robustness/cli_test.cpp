@@ -114,6 +114,55 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_image(folder / "whole.exr").pixels == dpr::read_image(folder / "banded.exr").pixels);
   }
 
+  TEST_CASE("cli: auxiliary outputs lie beside the image") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    folder.write(
+        "square.obj",
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n");
+    const std::size_t before = files(folder).size();
+    const Outcome all = run(folder, {"render", "square.obj", "-o", "a.png", "--size", "16x12", "--aov",
+                                     "depth,normal,face_id,barycentrics,uv,effective_faces"});
+    CAPTURE(all.err);
+    CHECK(all.status == 0);
+    CHECK(files(folder).size() == before + 7);
+    for (const char* name : {"depth", "normal", "face_id", "barycentrics", "uv", "effective_faces"}) {
+      CHECK(dpr::read_image(folder / (std::string("a.") + name + ".exr")).height == 12);
+    }
+    CHECK(dpr::read_image(folder / "a.face_id.exr").at(8, 6).a == 1);
+    CHECK(run(folder, {"render", "--aov", "depth", "square.obj", "-o", "a.png", "--size", "16x12"}).status ==
+          0);
+    const Outcome sampled =
+        run(folder, {"render", "--scene", "scene.json", "-o", "b.exr", "--preset", "paper_gaussian",
+                     "--verbose", "--aov", "standard_error,gradient_standard_error"});
+    CHECK(sampled.status == 0);
+    CHECK(dpr::test::contains(sampled.out, "standard error of the colours: "));
+    CHECK(dpr::read_image(folder / "b.standard_error.exr").width == 16);
+    CHECK(dpr::read_image(folder / "b.gradient_standard_error.exr").width == 16);
+
+    check_fails(folder, 1, "nonsense", {"render", "square.obj", "-o", "c.png", "--aov", "depth,nonsense"});
+    check_fails(folder, 1, "no texture coordinates", {"render", "cube.ply", "-o", "c.png", "--aov", "uv"});
+  }
+
+  TEST_CASE("cli: presets of the size of the image") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto render = [&](const std::string& output, const std::vector<std::string>& more) {
+      std::vector<std::string> words{"render", "--scene", "scene.json", "--size", "40x20", "-o", output};
+      words.insert(words.end(), more.begin(), more.end());
+      CHECK(run(folder, words).status == 0);
+      return dpr::read_image(folder / output).pixels;
+    };
+    const auto preset = render("a.exr", {"--preset", "opendr"});
+    CHECK(preset == render("b.exr", {"--preset", "opendr", "--sigma", "0.1"}));  // 2 / 20
+    CHECK(preset != render("c.exr", {"--preset", "opendr", "--sigma", "0.2"}));
+    render("d.exr", {"--preset", "nmr", "--occupancy-width", "variable"});
+    check_fails(folder, 1, "occupancy_width",
+                {"render", "--scene", "scene.json", "-o", "e.exr", "--occupancy-width", "variable"});
+  }
+
   TEST_CASE("cli: wrong files") {
     if (is_skipped()) return;
     const TempDir folder;

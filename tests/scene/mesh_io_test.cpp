@@ -102,6 +102,23 @@ TEST_SUITE("unit") {
           std::vector<glm::uvec3>{{0, 0, 1}, {0, 1, 2}, {0, 1, 2}, {0, 2, 0}, {1, 2, 3}, {3, 3, 3}});
   }
 
+  TEST_CASE("OBJ: texture coordinates, where every corner has some") {
+    const TempDir folder;
+    const std::string corners = "vt 0 0\nvt 1 0.25 0.5\nf 1/1 2/2/1 3/-1 4/3\nvt .5 2\nf 1/3/ 2/1 3/2\n";
+    const Mesh mesh = read_mesh(folder.write("mesh.obj", k_obj_square + "vn 0 0 1\n" + corners));
+    CHECK(mesh.texcoords == std::vector<glm::vec2>{{0, 0}, {1, 0.25F}, {0.5F, 2}});
+    CHECK(mesh.face_texcoords == std::vector<glm::uvec3>{{0, 1, 1}, {0, 1, 2}, {2, 0, 1}});
+    write_mesh(folder / "again.obj", mesh);
+    const Mesh again = read_mesh(folder / "again.obj");
+    CHECK(again.texcoords == mesh.texcoords);
+    CHECK(again.face_texcoords == mesh.face_texcoords);
+    CHECK(again.faces == mesh.faces);
+    const Mesh without = read_mesh(folder.write("mesh.obj", k_obj_square + corners + "f 1//1 2/1 3/1\n"));
+    CHECK(without.texcoords.empty());
+    CHECK(without.face_texcoords.empty());
+    CHECK(without.faces.size() == 4);
+  }
+
   TEST_CASE("OBJ: colours of vertices") {
     const TempDir folder;
     const Mesh mesh =
@@ -310,6 +327,9 @@ TEST_SUITE("robustness") {
     check("v 1,5 0 0\nf 1 2 3\n", "mesh.obj:5: got \"1,5\"");
     check("v 0 0 0 1 0 x\nf 1 2 3\n", "mesh.obj:5: got \"x\"");
     check("vt 0.5\nf 1 2 3\n", "mesh.obj:5: too few numbers");
+    check("vt 0 0\nf 1/1 2/2 3/1\n", "a face with the texture coordinate 2: expected 1 to 1");
+    check("vt 0 0\nf 1/1 2/1 3/0\n", "mesh.obj:6: a face with the texture coordinate 0");
+    check("vt 0 0\nf 1/1 2/1 3/x\n", "mesh.obj:6: got the corner \"3/x\"");
   }
 
   TEST_CASE("PLY: headers") {

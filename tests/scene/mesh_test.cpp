@@ -95,6 +95,21 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "at most one of the two");
   }
 
+  TEST_CASE("texture coordinates are there for those who refer to them") {
+    Mesh mesh = triangle();
+    mesh.texcoords = {{0, 0}, {1, 0}};
+    mesh.face_texcoords = {{0, 1, 1}};
+    CHECK_NOTHROW(validate(mesh));
+    mesh.face_texcoords[0].z = 2;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh),
+                          "face_texcoords[0] (mesh): got texture coordinate 2");
+    mesh.face_texcoords = {{0, 1, 1}, {0, 1, 1}};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "face_texcoords (mesh): got 2, expected 1");
+    mesh.face_texcoords.clear();
+    mesh.texcoords[1].y = std::numeric_limits<float>::infinity();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "texcoords[1] (mesh)");
+  }
+
   TEST_CASE("lights") {
     Lights lights;
     lights.point.resize(2);

@@ -148,6 +148,15 @@ TEST_SUITE("unit") {
             .smoothing;
     CHECK(smoothing.occupancy_estimator == Estimator::monte_carlo);
     CHECK(smoothing.aggregation_estimator == Estimator::exact);
+    // One pixel of this scene.
+    smoothing =
+        read(folder, with(R"("width": 80, "height": 50, "smoothing": {"preset": "opendr"})")).smoothing;
+    CHECK(smoothing.sigma == 0.04F);
+    smoothing = read(folder, with(R"("smoothing": {"preset": "nmr", "sigma": 1e-2})")).smoothing;
+    CHECK(smoothing.occupancy_width == OccupancyWidth::variable);
+    CHECK(blur_radius(smoothing) == 0.5F);  // sigma is no width here
+    smoothing = read(folder, with(R"("smoothing": {"occupancy_width": "fixed"})")).smoothing;
+    CHECK(smoothing.occupancy_width == OccupancyWidth::fixed);
   }
 }
 
@@ -203,6 +212,8 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"depth_prior": "normal"})"), "smoothing.depth_prior (");
     check(with(R"("smoothing": {"samples": 1e3})"), "smoothing.samples (");
     check(with(R"("smoothing": {"preset": "soft"})"), "got \"soft\", expected softras");
+    check(with(R"("smoothing": {"occupancy_width": "wide"})"), "got \"wide\", expected fixed or variable");
+    check(with(R"("smoothing": {"occupancy_width": "variable"})"), "occupancy_width (smoothing)");
     check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong or gouraud");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
     const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";

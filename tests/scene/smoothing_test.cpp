@@ -77,7 +77,8 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("presets") {
-    for (const char* name : {"softras", "paper_gaussian", "paper_cauchy", "joint_gaussian", "rigid"}) {
+    for (const char* name :
+         {"softras", "opendr", "nmr", "paper_gaussian", "paper_cauchy", "joint_gaussian", "rigid"}) {
       CHECK_NOTHROW(validate(smoothing_preset(name)));
     }
     const Smoothing softras = smoothing_preset("softras");
@@ -98,6 +99,18 @@ TEST_SUITE("unit") {
       CHECK(paper.gamma == 1e-2F);
       CHECK(blur_radius(paper) == doctest::Approx(9.21e-3).epsilon(1e-4));
     }
+    const Smoothing opendr = smoothing_preset("opendr");
+    CHECK(opendr.occupancy_prior == Prior::uniform);
+    CHECK(opendr.distance == DistanceMetric::euclidean);
+    CHECK(opendr.sigma == 2.0F / 128);  // a pixel of the default size
+    CHECK(smoothing_preset("opendr", 300, 200).sigma == 0.01F);
+    CHECK(blur_radius(opendr) == doctest::Approx(opendr.sigma / 2).epsilon(1e-3));
+    const Smoothing nmr = smoothing_preset("nmr", 300, 200);
+    CHECK(nmr.occupancy_prior == Prior::uniform);
+    CHECK(nmr.occupancy_width == OccupancyWidth::variable);
+    CHECK(nmr.distance == DistanceMetric::euclidean);
+    CHECK(nmr.sigma == 1e-3F);
+    CHECK(blur_radius(nmr) == 0.5F);
     CHECK(smoothing_preset("joint_gaussian").composition == Composition::joint);
     CHECK(smoothing_preset("joint_gaussian").occupancy_prior == Prior::gaussian);
     const Smoothing rigid = smoothing_preset("rigid");
@@ -123,6 +136,9 @@ TEST_SUITE("unit") {
     }
     for (const DistanceMetric value : {DistanceMetric::squared, DistanceMetric::euclidean}) {
       CHECK(parse_distance_metric(to_string(value), "x") == value);
+    }
+    for (const OccupancyWidth value : {OccupancyWidth::fixed, OccupancyWidth::variable}) {
+      CHECK(parse_occupancy_width(to_string(value), "x") == value);
     }
     CHECK(to_string(Estimator::monte_carlo) == "monte_carlo");
   }
@@ -170,6 +186,24 @@ TEST_SUITE("robustness") {
     smoothing = smoothing_preset("joint_gaussian");
     smoothing.aggregation_estimator = Estimator::monte_carlo;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "with the joint composition, expected exact");
+  }
+
+  TEST_CASE("a variable width needs what makes the image rigid") {
+    const auto check = [](auto change, const std::string& part) {
+      Smoothing smoothing = smoothing_preset("nmr");
+      change(smoothing);
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing),
+                            "occupancy_width (smoothing): got variable with " + part);
+    };
+    check([](Smoothing& s) { s.occupancy_prior = Prior::gaussian; }, "another prior");
+    check([](Smoothing& s) { s.occupancy_estimator = Estimator::monte_carlo; }, "monte_carlo");
+    check([](Smoothing& s) { s.distance = DistanceMetric::squared; }, "squared distances");
+    check([](Smoothing& s) { s.composition = Composition::barrier; }, "the barrier");
+    check([](Smoothing& s) { s.blur_radius.reset(); }, "no blur_radius");
+    Smoothing smoothing;
+    smoothing.occupancy_width = static_cast<OccupancyWidth>(7);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "occupancy_width (smoothing): got 7");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, smoothing_preset("opendr", 0, 5), "size (preset): got 0x5");
   }
 
   TEST_CASE("unknown words") {

@@ -1,0 +1,33 @@
+// The auxiliary outputs of `dpr render --aov`.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dpr/aov.hpp"
+#include "dpr/sampling_error.hpp"
+
+namespace dpr::cli {
+
+class AovFiles {
+ public:
+  /// Throws InvalidArgument for a word that names none, and for uv of a scene without texture coordinates.
+  AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene);
+
+  /// Writes them, from the renderer's last forward(), to OUT.NAME.exr for the output OUT.png.
+  void write(Renderer& renderer) const;
+  /// A line on the standard error of the image, if the scene is sampled.
+  void print_sampling_error(Renderer& renderer) const;
+
+ private:
+  std::string file_name(std::string_view name) const;
+  const SamplingError& sampling_error(Renderer& renderer) const;
+
+  std::string output_;
+  std::vector<Aov> aovs_;
+  bool standard_error_ = false, gradient_standard_error_ = false;
+  mutable std::optional<SamplingError> sampling_error_;  // measured once
+};
+
+}  // namespace dpr::cli

@@ -1,0 +1,36 @@
+// Auxiliary outputs of every pixel from the weights of its fragments.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "stages/aggregate.hpp"
+#include "stages/geometry.hpp"
+
+namespace dpr {
+
+class AovStage {
+ public:
+  explicit AovStage(Device::Impl& device);
+
+  /// Runs the aggregation backward pass for a gradient of 1 in red, which leaves the weight of every fragment
+  /// in the gradient of its red: `aggregate` is left with that.
+  void forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
+               Aggregate& aggregate);
+
+  Buffer<float> outputs;    ///< [DPR_AOV_CHANNELS][view][height][width]
+  Buffer<cl_uint> face_id;  ///< [view][height][width] DPR_NO_FACE for the background
+
+  std::size_t bytes() const {
+    return outputs.capacity_bytes() + face_id.capacity_bytes() + unit_gradient_.capacity_bytes() +
+           background_weight_.capacity_bytes();
+  }
+
+ private:
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
+         In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
+      forward_;
+  Buffer<cl_float4> unit_gradient_;
+  Buffer<float> background_weight_;
+};
+
+}  // namespace dpr
