@@ -40,7 +40,10 @@ Aov parse_aov(std::string_view word, std::string_view where) {
 void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
   if (!aov) aov.emplace(device.impl());
-  aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
+  for (const Band& band : bands) {
+    if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
+    aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
+  }
   aov_frame = frame_number;
 }
 

@@ -74,13 +74,7 @@ class Replicates {
   void add(const Renderer& renderer, SceneGradient gradient) {
     for (Spread* spread : {&image_, &depth_, &distance_, &gradient_}) spread->next_replicate();
     for (std::size_t v = 0; v < m_.views.size(); ++v) add_image(renderer.image(v), v);
-    const std::vector<float> by_depth = m_.aggregate.grad_depth.download();
-    const std::vector<float> by_distance = m_.occupancy.grad_distance.download();
-    // The rest of the buffers is padding.
-    for (const cl_uint k : m_.rasterize.list.download()) {
-      depth_.add(k, static_cast<double>(by_depth[k]));
-      distance_.add(k, static_cast<double>(by_distance[k]));
-    }
+    if (m_.bands.size() == 1) add_fragments();
     std::size_t i = 0;
     transform_numbers(gradient, [&](double value) {
       gradient_.add(i++, value);
@@ -92,7 +86,7 @@ class Replicates {
   SamplingError result() const {
     SamplingError error;
     for (std::size_t v = 0; v < m_.views.size(); ++v) error.images.push_back(image_of(v));
-    error.pixel_gradients = pixel_gradients();
+    if (m_.bands.size() == 1) error.pixel_gradients = pixel_gradients();
     error.gradient = last_;
     std::size_t i = 0;
     transform_numbers(error.gradient, [&](double) { return gradient_.deviation(i++); });
@@ -104,6 +98,16 @@ class Replicates {
     std::size_t i = view * 4 * image.pixels.size();
     for (const glm::vec4& pixel : image.pixels) {
       for (int c = 0; c < 4; ++c) image_.add(i++, static_cast<double>(pixel[c]));
+    }
+  }
+
+  void add_fragments() {
+    const std::vector<float> by_depth = m_.aggregate.grad_depth.download();
+    const std::vector<float> by_distance = m_.occupancy.grad_distance.download();
+    // The rest of the buffers is padding.
+    for (const cl_uint k : m_.rasterize.list.download()) {
+      depth_.add(k, static_cast<double>(by_depth[k]));
+      distance_.add(k, static_cast<double>(by_distance[k]));
     }
   }
 

@@ -76,6 +76,10 @@ void AovFiles::write(Renderer& renderer) const {
   }
   if (standard_error_) write_image(file_name(k_standard_error), sampling_error(renderer).images.front());
   if (gradient_standard_error_) {
+    if (sampling_error(renderer).pixel_gradients.empty()) {
+      throw InvalidArgument("gradient_standard_error (--aov)", "a frame in bands of the memory budget",
+                            "an image whose fragments fit the device's memory");
+    }
     write_image(file_name(k_gradient_standard_error),
                 grey(sampling_error(renderer).pixel_gradients.front(), renderer.scene()));
   }

@@ -18,9 +18,9 @@ void AovStage::forward(const AggregateInputs& in, const Geometry& geometry, cons
   outputs.resize(device_, DPR_AOV_CHANNELS * pixels);
   face_id.resize(device_, pixels);
   const Rasterize& r = in.rasterize;
-  forward_(pixels, in.p, r.pixel_starts, r.list, aggregate.grad_color.red, background_weight_, r.depth,
-           r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices, transform.world,
-           outputs, face_id);
+  forward_(r.pixels(in.p), in.p, r.pixel_starts, r.list, aggregate.grad_color.red, background_weight_,
+           r.depth, r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices,
+           transform.world, outputs, face_id);
 }
 
 }  // namespace dpr

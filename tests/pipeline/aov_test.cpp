@@ -217,6 +217,31 @@ TEST_SUITE("pipeline") {
     CHECK(alone.normal == b.normal);
   }
 
+  TEST_CASE("aov: frames in bands show the same") {
+    Device device = open_device();
+    Scene scene = two_meshes(reduced(40, 12), reduced(40, 20));
+    scene.smoothing.composition = Composition::joint;
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    renderer.forward();
+    const AuxiliaryOutputs whole = auxiliary_outputs(renderer);
+    const std::size_t enough = device.memory_budget();
+    device.set_memory_budget(renderer.statistics().fragments * 50);
+    renderer.forward();
+    REQUIRE(renderer.statistics().bands > 1);
+    const AuxiliaryOutputs found = auxiliary_outputs(renderer);
+    CHECK(found.depth == whole.depth);
+    CHECK(found.normal == whole.normal);
+    CHECK(found.face_id == whole.face_id);
+    CHECK(found.barycentrics == whole.barycentrics);
+    CHECK(found.effective_faces == whole.effective_faces);
+    const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
+    const SamplingError error = estimate_sampling_error(renderer, std::span(&grad, 1));
+    CHECK(error.pixel_gradients.empty());
+    CHECK(error.images.size() == 1);
+    device.set_memory_budget(enough);
+  }
+
   TEST_CASE("aov: sampled weights count too") {
     Scene scene = cube_scene(reduced(24, 9), reduced(16, 7));
     scene.smoothing = smoothing_preset("paper_gaussian");
