@@ -14,37 +14,33 @@
 #endif
 #include "integrate.h"
 
-/// Appends a slot if it counts beside the largest so far, which stays in front.
-static inline void append_slot(Slots* run, float beta, uint fragment) {
-  const float largest = run->count > 0 ? run->slot[0].beta : -INFINITY;
-  if (!(beta > largest - DPR_BARRIER_REACH) || beta <= DPR_LOG_ZERO) return;
-  Slot s = {beta, 1.0f, 0.0f, fragment};
-  if (beta > largest && run->count > 0) {
-    const Slot second = run->slot[0];
-    run->slot[0] = s;
-    s = second;
-  }
-  run->slot[run->count++] = s;
-}
-
 /// The slots that count, the largest first; betas relative to it. Slots further below than the prior reaches have no
-/// weight, and change no other's.
+/// weight, and change no other's. Everything is written, and what does not count written over: no branch to mispredict.
 static inline Slots gather_slots(const BarrierPixel q, const Fragments f, global Slot* slots) {
-  Slots run = {slots, 0, 0.0f};
+  float largest = q.background;
+  const Slot background = {q.background, 1.0f, 0.0f, DPR_BACKGROUND_SLOT};
+  slots[0] = background;
+  uint appended = 1;
   for (uint i = q.first; i < q.last; ++i) {
     const uint k = f.list[i];
     const float log_p = f.log_occupancy[k];
-    if (log_p > DPR_LOG_ZERO) append_slot(&run, barrier_beta(q, f.depth[k], log_p), k);
+    const Slot s = {barrier_beta(q, f.depth[k], log_p), 1.0f, 0.0f, k};
+    slots[appended] = s;
+    appended += log_p > DPR_LOG_ZERO && s.beta > largest - DPR_BARRIER_REACH;
+    largest = log_p > DPR_LOG_ZERO ? max(largest, s.beta) : largest;
   }
-  append_slot(&run, q.background, DPR_BACKGROUND_SLOT);
-  const float largest = slots[0].beta;
-  const uint appended = run.count;
-  run.count = 0;
+  Slots run = {slots, 0, 0.0f};
+  uint front = 0;
   for (uint i = 0; i < appended; ++i) {
     Slot s = slots[i];
     s.beta -= largest;
-    if (s.beta > -DPR_BARRIER_REACH) slots[run.count++] = s;
+    slots[run.count] = s;
+    front = s.beta == 0.0f ? run.count : front;
+    run.count += s.beta > -DPR_BARRIER_REACH;
   }
+  const Slot s = slots[front];
+  slots[front] = slots[0];
+  slots[0] = s;
   return run;
 }
 
@@ -142,7 +138,7 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
     const float4 sum = weigh_colors(run, f, background);
     color = sum.xyz / sum.w;
   }
-  image[pixel] = (float4)(color, 1.0f - run_transparency(f, q.first, q.last));
+  image[pixel] = (float4)(color, 1.0f - q.transparency);
 }
 
 /// Clears a pixel's gradients, but for what alpha adds to those of ln p.

@@ -20,8 +20,7 @@
 
 #define DPR_OPAQUE 1e-9f
 
-/// The backward pass skips fragments whose occupancy is below this: an error of at most that in the weights. The
-/// forward pass keeps them, since an L1 loss asks for the sign of the smallest difference.
+/// Fragments that cover less than this of what the pixel's most covering one does are left out.
 #define DPR_NEGLIGIBLE 1e-8f
 
 /// Runs up to this length are sorted by insertion.
@@ -68,31 +67,44 @@ kernel void aggregate_joint_sort(const uint pixels, global const uint* restrict 
   }
 }
 
-/// A run of sorted fragments whose noise overlaps.
+/// A run of a pixel's slots whose noise overlaps.
 typedef struct {
   Slots run;
   float transparency;  // prod (1 - p)
   float coverage;      // 1 - that, added up so that coverages far below 1 keep their digits
 } Cluster;
 
-/// The cluster that begins with fragment `first` of the lists, its slots' betas relative to the first's. It ends where
-/// the noise of two neighbours in depth does not overlap: the nearer one is always in front.
-static inline Cluster gather_cluster(const Fragments f, uint first, uint end, float depth_scale, float in_front,
-                                     global Slot* slots) {
-  Cluster c = {{slots, 0, 0.0f}, 1.0f, 0.0f};
-  const float nearest = f.depth[f.list[first]];
-  float last = nearest;
-  for (uint i = first; i < end; ++i) {
+/// The fragments that cover, as slots in the order of the lists, with their view depths in place of the betas. Left out
+/// are those that cover less than DPR_NEGLIGIBLE of what another does: an error of at most that, relative to the pixel's
+/// coverage, so that the smallest difference to the background keeps its sign. Returns how many are left.
+static inline uint gather_slots(const Fragments f, uint first, uint last, global Slot* slots) {
+  float largest = 0.0f;
+  for (uint i = first; i < last; ++i) largest = max(largest, f.occupancy[f.list[i]]);
+  uint count = 0;
+  for (uint i = first; i < last; ++i) {
     const uint k = f.list[i];
-    const float depth = f.depth[k];
+    const Slot s = {f.depth[k], f.occupancy[k], -1.0f, k};
+    slots[count] = s;
+    count += s.occupancy > DPR_NEGLIGIBLE * largest;
+  }
+  return count;
+}
+
+/// The cluster that begins with the first of `count` slots that hold view depths, which become betas relative to the
+/// first's. It ends where the noise of two neighbours in depth does not overlap: the nearer one is always in front.
+static inline Cluster first_cluster(global Slot* slots, uint count, float depth_scale) {
+  Cluster c = {{slots, 0, 0.0f}, 1.0f, 0.0f};
+  const float nearest = slots[0].beta;
+  float last = nearest;
+  for (uint i = 0; i < count; ++i) {
+    const float depth = slots[i].beta, p = slots[i].occupancy;
     if ((depth - last) * depth_scale >= DPR_JOINT_BELOW + DPR_JOINT_ABOVE) break;
     last = depth;
-    const float p = f.occupancy[k];
-    const Slot s = {(nearest - depth) * depth_scale, p, i == first ? in_front : -1.0f, k};
-    slots[c.run.count++] = s;
+    slots[i].beta = (nearest - depth) * depth_scale;
+    c.run.count = i + 1;
     c.run.covering += p;
     c.coverage += (1.0f - c.coverage) * p;
-    c.transparency *= fragment_transparency(f, k);
+    c.transparency *= slot_transparency(slots[i]);
   }
   return c;
 }
@@ -119,22 +131,23 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
   if (pixel >= p.pixels) return;
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
-  const uint start = starts[pixel], end = starts[pixel + 1];
+  global Slot* pixel_slots = slots + starts[pixel];
+  const uint count = gather_slots(f, starts[pixel], starts[pixel + 1], pixel_slots);
   float transparency = 1.0f;
   float3 color = 0.0f;
-  uint first = start;
-  while (first < end && transparency > DPR_OPAQUE) {
-    const Cluster c = gather_cluster(f, first, end, depth_scale, transparency, slots + first);
+  uint seen = 0;
+  while (seen < count && transparency > DPR_OPAQUE) {
+    const Cluster c = first_cluster(pixel_slots + seen, count - seen, depth_scale);
+    pixel_slots[seen].grad = transparency;
     color += transparency * cluster_color(c, f);
     transparency *= c.transparency;
-    first += c.run.count;
+    seen += c.run.count;
   }
-  slot_counts[pixel] = first - start;
+  slot_counts[pixel] = seen;
   image[pixel] = (float4)(color + transparency * p.background.xyz, 1.0f - transparency);
 }
 
-/// The cluster whose last slot is before `end`; `in_front` is set to the transparency in front of it. Slots that hardly
-/// cover are left out of the run, which moves to the end.
+/// The cluster whose last slot is before `end`; `in_front` is set to the transparency in front of it.
 static inline Slots cluster_before(global Slot* slots, uint end, float* in_front) {
   uint first = end - 1;
   while (slots[first].grad < 0.0f) --first;
@@ -147,13 +160,12 @@ static inline Slots cluster_before(global Slot* slots, uint end, float* in_front
 /// w_k / p_k, dL/dbeta_k, dL/dp_k. Returns what is seen of the cluster and behind.
 static inline float cluster_gradients(Slots run, const Fragments f, float3 grad, float behind, SlotGradients* out) {
   float transparency = 1.0f;
-  for (uint i = 0; i < run.count; ++i) transparency *= fragment_transparency(f, run.slot[i].fragment);
+  for (uint i = 0; i < run.count; ++i) transparency *= slot_transparency(run.slot[i]);
   for (uint i = 0; i < run.count; ++i) {
-    const uint k = run.slot[i].fragment;
-    run.slot[i].grad = dot(grad, fragment_color(f, k));
-    run.covering += run.slot[i].occupancy;
-    out->weight[k] = out->beta[k] = 0.0f;
-    out->occupancy[k] = -behind * transparency / fragment_transparency(f, k);
+    const Slot s = run.slot[i];
+    run.slot[i].grad = dot(grad, fragment_color(f, s.fragment));
+    run.covering += s.occupancy;
+    out->occupancy[s.fragment] = -behind * transparency / slot_transparency(s);
   }
   if (run.count == 1) {
     const Slot s = run.slot[0];
@@ -181,20 +193,20 @@ kernel void aggregate_joint_backward(const AggregateParams p, global const ViewP
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const float4 grad = grad_image[pixel];
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
-  const uint start = starts[pixel], end = starts[pixel + 1], visible = slot_counts[pixel];
-  global Slot* pixel_slots = slots + start;
-  for (uint i = start + visible; i < end; ++i) {
+  global Slot* pixel_slots = slots + starts[pixel];
+  const uint seen = slot_counts[pixel];
+  for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
     const uint k = list[i];
     grad_depth[k] = grad_log_occupancy[k] = grad_red[k] = grad_green[k] = grad_blue[k] = 0.0f;
   }
   float transparency = 1.0f;
-  for (uint i = 0; i < visible; ++i) transparency *= fragment_transparency(f, pixel_slots[i].fragment);
+  for (uint i = 0; i < seen; ++i) transparency *= slot_transparency(pixel_slots[i]);
 
   // Back to front: what lies behind each cluster, as one background.
   float grad_gamma = 0.0f;
   float behind = dot(grad.xyz, p.background.xyz);
   SlotGradients sums = {grad_red, grad_depth, grad_log_occupancy, 0.0f, 0.0f};
-  for (uint last = visible; last > 0;) {
+  for (uint last = seen; last > 0;) {
     float in_front;
     const Slots run = cluster_before(pixel_slots, last, &in_front);
     behind = cluster_gradients(run, f, grad.xyz, behind, &sums);
@@ -206,7 +218,7 @@ kernel void aggregate_joint_backward(const AggregateParams p, global const ViewP
       grad_gamma -= grad_beta * s.beta / p.gamma;
       grad_depth[k] = -grad_beta * depth_scale;
       grad_log_occupancy[k] *= s.occupancy * in_front;
-      grad_log_occupancy[k] += grad.w * alpha_sensitivity(f, k, transparency);
+      grad_log_occupancy[k] += grad.w * s.occupancy * transparency / slot_transparency(s);
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;
       grad_blue[k] = weight * grad.z;

@@ -11,6 +11,13 @@
 #define DPR_WIDTH DPR_LANES /* the width of this file's vectors */
 #endif
 
+/// a * b + c in one instruction. `mad` is two on PoCL, `fma` a library call where the hardware has none.
+#ifdef __FMA__
+#define fma_n fma
+#else
+#define fma_n mad
+#endif
+
 #define DPR_CONCAT_(a, b) a##b
 #define DPR_CONCAT(a, b) DPR_CONCAT_(a, b)
 
@@ -81,25 +88,39 @@ static inline realn square(realn x) { return x * x; }
 /// `a` where the comparison holds, else `b`: select() with its arguments in the order of the ?: operator.
 static inline realn choose(intn condition, realn a, realn b) { return select(b, a, condition); }
 
+#if DPR_WIDTH != 1
+/// 2^round(x / ln 2) times a polynomial of the rest (least maximum error on |f| <= ln 2 / 2), for -87 <= x <= 88.
+static inline realn exp_in_range(realn x) {
+  const realn n = rint(x * M_LOG2E_F);
+  // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
+  const realn f = fma_n(n, (realn)(-1.42860677e-6f), fma_n(n, (realn)(-0.693145752f), x));
+  realn p = 0.00138368784f;
+  p = fma_n(p, f, (realn)(0.00837481394f));
+  p = fma_n(p, f, (realn)(0.0416682251f));
+  p = fma_n(p, f, (realn)(0.166664198f));
+  p = fma_n(p, f, (realn)(0.499999911f));
+  p = fma_n(p, f, (realn)(1.0f));
+  p = fma_n(p, f, (realn)(1.0f));
+  return p * as_realn((convert_intn(n) + 127) << 23);
+}
+#endif
+
 /// Natural exponential. Relative error below 2e-7 for -87 < x < 88, 0 below. On a vector CPU OpenCL's own exp() is a
-/// library call a lane; a polynomial (least maximum error on |f| <= ln 2 / 2) stays in the registers.
+/// library call a lane; a polynomial stays in the registers.
 static inline realn exp_n(realn x) {
 #if DPR_WIDTH == 1
   return exp(x);
 #else
-  const realn clamped = clamp(x, -87.0f, 88.0f);
-  const realn n = rint(clamped * M_LOG2E_F);
-  // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
-  const realn f = mad(n, -1.42860677e-6f, mad(n, -0.693145752f, clamped));
-  realn p = 0.00138368784f;
-  p = mad(p, f, 0.00837481394f);
-  p = mad(p, f, 0.0416682251f);
-  p = mad(p, f, 0.166664198f);
-  p = mad(p, f, 0.499999911f);
-  p = mad(p, f, 1.0f);
-  p = mad(p, f, 1.0f);
-  const realn scale = as_realn((convert_intn(n) + 127) << 23);
-  return choose(x < -87.0f, (realn)(0.0f), p * scale);
+  return choose(x < -87.0f, (realn)(0.0f), exp_in_range(clamp(x, -87.0f, 88.0f)));
+#endif
+}
+
+/// The same for x <= 0, and not below exp(-87) = 1.6e-38.
+static inline realn exp_of_negative(realn x) {
+#if DPR_WIDTH == 1
+  return exp(max(x, -87.0f));
+#else
+  return exp_in_range(max(x, -87.0f));
 #endif
 }
 
@@ -113,14 +134,14 @@ static inline realn log_n(realn x) {
   const intn exponent = (bits - 0x3f3504f3) >> 23; /* of x / sqrt(1/2) */
   const realn f = as_realn(bits - (exponent << 23)) - 1.0f;
   realn p = 0.0870029986f;
-  p = mad(p, f, -0.142672828f);
-  p = mad(p, f, 0.149147247f);
-  p = mad(p, f, -0.165776079f);
-  p = mad(p, f, 0.1996307f);
-  p = mad(p, f, -0.250013364f);
-  p = mad(p, f, 0.333339106f);
+  p = fma_n(p, f, (realn)(-0.142672828f));
+  p = fma_n(p, f, (realn)(0.149147247f));
+  p = fma_n(p, f, (realn)(-0.165776079f));
+  p = fma_n(p, f, (realn)(0.1996307f));
+  p = fma_n(p, f, (realn)(-0.250013364f));
+  p = fma_n(p, f, (realn)(0.333339106f));
   const realn f2 = f * f;
-  return mad(convert_realn(exponent), M_LN2_F, mad(f2 * f, p, mad(f2, -0.5f, f)));
+  return fma_n(convert_realn(exponent), (realn)(M_LN2_F), fma_n(f2 * f, p, fma_n(f2, (realn)(-0.5f), f)));
 #endif
 }
 

@@ -37,18 +37,13 @@ static inline float fragment_transparency(const Fragments f, uint fragment) {
   return max(1.0f - f.occupancy[fragment], DPR_MIN_TRANSPARENCY);
 }
 
+static inline float slot_transparency(const Slot s) { return max(1.0f - s.occupancy, DPR_MIN_TRANSPARENCY); }
+
 /// prod (1 - p) over a run: what the pixel's alpha leaves.
 static inline float run_transparency(const Fragments f, uint first, uint last) {
   float product = 1.0f;
   for (uint i = first; i < last; ++i) product *= fragment_transparency(f, f.list[i]);
   return product;
-}
-
-/// 1 - prod (1 - p) over a run, added up so that coverages far below 1 keep their digits.
-static inline float run_coverage(const Fragments f, uint first, uint last) {
-  float covered = 0.0f;
-  for (uint i = first; i < last; ++i) covered += (1.0f - covered) * f.occupancy[f.list[i]];
-  return covered;
 }
 
 /// d alpha / d ln p of one fragment: p prod of the others' transparencies.
@@ -63,6 +58,7 @@ typedef struct {
   float depth_scale;    // d beta / d (nearest - depth)
   float inverse_alpha;
   float background;     // beta of the background slot
+  float transparency;   // prod (1 - p)
 } BarrierPixel;
 
 static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
@@ -73,7 +69,11 @@ static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixe
   q.first = starts[pixel];
   q.last = starts[pixel + 1];
   q.nearest = INFINITY;
-  for (uint i = q.first; i < q.last; ++i) q.nearest = min(q.nearest, f.depth[f.list[i]]);
+  q.transparency = 1.0f;
+  for (uint i = q.first; i < q.last; ++i) {
+    q.nearest = min(q.nearest, f.depth[f.list[i]]);
+    q.transparency *= fragment_transparency(f, f.list[i]);
+  }
   q.depth_scale = view->inverse_range / p.gamma;
   q.inverse_alpha = 1.0f / p.alpha;
   q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;

@@ -17,7 +17,7 @@
 #define DPR_JOINT_CROWD_STEP 0.475f
 
 static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
-  const realn e = exp_n(-fabs(x));
+  const realn e = exp_of_negative(-fabs(x));
   const realn large = 1.0f / (1.0f + e), small = e * large;
   *cdf = choose(x < 0.0f, small, large);
   *density = small * large;

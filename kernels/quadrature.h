@@ -19,7 +19,7 @@
 #include "priors.h"
 
 /// Barrier composition: with more slots than this there are twice as many nodes.
-#define DPR_THRONG 64
+#define DPR_THRONG 40
 /// Joint composition: from this sum of occupancies on a cluster is crowded.
 #define DPR_JOINT_CROWD 3.0f
 /// And how much further its slots then reach, so that many do not leave out too much.

@@ -90,7 +90,7 @@ inline std::vector<SyntheticPixel> make_crowds(float gamma, unsigned seed) {
     pixels.push_back(make_pixel(reduced(300, 20), spread, gamma, Occupancies::any, random));
   }
   pixels.push_back(make_pixel(reduced(300, 20), 5, gamma, Occupancies::decades, random));
-  for (const int count : {reduced(64, 9), reduced(65, 10), reduced(120, 11)}) {
+  for (const int count : {reduced(40, 9), reduced(41, 10), reduced(120, 11)}) {
     for (const float spread : {0.0F, 2.0F}) {
       pixels.push_back(make_pixel(count, spread, gamma, Occupancies::any, random));
       pixels.push_back(make_pixel(count, spread, gamma, Occupancies::solid, random));
