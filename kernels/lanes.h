@@ -1,6 +1,6 @@
 // Vectors of DPR_WIDTH floats under one name. A kernel file that works on lanes defines DPR_WIDTH before it includes
 // this: 1 where the device's lanes are its work-items (GPUs), 8 or 16 where they are vector registers (CPUs),
-// 4 where they are the four numbers of one Philox call.
+// 8 where they are samples.
 #ifndef DPR_LANES_H
 #define DPR_LANES_H
 
@@ -27,6 +27,7 @@ typedef uint uintn;
 #define convert_uintn convert_uint
 #define DPR_LANE_INDEX 0
 static inline float sum_lanes(float v) { return v; }
+static inline int any_lane(int condition) { return condition; }
 #else
 typedef DPR_CONCAT(float, DPR_WIDTH) realn;
 typedef DPR_CONCAT(int, DPR_WIDTH) intn;
@@ -38,6 +39,7 @@ typedef DPR_CONCAT(uint, DPR_WIDTH) uintn;
 #define convert_intn DPR_CONCAT(convert_int, DPR_WIDTH)
 #define convert_realn DPR_CONCAT(convert_float, DPR_WIDTH)
 #define convert_uintn DPR_CONCAT(convert_uint, DPR_WIDTH)
+static inline int any_lane(intn condition) { return any(condition); }
 static inline float sum_lanes8(float8 v) {
   const float4 a = v.lo + v.hi;
   const float2 b = a.lo + a.hi;

@@ -2,7 +2,11 @@
 //
 //   prior_cdf_ratio(x, &cdf, &ratio)      F(x), and f(x) / F(x), the density over it: what aggregation integrates
 //   occupancy_log(x, &log_p, &hazard)     ln p and d ln p / dx of p = 1 - F(-x): the perturbed Heaviside (8)
-//   prior_sample(u), prior_score(z)       inverse CDF of u in (0, 1); nu'(z) of the density exp(-nu)
+//   noise_quantile(prior, u)              inverse CDF of u in (0, 1)
+//   noise_score(prior, z)                 nu'(z) of the density exp(-nu)
+//   lowest_noise(prior), highest_noise(prior)  bounds of what is drawn
+//
+// The last three take the prior as an argument, a constant: the joint composition samples two of them.
 //
 // Everything is written for vectors of lanes (lanes.h), without branches, and holds far into the tails: an occupancy
 // of 1e-20 has a logarithm, and a gradient, as good as one of 0.5. Errors: tests/stages/priors_test.cpp.
@@ -88,21 +92,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(negative, 1.0f / mills, density / (1.0f - tail));
 }
 
-/// Wichura's PPND7 (Algorithm AS 241, 1988): absolute error below 1e-6 for the u that 32 random bits give.
-static inline realn prior_sample(realn u) {
-  const realn q = u - 0.5f;
-  const realn s = 0.180625f - q * q; /* 0.425^2: where the central expansion ends */
-  const realn central =
-      q * mad(mad(mad(59.109374720f, s, 159.29113202f), s, 50.434271938f), s, 3.3871327179f) /
-      mad(mad(mad(67.187563600f, s, 78.757757664f), s, 17.895169469f), s, 1.0f);
-  const realn r = sqrt(-log_n(min(u, 1.0f - u))) - 1.6f;
-  const realn tail = mad(mad(mad(0.17023821103f, r, 1.3067284816f), r, 2.7568153900f), r, 1.4234372777f) /
-                     mad(mad(0.12021132975f, r, 0.73700164250f), r, 1.0f);
-  return choose(fabs(q) <= 0.425f, central, copysign(tail, q));
-}
-
-static inline realn prior_score(realn z) { return z; }
-
 #elif DPR_PRIOR == DPR_CAUCHY
 
 static inline void prior_cdf_ratio(realn x, realn* cdf, realn* ratio) {
@@ -117,10 +106,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *log_p = choose(x < 0.0f, log(p), log1p(p - 1.0f));
   *hazard = ratio;
 }
-
-static inline realn prior_sample(realn u) { return -cospi(u) / sinpi(u); }
-
-static inline realn prior_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
 
 #elif DPR_PRIOR == DPR_LOGISTIC
 
@@ -137,10 +122,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *log_p = min(x, 0.0f) - log1p(e);
   *hazard = choose(x < 0.0f, 1.0f / (1.0f + e), e / (1.0f + e));
 }
-
-static inline realn prior_sample(realn u) { return log_n(u) - log_n(1.0f - u); }
-
-static inline realn prior_score(realn z) { return tanh(0.5f * z); }
 
 #elif DPR_PRIOR == DPR_GUMBEL
 
@@ -164,10 +145,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(small, mad(u, mad(u, 1.0f / 12.0f, -0.5f), 1.0f), u * survival / (1.0f - survival));
 }
 
-static inline realn prior_sample(realn u) { return -log_n(-log_n(u)); }
-
-static inline realn prior_score(realn z) { return 1.0f - exp_n(-z); }
-
 #elif DPR_PRIOR == DPR_UNIFORM
 
 static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
@@ -179,7 +156,82 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
 
 #endif
 
+// Sampling. The uniform prior has no score and is not sampled.
+
+/// What uniform_from_bits gives lies between these.
+#define DPR_LOWEST_UNIFORM 0x1p-24f
+#define DPR_HIGHEST_UNIFORM (1.0f - 0x1p-24f)
+
+/// Giles, "Approximating the erfinv function" (GPU Computing Gems Jade Edition, 2011): sqrt(2) erfinv(2 u - 1), a
+/// polynomial in w = -ln(4 u (1 - u)), and one in sqrt(w) for the 0.34% in the tails.
+static inline realn gaussian_quantile(realn u) {
+  const realn w = -log_n(4.0f * u * (1.0f - u));
+  const realn c = w - 2.5f;
+  realn p = 2.81022636e-08f;
+  p = mad(p, c, 3.43273939e-07f);
+  p = mad(p, c, -3.5233877e-06f);
+  p = mad(p, c, -4.39150654e-06f);
+  p = mad(p, c, 0.00021858087f);
+  p = mad(p, c, -0.00125372503f);
+  p = mad(p, c, -0.00417768164f);
+  p = mad(p, c, 0.246640727f);
+  p = mad(p, c, 1.50140941f);
+  const intn is_tail = w >= 5.0f; /* where the first polynomial ends */
+  if (any_lane(is_tail)) {
+    const realn r = sqrt(max(w, 5.0f)) - 3.0f;
+    realn q = -0.000200214257f;
+    q = mad(q, r, 0.000100950558f);
+    q = mad(q, r, 0.00134934322f);
+    q = mad(q, r, -0.00367342844f);
+    q = mad(q, r, 0.00573950773f);
+    q = mad(q, r, -0.0076224613f);
+    q = mad(q, r, 0.00943887047f);
+    q = mad(q, r, 1.00167406f);
+    q = mad(q, r, 2.83297682f);
+    p = choose(is_tail, q, p);
+  }
+  return M_SQRT2_F * p * mad(2.0f, u, -1.0f);
+}
+
+/// -cot(pi u), by way of the Taylor polynomials of sine and cosine on [0, pi / 4]: relative error 5e-8 before rounding.
+static inline realn cauchy_quantile(realn u) {
+  const realn folded = min(u, 1.0f - u); /* cot(pi u) = -cot(pi (1 - u)) */
+  const intn is_outer = folded <= 0.25f;
+  const realn x = M_PI_F * choose(is_outer, folded, 0.5f - folded);
+  const realn s = x * x;
+  const realn sine = x * mad(mad(mad(mad(2.75573192e-6f, s, -1.98412698e-4f), s, 8.33333333e-3f), s, -1.66666667e-1f), s, 1.0f);
+  const realn cosine = mad(mad(mad(mad(2.48015873e-5f, s, -1.38888889e-3f), s, 4.16666667e-2f), s, -0.5f), s, 1.0f);
+  const realn size = choose(is_outer, cosine, sine) / choose(is_outer, sine, cosine);
+  return choose(u < 0.5f, -size, size);
+}
+
+static inline realn noise_quantile(int prior, realn u) {
+  if (prior == DPR_CAUCHY) return cauchy_quantile(u);
+  if (prior == DPR_LOGISTIC) return log_n(u) - log_n(1.0f - u);
+  if (prior == DPR_GUMBEL) return -log_n(-log_n(u));
+  return gaussian_quantile(u);
+}
+
+static inline realn noise_score(int prior, realn z) {
+  if (prior == DPR_CAUCHY) return 2.0f * z / mad(z, z, 1.0f);
+  if (prior == DPR_GUMBEL) return 1.0f - exp_n(-z);
+  if (prior == DPR_LOGISTIC) {
+    const realn e = exp_n(-fabs(z));
+    return copysign((1.0f - e) / (1.0f + e), z);
+  }
+  return z;
+}
+
+/// No noise is above this, the quantile of DPR_HIGHEST_UNIFORM.
+static inline float highest_noise(int prior) {
+  if (prior == DPR_CAUCHY) return 5.35e6f;
+  return prior == DPR_GAUSSIAN ? 5.3f : 16.7f;
+}
+
+/// No noise is below this.
+static inline float lowest_noise(int prior) { return prior == DPR_GUMBEL ? -2.82f : -highest_noise(prior); }
+
 /// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1.
-static inline realn uniform_from_bits(uintn bits) { return mad(convert_realn(bits >> 9), 0x1p-23f, 0x1p-24f); }
+static inline realn uniform_from_bits(uintn bits) { return mad(convert_realn(bits >> 9), 0x1p-23f, DPR_LOWEST_UNIFORM); }
 
 #endif

@@ -44,13 +44,11 @@ void Aggregate::set_smoothing(const Smoothing& smoothing) {
 shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {
   shared::AggregateParams a{};
   a.background = to_cl(background);
+  a.sigma = smoothing_.sigma;
   a.gamma = smoothing_.gamma;
   a.alpha = smoothing_.alpha;
   a.background_depth = smoothing_.background_depth;
-  a.samples = smoothing_.samples;
-  a.baseline = smoothing_.variance_reduction == VarianceReduction::rigid ? 1.0F : 0.0F;
-  a.seed_low = static_cast<cl_uint>(smoothing_.seed);
-  a.seed_high = static_cast<cl_uint>(smoothing_.seed >> 32U);
+  a.sampling = sampling_params(smoothing_);
   a.pixels_per_view = p.width * p.height;
   a.pixels = p.views * a.pixels_per_view;
   a.faces = p.faces;

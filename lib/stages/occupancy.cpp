@@ -4,6 +4,20 @@ namespace dpr {
 
 std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior)); }
 
+shared::Sampling sampling_params(const Smoothing& smoothing) {
+  shared::Sampling s{};
+  s.samples = smoothing.samples;
+  s.draws = static_cast<cl_uint>(smoothing.draws);
+  s.baseline = smoothing.variance_reduction == VarianceReduction::none ? 0.0F : 1.0F;
+  if (smoothing.variance_reduction == VarianceReduction::leave_one_out) {
+    const std::uint32_t group = smoothing.draws == Draws::antithetic ? 2 : 1;
+    s.leave_out = 1.0F / static_cast<float>(smoothing.samples - group);
+  }
+  s.seed_low = static_cast<cl_uint>(smoothing.seed);
+  s.seed_high = static_cast<cl_uint>(smoothing.seed >> 32U);
+  return s;
+}
+
 Occupancy::Exact::Exact(Device::Impl& device, const std::string& options)
     : forward(device, "occupancy.cl", "occupancy_forward", options),
       backward(device, "occupancy.cl", "occupancy_backward", options) {}
@@ -32,10 +46,7 @@ void Occupancy::set_smoothing(const Smoothing& smoothing) {
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   shared::OccupancyParams o{};
   o.sigma = smoothing_.sigma;
-  o.samples = smoothing_.samples;
-  o.baseline = smoothing_.variance_reduction == VarianceReduction::rigid ? 1.0F : 0.0F;
-  o.seed_low = static_cast<cl_uint>(smoothing_.seed);
-  o.seed_high = static_cast<cl_uint>(smoothing_.seed >> 32U);
+  o.sampling = sampling_params(smoothing_);
   o.width = p.width;
   o.faces = p.faces;
   o.pixels_per_view = p.width * p.height;

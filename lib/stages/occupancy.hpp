@@ -58,4 +58,7 @@ class Occupancy {
 /// The build option that chooses a prior.
 std::string prior_option(Prior prior);
 
+/// How the Monte Carlo estimators of either stage sample.
+shared::Sampling sampling_params(const Smoothing& smoothing);
+
 }  // namespace dpr
