@@ -134,24 +134,6 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
   image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - run_transparency(f, q.first, q.last));
 }
 
-/// Sums over a pixel's samples: those of y, and of the scores of gamma.
-typedef struct {
-  float y;
-  realn by_gamma, gamma_scores;
-} PixelSums;
-
-/// Adds a block's scores of one slot: returns sum (y + G / (M - g)) nu'(Z), sum nu'(Z).
-static inline float2 add_slot(const AggregateParams p, const NoiseName name, uint block, realn grouped,
-                              PixelSums* sums) {
-  const realn z = draw_noise(p.sampling, DPR_PRIOR, name, block);
-  const intn counts = sample_counts(p.sampling, block);
-  const realn score = choose(counts, noise_score(DPR_PRIOR, z), (realn)(0.0f));
-  const realn scale_score = choose(counts, mad(score, z, -1.0f), (realn)(0.0f));
-  sums->by_gamma += grouped * scale_score;
-  sums->gamma_scores += scale_score;
-  return (float2)(sum_lanes(grouped * score), sum_lanes(score));
-}
-
 /// y of every sample of a block, relative to `rigid`, and 1 to the weight of each winner.
 static inline realn block_values(const AggregateParams p, const Fragments f, float3 grad, float rigid, uint block,
                                  intn winner, global float* weight) {
@@ -167,11 +149,18 @@ static inline realn block_values(const AggregateParams p, const Fragments f, flo
   return load_n(0, y);
 }
 
+static inline float2 add_slot(const AggregateParams p, const NoiseName name, uint block, realn grouped,
+                              ScaleSums* gamma) {
+  const realn z = draw_noise(p.sampling, DPR_PRIOR, name, block);
+  return add_scores(DPR_PRIOR, z, sample_counts(p.sampling, block), grouped, gamma);
+}
+
 /// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every slot.
-static inline PixelSums add_samples(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                    float3 grad, global float* weight, global float* by_score,
-                                    global float* score_sum) {
-  PixelSums sums = {0.0f, (realn)(0.0f), (realn)(0.0f)};
+/// Returns sum y.
+static inline float add_samples(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
+                                float3 grad, global float* weight, global float* by_score, global float* score_sum,
+                                ScaleSums* gamma) {
+  float y_sum = 0.0f;
   for (uint i = q.first; i < q.last; ++i) weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
   const float rigid = p.sampling.baseline * dot(grad, winner_color(p, f, q.rigid));
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
@@ -179,17 +168,17 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
     const realn y = block_values(p, f, grad, rigid, block, lead.winner, weight);
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
-    sums.y += sum_lanes(y);
-    if (could_win(lead, q.background)) add_slot(p, slot_noise(p, q, face, -1), block, grouped, &sums);
+    y_sum += sum_lanes(y);
+    if (could_win(lead, q.background)) add_slot(p, slot_noise(p, q, face, -1), block, grouped, gamma);
     for (uint i = q.first; i < q.last; ++i) {
       const uint k = f.list[i];
       if (f.log_occupancy[k] <= DPR_LOG_ZERO || !could_win(lead, slot_beta(q, f, k))) continue;
-      const float2 slot = add_slot(p, slot_noise(p, q, face, (int)k), block, grouped, &sums);
+      const float2 slot = add_slot(p, slot_noise(p, q, face, (int)k), block, grouped, gamma);
       by_score[k] += slot.x;
       score_sum[k] += slot.y;
     }
   }
-  return sums;
+  return y_sum;
 }
 
 /// One work-item per pixel. Buffers as in aggregate.cl and aggregate_sampled_forward.
@@ -211,14 +200,14 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
   float grad_gamma = 0.0f, grad_alpha = 0.0f, background_weight = 1.0f;
   if (starts[pixel] != starts[pixel + 1]) {
     const Pixel q = load_pixel(p, pixel, views, starts, f);
-    const PixelSums sums = add_samples(p, q, f, face, grad.xyz, grad_red, grad_depth, grad_log_occupancy);
+    ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
+    const float y_sum = add_samples(p, q, f, face, grad.xyz, grad_red, grad_depth, grad_log_occupancy, &gamma);
     const float transparency = run_transparency(f, q.first, q.last);
-    grad_gamma =
-        score_estimate(p.sampling, sum_lanes(sums.by_gamma), sum_lanes(sums.gamma_scores), sums.y) / p.gamma;
+    grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
     for (uint i = q.first; i < q.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] / (float)p.sampling.samples;
-      const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], sums.y);
+      const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], y_sum);
       background_weight -= weight;
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;

@@ -106,9 +106,29 @@ static inline realn add_group(const Sampling s, realn y) {
   return mad(s.leave_out, s.draws == DPR_ANTITHETIC ? y + y.s10325476 : y, y);
 }
 
+/// What a scale, sigma or gamma, collects over variables and samples: sums of (y + G / (M - g)) (nu'(Z) Z - 1) and of
+/// nu'(Z) Z - 1.
+typedef struct {
+  realn by_score, scores;
+} ScaleSums;
+
+/// Adds a block's scores of one variable, where `counts`: those of the scale to `scale`; returns the variable's own,
+/// sum (y + G / (M - g)) nu'(Z) and sum nu'(Z). `grouped` is add_group of y.
+static inline float2 add_scores(int prior, realn noise, intn counts, realn grouped, ScaleSums* scale) {
+  const realn score = choose(counts, noise_score(prior, noise), (realn)(0.0f));
+  const realn scale_score = choose(counts, mad(score, noise, -1.0f), (realn)(0.0f));
+  scale->by_score += grouped * scale_score;
+  scale->scores += scale_score;
+  return (float2)(sum_lanes(grouped * score), sum_lanes(score));
+}
+
 /// The estimate, from sum (y + G / (M - g)) nu', B = sum nu' and S = sum y.
 static inline float score_estimate(const Sampling s, float by_score, float score_sum, float y_sum) {
   return (by_score - s.leave_out * y_sum * score_sum) / (float)s.samples;
+}
+
+static inline float scale_estimate(const Sampling s, const ScaleSums scale, float y_sum) {
+  return score_estimate(s, sum_lanes(scale.by_score), sum_lanes(scale.scores), y_sum);
 }
 
 #endif

@@ -40,30 +40,25 @@ kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
       mean = sum_lanes(sum) / (float)p.sampling.samples;
     }
     occupancy[i] = mean;
-    log_occupancy[i] = mean > 0.0f ? log(mean) : DPR_LOG_ZERO;
+    // Most fragments are covered by all samples or by none: the logarithm is worth the question.
+    log_occupancy[i] = mean <= 0.0f ? DPR_LOG_ZERO : mean < 1.0f ? log(mean) : 0.0f;
   }
 }
 
 /// Score estimates of sigma dp/ds, with nu'(X), and of sigma dp/dsigma, with nu'(X) X - 1: d = 1 here.
 static inline float2 score_estimates(const OccupancyParams p, const NoiseName name, float x) {
   const float rigid = x > 0.0f ? p.sampling.baseline : 0.0f;
-  realn y_sum = 0.0f, distance = 0.0f, distance_scores = 0.0f, sigma = 0.0f, sigma_scores = 0.0f;
+  float y_sum = 0.0f;
+  float2 distance = 0.0f;
+  ScaleSums sigma = {(realn)(0.0f), (realn)(0.0f)};
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     const realn noise = draw_noise(p.sampling, DPR_PRIOR, name, block);
     const intn counts = sample_counts(p.sampling, block);
     const realn y = choose(counts, heaviside(p, x, noise, block) - rigid, (realn)(0.0f));
-    const realn grouped = add_group(p.sampling, y);
-    const realn score = choose(counts, noise_score(DPR_PRIOR, noise), (realn)(0.0f));
-    const realn scale_score = choose(counts, mad(score, noise, -1.0f), (realn)(0.0f));
-    y_sum += y;
-    distance += grouped * score;
-    distance_scores += score;
-    sigma += grouped * scale_score;
-    sigma_scores += scale_score;
+    y_sum += sum_lanes(y);
+    distance += add_scores(DPR_PRIOR, noise, counts, add_group(p.sampling, y), &sigma);
   }
-  const float sum = sum_lanes(y_sum);
-  return (float2)(score_estimate(p.sampling, sum_lanes(distance), sum_lanes(distance_scores), sum),
-                  score_estimate(p.sampling, sum_lanes(sigma), sum_lanes(sigma_scores), sum));
+  return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum), scale_estimate(p.sampling, sigma, y_sum));
 }
 
 /// One work-item per pair.
@@ -75,7 +70,7 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
                                        global const uint* restrict pair_face, global const uint2* restrict masks,
                                        global const uint* restrict fragment_starts,
                                        global const uint* restrict pixels, global const float* restrict distance,
-                                       global const float* restrict log_occupancy,
+                                       global const float* restrict occupancy,
                                        global const float* restrict grad_log_occupancy,
                                        global float* restrict grad_distance, global float* restrict grad_sigma) {
   const uint pair = (uint)get_global_id(0);
@@ -87,10 +82,10 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
   for (uint i = first; i < fragment_starts[pair + 1]; ++i) {
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
-    if (i >= last || log_occupancy[i] <= DPR_LOG_ZERO || always_covers(x)) continue;
+    if (i >= last || occupancy[i] <= 0.0f || always_covers(x)) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p
-    const float chain = grad_log_occupancy[i] * exp(-log_occupancy[i]) / p.sigma;
+    const float chain = grad_log_occupancy[i] / (occupancy[i] * p.sigma);
     grad_distance[i] = chain * estimates.x;
     total += chain * estimates.y;
   }

@@ -17,6 +17,7 @@ static inline uint8 philox4x32_10(uint4 counter, uint2 key) {
   const ulong4 factor = (ulong4)(DPR_PHILOX_M0, DPR_PHILOX_M1, DPR_PHILOX_M0, DPR_PHILOX_M1);
   ulong4 even = (ulong4)(counter.x, counter.z, counter.x, counter.z + 1); /* words 0, 2 of both counters */
   ulong4 odd = (ulong4)(counter.y, counter.w, counter.y, counter.w);      /* words 1, 3 */
+#pragma unroll
   for (int round = 0; round < DPR_PHILOX_ROUNDS; ++round) {
     const ulong4 product = ((even & DPR_LOW_WORD) * factor).yxwz;
     even = (product >> 32) ^ odd ^ (ulong4)(key.x, key.y, key.x, key.y);

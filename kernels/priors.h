@@ -231,7 +231,10 @@ static inline float highest_noise(int prior) {
 /// No noise is below this.
 static inline float lowest_noise(int prior) { return prior == DPR_GUMBEL ? -2.82f : -highest_noise(prior); }
 
-/// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1.
-static inline realn uniform_from_bits(uintn bits) { return mad(convert_realn(bits >> 9), 0x1p-23f, DPR_LOWEST_UNIFORM); }
+/// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1: the mantissa of a number
+/// in [1, 2), from which 1 less half a step is taken. Exact.
+static inline realn uniform_from_bits(uintn bits) {
+  return as_realn(bits >> 9 | 0x3f800000u) - (1.0f - DPR_LOWEST_UNIFORM);
+}
 
 #endif

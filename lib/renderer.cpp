@@ -131,7 +131,7 @@ void Renderer::Impl::forward() {
   bin.forward(frame, setup.triangles);
   rasterize.forward(frame, setup.triangles, bin);
   shade.forward(shade_inputs());
-  occupancy.forward(frame, bin, rasterize);
+  if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   rendered = true;
   frame_number = ++frames_rendered;
@@ -146,11 +146,15 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
 
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
-  if (geometric || wanted.smoothing) occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
+  const bool sampled_jointly = aggregate.perturbs_distances();
+  if ((geometric || wanted.smoothing) && !sampled_jointly) {
+    occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
+  }
   if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
   if (geometric) {
-    rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth,
-                       shade.grad_bary1, shade.grad_bary2);
+    rasterize.backward(frame, setup.triangles, bin,
+                       sampled_jointly ? aggregate.grad_distance : occupancy.grad_distance,
+                       aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
                     grad_ndc);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);

@@ -9,8 +9,8 @@ namespace dpr {
 using glm::dvec3;
 
 void Renderer::Impl::read_smoothing_gradients(SceneGradient& gradient) {
+  const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
   if (scene.gradients.smoothing || scene.gradients.background) {
-    const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
     const std::vector<float> sums =
         reduce.read(pixels, DPR_PIXEL_CHANNELS, 1, 1, all_pixels, aggregate.channels);
     if (scene.gradients.smoothing) {
@@ -22,7 +22,9 @@ void Renderer::Impl::read_smoothing_gradients(SceneGradient& gradient) {
                                   sums[DPR_CHANNEL_BACKGROUND + 2]);
     }
   }
-  if (scene.gradients.smoothing) {
+  if (scene.gradients.smoothing && aggregate.perturbs_distances()) {
+    gradient.sigma = reduce.read(pixels, 1, 1, 1, all_pixels, aggregate.grad_sigma)[0];
+  } else if (scene.gradients.smoothing) {
     const std::size_t stride = std::size_t{frame.views} * frame.faces;
     gradient.sigma = reduce.read(bin.pairs, 1, 1, stride, bin.pair_starts, occupancy.grad_sigma)[0];
   }

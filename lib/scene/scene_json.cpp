@@ -206,8 +206,8 @@ Camera parse_camera(const JsonNode& node) {
 Smoothing parse_smoothing(const JsonNode& node) {
   node.require_keys({"preset", "occupancy_prior", "depth_prior", "sigma", "gamma", "alpha", "composition",
                      "estimator", "occupancy_estimator", "aggregation_estimator", "samples",
-                     "variance_reduction", "draws", "seed", "occupancy_threshold", "blur_radius", "background_depth",
-                     "distance"});
+                     "variance_reduction", "draws", "seed", "occupancy_threshold", "blur_radius",
+                     "background_depth", "distance"});
   Smoothing smoothing;
   take(node, "preset", smoothing, [](const JsonNode& n) { return smoothing_preset(n.string()); });
   take_word(node, "occupancy_prior", smoothing.occupancy_prior, parse_prior);

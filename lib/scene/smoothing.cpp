@@ -135,8 +135,9 @@ void validate_estimators(const Smoothing& s) {
     throw InvalidArgument("depth_prior (smoothing)", "uniform", "gaussian, cauchy, logistic or gumbel");
   }
   if (s.composition == Composition::joint && s.depth_prior == Prior::cauchy && !aggregation) {
-    throw InvalidArgument("depth_prior (smoothing)", "cauchy with the exact joint composition",
-                          "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
+    throw InvalidArgument(
+        "depth_prior (smoothing)", "cauchy with the exact joint composition",
+        "gaussian, logistic or gumbel: with Cauchy's tails every triangle overlaps every other");
   }
 }
 

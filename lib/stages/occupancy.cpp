@@ -4,6 +4,11 @@ namespace dpr {
 
 std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior)); }
 
+bool samples_jointly(const Smoothing& smoothing) {
+  return smoothing.composition == Composition::joint &&
+         smoothing.aggregation_estimator == Estimator::monte_carlo;
+}
+
 shared::Sampling sampling_params(const Smoothing& smoothing) {
   shared::Sampling s{};
   s.samples = smoothing.samples;
@@ -27,6 +32,7 @@ Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
       backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
 
 void Occupancy::set_smoothing(const Smoothing& smoothing) {
+  if (samples_jointly(smoothing)) return;
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
   const std::string options = prior_option(smoothing.occupancy_prior);
   const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
@@ -77,7 +83,7 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
                      grad_log_occupancy, grad_distance, grad_sigma);
   } else {
     sampled_->backward(pairs, params(p), pairs, bin.pair_face, rasterize.masks, rasterize.fragment_starts,
-                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, grad_log_occupancy,
+                       rasterize.fragment_pixel, rasterize.distance, occupancy, grad_log_occupancy,
                        grad_distance, grad_sigma);
   }
 }
