@@ -33,8 +33,11 @@ typedef struct {
   uint view, in_view;  // the pixel's view, and its number in it
   float nearest;       // view depth of the nearest fragment
   float depth_scale;   // d beta / d (nearest - depth)
-  int rigid;           // the winner without noise: a fragment, or -1 for the background
+  int rigid;           // the winner without noise
 } Pixel;
+
+/// A fragment by its place in the pixel's run; where a winner is meant, -1 is the background.
+static inline uint fragment_of(const Pixel q, const Layers f, int place) { return f.list[q.first + (uint)place]; }
 
 static inline Layers make_layers(global const uint* list, global const float* distance, global const float* depth,
                                  global const float* red, global const float* green, global const float* blue,
@@ -62,12 +65,12 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   q.nearest = INFINITY;
   q.rigid = -1;
   float nearest_inside = INFINITY;
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
+  for (int place = 0; place < (int)(q.last - q.first); ++place) {
+    const uint k = fragment_of(q, f, place);
     q.nearest = min(q.nearest, f.depth[k]);
     if (f.distance[k] <= 0.0f || f.depth[k] >= nearest_inside) continue;
     nearest_inside = f.depth[k];
-    q.rigid = (int)k;
+    q.rigid = place;
   }
   return q;
 }
@@ -89,17 +92,17 @@ static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, 
 static inline int never_covers(const Coordinates c) { return c.x + highest_noise(DPR_OCCUPANCY_PRIOR) <= 0.0f; }
 static inline int always_covers(const Coordinates c) { return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f; }
 
-static inline realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+static inline __attribute__((always_inline)) realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
   const NoiseName name = name_noise(q.view, q.in_view, c.face, DPR_STAGE_OCCUPANCY);
   return draw_noise(p.sampling, DPR_OCCUPANCY_PRIOR, name, block);
 }
 
-static inline realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+static inline __attribute__((always_inline)) realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
   const NoiseName name = name_noise(q.view, q.in_view, c.face, DPR_STAGE_AGGREGATE);
   return draw_noise(p.sampling, DPR_DEPTH_PRIOR, name, block);
 }
 
-/// What is seen in a block's samples: a fragment each, or -1 for the background, at the beta `largest`, -INFINITY there.
+/// What is seen in a block's samples, at the beta `largest`: -INFINITY for the background.
 typedef struct {
   intn winner;
   realn largest;
@@ -110,33 +113,42 @@ static inline intn could_win(const Lead lead, const Coordinates c) {
   return c.beta + highest_noise(DPR_DEPTH_PRIOR) >= lead.largest;
 }
 
-static inline void challenge(const AggregateParams p, const Pixel q, const Layers f, uint block, uint k, Lead* lead) {
-  const Coordinates c = load_fragment(p, q, f, k);
-  if (never_covers(c) || !any_lane(could_win(*lead, c))) return;
-  intn covers = (intn)(-1);
-  if (!always_covers(c)) covers = c.x + draw_distance(p, q, c, block) > 0.0f;
-  if (!any_lane(covers)) return;
-  const realn value = c.beta + draw_depth(p, q, c, block);
-  const intn wins = covers && value > lead->largest;
-  lead->winner = select(lead->winner, (intn)((int)k), wins);
-  lead->largest = choose(wins, value, lead->largest);
-}
+/// What a block drew for the first fragments, kept for the backward pass: depths only where a sample covers.
+typedef struct {
+  realn distance[DPR_NOISE_CACHE], depth[DPR_NOISE_CACHE];
+} NoiseCache;
 
 /// A block's winners. The rigid one goes first: behind it most of the others need no noise.
-static inline Lead find_winners(const AggregateParams p, const Pixel q, const Layers f, uint block) {
+static inline Lead find_winners(const AggregateParams p, const Pixel q, const Layers f, uint block,
+                                NoiseCache* cache) {
   Lead lead;
   lead.winner = (intn)(-1);
   lead.largest = (realn)(-INFINITY);
-  if (q.rigid >= 0) challenge(p, q, f, block, (uint)q.rigid, &lead);
-  for (uint i = q.first; i < q.last; ++i) {
-    if ((int)f.list[i] != q.rigid) challenge(p, q, f, block, f.list[i], &lead);
+  for (int turn = q.rigid < 0 ? 0 : -1; turn < (int)(q.last - q.first); ++turn) {
+    if (turn == q.rigid) continue;
+    const int place = turn < 0 ? q.rigid : turn;
+    const Coordinates c = load_fragment(p, q, f, fragment_of(q, f, place));
+    if (never_covers(c) || !any_lane(could_win(lead, c))) continue;
+    intn covers = (intn)(-1);
+    if (!always_covers(c)) {
+      const realn x = draw_distance(p, q, c, block);
+      if (place < DPR_NOISE_CACHE) cache->distance[place] = x;
+      covers = c.x + x > 0.0f;
+    }
+    if (!any_lane(covers)) continue;
+    const realn z = draw_depth(p, q, c, block);
+    if (place < DPR_NOISE_CACHE) cache->depth[place] = z;
+    const intn wins = covers && c.beta + z > lead.largest;
+    lead.winner = select(lead.winner, (intn)(place), wins);
+    lead.largest = choose(wins, c.beta + z, lead.largest);
   }
   return lead;
 }
 
-static inline float4 winner_color(const AggregateParams p, const Layers f, int winner) {
+static inline float4 seen_color(const AggregateParams p, const Pixel q, const Layers f, int winner) {
   if (winner < 0) return (float4)(p.background.xyz, 0.0f);
-  return (float4)(f.red[winner], f.green[winner], f.blue[winner], 1.0f);
+  const uint k = fragment_of(q, f, winner);
+  return (float4)(f.red[k], f.green[k], f.blue[k], 1.0f);
 }
 
 /// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, and
@@ -160,10 +172,11 @@ kernel void aggregate_joint_sampled_forward(const AggregateParams p, global cons
   const Pixel q = load_pixel(p, pixel, views, starts, f);
   float4 sum = 0.0f;
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    NoiseCache unused;
     int winners[DPR_WIDTH];
-    store_n(find_winners(p, q, f, block).winner, 0, winners);
+    store_n(find_winners(p, q, f, block, &unused).winner, 0, winners);
     for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
-      sum += winner_color(p, f, winners[lane]);
+      sum += seen_color(p, q, f, winners[lane]);
     }
   }
   image[pixel] = sum / (float)p.sampling.samples;
@@ -181,36 +194,44 @@ typedef struct {
 } PixelSums;
 
 /// y of every sample of a block, relative to `rigid`, and 1 to the wins of each winner.
-static inline realn block_values(const AggregateParams p, const Layers f, float4 grad, float rigid, uint block,
-                                 intn winner, global float* wins) {
+static inline realn block_values(const AggregateParams p, const Pixel q, const Layers f, float4 grad, float rigid,
+                                 uint block, intn winner, global float* wins) {
   int winners[DPR_WIDTH];
   float y[DPR_WIDTH];
   store_n(winner, 0, winners);
   for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
     y[lane] = 0.0f;
     if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
-    y[lane] = dot(grad, winner_color(p, f, winners[lane])) - rigid;
-    if (winners[lane] >= 0) wins[winners[lane]] += 1.0f;
+    y[lane] = dot(grad, seen_color(p, q, f, winners[lane])) - rigid;
+    if (winners[lane] >= 0) wins[fragment_of(q, f, winners[lane])] += 1.0f;
   }
   return load_n(0, y);
 }
 
 /// Adds a block's scores of one fragment.
-static inline void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block, uint k,
-                                const Lead lead, realn grouped, const FragmentSums out, PixelSums* sums) {
+static inline __attribute__((always_inline)) void add_fragment(const AggregateParams p, const Pixel q,
+                                                               const Layers f, uint block, int place,
+                                                               const Lead lead, const NoiseCache* cache,
+                                                               realn grouped, const FragmentSums out,
+                                                               PixelSums* sums) {
+  const uint k = fragment_of(q, f, place);
   const Coordinates c = load_fragment(p, q, f, k);
   if (never_covers(c) || !any_lane(could_win(lead, c))) return;
   const intn counts = sample_counts(p.sampling, block);
-  const realn z = draw_depth(p, q, c, block);
+  const int is_kept = place < DPR_NOISE_CACHE;
+  realn x = 0.0f;
   intn covers = (intn)(-1);
   if (!always_covers(c)) {
-    const realn x = draw_distance(p, q, c, block);
+    x = is_kept ? cache->distance[place] : draw_distance(p, q, c, block);
+    covers = c.x + x > 0.0f;
+  }
+  const realn z = is_kept && any_lane(covers) ? cache->depth[place] : draw_depth(p, q, c, block);
+  if (!always_covers(c)) {
     const intn wins_if_it_covers = c.beta + z >= lead.largest;
     const float2 scores =
         add_scores(DPR_OCCUPANCY_PRIOR, x, counts && wins_if_it_covers, grouped, &sums->sigma);
     out.by_distance[k] += scores.x;
     out.distance_scores[k] += scores.y;
-    covers = c.x + x > 0.0f;
   }
   const float2 scores =
       add_scores(DPR_DEPTH_PRIOR, z, counts && covers && could_win(lead, c), grouped, &sums->gamma);
@@ -226,14 +247,17 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
     const uint k = f.list[i];
     out.wins[k] = out.by_distance[k] = out.distance_scores[k] = out.by_depth[k] = out.depth_scores[k] = 0.0f;
   }
-  const float rigid = p.sampling.baseline * dot(grad, winner_color(p, f, q.rigid));
+  const float rigid = p.sampling.baseline * dot(grad, seen_color(p, q, f, q.rigid));
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
-    const Lead lead = find_winners(p, q, f, block);
-    const realn y = block_values(p, f, grad, rigid, block, lead.winner, out.wins);
+    NoiseCache cache;
+    const Lead lead = find_winners(p, q, f, block, &cache);
+    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, out.wins);
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
     sums.y += sum_lanes(y);
-    for (uint i = q.first; i < q.last; ++i) add_fragment(p, q, f, block, f.list[i], lead, grouped, out, &sums);
+    for (int place = 0; place < (int)(q.last - q.first); ++place) {
+      add_fragment(p, q, f, block, place, lead, &cache, grouped, out, &sums);
+    }
   }
   return sums;
 }

@@ -21,8 +21,7 @@ typedef struct {
   float depth_scale;   // d beta / d (nearest - depth)
   float inverse_alpha;
   float background;    // beta of the background slot
-  int rigid;           // the winner without noise: a fragment, or -1
-  float rigid_beta;
+  int rigid;           // the winner without noise
 } Pixel;
 
 /// What says which face's noise a fragment takes.
@@ -30,9 +29,17 @@ typedef struct {
   global const uint *fragment_pair, *pair_face;
 } FaceOf;
 
+/// A slot is a place in the pixel's run, or -1 for the background.
+static inline uint fragment_of(const Pixel q, const Fragments f, int slot) { return f.list[q.first + (uint)slot]; }
+
 static inline float depth_beta(const Pixel q, float depth) { return (q.nearest - depth) * q.depth_scale; }
-static inline float slot_beta(const Pixel q, const Fragments f, uint k) {
-  return depth_beta(q, f.depth[k]) + f.log_occupancy[k] * q.inverse_alpha;
+
+/// DPR_LOG_ZERO for a fragment with p = 0.
+static inline float slot_beta(const Pixel q, const Fragments f, int slot) {
+  if (slot < 0) return q.background;
+  const uint k = fragment_of(q, f, slot);
+  const float log_p = f.log_occupancy[k];
+  return log_p > DPR_LOG_ZERO ? depth_beta(q, f.depth[k]) + log_p * q.inverse_alpha : DPR_LOG_ZERO;
 }
 
 static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
@@ -49,24 +56,24 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   q.inverse_alpha = 1.0f / p.alpha;
   q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
   q.rigid = -1;
-  q.rigid_beta = q.background;
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
-    const float beta = slot_beta(q, f, k);
-    if (f.log_occupancy[k] <= DPR_LOG_ZERO || beta <= q.rigid_beta) continue;
-    q.rigid = (int)k;
-    q.rigid_beta = beta;
+  float largest = q.background;
+  for (int slot = 0; slot < (int)(q.last - q.first); ++slot) {
+    const float beta = slot_beta(q, f, slot);
+    if (beta <= largest) continue;
+    largest = beta;
+    q.rigid = slot;
   }
   return q;
 }
 
-static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const FaceOf face, int slot) {
-  const uint index =
-      slot < 0 ? DPR_BACKGROUND_FACE : face.pair_face[face.fragment_pair[slot]] - q.view * p.faces;
+static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
+                                   int slot) {
+  uint index = DPR_BACKGROUND_FACE;
+  if (slot >= 0) index = face.pair_face[face.fragment_pair[fragment_of(q, f, slot)]] - q.view * p.faces;
   return name_noise(q.view, q.in_view, index, DPR_STAGE_AGGREGATE);
 }
 
-/// The leading slots of a block's samples: a fragment each, or -1 for the background.
+/// The leading slots of a block's samples.
 typedef struct {
   intn winner;
   realn largest;
@@ -74,35 +81,32 @@ typedef struct {
 
 /// Whether a slot could win in any sample of the block. It could not where its largest noise were too little.
 static inline int could_win(const Lead lead, float beta) {
-  return any_lane(beta + highest_noise(DPR_PRIOR) >= lead.largest);
+  return beta > DPR_LOG_ZERO && any_lane(beta + highest_noise(DPR_PRIOR) >= lead.largest);
 }
 
-static inline void challenge(const AggregateParams p, const Pixel q, const FaceOf face, uint block, int slot,
-                             float beta, Lead* lead) {
-  if (!could_win(*lead, beta)) return;
-  const realn value = beta + draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, face, slot), block);
-  lead->winner = select(lead->winner, (intn)(slot), value > lead->largest);
-  lead->largest = max(lead->largest, value);
-}
-
-/// A block's winners. The rigid one goes first: beside it most of the others need no noise.
+/// A block's winners. The rigid one goes first: beside it most of the others need no noise. What is drawn for slot k
+/// stays in cache[k + 1], as far as it reaches.
 static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                uint block) {
+                                uint block, realn cache[DPR_NOISE_CACHE]) {
   Lead lead;
-  lead.winner = (intn)(-1);
+  lead.winner = (intn)(q.rigid);
   lead.largest = (realn)(-INFINITY);
-  challenge(p, q, face, block, q.rigid, q.rigid_beta, &lead);
-  if (q.rigid >= 0) challenge(p, q, face, block, -1, q.background, &lead);
-  for (uint i = q.first; i < q.last; ++i) {
-    const int k = (int)f.list[i];
-    if (k == q.rigid || f.log_occupancy[k] <= DPR_LOG_ZERO) continue;
-    challenge(p, q, face, block, k, slot_beta(q, f, (uint)k), &lead);
+  for (int turn = -2; turn < (int)(q.last - q.first); ++turn) {
+    if (turn == q.rigid) continue;
+    const int slot = turn == -2 ? q.rigid : turn;
+    const float beta = slot_beta(q, f, slot);
+    if (!could_win(lead, beta)) continue;
+    const realn noise = draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
+    if (slot + 1 < DPR_NOISE_CACHE) cache[slot + 1] = noise;
+    const realn value = beta + noise;
+    lead.winner = select(lead.winner, (intn)(slot), value > lead.largest);
+    lead.largest = max(lead.largest, value);
   }
   return lead;
 }
 
-static inline float3 winner_color(const AggregateParams p, const Fragments f, int winner) {
-  return winner < 0 ? p.background.xyz : fragment_color(f, (uint)winner);
+static inline float3 slot_color(const AggregateParams p, const Pixel q, const Fragments f, int slot) {
+  return slot < 0 ? p.background.xyz : fragment_color(f, fragment_of(q, f, slot));
 }
 
 /// One work-item per pixel. Buffers as in aggregate.cl, and
@@ -125,34 +129,29 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
   const Pixel q = load_pixel(p, pixel, views, starts, f);
   float3 sum = 0.0f;
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    realn unused[DPR_NOISE_CACHE];
     int winners[DPR_WIDTH];
-    store_n(find_winners(p, q, f, face, block).winner, 0, winners);
+    store_n(find_winners(p, q, f, face, block, unused).winner, 0, winners);
     for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
-      sum += winner_color(p, f, winners[lane]);
+      sum += slot_color(p, q, f, winners[lane]);
     }
   }
   image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - run_transparency(f, q.first, q.last));
 }
 
 /// y of every sample of a block, relative to `rigid`, and 1 to the weight of each winner.
-static inline realn block_values(const AggregateParams p, const Fragments f, float3 grad, float rigid, uint block,
-                                 intn winner, global float* weight) {
+static inline realn block_values(const AggregateParams p, const Pixel q, const Fragments f, float3 grad, float rigid,
+                                 uint block, intn winner, global float* weight) {
   int winners[DPR_WIDTH];
   float y[DPR_WIDTH];
   store_n(winner, 0, winners);
   for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
     y[lane] = 0.0f;
     if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
-    y[lane] = dot(grad, winner_color(p, f, winners[lane])) - rigid;
-    if (winners[lane] >= 0) weight[winners[lane]] += 1.0f;
+    y[lane] = dot(grad, slot_color(p, q, f, winners[lane])) - rigid;
+    if (winners[lane] >= 0) weight[fragment_of(q, f, winners[lane])] += 1.0f;
   }
   return load_n(0, y);
-}
-
-static inline float2 add_slot(const AggregateParams p, const NoiseName name, uint block, realn grouped,
-                              ScaleSums* gamma) {
-  const realn z = draw_noise(p.sampling, DPR_PRIOR, name, block);
-  return add_scores(DPR_PRIOR, z, sample_counts(p.sampling, block), grouped, gamma);
 }
 
 /// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every slot.
@@ -162,20 +161,23 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
                                 ScaleSums* gamma) {
   float y_sum = 0.0f;
   for (uint i = q.first; i < q.last; ++i) weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
-  const float rigid = p.sampling.baseline * dot(grad, winner_color(p, f, q.rigid));
+  const float rigid = p.sampling.baseline * dot(grad, slot_color(p, q, f, q.rigid));
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
-    const Lead lead = find_winners(p, q, f, face, block);
-    const realn y = block_values(p, f, grad, rigid, block, lead.winner, weight);
+    realn cache[DPR_NOISE_CACHE];
+    const Lead lead = find_winners(p, q, f, face, block, cache);
+    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, weight);
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
     y_sum += sum_lanes(y);
-    if (could_win(lead, q.background)) add_slot(p, slot_noise(p, q, face, -1), block, grouped, gamma);
-    for (uint i = q.first; i < q.last; ++i) {
-      const uint k = f.list[i];
-      if (f.log_occupancy[k] <= DPR_LOG_ZERO || !could_win(lead, slot_beta(q, f, k))) continue;
-      const float2 slot = add_slot(p, slot_noise(p, q, face, (int)k), block, grouped, gamma);
-      by_score[k] += slot.x;
-      score_sum[k] += slot.y;
+    for (int slot = -1; slot < (int)(q.last - q.first); ++slot) {
+      if (!could_win(lead, slot_beta(q, f, slot))) continue;
+      const realn noise = slot + 1 < DPR_NOISE_CACHE
+                              ? cache[slot + 1]
+                              : draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
+      const float2 scores = add_scores(DPR_PRIOR, noise, sample_counts(p.sampling, block), grouped, gamma);
+      if (slot < 0) continue;
+      by_score[fragment_of(q, f, slot)] += scores.x;
+      score_sum[fragment_of(q, f, slot)] += scores.y;
     }
   }
   return y_sum;

@@ -24,6 +24,15 @@
 #include "philox.h"
 #include "priors.h"
 
+/// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
+#ifndef DPR_NOISE_CACHE
+#if DPR_LANES == 1
+#define DPR_NOISE_CACHE 4
+#else
+#define DPR_NOISE_CACHE 32
+#endif
+#endif
+
 /// Which decision the noise is for: the last word of the counter, beside the view.
 #define DPR_STAGE_OCCUPANCY 0u
 #define DPR_STAGE_AGGREGATE 1u
@@ -51,7 +60,8 @@ static inline uintn sample_index(uint block) { return DPR_WIDTH * block + conver
 static inline intn sample_counts(const Sampling s, uint block) { return sample_index(block) < (uintn)(s.samples); }
 
 /// Kensler, "Correlated multi-jittered sampling" (Pixar 13-01, 2013): a permutation of [0, count) that a hash of `seed`
-/// chooses, for any count, by walking the cycles of one of the next power of two. `i` is below `count`.
+/// chooses, for any count, by walking the cycles of one of the next power of two. `i` is below `count`. Standard errors are those of true random
+/// permutations; a mere rotation, which leaves the samples of all variables on diagonals, doubles them at M = 32.
 static inline uintn permute(uintn i, uint count, uint seed) {
   uint mask = count - 1;
   mask |= mask >> 1;
@@ -76,28 +86,33 @@ static inline uintn permute(uintn i, uint count, uint seed) {
   return i;
 }
 
+/// Moves independent uniform numbers into the strata of a Latin hypercube.
+static inline realn stratify(const Sampling s, const NoiseName name, uint block, realn u) {
+  const uint4 counter = (uint4)(name.pixel, name.face, DPR_PERMUTATION_BLOCK, name.stream);
+  const uint8 words = philox4x32_10(counter, (uint2)(s.seed_low, s.seed_high));
+  const uintn hashed = permute(min(sample_index(block), s.samples - 1), s.samples, words.s0);
+  const uintn rotated = hashed + words.s1 % s.samples;
+  const uintn stratum = rotated - select((uintn)(0), (uintn)(s.samples), rotated >= s.samples);
+  return clamp((convert_realn(stratum) + u) / (float)s.samples, DPR_LOWEST_UNIFORM, DPR_HIGHEST_UNIFORM);
+}
+
 /// Uniform numbers for a block of samples, each in (0, 1) and never 0 or 1.
 ///   independent  sample m: word m mod 4 of the counter (pixel, face, m / 4, stream)
 ///   antithetic   samples 2 j and 2 j + 1: u and 1 - u, word j mod 4 of the counter (pixel, face, j / 4, stream)
-///   stratified   Latin hypercube: (pi(m) + u) / M with the independent u, and a permutation pi of its own for every
-///                name. pi is rotated by a word of its own, so that pi(m) is uniform whatever the hash is worth.
-static inline realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
-  const uint2 key = (uint2)(s.seed_low, s.seed_high);
-  if (s.draws == DPR_ANTITHETIC) {
-    const uint4 words = philox4x32_10((uint4)(name.pixel, name.face, block, name.stream), key).lo;
-    return uniform_from_bits(words.xxyyzzww ^ (uint8)(0, ~0u, 0, ~0u, 0, ~0u, 0, ~0u));
-  }
-  const realn u = uniform_from_bits(philox4x32_10((uint4)(name.pixel, name.face, 2 * block, name.stream), key));
-  if (s.draws != DPR_STRATIFIED) return u;
-  const uint2 words = philox4x32_10((uint4)(name.pixel, name.face, DPR_PERMUTATION_BLOCK, name.stream), key).lo.lo;
-  const uintn hashed = permute(min(sample_index(block), s.samples - 1), s.samples, words.x);
-  const uintn rotated = hashed + words.y % s.samples;
-  const uintn stratum = rotated - select((uintn)(0), (uintn)(s.samples), rotated >= s.samples);
-  const realn v = (convert_realn(stratum) + u) / (float)s.samples;
-  return clamp(v, DPR_LOWEST_UNIFORM, DPR_HIGHEST_UNIFORM);
+///   stratified   (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi is rotated
+///                by a word of its own, so that pi(m) is uniform whatever the hash is worth.
+static inline __attribute__((always_inline)) realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
+  const uint first = s.draws == DPR_ANTITHETIC ? block : 2 * block;
+  uint8 words =
+      philox4x32_10((uint4)(name.pixel, name.face, first, name.stream), (uint2)(s.seed_low, s.seed_high));
+  if (s.draws == DPR_ANTITHETIC) words = words.s00112233 ^ (uint8)(0, ~0u, 0, ~0u, 0, ~0u, 0, ~0u);
+  const realn u = uniform_from_bits(words);
+  return s.draws == DPR_STRATIFIED ? stratify(s, name, block, u) : u;
 }
 
-static inline realn draw_noise(const Sampling s, int prior, const NoiseName name, uint block) {
+/// Inlined by force: what the key contributes to the generator's rounds is the same for all noise of a launch.
+static inline __attribute__((always_inline)) realn draw_noise(const Sampling s, int prior, const NoiseName name,
+                                                              uint block) {
   return noise_quantile(prior, draw_uniform(s, name, block));
 }
 

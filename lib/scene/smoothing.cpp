@@ -124,9 +124,9 @@ void validate_estimators(const Smoothing& s) {
   const bool occupancy = s.occupancy_estimator == Estimator::monte_carlo;
   const bool aggregation = s.aggregation_estimator == Estimator::monte_carlo;
   if (s.composition == Composition::joint && occupancy != aggregation) {
-    throw InvalidArgument(std::string(occupancy ? "aggregation" : "occupancy") + "_estimator (smoothing)",
-                          "exact beside monte_carlo in the joint composition",
-                          "monte_carlo: one rigid image a sample perturbs distances and depths together");
+    throw InvalidArgument(std::string(occupancy ? "occupancy" : "aggregation") + "_estimator (smoothing)",
+                          "monte_carlo beside an exact stage in the joint composition",
+                          "the same for both: a sample perturbs distances and depths together");
   }
   if (occupancy) validate_sampled_prior(s.occupancy_prior, s.draws, "occupancy");
   if (aggregation) validate_sampled_prior(s.depth_prior, s.draws, "aggregation");
