@@ -92,12 +92,12 @@ static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, 
 static inline int never_covers(const Coordinates c) { return c.x + highest_noise(DPR_OCCUPANCY_PRIOR) <= 0.0f; }
 static inline int always_covers(const Coordinates c) { return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f; }
 
-static inline __attribute__((always_inline)) realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+DPR_ALWAYS_INLINE realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
   const NoiseName name = name_noise(q.view, q.in_view, c.face, DPR_STAGE_OCCUPANCY);
   return draw_noise(p.sampling, DPR_OCCUPANCY_PRIOR, name, block);
 }
 
-static inline __attribute__((always_inline)) realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+DPR_ALWAYS_INLINE realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
   const NoiseName name = name_noise(q.view, q.in_view, c.face, DPR_STAGE_AGGREGATE);
   return draw_noise(p.sampling, DPR_DEPTH_PRIOR, name, block);
 }
@@ -209,11 +209,9 @@ static inline realn block_values(const AggregateParams p, const Pixel q, const L
 }
 
 /// Adds a block's scores of one fragment.
-static inline __attribute__((always_inline)) void add_fragment(const AggregateParams p, const Pixel q,
-                                                               const Layers f, uint block, int place,
-                                                               const Lead lead, const NoiseCache* cache,
-                                                               realn grouped, const FragmentSums out,
-                                                               PixelSums* sums) {
+DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block, int place,
+                                    const Lead lead, const NoiseCache* cache, realn grouped, const FragmentSums out,
+                                    PixelSums* sums) {
   const uint k = fragment_of(q, f, place);
   const Coordinates c = load_fragment(p, q, f, k);
   if (never_covers(c) || !any_lane(could_win(lead, c))) return;

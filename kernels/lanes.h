@@ -67,8 +67,8 @@ static inline int any_lane(int16 condition) {
 #endif
 #endif
 
-/// a * b + c, which compilers fuse where the device can. PoCL's own mad() is a product and a sum: its library is compiled
-/// without contraction.
+/// a * b + c, which compilers fuse where the device can. PoCL's own mad() is a product and a sum: its library is
+/// compiled without contraction.
 #define mad(a, b, c) ((a) * (b) + (c))
 
 static inline realn square(realn x) { return x * x; }

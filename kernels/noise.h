@@ -8,8 +8,8 @@
 //
 //   none           b = 0
 //   rigid          b = y without noise
-//   leave_one_out  b_m = (S - G_m) / (M - g): the mean of the samples outside the group of m, S = sum y, G_m the group's
-//                  sum; a group is one sample, or an antithetic pair, whose halves know of each other
+//   leave_one_out  b_m = (S - G_m) / (M - g): the mean of the samples outside the group of m, S = sum y, G_m the sum
+//                  of the group; a group is one sample, or an antithetic pair, whose halves know of each other
 //
 // The last needs S before its first term; but it is linear: 1/M (sum_m (y_m + G_m / (M - g)) nu'(Z_m) - S B / (M - g))
 // with B = sum_m nu'(Z_m). So one pass over the samples collects both sums. Its y count from the rigid solution, which
@@ -23,6 +23,9 @@
 #define DPR_WIDTH 8 /* lanes are samples */
 #include "philox.h"
 #include "priors.h"
+
+/// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole launch.
+#define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
 /// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
 #ifndef DPR_NOISE_CACHE
@@ -60,8 +63,9 @@ static inline uintn sample_index(uint block) { return DPR_WIDTH * block + conver
 static inline intn sample_counts(const Sampling s, uint block) { return sample_index(block) < (uintn)(s.samples); }
 
 /// Kensler, "Correlated multi-jittered sampling" (Pixar 13-01, 2013): a permutation of [0, count) that a hash of `seed`
-/// chooses, for any count, by walking the cycles of one of the next power of two. `i` is below `count`. Standard errors are those of true random
-/// permutations; a mere rotation, which leaves the samples of all variables on diagonals, doubles them at M = 32.
+/// chooses, for any count, by walking the cycles of one of the next power of two. `i` is below `count`. Standard errors
+/// are those of true random permutations; a mere rotation, which leaves the samples of all variables on diagonals,
+/// doubles them at M = 32.
 static inline uintn permute(uintn i, uint count, uint seed) {
   uint mask = count - 1;
   mask |= mask >> 1;
@@ -101,7 +105,7 @@ static inline realn stratify(const Sampling s, const NoiseName name, uint block,
 ///   antithetic   samples 2 j and 2 j + 1: u and 1 - u, word j mod 4 of the counter (pixel, face, j / 4, stream)
 ///   stratified   (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi is rotated
 ///                by a word of its own, so that pi(m) is uniform whatever the hash is worth.
-static inline __attribute__((always_inline)) realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
+DPR_ALWAYS_INLINE realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
   const uint first = s.draws == DPR_ANTITHETIC ? block : 2 * block;
   uint8 words =
       philox4x32_10((uint4)(name.pixel, name.face, first, name.stream), (uint2)(s.seed_low, s.seed_high));
@@ -110,9 +114,7 @@ static inline __attribute__((always_inline)) realn draw_uniform(const Sampling s
   return s.draws == DPR_STRATIFIED ? stratify(s, name, block, u) : u;
 }
 
-/// Inlined by force: what the key contributes to the generator's rounds is the same for all noise of a launch.
-static inline __attribute__((always_inline)) realn draw_noise(const Sampling s, int prior, const NoiseName name,
-                                                              uint block) {
+DPR_ALWAYS_INLINE realn draw_noise(const Sampling s, int prior, const NoiseName name, uint block) {
   return noise_quantile(prior, draw_uniform(s, name, block));
 }
 

@@ -2,6 +2,9 @@
 // backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
 #include "noise.h"
 
+/// Below the least share of samples that is not 0.
+#define DPR_LEAST_SHARE 1e-7f
+
 /// H(x + noise) in the lanes that hold a sample, 0 in the others.
 static inline realn heaviside(const OccupancyParams p, float x, realn noise, uint block) {
   return choose(sample_counts(p.sampling, block) && x + noise > 0.0f, (realn)(1.0f), (realn)(0.0f));
@@ -13,6 +16,21 @@ static inline int always_covers(float x) { return x + lowest_noise(DPR_PRIOR) > 
 /// Names a fragment's noise. `packed` is the fragment's pixel, x | y << 16.
 static inline NoiseName fragment_noise(const OccupancyParams p, uint view, uint face, uint packed) {
   return name_noise(view, (packed >> 16) * p.width + (packed & 0xffffu), face, DPR_STAGE_OCCUPANCY);
+}
+
+/// ln p of a run of fragments from their p. Apart from the samples: asked for its logarithm right away, whether p is 0
+/// would keep the processor waiting for all of them.
+static inline void write_logarithms(uint first, uint last, global const float* occupancy,
+                                    global float* log_occupancy) {
+#if DPR_LANES < DPR_WIDTH
+  for (uint i = first; i < last; ++i) log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
+#else
+  // Runs are padded to whole vectors.
+  for (uint i = first; i < last; i += DPR_WIDTH) {
+    const realn p = load_n(i, occupancy);
+    store_n(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, log_occupancy);
+  }
+#endif
 }
 
 /// One work-item per pair.
@@ -28,21 +46,19 @@ kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
-  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  for (uint i = first; i < last; ++i) {
     const float x = distance[i] / p.sigma;
-    float mean = always_covers(x) ? 1.0f : 0.0f;
-    if (!always_covers(x) && !never_covers(x)) {
-      const NoiseName name = fragment_noise(p, view, face, pixels[i]);
-      realn sum = 0.0f;
-      for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
-        sum += heaviside(p, x, draw_noise(p.sampling, DPR_PRIOR, name, block), block);
-      }
-      mean = sum_lanes(sum) / (float)p.sampling.samples;
+    occupancy[i] = always_covers(x) ? 1.0f : 0.0f;
+    if (always_covers(x) || never_covers(x)) continue;
+    const NoiseName name = fragment_noise(p, view, face, pixels[i]);
+    realn sum = 0.0f;
+    for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+      sum += heaviside(p, x, draw_noise(p.sampling, DPR_PRIOR, name, block), block);
     }
-    occupancy[i] = mean;
-    // Most fragments are covered by all samples or by none: the logarithm is worth the question.
-    log_occupancy[i] = mean <= 0.0f ? DPR_LOG_ZERO : mean < 1.0f ? log(mean) : 0.0f;
+    occupancy[i] = sum_lanes(sum) / (float)p.sampling.samples;
   }
+  write_logarithms(first, last, occupancy, log_occupancy);
 }
 
 /// Score estimates of sigma dp/ds, with nu'(X), and of sigma dp/dsigma, with nu'(X) X - 1: d = 1 here.
@@ -82,7 +98,9 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
   for (uint i = first; i < fragment_starts[pair + 1]; ++i) {
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
-    if (i >= last || occupancy[i] <= 0.0f || always_covers(x)) continue;
+    // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
+    const int agrees = always_covers(x) || (x > 0.0f && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
+    if (i >= last || occupancy[i] <= 0.0f || agrees) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p
     const float chain = grad_log_occupancy[i] / (occupancy[i] * p.sigma);

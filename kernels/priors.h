@@ -199,8 +199,16 @@ static inline realn cauchy_quantile(realn u) {
   const intn is_outer = folded <= 0.25f;
   const realn x = M_PI_F * choose(is_outer, folded, 0.5f - folded);
   const realn s = x * x;
-  const realn sine = x * mad(mad(mad(mad(2.75573192e-6f, s, -1.98412698e-4f), s, 8.33333333e-3f), s, -1.66666667e-1f), s, 1.0f);
-  const realn cosine = mad(mad(mad(mad(2.48015873e-5f, s, -1.38888889e-3f), s, 4.16666667e-2f), s, -0.5f), s, 1.0f);
+  realn sine = 2.75573192e-6f;
+  sine = mad(sine, s, -1.98412698e-4f);
+  sine = mad(sine, s, 8.33333333e-3f);
+  sine = mad(sine, s, -1.66666667e-1f);
+  sine = mad(sine, s, 1.0f) * x;
+  realn cosine = 2.48015873e-5f;
+  cosine = mad(cosine, s, -1.38888889e-3f);
+  cosine = mad(cosine, s, 4.16666667e-2f);
+  cosine = mad(cosine, s, -0.5f);
+  cosine = mad(cosine, s, 1.0f);
   const realn size = choose(is_outer, cosine, sine) / choose(is_outer, sine, cosine);
   return choose(u < 0.5f, -size, size);
 }

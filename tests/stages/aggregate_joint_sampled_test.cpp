@@ -169,15 +169,13 @@ TEST_SUITE("statistical") {
     const Exact exact(k_pixel, smoothing), wrong(k_pixel, other);
     if (dpr::test::is_reduced()) return;
     CHECK_FALSE(samples.channel(0).agrees_with(wrong.result.color.x));
-    for (const double factor : {-1.0, 0.5, 2.0}) {
+    for (const double factor : {-1.0, 2.0}) {
       CAPTURE(factor);
       const SyntheticFrame::Gradients& g = samples.gradients;
       CHECK_FALSE(JointSamples::of(g.distance, 0).agrees_with(factor * exact.distance[0]));
       CHECK_FALSE(JointSamples::of(g.depth, 0).agrees_with(factor * exact.grad.fragments[0].depth));
       CHECK_FALSE(JointSamples::of(g.sigma).agrees_with(factor * exact.sigma));
-      // The pixel's depths nearly balance in gamma: only a wrong sign, or a term of its own, stands out.
-      CHECK_FALSE(
-          JointSamples::of(g.gamma).agrees_with(exact.grad.gamma + factor * 0.1 / number(smoothing.gamma)));
+      CHECK_FALSE(JointSamples::of(g.gamma).agrees_with(factor * exact.grad.gamma));
     }
   }
 

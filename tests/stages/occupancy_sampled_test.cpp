@@ -47,7 +47,7 @@ class OccupancySamples {
       }
     }
     const cl_uint all = 0xffffffffU;
-    const std::vector<cl_uint2> masks(faces.size(), run_ == 64 ? cl_uint2{{all, all}} : cl_uint2{{0xfU, 0}});
+    const std::vector<cl_uint2> masks(faces.size(), run_ == 64 ? cl_uint2{{all, all}} : cl_uint2{{0xffU, 0}});
     frame_.width = k_width;
     frame_.height = static_cast<cl_uint>(count_ / k_width + 1);
     frame_.faces = static_cast<cl_uint>(xs.size());
@@ -106,7 +106,7 @@ class OccupancySamples {
   dpr::Occupancy occupancy_;
   dpr::shared::FrameParams frame_{};
   std::size_t count_;                                           // a multiple of run_
-  std::size_t run_ = static_cast<std::size_t>(reduced(64, 4));  // fragments of a pair
+  std::size_t run_ = static_cast<std::size_t>(reduced(64, 8));  // fragments of a pair, whole vectors
 };
 
 Smoothing sampled_occupancy(Prior prior, SamplingMode mode, std::uint32_t samples, std::uint64_t seed = 1) {
