@@ -1,34 +1,46 @@
 // The perturbed arg-max by Monte Carlo with a control variate, for the barrier composition: eq. (9)-(16). Each sample
-// perturbs every slot's beta, the largest wins, the pixel takes its colour. Four samples at a time: the four words of
-// one Philox call. The backward pass draws the forward pass' noise again, so nothing is stored, and memory does not
-// depend on the number of samples. A fragment with p = 0 is no slot: no noise is drawn for it.
+// perturbs every slot's beta, the largest wins, the pixel takes its colour. A fragment with p = 0 is no slot.
 //
-//   dL/dbeta_k       = 1/M sum_m (g_winner(m) - baseline g_rigid) nu'(Z_km)                        (12), (14)
-//   dL/dgamma at b   = 1/M sum_m (g_winner(m) - baseline g_rigid) (sum_k nu'(Z_km) Z_km - d) / gamma
+//   dL/dbeta_k       = 1/M sum_m (y_m - b_m) nu'(Z_km)                                          (12), (14)
+//   dL/dgamma at b   = 1/M sum_m (y_m - b_m) sum_k (nu'(Z_km) Z_km - 1) / gamma                 (15), (16)
 //
-// with d the number of slots: the change of variables has the determinant gamma^-d.
-#define DPR_WIDTH 4
-#include "philox.h"
+// with y = <dL/dcolour, colour of the winner>, the baselines b of noise.h, and the sums over the slots that could have
+// won in the sample's block, given the noise of the others: y does not depend on the rest. The sum over all d of them
+// has the constant d: the change of variables has the determinant gamma^-d.
+#include "noise.h"
 #include "pixel.h"
-#include "priors.h"
 
 /// The face index that names the background's noise.
 #define DPR_BACKGROUND_FACE 0xffffffffu
 
 /// What a pixel's slots have in common.
 typedef struct {
-  uint first, last;   // the pixel's run of the fragment lists
-  uint view, in_view; // the pixel's view, and its number in it
-  float nearest;      // view depth of the nearest fragment
-  float depth_scale;  // d beta / d (nearest - depth)
+  uint first, last;    // the pixel's run of the fragment lists
+  uint view, in_view;  // the pixel's view, and its number in it
+  float nearest;       // view depth of the nearest fragment
+  float depth_scale;   // d beta / d (nearest - depth)
   float inverse_alpha;
-  float background;   // beta of the background slot
+  float background;    // beta of the background slot
+  int rigid;           // the winner without noise
 } Pixel;
 
 /// What says which face's noise a fragment takes.
 typedef struct {
   global const uint *fragment_pair, *pair_face;
 } FaceOf;
+
+/// A slot is a place in the pixel's run, or -1 for the background.
+static inline uint fragment_of(const Pixel q, const Fragments f, int slot) { return f.list[q.first + (uint)slot]; }
+
+static inline float depth_beta(const Pixel q, float depth) { return (q.nearest - depth) * q.depth_scale; }
+
+/// DPR_LOG_ZERO for a fragment with p = 0.
+static inline float slot_beta(const Pixel q, const Fragments f, int slot) {
+  if (slot < 0) return q.background;
+  const uint k = fragment_of(q, f, slot);
+  const float log_p = f.log_occupancy[k];
+  return log_p > DPR_LOG_ZERO ? depth_beta(q, f.depth[k]) + log_p * q.inverse_alpha : DPR_LOG_ZERO;
+}
 
 static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                global const uint* restrict starts, const Fragments f) {
@@ -43,57 +55,58 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   q.depth_scale = view->inverse_range / p.gamma;
   q.inverse_alpha = 1.0f / p.alpha;
   q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
+  q.rigid = -1;
+  float largest = q.background;
+  for (int slot = 0; slot < (int)(q.last - q.first); ++slot) {
+    const float beta = slot_beta(q, f, slot);
+    if (beta <= largest) continue;
+    largest = beta;
+    q.rigid = slot;
+  }
   return q;
 }
 
-static inline float depth_beta(const Pixel q, float depth) { return (q.nearest - depth) * q.depth_scale; }
-static inline float slot_beta(const Pixel q, const Fragments f, uint k) {
-  return depth_beta(q, f.depth[k]) + f.log_occupancy[k] * q.inverse_alpha;
+static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
+                                   int slot) {
+  uint index = DPR_BACKGROUND_FACE;
+  if (slot >= 0) index = face.pair_face[face.fragment_pair[fragment_of(q, f, slot)]] - q.view * p.faces;
+  return name_noise(p.first_view + q.view, q.in_view, index, DPR_STAGE_AGGREGATE);
 }
 
-static inline realn draw_noise(const AggregateParams p, const Pixel q, uint face, uint block) {
-  const uint4 counter = (uint4)(q.in_view, face, block, (p.first_view + q.view) << 1 | DPR_STAGE_AGGREGATE);
-  return prior_sample(uniform_from_bits(philox4x32_10(counter, (uint2)(p.seed_low, p.seed_high))));
+/// The leading slots of a block's samples.
+typedef struct {
+  intn winner;
+  realn largest;
+} Lead;
+
+/// Whether a slot could win in any sample of the block. It could not where its largest noise were too little.
+static inline int could_win(const Lead lead, float beta) {
+  return beta > DPR_LOG_ZERO && any_lane(beta + highest_noise(DPR_PRIOR) >= lead.largest);
 }
 
-static inline uint face_of(const AggregateParams p, const FaceOf face, uint fragment) {
-  return face.pair_face[face.fragment_pair[fragment]] % p.faces;
-}
-
-/// The winners of a block of samples: a fragment each, or -1 for the background. `scores` are sum_k nu'(Z_km) Z_km - d.
-static inline intn sample_winners(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                  uint block, realn* scores) {
-  const realn noise = draw_noise(p, q, DPR_BACKGROUND_FACE, block);
-  realn largest = q.background + noise;
-  *scores = mad(prior_score(noise), noise, -1.0f);
-  intn winner = -1;
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
-    if (f.log_occupancy[k] <= DPR_LOG_ZERO) continue;
-    const realn z = draw_noise(p, q, face_of(p, face, k), block);
-    const realn value = slot_beta(q, f, k) + z;
-    winner = select(winner, (intn)((int)k), value > largest);
-    largest = max(largest, value);
-    *scores += mad(prior_score(z), z, -1.0f);
+/// A block's winners. The rigid one goes first: beside it most of the others need no noise. What is drawn for slot k
+/// stays in cache[k + 1], as far as it reaches.
+static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
+                                uint block, realn cache[DPR_NOISE_CACHE]) {
+  Lead lead;
+  lead.winner = (intn)(q.rigid);
+  lead.largest = (realn)(-INFINITY);
+  for (int turn = -2; turn < (int)(q.last - q.first); ++turn) {
+    if (turn == q.rigid) continue;
+    const int slot = turn == -2 ? q.rigid : turn;
+    const float beta = slot_beta(q, f, slot);
+    if (!could_win(lead, beta)) continue;
+    const realn noise = draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
+    if (slot + 1 < DPR_NOISE_CACHE) cache[slot + 1] = noise;
+    const realn value = beta + noise;
+    lead.winner = select(lead.winner, (intn)(slot), value > lead.largest);
+    lead.largest = max(lead.largest, value);
   }
-  return winner;
+  return lead;
 }
 
-/// The winner without noise.
-static inline int rigid_winner(const Pixel q, const Fragments f) {
-  float largest = q.background;
-  int winner = -1;
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
-    if (f.log_occupancy[k] <= DPR_LOG_ZERO || slot_beta(q, f, k) <= largest) continue;
-    largest = slot_beta(q, f, k);
-    winner = (int)k;
-  }
-  return winner;
-}
-
-static inline float3 winner_color(const AggregateParams p, const Fragments f, int winner) {
-  return winner < 0 ? p.background.xyz : fragment_color(f, (uint)winner);
+static inline float3 slot_color(const AggregateParams p, const Pixel q, const Fragments f, int slot) {
+  return slot < 0 ? p.background.xyz : fragment_color(f, fragment_of(q, f, slot));
 }
 
 /// One work-item per pixel. Buffers as in aggregate.cl, and
@@ -115,29 +128,59 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
   const FaceOf face = {fragment_pair, pair_face};
   const Pixel q = load_pixel(p, pixel, views, starts, f);
   float3 sum = 0.0f;
-  for (uint block = 0; DPR_WIDTH * block < p.samples; ++block) {
-    realn scores;
+  for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    realn unused[DPR_NOISE_CACHE];
     int winners[DPR_WIDTH];
-    store_n(sample_winners(p, q, f, face, block, &scores), 0, winners);
-    for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.samples; ++lane) {
-      sum += winner_color(p, f, winners[lane]);
+    store_n(find_winners(p, q, f, face, block, unused).winner, 0, winners);
+    for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
+      sum += slot_color(p, q, f, winners[lane]);
     }
   }
-  image[pixel] = (float4)(sum / (float)p.samples, 1.0f - run_transparency(f, q.first, q.last));
+  image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - run_transparency(f, q.first, q.last));
 }
 
-/// Adds a block of samples to the gradients: 1 to the weight of each winner, excess * nu'(Z) to every slot's dL/dbeta.
-static inline void add_block(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face, uint block,
-                             const int winners[DPR_WIDTH], realn excess, global float* weight,
-                             global float* grad_beta) {
-  for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.samples; ++lane) {
-    if (winners[lane] >= 0) weight[winners[lane]] += 1.0f;
+/// y of every sample of a block, relative to `rigid`, and 1 to the weight of each winner.
+static inline realn block_values(const AggregateParams p, const Pixel q, const Fragments f, float3 grad, float rigid,
+                                 uint block, intn winner, global float* weight) {
+  int winners[DPR_WIDTH];
+  float y[DPR_WIDTH];
+  store_n(winner, 0, winners);
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
+    y[lane] = 0.0f;
+    if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
+    y[lane] = dot(grad, slot_color(p, q, f, winners[lane])) - rigid;
+    if (winners[lane] >= 0) weight[fragment_of(q, f, winners[lane])] += 1.0f;
   }
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
-    if (f.log_occupancy[k] <= DPR_LOG_ZERO) continue;
-    grad_beta[k] += sum_lanes(excess * prior_score(draw_noise(p, q, face_of(p, face, k), block)));
+  return load_n(0, y);
+}
+
+/// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every slot.
+/// Returns sum y.
+static inline float add_samples(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
+                                float3 grad, global float* weight, global float* by_score, global float* score_sum,
+                                ScaleSums* gamma) {
+  float y_sum = 0.0f;
+  for (uint i = q.first; i < q.last; ++i) weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
+  const float rigid = p.sampling.baseline * dot(grad, slot_color(p, q, f, q.rigid));
+  for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    realn cache[DPR_NOISE_CACHE];
+    const Lead lead = find_winners(p, q, f, face, block, cache);
+    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, weight);
+    if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
+    const realn grouped = add_group(p.sampling, y);
+    y_sum += sum_lanes(y);
+    for (int slot = -1; slot < (int)(q.last - q.first); ++slot) {
+      if (!could_win(lead, slot_beta(q, f, slot))) continue;
+      const realn noise = slot + 1 < DPR_NOISE_CACHE
+                              ? cache[slot + 1]
+                              : draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
+      const float2 scores = add_scores(DPR_PRIOR, noise, sample_counts(p.sampling, block), grouped, gamma);
+      if (slot < 0) continue;
+      by_score[fragment_of(q, f, slot)] += scores.x;
+      score_sum[fragment_of(q, f, slot)] += scores.y;
+    }
   }
+  return y_sum;
 }
 
 /// One work-item per pixel. Buffers as in aggregate.cl and aggregate_sampled_forward.
@@ -159,28 +202,14 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
   float grad_gamma = 0.0f, grad_alpha = 0.0f, background_weight = 1.0f;
   if (starts[pixel] != starts[pixel + 1]) {
     const Pixel q = load_pixel(p, pixel, views, starts, f);
-    for (uint i = q.first; i < q.last; ++i) grad_red[list[i]] = grad_depth[list[i]] = 0.0f;
-    const float rigid = p.baseline * dot(grad.xyz, winner_color(p, f, rigid_winner(q, f)));
-    float by_gamma = 0.0f;
-    for (uint block = 0; DPR_WIDTH * block < p.samples; ++block) {
-      realn scores;
-      int winners[DPR_WIDTH];
-      store_n(sample_winners(p, q, f, face, block, &scores), 0, winners);
-      float lanes[DPR_WIDTH];
-      for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-        const int counts = DPR_WIDTH * block + lane < p.samples;
-        lanes[lane] = counts ? dot(grad.xyz, winner_color(p, f, winners[lane])) - rigid : 0.0f;
-      }
-      const realn excess = load_n(0, lanes);
-      by_gamma += sum_lanes(excess * scores);
-      add_block(p, q, f, face, block, winners, excess, grad_red, grad_depth);
-    }
-    const float share = 1.0f / (float)p.samples;
+    ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
+    const float y_sum = add_samples(p, q, f, face, grad.xyz, grad_red, grad_depth, grad_log_occupancy, &gamma);
     const float transparency = run_transparency(f, q.first, q.last);
-    grad_gamma = by_gamma * share / p.gamma;
+    grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
     for (uint i = q.first; i < q.last; ++i) {
       const uint k = list[i];
-      const float weight = grad_red[k] * share, grad_beta = grad_depth[k] * share;
+      const float weight = grad_red[k] / (float)p.sampling.samples;
+      const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], y_sum);
       background_weight -= weight;
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;

@@ -1,6 +1,6 @@
 // Vectors of DPR_WIDTH floats under one name. A kernel file that works on lanes defines DPR_WIDTH before it includes
 // this: 1 where the device's lanes are its work-items (GPUs), 8 or 16 where they are vector registers (CPUs),
-// 4 where they are the four numbers of one Philox call.
+// 8 where they are samples.
 #ifndef DPR_LANES_H
 #define DPR_LANES_H
 
@@ -35,6 +35,8 @@ typedef uint uintn;
 #define DPR_LANE_INDEX 0
 static inline float sum_lanes(float v) { return v; }
 static inline float4 sum_lanes_of_4(float a, float b, float c, float d) { return (float4)(a, b, c, d); }
+/// Whether a comparison holds in any lane. By halves: PoCL's any() asks lane by lane.
+static inline int any_lane(int condition) { return condition; }
 #else
 typedef DPR_CONCAT(float, DPR_WIDTH) realn;
 typedef DPR_CONCAT(int, DPR_WIDTH) intn;
@@ -46,6 +48,10 @@ typedef DPR_CONCAT(uint, DPR_WIDTH) uintn;
 #define convert_intn DPR_CONCAT(convert_int, DPR_WIDTH)
 #define convert_realn DPR_CONCAT(convert_float, DPR_WIDTH)
 #define convert_uintn DPR_CONCAT(convert_uint, DPR_WIDTH)
+static inline int any_lane4(int4 v) {
+  const int2 a = v.lo | v.hi;
+  return a.x | a.y;
+}
 static inline float sum_lanes8(float8 v) {
   const float4 a = v.lo + v.hi;
   const float2 b = a.lo + a.hi;
@@ -54,12 +60,18 @@ static inline float sum_lanes8(float8 v) {
 #if DPR_WIDTH == 4
 #define DPR_LANE_INDEX ((intn)(0, 1, 2, 3))
 static inline float sum_lanes(float4 v) { return (v.x + v.z) + (v.y + v.w); }
+static inline int any_lane(int4 condition) { return any_lane4(condition); }
 #elif DPR_WIDTH == 8
 #define DPR_LANE_INDEX ((intn)(0, 1, 2, 3, 4, 5, 6, 7))
 static inline float sum_lanes(float8 v) { return sum_lanes8(v); }
+static inline int any_lane(int8 condition) { return any_lane4(condition.lo | condition.hi); }
 #else
 #define DPR_LANE_INDEX ((intn)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 static inline float sum_lanes(float16 v) { return sum_lanes8(v.lo + v.hi); }
+static inline int any_lane(int16 condition) {
+  const int8 half_lanes = condition.lo | condition.hi;
+  return any_lane4(half_lanes.lo | half_lanes.hi);
+}
 #endif
 
 /// The sums over the lanes of four vectors at once: the transpose costs less than four sums.
@@ -82,6 +94,10 @@ static inline float4 sum_lanes_of_4(float16 a, float16 b, float16 c, float16 d) 
 #endif
 #endif
 #endif
+
+/// a * b + c, which compilers fuse where the device can. PoCL's own mad() is a product and a sum: its library is
+/// compiled without contraction.
+#define mad(a, b, c) ((a) * (b) + (c))
 
 static inline realn square(realn x) { return x * x; }
 

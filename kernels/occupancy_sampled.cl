@@ -1,19 +1,36 @@
-// The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise. Four
-// samples at a time: the four words of one Philox call. The backward pass draws the forward pass' noise again.
-#define DPR_WIDTH 4
-#include "philox.h"
-#include "priors.h"
+// The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise. The
+// backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
+#include "noise.h"
 
-/// The samples 4 * block ... 4 * block + 3 of a fragment.
-static inline realn draw_noise(const OccupancyParams p, uint view, uint pixel, uint face, uint block) {
-  const uint4 counter = (uint4)(pixel, face, block, (p.first_view + view) << 1 | DPR_STAGE_OCCUPANCY);
-  return prior_sample(uniform_from_bits(philox4x32_10(counter, (uint2)(p.seed_low, p.seed_high))));
+/// Below the least share of samples that is not 0.
+#define DPR_LEAST_SHARE 1e-7f
+
+/// H(x + noise) in the lanes that hold a sample, 0 in the others.
+static inline realn heaviside(const OccupancyParams p, float x, realn noise, uint block) {
+  return choose(sample_counts(p.sampling, block) && x + noise > 0.0f, (realn)(1.0f), (realn)(0.0f));
 }
 
-/// H(x + noise) in each lane, 0 beyond the last sample.
-static inline realn heaviside(const OccupancyParams p, float x, realn noise, uint block) {
-  const intn counts = (int)(4 * block) + DPR_LANE_INDEX < (intn)((int)p.samples);
-  return choose(counts && x + noise > 0.0f, (realn)(1.0f), (realn)(0.0f));
+static inline int never_covers(float x) { return x + highest_noise(DPR_PRIOR) <= 0.0f; }
+static inline int always_covers(float x) { return x + lowest_noise(DPR_PRIOR) > 0.0f; }
+
+/// Names a fragment's noise. `packed` is the fragment's pixel, x | y << 16.
+static inline NoiseName fragment_noise(const OccupancyParams p, uint view, uint face, uint packed) {
+  return name_noise(p.first_view + view, (packed >> 16) * p.width + (packed & 0xffffu), face, DPR_STAGE_OCCUPANCY);
+}
+
+/// ln p of a run of fragments from their p. Apart from the samples: asked for its logarithm right away, whether p is 0
+/// would keep the processor waiting for all of them.
+static inline void write_logarithms(uint first, uint last, global const float* occupancy,
+                                    global float* log_occupancy) {
+#if DPR_LANES < DPR_WIDTH
+  for (uint i = first; i < last; ++i) log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
+#else
+  // Runs are padded to whole vectors.
+  for (uint i = first; i < last; i += DPR_WIDTH) {
+    const realn p = load_n(i, occupancy);
+    store_n(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, log_occupancy);
+  }
+#endif
 }
 
 /// One work-item per pair.
@@ -29,21 +46,38 @@ kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
-  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
-    const uint pixel = (pixels[i] >> 16) * p.width + (pixels[i] & 0xffffu);
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  for (uint i = first; i < last; ++i) {
     const float x = distance[i] / p.sigma;
+    occupancy[i] = always_covers(x) ? 1.0f : 0.0f;
+    if (always_covers(x) || never_covers(x)) continue;
+    const NoiseName name = fragment_noise(p, view, face, pixels[i]);
     realn sum = 0.0f;
-    for (uint block = 0; 4 * block < p.samples; ++block) {
-      sum += heaviside(p, x, draw_noise(p, view, pixel, face, block), block);
+    for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+      sum += heaviside(p, x, draw_noise(p.sampling, DPR_PRIOR, name, block), block);
     }
-    const float mean = sum_lanes(sum) / (float)p.samples;
-    occupancy[i] = mean;
-    log_occupancy[i] = mean > 0.0f ? log(mean) : DPR_LOG_ZERO;
+    occupancy[i] = sum_lanes(sum) / (float)p.sampling.samples;
   }
+  write_logarithms(first, last, occupancy, log_occupancy);
 }
 
-/// Score estimates of dp/dx = 1/M sum (H(x + X_m) - baseline H(x)) nu'(X_m) and of
-/// dp/dsigma = 1/M sum (H(x + X_m) - baseline H(x)) (nu'(X_m) X_m - 1) / sigma; d = 1 here. One work-item per pair.
+/// Score estimates of sigma dp/ds, with nu'(X), and of sigma dp/dsigma, with nu'(X) X - 1: d = 1 here.
+static inline float2 score_estimates(const OccupancyParams p, const NoiseName name, float x) {
+  const float rigid = x > 0.0f ? p.sampling.baseline : 0.0f;
+  float y_sum = 0.0f;
+  float2 distance = 0.0f;
+  ScaleSums sigma = {(realn)(0.0f), (realn)(0.0f)};
+  for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    const realn noise = draw_noise(p.sampling, DPR_PRIOR, name, block);
+    const intn counts = sample_counts(p.sampling, block);
+    const realn y = choose(counts, heaviside(p, x, noise, block) - rigid, (realn)(0.0f));
+    y_sum += sum_lanes(y);
+    distance += add_scores(DPR_PRIOR, noise, counts, add_group(p.sampling, y), &sigma);
+  }
+  return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum), scale_estimate(p.sampling, sigma, y_sum));
+}
+
+/// One work-item per pair.
 /// in   masks               uint2[pair]  says which fragments are padding: their gradients become 0
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
@@ -52,7 +86,7 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
                                        global const uint* restrict pair_face, global const uint2* restrict masks,
                                        global const uint* restrict fragment_starts,
                                        global const uint* restrict pixels, global const float* restrict distance,
-                                       global const float* restrict log_occupancy,
+                                       global const float* restrict occupancy,
                                        global const float* restrict grad_log_occupancy,
                                        global float* restrict grad_distance, global float* restrict grad_sigma) {
   const uint pair = (uint)get_global_id(0);
@@ -62,24 +96,16 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
   const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
   float total = 0.0f;
   for (uint i = first; i < fragment_starts[pair + 1]; ++i) {
-    grad_distance[i] = 0.0f;
-    if (i >= last || log_occupancy[i] <= DPR_LOG_ZERO) continue;
-    const uint pixel = (pixels[i] >> 16) * p.width + (pixels[i] & 0xffffu);
     const float x = distance[i] / p.sigma;
-    const float rigid = x > 0.0f ? p.baseline : 0.0f;
-    realn by_distance = 0.0f, by_sigma = 0.0f;
-    for (uint block = 0; 4 * block < p.samples; ++block) {
-      const realn noise = draw_noise(p, view, pixel, face, block);
-      const intn counts = (int)(4 * block) + DPR_LANE_INDEX < (intn)((int)p.samples);
-      const realn excess = choose(counts, heaviside(p, x, noise, block) - rigid, (realn)(0.0f));
-      const realn score = prior_score(noise);
-      by_distance += excess * score;
-      by_sigma += excess * mad(score, noise, -1.0f);
-    }
+    grad_distance[i] = 0.0f;
+    // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
+    const int agrees = always_covers(x) || (x > 0.0f && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
+    if (i >= last || occupancy[i] <= 0.0f || agrees) continue;
+    const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p
-    const float chain = grad_log_occupancy[i] * exp(-log_occupancy[i]) / (p.sigma * (float)p.samples);
-    grad_distance[i] = chain * sum_lanes(by_distance);
-    total += chain * sum_lanes(by_sigma);
+    const float chain = grad_log_occupancy[i] / (occupancy[i] * p.sigma);
+    grad_distance[i] = chain * estimates.x;
+    total += chain * estimates.y;
   }
   grad_sigma[pair] = total;
 }

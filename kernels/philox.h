@@ -5,28 +5,26 @@
 #define DPR_PHILOX_H
 
 #define DPR_PHILOX_ROUNDS 10
-#define DPR_PHILOX_M0 0xD2511F53u
-#define DPR_PHILOX_M1 0xCD9E8D57u
+#define DPR_PHILOX_M0 0xD2511F53UL
+#define DPR_PHILOX_M1 0xCD9E8D57UL
 #define DPR_PHILOX_W0 0x9E3779B9u /* golden ratio */
 #define DPR_PHILOX_W1 0xBB67AE85u /* sqrt(3) - 1 */
+#define DPR_LOW_WORD 0xffffffffUL
 
-/// Which decision the noise is for: the last word of the counter, beside the view.
-#define DPR_STAGE_OCCUPANCY 0u
-#define DPR_STAGE_AGGREGATE 1u
-
-/// Scalars inside: as vectors the words would travel between registers in every round.
-static inline uint4 philox4x32_10(uint4 counter, uint2 key) {
-  uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
+/// The four words of `counter`, then those of the next: counter.z + 1. All four multiplications of a round are one of
+/// vectors: words sit in the low halves of 64-bit lanes, what is left in the high halves does not count.
+static inline uint8 philox4x32_10(uint4 counter, uint2 key) {
+  const ulong4 factor = (ulong4)(DPR_PHILOX_M0, DPR_PHILOX_M1, DPR_PHILOX_M0, DPR_PHILOX_M1);
+  ulong4 even = (ulong4)(counter.x, counter.z, counter.x, counter.z + 1); /* words 0, 2 of both counters */
+  ulong4 odd = (ulong4)(counter.y, counter.w, counter.y, counter.w);      /* words 1, 3 */
+#pragma unroll
   for (int round = 0; round < DPR_PHILOX_ROUNDS; ++round) {
-    const ulong first = (ulong)DPR_PHILOX_M0 * a, second = (ulong)DPR_PHILOX_M1 * c;
-    a = (uint)(second >> 32) ^ b ^ k0;
-    b = (uint)second;
-    c = (uint)(first >> 32) ^ d ^ k1;
-    d = (uint)first;
-    k0 += DPR_PHILOX_W0;
-    k1 += DPR_PHILOX_W1;
+    const ulong4 product = ((even & DPR_LOW_WORD) * factor).yxwz;
+    even = (product >> 32) ^ odd ^ (ulong4)(key.x, key.y, key.x, key.y);
+    odd = product;
+    key += (uint2)(DPR_PHILOX_W0, DPR_PHILOX_W1);
   }
-  return (uint4)(a, b, c, d);
+  return as_uint8((even & DPR_LOW_WORD) | odd << 32);
 }
 
 #endif

@@ -4,6 +4,34 @@
 
 #include "lanes.h"
 
+/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+#define DPR_CAUCHY_LOWEST (-5.35e6f)
+#define DPR_CAUCHY_HIGHEST 5.35e6f
+
+/// -cot(pi u), by way of the Taylor polynomials of sine and cosine on [0, pi / 4]: relative error 5e-8 before rounding.
+static inline realn cauchy_quantile(realn u) {
+  const realn folded = min(u, 1.0f - u); /* cot(pi u) = -cot(pi (1 - u)) */
+  const intn is_outer = folded <= 0.25f;
+  const realn x = M_PI_F * choose(is_outer, folded, 0.5f - folded);
+  const realn s = x * x;
+  realn sine = 2.75573192e-6f;
+  sine = mad(sine, s, -1.98412698e-4f);
+  sine = mad(sine, s, 8.33333333e-3f);
+  sine = mad(sine, s, -1.66666667e-1f);
+  sine = mad(sine, s, 1.0f) * x;
+  realn cosine = 2.48015873e-5f;
+  cosine = mad(cosine, s, -1.38888889e-3f);
+  cosine = mad(cosine, s, 4.16666667e-2f);
+  cosine = mad(cosine, s, -0.5f);
+  cosine = mad(cosine, s, 1.0f);
+  const realn size = choose(is_outer, cosine, sine) / choose(is_outer, sine, cosine);
+  return choose(u < 0.5f, -size, size);
+}
+
+static inline realn cauchy_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
+
+#if DPR_PRIOR == DPR_CAUCHY
+
 #define DPR_RULE DPR_RULE_TAILS
 #define DPR_BARRIER_REACH INFINITY
 /// Slots within this distance of a cluster's head share its nodes.
@@ -50,8 +78,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = density / p;
 }
 
-static inline realn prior_sample(realn u) { return -cospi(u) / sinpi(u); }
-
-static inline realn prior_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
+#endif
 
 #endif

@@ -4,6 +4,45 @@
 
 #include "lanes.h"
 
+/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+#define DPR_GAUSSIAN_LOWEST (-5.3f)
+#define DPR_GAUSSIAN_HIGHEST 5.3f
+
+/// Giles, "Approximating the erfinv function" (GPU Computing Gems Jade Edition, 2011): sqrt(2) erfinv(2 u - 1), a
+/// polynomial in w = -ln(4 u (1 - u)), and one in sqrt(w) for the 0.34% in the tails.
+static inline realn gaussian_quantile(realn u) {
+  const realn w = -log_n(4.0f * u * (1.0f - u));
+  const realn c = w - 2.5f;
+  realn p = 2.81022636e-08f;
+  p = mad(p, c, 3.43273939e-07f);
+  p = mad(p, c, -3.5233877e-06f);
+  p = mad(p, c, -4.39150654e-06f);
+  p = mad(p, c, 0.00021858087f);
+  p = mad(p, c, -0.00125372503f);
+  p = mad(p, c, -0.00417768164f);
+  p = mad(p, c, 0.246640727f);
+  p = mad(p, c, 1.50140941f);
+  const intn is_tail = w >= 5.0f; /* where the first polynomial ends */
+  if (any_lane(is_tail)) {
+    const realn r = sqrt(max(w, 5.0f)) - 3.0f;
+    realn q = -0.000200214257f;
+    q = mad(q, r, 0.000100950558f);
+    q = mad(q, r, 0.00134934322f);
+    q = mad(q, r, -0.00367342844f);
+    q = mad(q, r, 0.00573950773f);
+    q = mad(q, r, -0.0076224613f);
+    q = mad(q, r, 0.00943887047f);
+    q = mad(q, r, 1.00167406f);
+    q = mad(q, r, 2.83297682f);
+    p = choose(is_tail, q, p);
+  }
+  return M_SQRT2_F * p * mad(2.0f, u, -1.0f);
+}
+
+static inline realn gaussian_score(realn z) { return z; }
+
+#if DPR_PRIOR == DPR_GAUSSIAN
+
 #define DPR_RULE DPR_RULE_SMOOTH
 /// Barrier composition: where a slot's mass ends above it, 1 - F = 1e-7, and how much further a slot more moves that.
 #define DPR_BARRIER_HIGH 5.2f
@@ -66,19 +105,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(negative, 1.0f / mills, density / (1.0f - tail));
 }
 
-/// Wichura's PPND7 (Algorithm AS 241, 1988): absolute error below 1e-6 for the u that 32 random bits give.
-static inline realn prior_sample(realn u) {
-  const realn q = u - 0.5f;
-  const realn s = 0.180625f - q * q; /* 0.425^2: where the central expansion ends */
-  const realn central =
-      q * mad(mad(mad(59.109374720f, s, 159.29113202f), s, 50.434271938f), s, 3.3871327179f) /
-      mad(mad(mad(67.187563600f, s, 78.757757664f), s, 17.895169469f), s, 1.0f);
-  const realn r = sqrt(-log_n(min(u, 1.0f - u))) - 1.6f;
-  const realn tail = mad(mad(mad(0.17023821103f, r, 1.3067284816f), r, 2.7568153900f), r, 1.4234372777f) /
-                     mad(mad(0.12021132975f, r, 0.73700164250f), r, 1.0f);
-  return choose(fabs(q) <= 0.425f, central, copysign(tail, q));
-}
-
-static inline realn prior_score(realn z) { return z; }
+#endif
 
 #endif

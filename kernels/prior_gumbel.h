@@ -4,6 +4,16 @@
 
 #include "lanes.h"
 
+/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+#define DPR_GUMBEL_LOWEST (-2.82f)
+#define DPR_GUMBEL_HIGHEST 16.7f
+
+static inline realn gumbel_quantile(realn u) { return -log_n(-log_n(u)); }
+
+static inline realn gumbel_score(realn z) { return 1.0f - exp_n(-z); }
+
+#if DPR_PRIOR == DPR_GUMBEL
+
 #define DPR_RULE DPR_RULE_SMOOTH
 #define DPR_SOFTMAX 1
 #define DPR_BARRIER_REACH 17.0f /* exp(-17) = 4e-8 */
@@ -33,8 +43,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(small, mad(u, mad(u, 1.0f / 12.0f, -0.5f), 1.0f), u * survival / (1.0f - survival));
 }
 
-static inline realn prior_sample(realn u) { return -log_n(-log_n(u)); }
-
-static inline realn prior_score(realn z) { return 1.0f - exp_n(-z); }
+#endif
 
 #endif

@@ -4,6 +4,20 @@
 
 #include "lanes.h"
 
+/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+#define DPR_LOGISTIC_LOWEST (-16.7f)
+#define DPR_LOGISTIC_HIGHEST 16.7f
+
+static inline realn logistic_quantile(realn u) { return log_n(u) - log_n(1.0f - u); }
+
+/// tanh(z / 2).
+static inline realn logistic_score(realn z) {
+  const realn e = exp_n(-fabs(z));
+  return copysign((1.0f - e) / (1.0f + e), z);
+}
+
+#if DPR_PRIOR == DPR_LOGISTIC
+
 #define DPR_RULE DPR_RULE_SMOOTH
 /// As in prior_gaussian.h; 1 - F = 5e-7 at the upper end.
 #define DPR_BARRIER_HIGH 14.5f
@@ -35,8 +49,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(x < 0.0f, 1.0f / (1.0f + e), e / (1.0f + e));
 }
 
-static inline realn prior_sample(realn u) { return log_n(u) - log_n(1.0f - u); }
-
-static inline realn prior_score(realn z) { return tanh(0.5f * z); }
+#endif
 
 #endif

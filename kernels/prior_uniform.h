@@ -4,6 +4,8 @@
 
 #include "lanes.h"
 
+#if DPR_PRIOR == DPR_UNIFORM
+
 #define DPR_RULE DPR_RULE_PIECEWISE
 /// Where the density ends.
 #define DPR_HALF_WIDTH 0.5f
@@ -25,6 +27,6 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   *hazard = choose(inside, 1.0f / max(p, 1e-30f), (realn)(0.0f));
 }
 
-static inline realn prior_sample(realn u) { return u - 0.5f; }
+#endif
 
 #endif

@@ -45,6 +45,11 @@ using float4 = cl_float4;
 #define DPR_GUMBEL 3
 #define DPR_UNIFORM 4
 
+/// How noise is drawn, in the order of dpr::Draws.
+#define DPR_INDEPENDENT 0
+#define DPR_ANTITHETIC 1
+#define DPR_STRATIFIED 2
+
 /// Shading models, in the order of dpr::Shading after the unlit one.
 #define DPR_UNLIT 0
 #define DPR_FLAT 1
@@ -123,13 +128,20 @@ typedef struct Light {
   float4 diffuse, specular;
 } Light;
 
+/// How the Monte Carlo estimators sample; part of the structs below.
+typedef struct Sampling {
+  uint samples;
+  uint draws;      /* DPR_INDEPENDENT, DPR_ANTITHETIC or DPR_STRATIFIED */
+  float baseline;  /* 1: the rigid solution is subtracted from every sample (14); 0: it is not */
+  float leave_out; /* 1 / (samples outside a group) for the leave-one-out baseline (noise.h); 0: none */
+  uint seed_low, seed_high;
+} Sampling;
+
 /// The perturbation of distances.
 typedef struct OccupancyParams {
   DPR_SHARED_NAME(OccupancyParams)
   float sigma;
-  uint samples;
-  float baseline; /* 1: the rigid solution is subtracted from every sample (14); 0: it is not */
-  uint seed_low, seed_high;
+  Sampling sampling;
   uint width;           /* pixels, to name a pixel's noise */
   uint faces;           /* of one view */
   uint pixels_per_view; /* width * height */
@@ -140,15 +152,13 @@ typedef struct OccupancyParams {
 typedef struct AggregateParams {
   DPR_SHARED_NAME(AggregateParams)
   float4 background;
-  float gamma, alpha, background_depth;
-  uint samples;
-  float baseline;
-  uint seed_low, seed_high;
+  float sigma, gamma, alpha, background_depth;
+  Sampling sampling;
   uint pixels_per_view;
   uint pixels; /* of all views */
   uint faces;  /* of one view */
   uint first_view; /* of the batch that names the noise */
-  uint unused;
+  uint unused0, unused1;
 } AggregateParams;
 
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward pass.

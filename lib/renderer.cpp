@@ -156,7 +156,7 @@ void Renderer::Impl::forward() {
 void Renderer::Impl::render(const Band& band) {
   rasterize.forward(frame, setup.triangles, bin, band);
   shade.forward(shade_inputs());
-  occupancy.forward(frame, bin, rasterize);
+  if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
 }
 
@@ -185,11 +185,15 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
-  if (geometric || wanted.smoothing) occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
+  const bool sampled_jointly = aggregate.perturbs_distances();
+  if ((geometric || wanted.smoothing) && !sampled_jointly) {
+    occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
+  }
   if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
   if (geometric) {
-    rasterize.backward(frame, setup.triangles, bin, occupancy.grad_distance, aggregate.grad_depth,
-                       shade.grad_bary1, shade.grad_bary2);
+    rasterize.backward(frame, setup.triangles, bin,
+                       sampled_jointly ? aggregate.grad_distance : occupancy.grad_distance,
+                       aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
   }
   if (wanted.lights && shade.lit()) {
     for (std::size_t light = 0; light < shade.light_sets(); ++light) {

@@ -103,7 +103,9 @@ class Replicates {
 
   void add_fragments() {
     const std::vector<float> by_depth = m_.aggregate.grad_depth.download();
-    const std::vector<float> by_distance = m_.occupancy.grad_distance.download();
+    const Buffer<float>& grad_distance =
+        m_.aggregate.perturbs_distances() ? m_.aggregate.grad_distance : m_.occupancy.grad_distance;
+    const std::vector<float> by_distance = grad_distance.download();
     // The rest of the buffers is padding.
     for (const cl_uint k : m_.rasterize.list.download()) {
       depth_.add(k, static_cast<double>(by_depth[k]));

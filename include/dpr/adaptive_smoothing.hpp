@@ -14,7 +14,7 @@ struct AdaptiveSchedule {
   float rate = 1.1F;                   ///< > 1: sigma and gamma are divided by it
   float sigma_floor = 5e-5F;           ///< > 0
   float gamma_floor = 5e-4F;           ///< > 0
-  std::uint32_t max_samples = 128;     ///< samples double up to this
+  std::uint32_t max_samples = 128;     ///< samples double up to this; antithetic draws stay even
   float learning_rate_divisor = 1.5F;  ///< >= 1, applied with each change
   float learning_rate_floor = 1e-4F;
   float memory = 0.9F;  ///< v <- memory v + (1 - memory) d loss / d gamma

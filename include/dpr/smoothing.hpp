@@ -18,8 +18,14 @@ enum class Composition { barrier, joint };
 /// exact: closed form or quadrature, no variance. monte_carlo: `samples` draws, eq. (11)-(16).
 enum class Estimator { exact, monte_carlo };
 
-/// Control variate of the sampled gradients. rigid: the unperturbed solution is subtracted, eq. (14).
-enum class VarianceReduction { none, rigid };
+/// Control variate of the sampled gradients: what is subtracted from every sample. rigid: the unperturbed
+/// solution, eq. (14). leave_one_out: the mean of the other samples.
+enum class VarianceReduction { none, rigid, leave_one_out };
+
+/// How the samples' noise is drawn. The values are shared with the kernels (kernels/shared_types.h).
+/// antithetic: in pairs, z and -z. stratified: a Latin hypercube, each variable once in each of `samples`
+/// strata of equal probability.
+enum class Draws { independent, antithetic, stratified };
 
 /// Unit of the signed distance, of sigma and of the blur radius: NDC^2 with the sign attached, or NDC.
 enum class DistanceMetric { squared, euclidean };
@@ -41,6 +47,7 @@ struct Smoothing {
   Estimator aggregation_estimator = Estimator::exact;
   std::uint32_t samples = 8;  ///< 1 to 2^20, of Monte Carlo
   VarianceReduction variance_reduction = VarianceReduction::rigid;
+  Draws draws = Draws::independent;
   std::uint64_t seed = 1;  ///< the noise is a pure function of seed, view, pixel, face, sample and stage
   float occupancy_threshold = 1e-4F;  ///< in (0, 0.5): sets the blur radius where none is given
   std::optional<float>
@@ -51,10 +58,15 @@ struct Smoothing {
 };
 
 /// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform
-/// prior (its density is no exp(-nu), so it has no score), sampling the joint composition, uniform depths,
-/// Cauchy depths in the joint composition, and a variable width with another prior than the uniform one, with
-/// samples, squared distances, the barrier (where an occupancy of nearly 0 still has weight), or no
-/// blur_radius (no occupancy says where such noise ends).
+/// prior (its density is no exp(-nu), so it has no score), and one sampled and one exact stage in the joint
+/// composition.
+/// - A variable width needs the uniform prior, the exact estimator, Euclidean distances, the joint composition
+///   (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy says where such
+///   noise ends).
+/// - Antithetic draws need symmetric priors, so not Gumbel's, and an even number of samples.
+/// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
+///   half's value is correlated with the score. With stratified draws it is refused: every other sample's
+///   stratum tells of one's own, which biases the gradient.
 void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to
@@ -92,6 +104,7 @@ std::string_view to_string(Prior);
 std::string_view to_string(Composition);
 std::string_view to_string(Estimator);
 std::string_view to_string(VarianceReduction);
+std::string_view to_string(Draws);
 std::string_view to_string(DistanceMetric);
 std::string_view to_string(OccupancyWidth);
 
@@ -100,6 +113,7 @@ Prior parse_prior(std::string_view word, std::string_view where);
 Composition parse_composition(std::string_view word, std::string_view where);
 Estimator parse_estimator(std::string_view word, std::string_view where);
 VarianceReduction parse_variance_reduction(std::string_view word, std::string_view where);
+Draws parse_draws(std::string_view word, std::string_view where);
 DistanceMetric parse_distance_metric(std::string_view word, std::string_view where);
 OccupancyWidth parse_occupancy_width(std::string_view word, std::string_view where);
 

@@ -29,7 +29,9 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   add("--aggregation-estimator", s.aggregation_estimator, "Overrides --estimator for the aggregation",
       estimators);
   add("--samples", s.samples, "Draws of Monte Carlo", "N");
-  add("--variance-reduction", s.variance_reduction, "Control variate of sampled gradients", "none|rigid");
+  add("--variance-reduction", s.variance_reduction, "Control variate of sampled gradients",
+      "none|rigid|leave_one_out");
+  add("--draws", s.draws, "How the samples' noise is drawn", "independent|antithetic|stratified");
   add("--occupancy-threshold", s.occupancy_threshold, "Sets the blur radius where none is given", "FLOAT");
   add("--blur-radius", s.blur_radius, "Triangles further from a pixel are not there", "FLOAT");
   add("--background-depth", s.background_depth, "Normalised depth of the background", "FLOAT");
@@ -66,6 +68,7 @@ void apply(const SmoothingOptions& options, Scene& scene) {
              "--aggregation-estimator");
   apply_word(options.variance_reduction, smoothing.variance_reduction, parse_variance_reduction,
              "--variance-reduction");
+  apply_word(options.draws, smoothing.draws, parse_draws, "--draws");
   apply_word(options.distance, smoothing.distance, parse_distance_metric, "--distance");
   apply_word(options.occupancy_width, smoothing.occupancy_width, parse_occupancy_width, "--occupancy-width");
   apply_value(options.sigma, smoothing.sigma);

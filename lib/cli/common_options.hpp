@@ -14,7 +14,7 @@ namespace dpr::cli {
 /// What the command line says of a Smoothing; what it does not mention stays as the scene has it.
 struct SmoothingOptions {
   std::optional<std::string> preset, occupancy_prior, depth_prior, composition, estimator,
-      occupancy_estimator, aggregation_estimator, variance_reduction, distance, occupancy_width;
+      occupancy_estimator, aggregation_estimator, variance_reduction, draws, distance, occupancy_width;
   std::optional<float> sigma, gamma, alpha, occupancy_threshold, blur_radius, background_depth;
   std::optional<std::uint32_t> samples;
 };

@@ -209,8 +209,8 @@ Camera parse_camera(const JsonNode& node) {
 Smoothing parse_smoothing(const JsonNode& node, int width, int height) {
   node.require_keys({"preset", "occupancy_prior", "depth_prior", "sigma", "gamma", "alpha", "composition",
                      "estimator", "occupancy_estimator", "aggregation_estimator", "samples",
-                     "variance_reduction", "seed", "occupancy_threshold", "blur_radius", "background_depth",
-                     "distance", "occupancy_width"});
+                     "variance_reduction", "draws", "seed", "occupancy_threshold", "blur_radius",
+                     "background_depth", "distance", "occupancy_width"});
   Smoothing smoothing;
   take(node, "preset", smoothing,
        [=](const JsonNode& n) { return smoothing_preset(n.string(), width, height); });
@@ -225,6 +225,7 @@ Smoothing parse_smoothing(const JsonNode& node, int width, int height) {
   take(node, "samples", smoothing.samples,
        [](const JsonNode& n) { return static_cast<std::uint32_t>(n.whole_number(k_most_samples)); });
   take_word(node, "variance_reduction", smoothing.variance_reduction, parse_variance_reduction);
+  take_word(node, "draws", smoothing.draws, parse_draws);
   constexpr std::uint64_t k_most_seed = std::numeric_limits<std::uint64_t>::max();
   take(node, "seed", smoothing.seed, [](const JsonNode& n) { return n.whole_number(k_most_seed); });
   take_number(node, "occupancy_threshold", smoothing.occupancy_threshold);

@@ -33,8 +33,13 @@ constexpr std::array<Word<Composition>, 2> k_compositions{
     {{Composition::barrier, "barrier"}, {Composition::joint, "joint"}}};
 constexpr std::array<Word<Estimator>, 2> k_estimators{
     {{Estimator::exact, "exact"}, {Estimator::monte_carlo, "monte_carlo"}}};
-constexpr std::array<Word<VarianceReduction>, 2> k_variance_reductions{
-    {{VarianceReduction::none, "none"}, {VarianceReduction::rigid, "rigid"}}};
+constexpr std::array<Word<VarianceReduction>, 3> k_variance_reductions{
+    {{VarianceReduction::none, "none"},
+     {VarianceReduction::rigid, "rigid"},
+     {VarianceReduction::leave_one_out, "leave_one_out"}}};
+constexpr std::array<Word<Draws>, 3> k_draws{{{Draws::independent, "independent"},
+                                              {Draws::antithetic, "antithetic"},
+                                              {Draws::stratified, "stratified"}}};
 constexpr std::array<Word<DistanceMetric>, 2> k_distance_metrics{
     {{DistanceMetric::squared, "squared"}, {DistanceMetric::euclidean, "euclidean"}}};
 constexpr std::array<Word<OccupancyWidth>, 2> k_occupancy_widths{
@@ -81,21 +86,54 @@ void validate_words(const Smoothing& s) {
   require_known<Estimator>(k_estimators, s.aggregation_estimator, "aggregation_estimator (smoothing)");
   require_known<VarianceReduction>(k_variance_reductions, s.variance_reduction,
                                    "variance_reduction (smoothing)");
+  require_known<Draws>(k_draws, s.draws, "draws (smoothing)");
   require_known<DistanceMetric>(k_distance_metrics, s.distance, "distance (smoothing)");
   require_known<OccupancyWidth>(k_occupancy_widths, s.occupancy_width, "occupancy_width (smoothing)");
 }
 
-void validate_stage(Estimator estimator, const std::string& stage, Prior prior, Composition composition) {
-  if (estimator == Estimator::exact) return;
-  const std::string argument = stage + "_estimator (smoothing)";
-  if (composition == Composition::joint) {
-    throw InvalidArgument(argument, "monte_carlo with the joint composition",
-                          "exact: the joint composition is not sampled");
-  }
+/// What a sampled stage asks of its prior.
+void validate_sampled_prior(Prior prior, Draws draws, const std::string& stage) {
   if (prior == Prior::uniform) {
-    throw InvalidArgument(argument, "monte_carlo with the uniform prior",
+    throw InvalidArgument(stage + "_estimator (smoothing)", "monte_carlo with the uniform prior",
                           "exact: the uniform density has no score, so its gradient cannot be sampled");
   }
+  if (prior == Prior::gumbel && draws == Draws::antithetic) {
+    throw InvalidArgument("draws (smoothing)", "antithetic with the gumbel prior of the " + stage,
+                          "independent or stratified: Gumbel's density is not symmetric");
+  }
+}
+
+/// Which baselines, draws and numbers of samples make an unbiased estimator.
+void validate_sampling(const Smoothing& s) {
+  const bool paired = s.draws == Draws::antithetic;
+  if (paired && s.samples % 2 != 0) {
+    throw InvalidArgument("samples (smoothing)", checks::text(s.samples) + " with antithetic draws",
+                          "an even number: antithetic draws come in pairs");
+  }
+  if (s.variance_reduction != VarianceReduction::leave_one_out) return;
+  if (s.draws == Draws::stratified) {
+    throw InvalidArgument("variance_reduction (smoothing)", "leave_one_out with stratified draws",
+                          "none or rigid: stratified samples are not independent of each other");
+  }
+  const std::uint32_t least = paired ? 4 : 2;
+  if (s.samples < least) {
+    throw InvalidArgument("samples (smoothing)", checks::text(s.samples) + " with leave_one_out",
+                          "at least " + checks::text(least) + ", so that samples are left" +
+                              (paired ? " beside an antithetic pair" : ""));
+  }
+}
+
+void validate_estimators(const Smoothing& s) {
+  const bool occupancy = s.occupancy_estimator == Estimator::monte_carlo;
+  const bool aggregation = s.aggregation_estimator == Estimator::monte_carlo;
+  if (s.composition == Composition::joint && occupancy != aggregation) {
+    throw InvalidArgument(std::string(occupancy ? "occupancy" : "aggregation") + "_estimator (smoothing)",
+                          "monte_carlo beside an exact stage in the joint composition",
+                          "the same for both: a sample perturbs distances and depths together");
+  }
+  if (occupancy) validate_sampled_prior(s.occupancy_prior, s.draws, "occupancy");
+  if (aggregation) validate_sampled_prior(s.depth_prior, s.draws, "aggregation");
+  if (occupancy || aggregation) validate_sampling(s);
 }
 
 void validate_width(const Smoothing& s) {
@@ -193,10 +231,7 @@ void validate(const Smoothing& smoothing) {
   }
   checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
   validate_width(smoothing);
-  validate_stage(smoothing.occupancy_estimator, "occupancy", smoothing.occupancy_prior,
-                 smoothing.composition);
-  validate_stage(smoothing.aggregation_estimator, "aggregation", smoothing.depth_prior,
-                 smoothing.composition);
+  validate_estimators(smoothing);
 }
 
 float blur_radius(const Smoothing& smoothing) {
@@ -235,6 +270,7 @@ std::string_view to_string(Estimator value) { return find_name<Estimator>(k_esti
 std::string_view to_string(VarianceReduction value) {
   return find_name<VarianceReduction>(k_variance_reductions, value);
 }
+std::string_view to_string(Draws value) { return find_name<Draws>(k_draws, value); }
 std::string_view to_string(DistanceMetric value) {
   return find_name<DistanceMetric>(k_distance_metrics, value);
 }
@@ -253,6 +289,9 @@ Estimator parse_estimator(std::string_view word, std::string_view where) {
 }
 VarianceReduction parse_variance_reduction(std::string_view word, std::string_view where) {
   return find_value<VarianceReduction>(k_variance_reductions, word, where);
+}
+Draws parse_draws(std::string_view word, std::string_view where) {
+  return find_value<Draws>(k_draws, word, where);
 }
 DistanceMetric parse_distance_metric(std::string_view word, std::string_view where) {
   return find_value<DistanceMetric>(k_distance_metrics, word, where);

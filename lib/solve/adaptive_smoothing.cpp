@@ -53,9 +53,9 @@ bool AdaptiveSmoothing::update(unsigned iteration, double grad_gamma, Smoothing&
   const float gamma = shrink(smoothing.gamma, schedule_.rate, schedule_.gamma_floor);
   std::uint32_t samples = smoothing.samples;
   // The exact estimators have no use for samples: doubling them would be a change without an effect.
-  if (is_sampled(smoothing) && samples < schedule_.max_samples) {
-    samples = std::min(2 * samples, schedule_.max_samples);
-  }
+  const std::uint32_t most =
+      schedule_.max_samples - (smoothing.draws == Draws::antithetic ? schedule_.max_samples % 2 : 0);
+  if (is_sampled(smoothing) && samples < most) samples = std::min(2 * samples, most);
   if (sigma == smoothing.sigma && gamma == smoothing.gamma && samples == smoothing.samples) return false;
 
   if (smoothing.blur_radius) *smoothing.blur_radius *= sigma / smoothing.sigma;

@@ -42,6 +42,12 @@ class Aggregate {
   ColorGradients grad_color;                     ///< [fragment]
   Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
 
+  /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
+  /// written, but these are.
+  bool perturbs_distances() const { return joint_sampled_.has_value(); }
+  Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
+  Buffer<float> grad_sigma;     ///< [view][height][width]
+
   std::size_t bytes() const;
 
  private:
@@ -70,6 +76,17 @@ class Aggregate {
            Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
         backward;
   };
+  /// Perturbs distances too, and so takes the place of the occupancy stage.
+  struct JointSampled {
+    JointSampled(Device::Impl& device, const std::string& options);
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
+        forward;
+    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>, Out<float>,
+           Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+        backward;
+  };
 
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
 
@@ -80,6 +97,7 @@ class Aggregate {
   Buffer<cl_uint> slot_counts_;  // [pixel]
   std::optional<Exact> exact_;
   std::optional<Sampled> sampled_;
+  std::optional<JointSampled> joint_sampled_;
 };
 
 }  // namespace dpr

@@ -4,6 +4,25 @@ namespace dpr {
 
 std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior)); }
 
+bool samples_jointly(const Smoothing& smoothing) {
+  return smoothing.composition == Composition::joint &&
+         smoothing.aggregation_estimator == Estimator::monte_carlo;
+}
+
+shared::Sampling sampling_params(const Smoothing& smoothing) {
+  shared::Sampling s{};
+  s.samples = smoothing.samples;
+  s.draws = static_cast<cl_uint>(smoothing.draws);
+  s.baseline = smoothing.variance_reduction == VarianceReduction::none ? 0.0F : 1.0F;
+  if (smoothing.variance_reduction == VarianceReduction::leave_one_out) {
+    const std::uint32_t group = smoothing.draws == Draws::antithetic ? 2 : 1;
+    s.leave_out = 1.0F / static_cast<float>(smoothing.samples - group);
+  }
+  s.seed_low = static_cast<cl_uint>(smoothing.seed);
+  s.seed_high = static_cast<cl_uint>(smoothing.seed >> 32U);
+  return s;
+}
+
 Occupancy::Exact::Exact(Device::Impl& device, const std::string& options)
     : forward(device, "occupancy.cl", "occupancy_forward", options),
       backward(device, "occupancy.cl", "occupancy_backward", options) {}
@@ -13,6 +32,7 @@ Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
       backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
 
 void Occupancy::set_smoothing(const Smoothing& smoothing) {
+  if (samples_jointly(smoothing)) return;
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
   const bool variable = smoothing.occupancy_width == OccupancyWidth::variable;
   const std::string options =
@@ -34,10 +54,7 @@ void Occupancy::set_smoothing(const Smoothing& smoothing) {
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   shared::OccupancyParams o{};
   o.sigma = smoothing_.sigma;
-  o.samples = smoothing_.samples;
-  o.baseline = smoothing_.variance_reduction == VarianceReduction::rigid ? 1.0F : 0.0F;
-  o.seed_low = static_cast<cl_uint>(smoothing_.seed);
-  o.seed_high = static_cast<cl_uint>(smoothing_.seed >> 32U);
+  o.sampling = sampling_params(smoothing_);
   o.width = p.width;
   o.faces = p.faces;
   o.pixels_per_view = p.width * p.height;
@@ -69,7 +86,7 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
                      rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
   } else {
     sampled_->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.masks,
-                       rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, log_occupancy,
+                       rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, occupancy,
                        grad_log_occupancy, grad_distance, grad_sigma);
   }
 }

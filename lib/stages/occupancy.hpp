@@ -1,4 +1,5 @@
-// The perturbed Heaviside of every fragment, exact or sampled.
+// The perturbed Heaviside of every fragment, exact or sampled. The sampled joint composition has no such
+// stage: there aggregation perturbs the distances together with the depths.
 #pragma once
 
 #include <optional>
@@ -59,5 +60,11 @@ class Occupancy {
 
 /// The build option that chooses a prior.
 std::string prior_option(Prior prior);
+
+/// Whether it is the sampled joint composition.
+bool samples_jointly(const Smoothing& smoothing);
+
+/// How the Monte Carlo estimators of either stage sample.
+shared::Sampling sampling_params(const Smoothing& smoothing);
 
 }  // namespace dpr

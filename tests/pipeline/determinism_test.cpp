@@ -98,6 +98,14 @@ Scene sampled_scene() {
   return scene;
 }
 
+Scene sampled_joint_scene() {
+  Scene scene = sampled_scene();
+  scene.smoothing.composition = Composition::joint;
+  scene.smoothing.variance_reduction = VarianceReduction::leave_one_out;
+  scene.smoothing.draws = Draws::antithetic;
+  return scene;
+}
+
 Scene joint_scene() {
   Scene scene = test_scene();
   scene.smoothing.composition = Composition::joint;
@@ -111,7 +119,7 @@ Scene joint_scene() {
 TEST_SUITE("pipeline") {
   TEST_CASE("determinism: two runs and two renderers agree in every bit") {
     const Device device = open_device();
-    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene()}) {
+    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene(), sampled_joint_scene()}) {
       Renderer renderer(device);
       renderer.set_scene(scene);
       const Result first = render(renderer);

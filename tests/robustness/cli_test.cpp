@@ -217,6 +217,12 @@ TEST_SUITE("robustness") {
     check_fails(folder, 1, "no such device", render({"--device", "no such device"}));
     check_fails(folder, 1, "no such device", render({}), "DPR_DEVICE=no such device");
     check_fails(folder, 1, "samples", render({"--samples", "0"}));
+    check_fails(folder, 1, "--draws", render({"--draws", "mirrored"}));
+    check_fails(folder, 1, "even number",
+                render({"--estimator", "monte_carlo", "--draws", "antithetic", "--samples", "3"}));
+    check_fails(
+        folder, 1, "at least 2",
+        render({"--estimator", "monte_carlo", "--variance-reduction", "leave_one_out", "--samples", "1"}));
     check_fails(folder, 1, "sigma", render({"--sigma", "nan"}));
     check_fails(folder, 1, "--size", render({"--size", "0x16"}));
     check_fails(folder, 1, "--memory-budget", render({"--memory-budget", "0"}));

@@ -44,7 +44,7 @@ TEST_SUITE("unit") {
       "smoothing": {
         "occupancy_prior": "gaussian", "depth_prior": "cauchy", "sigma": 2e-3, "gamma": 3e-2, "alpha": 4,
         "composition": "barrier", "estimator": "exact", "samples": 16,
-        "variance_reduction": "none", "seed": 18446744073709551615,
+        "variance_reduction": "none", "draws": "stratified", "seed": 18446744073709551615,
         "occupancy_threshold": 2e-4, "blur_radius": 9.21e-3, "background_depth": 2e-10,
         "distance": "euclidean"
       },
@@ -67,6 +67,7 @@ TEST_SUITE("unit") {
     CHECK(scene.smoothing.alpha == 4);
     CHECK(scene.smoothing.samples == 16);
     CHECK(scene.smoothing.variance_reduction == VarianceReduction::none);
+    CHECK(scene.smoothing.draws == Draws::stratified);
     CHECK(scene.smoothing.seed == std::numeric_limits<std::uint64_t>::max());
     CHECK(scene.smoothing.occupancy_threshold == 2e-4F);
     CHECK(*scene.smoothing.blur_radius == 9.21e-3F);

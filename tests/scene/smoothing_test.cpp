@@ -131,8 +131,12 @@ TEST_SUITE("unit") {
     for (const Estimator value : {Estimator::exact, Estimator::monte_carlo}) {
       CHECK(parse_estimator(to_string(value), "x") == value);
     }
-    for (const VarianceReduction value : {VarianceReduction::none, VarianceReduction::rigid}) {
+    for (const VarianceReduction value :
+         {VarianceReduction::none, VarianceReduction::rigid, VarianceReduction::leave_one_out}) {
       CHECK(parse_variance_reduction(to_string(value), "x") == value);
+    }
+    for (const Draws value : {Draws::independent, Draws::antithetic, Draws::stratified}) {
+      CHECK(parse_draws(to_string(value), "x") == value);
     }
     for (const DistanceMetric value : {DistanceMetric::squared, DistanceMetric::euclidean}) {
       CHECK(parse_distance_metric(to_string(value), "x") == value);
@@ -185,7 +189,60 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "aggregation_estimator (smoothing)");
     smoothing = smoothing_preset("joint_gaussian");
     smoothing.aggregation_estimator = Estimator::monte_carlo;
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "with the joint composition, expected exact");
+    DPR_CHECK_MESSAGE_HAS(
+        InvalidArgument, validate(smoothing),
+        "aggregation_estimator (smoothing): got monte_carlo beside an exact stage in the joint");
+    smoothing.occupancy_estimator = Estimator::monte_carlo;
+    CHECK_NOTHROW(validate(smoothing));
+    smoothing.aggregation_estimator = Estimator::exact;
+    DPR_CHECK_MESSAGE_HAS(
+        InvalidArgument, validate(smoothing),
+        "occupancy_estimator (smoothing): got monte_carlo beside an exact stage in the joint");
+    smoothing = smoothing_preset("joint_gaussian");
+    smoothing.depth_prior = Prior::cauchy;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "cauchy with the exact joint composition");
+    smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
+    CHECK_NOTHROW(validate(smoothing));
+    smoothing.occupancy_prior = Prior::uniform;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "monte_carlo with the uniform prior");
+  }
+
+  TEST_CASE("baselines, draws and numbers of samples that do not go together") {
+    const auto sampled = [](VarianceReduction reduction, Draws draws, std::uint32_t samples) {
+      Smoothing smoothing = smoothing_preset("paper_gaussian");
+      smoothing.variance_reduction = reduction;
+      smoothing.draws = draws;
+      smoothing.samples = samples;
+      return smoothing;
+    };
+    using enum VarianceReduction;
+    for (const VarianceReduction reduction : {none, rigid}) {
+      CHECK_NOTHROW(validate(sampled(reduction, Draws::independent, 1)));
+      CHECK_NOTHROW(validate(sampled(reduction, Draws::stratified, 1)));
+      CHECK_NOTHROW(validate(sampled(reduction, Draws::antithetic, 2)));
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(reduction, Draws::antithetic, 7)),
+                            "samples (smoothing): got 7 with antithetic draws, expected an even number");
+    }
+    CHECK_NOTHROW(validate(sampled(leave_one_out, Draws::independent, 2)));
+    CHECK_NOTHROW(validate(sampled(leave_one_out, Draws::antithetic, 4)));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::independent, 1)),
+                          "samples (smoothing): got 1 with leave_one_out, expected at least 2");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::antithetic, 2)),
+                          "samples (smoothing): got 2 with leave_one_out, expected at least 4");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::stratified, 8)),
+                          "variance_reduction (smoothing): got leave_one_out with stratified draws");
+    Smoothing gumbel = sampled(none, Draws::antithetic, 8);
+    gumbel.depth_prior = Prior::gumbel;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(gumbel),
+                          "draws (smoothing): got antithetic with the gumbel");
+    gumbel.aggregation_estimator = Estimator::exact;  // what is not sampled may be of any prior
+    CHECK_NOTHROW(validate(gumbel));
+    Smoothing exact = sampled(leave_one_out, Draws::stratified, 1);  // and has no draws
+    exact.occupancy_estimator = exact.aggregation_estimator = Estimator::exact;
+    CHECK_NOTHROW(validate(exact));
+    exact.draws = static_cast<Draws>(9);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(exact),
+                          "draws (smoothing): got 9, expected independent,");
   }
 
   TEST_CASE("a variable width needs what makes the image rigid") {

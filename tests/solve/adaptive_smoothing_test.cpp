@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <limits>
+#include <tuple>
 
 #include "dpr/error.hpp"
 
@@ -78,6 +79,33 @@ TEST_SUITE("unit") {
     CHECK(smoothing.sigma == 1e-5F);
     CHECK(smoothing.samples == 1000);
     CHECK(learning_rate == 1e-5);
+  }
+
+  TEST_CASE("every member of the family stays valid while it adapts") {
+    using enum dpr::VarianceReduction;
+    using dpr::Draws;
+    dpr::Smoothing softras = dpr::smoothing_preset("softras");
+    double rate = 1;
+    CHECK(dpr::AdaptiveSmoothing(eager()).update(0, 1.0, softras, rate));
+    CHECK_NOTHROW(validate(softras));
+    CHECK(*softras.blur_radius == doctest::Approx(9.2102404e-3 / 1.1));
+    for (const auto& [reduction, draws, samples] :
+         {std::tuple{leave_one_out, Draws::independent, 2U}, std::tuple{leave_one_out, Draws::antithetic, 4U},
+          std::tuple{rigid, Draws::antithetic, 2U}, std::tuple{none, Draws::stratified, 3U}}) {
+      dpr::AdaptiveSchedule schedule = eager();
+      schedule.max_samples = 101;
+      dpr::AdaptiveSmoothing adaptive(schedule);
+      dpr::Smoothing smoothing = sampled_smoothing();
+      smoothing.variance_reduction = reduction;
+      smoothing.draws = draws;
+      smoothing.samples = samples;
+      double learning_rate = 1;
+      for (unsigned i = 0; i < 10; ++i) {
+        adaptive.update(i, 1.0, smoothing, learning_rate);
+        CHECK_NOTHROW(validate(smoothing));
+      }
+      CHECK(smoothing.samples == (draws == Draws::antithetic ? 100 : 101));
+    }
   }
 
   TEST_CASE("a given blur radius shrinks with sigma; the exact estimator keeps its samples") {

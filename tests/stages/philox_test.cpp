@@ -2,6 +2,7 @@
 // numbers, the priors' samplers against the exact inverse CDFs, their scores against the reference.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -22,17 +23,28 @@ using RefPrior = dpr::reference::Prior;
 
 using Words = std::array<cl_uint, 4>;
 
-Words philox(const Words& counter, cl_uint key0, cl_uint key1) {
+/// The words of a counter, and of the one that follows it.
+std::array<cl_uint, 8> philox_pair(const Words& counter, cl_uint key0, cl_uint key1) {
   Probe probe({"philox.h"}, R"(
 kernel void probe(const uint4 counter, const uint2 key, global uint* restrict out) {
-  vstore4(philox4x32_10(counter, key), 0, out);
+  vstore8(philox4x32_10(counter, key), 0, out);
 })");
   Buffer<cl_uint> out;
-  poison(out, 4, 0xdeadbeefU);
+  poison(out, 8, 0xdeadbeefU);
   probe(1, cl_uint4{{counter[0], counter[1], counter[2], counter[3]}}, cl_uint2{{key0, key1}}, out);
-  Words words{};
+  std::array<cl_uint, 8> words{};
   out.download(words);
   return words;
+}
+
+/// The words of a counter, which come in the first half of the call that names it and in the second half of
+/// the call before.
+Words philox(const Words& counter, cl_uint key0, cl_uint key1) {
+  const std::array<cl_uint, 8> named = philox_pair(counter, key0, key1);
+  const std::array<cl_uint, 8> before =
+      philox_pair({counter[0], counter[1], counter[2] - 1, counter[3]}, key0, key1);
+  CHECK(std::equal(named.begin(), named.begin() + 4, before.begin() + 4));
+  return {named[0], named[1], named[2], named[3]};
 }
 
 std::string prior_option(RefPrior prior) {
@@ -44,7 +56,7 @@ std::vector<float> apply(RefPrior prior, const std::string& function, const std:
   Probe probe({"shared_types.h", "lanes.h", "priors.h"}, R"(
 kernel void probe(global const float* restrict in, global float* restrict out) {
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
-  store_n()" + function + R"((load_n(i, in)), i, out);
+  store_n()" + function + R"((DPR_PRIOR, load_n(i, in)), i, out);
 })",
               prior_option(prior));
   const Buffer<float> in_buffer(device_impl(), std::span<const float>(in));
@@ -164,7 +176,7 @@ TEST_SUITE("unit") {
     const std::vector<float> grid = uniform_grid();
     for (const SamplerCase& c : k_samplers) {
       CAPTURE(std::string(c.name));
-      const std::vector<float> found = apply(c.prior, "prior_sample", grid);
+      const std::vector<float> found = apply(c.prior, "noise_quantile", grid);
       Worst worst, shifted;
       for (std::size_t i = 0; i < grid.size(); ++i) {
         const long double expected = quantile(c.prior, static_cast<long double>(grid[i]));
@@ -193,7 +205,7 @@ TEST_SUITE("unit") {
       if (c.prior == RefPrior::gumbel) {
         for (float& z : points) z = std::max(z, -3.0F);
       }
-      const std::vector<float> found = apply(c.prior, "prior_score", points);
+      const std::vector<float> found = apply(c.prior, "noise_score", points);
       Worst worst, turned;
       for (std::size_t i = 0; i < points.size(); ++i) {
         const double expected = dpr::reference::score(c.prior, static_cast<double>(points[i]));

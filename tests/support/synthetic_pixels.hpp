@@ -14,6 +14,7 @@ namespace dpr::test {
 struct SyntheticFragment {
   float depth = 1, occupancy = 0;
   glm::vec3 color{0.0F};
+  float distance = 0;  ///< what the sampled joint composition reads instead of the occupancy
 };
 
 using SyntheticPixel = std::vector<SyntheticFragment>;
@@ -76,13 +77,15 @@ class SyntheticFrame {
     fragments_ = count + 1;
     first_ = starts;
     std::vector<float> depth(fragments_, k_poison), log_p(fragments_, k_poison), p(fragments_, k_poison),
-        red(fragments_, k_poison), green(fragments_, k_poison), blue(fragments_, k_poison);
+        red(fragments_, k_poison), green(fragments_, k_poison), blue(fragments_, k_poison),
+        distance(fragments_, k_poison);
     pair.assign(fragments_, 0);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       for (std::size_t k = 0; k < pixels[i].size(); ++k) {
         const std::size_t at = list[first_[i] + k];
         const SyntheticFragment& f = pixels[i][k];
         depth[at] = f.depth;
+        distance[at] = f.distance;
         p[at] = f.occupancy;
         log_p[at] = log_of(f.occupancy);
         red[at] = f.color.x;
@@ -106,6 +109,7 @@ class SyntheticFrame {
     rasterize_.list.upload(device_impl(), list);
     rasterize_.fragment_pair.upload(device_impl(), pair);
     rasterize_.depth.upload(device_impl(), depth);
+    rasterize_.distance.upload(device_impl(), distance);
     occupancy_.log_occupancy.upload(device_impl(), log_p);
     occupancy_.occupancy.upload(device_impl(), p);
     shade_.red.upload(device_impl(), red);
@@ -130,8 +134,11 @@ class SyntheticFrame {
   /// poisoned before.
   struct Gradients {
     std::vector<std::vector<float>> depth, log_occupancy, red, green, blue;  // [pixel][fragment]
-    std::vector<float> gamma, alpha;                                         // [pixel]
-    std::vector<glm::vec3> background;                                       // [pixel]
+    // Of the sampled joint composition alone: [pixel][fragment] and [pixel].
+    std::vector<std::vector<float>> distance;
+    std::vector<float> sigma;
+    std::vector<float> gamma, alpha;    // [pixel]
+    std::vector<glm::vec3> background;  // [pixel]
   };
   Gradients backward(const glm::vec3& background, const std::vector<cl_float4>& grad_image) {
     const Buffer<cl_float4> grad(device_impl(), std::span<const cl_float4>(grad_image));
@@ -142,6 +149,8 @@ class SyntheticFrame {
     }
     const std::size_t pixels = frame_.width;
     poison(aggregate_.channels, DPR_PIXEL_CHANNELS * pixels);
+    poison(aggregate_.grad_distance, fragments_);
+    poison(aggregate_.grad_sigma, pixels);
     aggregate_.backward(inputs(), background, grad);
     Gradients g;
     g.depth = by_pixel(aggregate_.grad_depth);
@@ -149,6 +158,10 @@ class SyntheticFrame {
     g.red = by_pixel(aggregate_.grad_color.red);
     g.green = by_pixel(aggregate_.grad_color.green);
     g.blue = by_pixel(aggregate_.grad_color.blue);
+    if (aggregate_.perturbs_distances()) {
+      g.distance = by_pixel(aggregate_.grad_distance);
+      g.sigma = aggregate_.grad_sigma.download();
+    }
     const std::vector<float> channels = aggregate_.channels.download();
     const auto channel = [&](std::size_t c, std::size_t i) { return channels[c * pixels + i]; };
     for (std::size_t i = 0; i < pixels; ++i) {

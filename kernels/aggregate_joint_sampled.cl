@@ -1,0 +1,301 @@
+// The joint composition by Monte Carlo: every sample perturbs the distances and the depths of all of a pixel's
+// fragments and renders them rigidly. A fragment covers if s / sigma + X > 0; of those that cover, the largest
+// zeta / gamma + Z wins; where none does, the background is seen. The image is the mean of the samples, eq. (11).
+//
+// Gradients are score estimates with the baselines of noise.h, eq. (12)-(16), of y = <dL/dRGBA, RGBA of the sample>:
+//
+//   dL/ds_k     = 1/M sum_m (y_m - b_m) nu'(X_km) / sigma           samples where k wins if it covers
+//   dL/dzeta_k  = 1/M sum_m (y_m - b_m) nu'(Z_km) / gamma           samples where k covers, and could win
+//   dL/dsigma   = 1/M sum_m (y_m - b_m) sum_k (nu'(X_km) X_km - 1) / sigma, and gamma's with Z, over the same samples
+//
+// y depends on X_k, given all the other noise, only where k would win, and on Z_k only where k covers: the rest has
+// mean zero. A fragment so far inside or outside that no noise changes its sign draws no X.
+#include "noise.h"
+#include "pixel.h"
+
+#ifndef DPR_OCCUPANCY_PRIOR
+#define DPR_OCCUPANCY_PRIOR DPR_GAUSSIAN
+#endif
+#ifndef DPR_DEPTH_PRIOR
+#define DPR_DEPTH_PRIOR DPR_GAUSSIAN
+#endif
+
+/// Fragments by way of the pixels' lists, and whose noise they take.
+typedef struct {
+  global const uint* list;
+  global const float *distance, *depth, *red, *green, *blue;
+  global const uint *fragment_pair, *pair_face;
+} Layers;
+
+/// What a pixel's fragments have in common.
+typedef struct {
+  uint first, last;    // the pixel's run of the fragment lists
+  uint view, in_view;  // the pixel's view, and its number in it
+  float nearest;       // view depth of the nearest fragment
+  float depth_scale;   // d beta / d (nearest - depth)
+  int rigid;           // the winner without noise
+} Pixel;
+
+/// A fragment by its place in the pixel's run; where a winner is meant, -1 is the background.
+static inline uint fragment_of(const Pixel q, const Layers f, int place) { return f.list[q.first + (uint)place]; }
+
+static inline Layers make_layers(global const uint* list, global const float* distance, global const float* depth,
+                                 global const float* red, global const float* green, global const float* blue,
+                                 global const uint* fragment_pair, global const uint* pair_face) {
+  Layers f;
+  f.list = list;
+  f.distance = distance;
+  f.depth = depth;
+  f.red = red;
+  f.green = green;
+  f.blue = blue;
+  f.fragment_pair = fragment_pair;
+  f.pair_face = pair_face;
+  return f;
+}
+
+static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
+                               global const uint* restrict starts, const Layers f) {
+  Pixel q;
+  q.view = pixel / p.pixels_per_view;
+  q.in_view = pixel - q.view * p.pixels_per_view;
+  q.first = starts[pixel];
+  q.last = starts[pixel + 1];
+  q.depth_scale = views[q.view].inverse_range / p.gamma;
+  q.nearest = INFINITY;
+  q.rigid = -1;
+  float nearest_inside = INFINITY;
+  for (int place = 0; place < (int)(q.last - q.first); ++place) {
+    const uint k = fragment_of(q, f, place);
+    q.nearest = min(q.nearest, f.depth[k]);
+    if (f.distance[k] <= 0.0f || f.depth[k] >= nearest_inside) continue;
+    nearest_inside = f.depth[k];
+    q.rigid = place;
+  }
+  return q;
+}
+
+/// A fragment's two coordinates, in units of the noise, and its face.
+typedef struct {
+  float x, beta;
+  uint face;
+} Coordinates;
+
+static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, const Layers f, uint k) {
+  Coordinates c;
+  c.x = f.distance[k] / p.sigma;
+  c.beta = (q.nearest - f.depth[k]) * q.depth_scale;
+  c.face = f.pair_face[f.fragment_pair[k]] - q.view * p.faces;
+  return c;
+}
+
+static inline int never_covers(const Coordinates c) { return c.x + highest_noise(DPR_OCCUPANCY_PRIOR) <= 0.0f; }
+static inline int always_covers(const Coordinates c) { return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f; }
+
+DPR_ALWAYS_INLINE realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+  const NoiseName name = name_noise(p.first_view + q.view, q.in_view, c.face, DPR_STAGE_OCCUPANCY);
+  return draw_noise(p.sampling, DPR_OCCUPANCY_PRIOR, name, block);
+}
+
+DPR_ALWAYS_INLINE realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+  const NoiseName name = name_noise(p.first_view + q.view, q.in_view, c.face, DPR_STAGE_AGGREGATE);
+  return draw_noise(p.sampling, DPR_DEPTH_PRIOR, name, block);
+}
+
+/// What is seen in a block's samples, at the beta `largest`: -INFINITY for the background.
+typedef struct {
+  intn winner;
+  realn largest;
+} Lead;
+
+/// Samples that a fragment could win if it covers: its largest noise would not be too little.
+static inline intn could_win(const Lead lead, const Coordinates c) {
+  return c.beta + highest_noise(DPR_DEPTH_PRIOR) >= lead.largest;
+}
+
+/// What a block drew for the first fragments, kept for the backward pass: depths only where a sample covers.
+typedef struct {
+  realn distance[DPR_NOISE_CACHE], depth[DPR_NOISE_CACHE];
+} NoiseCache;
+
+/// A block's winners. The rigid one goes first: behind it most of the others need no noise.
+static inline Lead find_winners(const AggregateParams p, const Pixel q, const Layers f, uint block,
+                                NoiseCache* cache) {
+  Lead lead;
+  lead.winner = (intn)(-1);
+  lead.largest = (realn)(-INFINITY);
+  for (int turn = q.rigid < 0 ? 0 : -1; turn < (int)(q.last - q.first); ++turn) {
+    if (turn == q.rigid) continue;
+    const int place = turn < 0 ? q.rigid : turn;
+    const Coordinates c = load_fragment(p, q, f, fragment_of(q, f, place));
+    if (never_covers(c) || !any_lane(could_win(lead, c))) continue;
+    intn covers = (intn)(-1);
+    if (!always_covers(c)) {
+      const realn x = draw_distance(p, q, c, block);
+      if (place < DPR_NOISE_CACHE) cache->distance[place] = x;
+      covers = c.x + x > 0.0f;
+    }
+    if (!any_lane(covers)) continue;
+    const realn z = draw_depth(p, q, c, block);
+    if (place < DPR_NOISE_CACHE) cache->depth[place] = z;
+    const intn wins = covers && c.beta + z > lead.largest;
+    lead.winner = select(lead.winner, (intn)(place), wins);
+    lead.largest = choose(wins, c.beta + z, lead.largest);
+  }
+  return lead;
+}
+
+static inline float4 seen_color(const AggregateParams p, const Pixel q, const Layers f, int winner) {
+  if (winner < 0) return (float4)(p.background.xyz, 0.0f);
+  const uint k = fragment_of(q, f, winner);
+  return (float4)(f.red[k], f.green[k], f.blue[k], 1.0f);
+}
+
+/// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, and
+/// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
+/// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
+/// out  image          float4[pixel]    means over the samples; alpha: the share in which any fragment covers
+kernel void aggregate_joint_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
+                                            global const uint* restrict starts, global const uint* restrict list,
+                                            global const float* restrict distance, global const float* restrict depth,
+                                            global const float* restrict red, global const float* restrict green,
+                                            global const float* restrict blue,
+                                            global const uint* restrict fragment_pair,
+                                            global const uint* restrict pair_face, global float4* restrict image) {
+  const uint pixel = (uint)get_global_id(0);
+  if (pixel >= p.pixels) return;
+  if (starts[pixel] == starts[pixel + 1]) {
+    image[pixel] = (float4)(p.background.xyz, 0.0f);
+    return;
+  }
+  const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);
+  const Pixel q = load_pixel(p, pixel, views, starts, f);
+  float4 sum = 0.0f;
+  for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    NoiseCache unused;
+    int winners[DPR_WIDTH];
+    store_n(find_winners(p, q, f, block, &unused).winner, 0, winners);
+    for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
+      sum += seen_color(p, q, f, winners[lane]);
+    }
+  }
+  image[pixel] = sum / (float)p.sampling.samples;
+}
+
+/// Where a pixel's fragments collect: wins, and the sums of add_scores for distance and depth. float[fragment]
+typedef struct {
+  global float *wins, *by_distance, *distance_scores, *by_depth, *depth_scores;
+} FragmentSums;
+
+/// What a pixel collects besides.
+typedef struct {
+  float y;
+  ScaleSums sigma, gamma;
+} PixelSums;
+
+/// y of every sample of a block, relative to `rigid`, and 1 to the wins of each winner.
+static inline realn block_values(const AggregateParams p, const Pixel q, const Layers f, float4 grad, float rigid,
+                                 uint block, intn winner, global float* wins) {
+  int winners[DPR_WIDTH];
+  float y[DPR_WIDTH];
+  store_n(winner, 0, winners);
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
+    y[lane] = 0.0f;
+    if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
+    y[lane] = dot(grad, seen_color(p, q, f, winners[lane])) - rigid;
+    if (winners[lane] >= 0) wins[fragment_of(q, f, winners[lane])] += 1.0f;
+  }
+  return load_n(0, y);
+}
+
+/// Adds a block's scores of one fragment.
+DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block, int place,
+                                    const Lead lead, const NoiseCache* cache, realn grouped, const FragmentSums out,
+                                    PixelSums* sums) {
+  const uint k = fragment_of(q, f, place);
+  const Coordinates c = load_fragment(p, q, f, k);
+  if (never_covers(c) || !any_lane(could_win(lead, c))) return;
+  const intn counts = sample_counts(p.sampling, block);
+  const int is_kept = place < DPR_NOISE_CACHE;
+  realn x = 0.0f;
+  intn covers = (intn)(-1);
+  if (!always_covers(c)) {
+    x = is_kept ? cache->distance[place] : draw_distance(p, q, c, block);
+    covers = c.x + x > 0.0f;
+  }
+  const realn z = is_kept && any_lane(covers) ? cache->depth[place] : draw_depth(p, q, c, block);
+  if (!always_covers(c)) {
+    const intn wins_if_it_covers = c.beta + z >= lead.largest;
+    const float2 scores =
+        add_scores(DPR_OCCUPANCY_PRIOR, x, counts && wins_if_it_covers, grouped, &sums->sigma);
+    out.by_distance[k] += scores.x;
+    out.distance_scores[k] += scores.y;
+  }
+  const float2 scores =
+      add_scores(DPR_DEPTH_PRIOR, z, counts && covers && could_win(lead, c), grouped, &sums->gamma);
+  out.by_depth[k] += scores.x;
+  out.depth_scores[k] += scores.y;
+}
+
+/// Collects the scores of all samples.
+static inline PixelSums add_samples(const AggregateParams p, const Pixel q, const Layers f, float4 grad,
+                                    const FragmentSums out) {
+  PixelSums sums = {0.0f, {(realn)(0.0f), (realn)(0.0f)}, {(realn)(0.0f), (realn)(0.0f)}};
+  for (uint i = q.first; i < q.last; ++i) {
+    const uint k = f.list[i];
+    out.wins[k] = out.by_distance[k] = out.distance_scores[k] = out.by_depth[k] = out.depth_scores[k] = 0.0f;
+  }
+  const float rigid = p.sampling.baseline * dot(grad, seen_color(p, q, f, q.rigid));
+  for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+    NoiseCache cache;
+    const Lead lead = find_winners(p, q, f, block, &cache);
+    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, out.wins);
+    if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
+    const realn grouped = add_group(p.sampling, y);
+    sums.y += sum_lanes(y);
+    for (int place = 0; place < (int)(q.last - q.first); ++place) {
+      add_fragment(p, q, f, block, place, lead, &cache, grouped, out, &sums);
+    }
+  }
+  return sums;
+}
+
+/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic.
+/// in   grad_image  float4[pixel]
+/// out  grad_distance, grad_depth, grad_red, grad_green, grad_blue  float[fragment]
+/// out  grad_sigma  float[pixel]                      what the pixel adds to dL/dsigma
+/// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma and the background colour
+kernel void aggregate_joint_sampled_backward(
+    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
+    global const uint* restrict list, global const float* restrict distance, global const float* restrict depth,
+    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
+    global const uint* restrict fragment_pair, global const uint* restrict pair_face,
+    global const float4* restrict grad_image, global float* restrict grad_distance, global float* restrict grad_depth,
+    global float* restrict grad_red, global float* restrict grad_green, global float* restrict grad_blue,
+    global float* restrict grad_sigma, global float* restrict channels) {
+  const uint pixel = (uint)get_global_id(0);
+  if (pixel >= p.pixels) return;
+  const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);
+  const float4 grad = grad_image[pixel];
+  float by_sigma = 0.0f, by_gamma = 0.0f, background_weight = 1.0f;
+  if (starts[pixel] != starts[pixel + 1]) {
+    const Pixel q = load_pixel(p, pixel, views, starts, f);
+    // The colours' gradients are written last; until then their places hold sums.
+    const FragmentSums collected = {grad_red, grad_distance, grad_green, grad_depth, grad_blue};
+    const PixelSums sums = add_samples(p, q, f, grad, collected);
+    by_sigma = scale_estimate(p.sampling, sums.sigma, sums.y) / p.sigma;
+    by_gamma = scale_estimate(p.sampling, sums.gamma, sums.y) / p.gamma;
+    for (uint i = q.first; i < q.last; ++i) {
+      const uint k = list[i];
+      const float weight = grad_red[k] / (float)p.sampling.samples;
+      background_weight -= weight;
+      grad_distance[k] = score_estimate(p.sampling, grad_distance[k], grad_green[k], sums.y) / p.sigma;
+      grad_depth[k] = -score_estimate(p.sampling, grad_depth[k], grad_blue[k], sums.y) * q.depth_scale;
+      grad_red[k] = weight * grad.x;
+      grad_green[k] = weight * grad.y;
+      grad_blue[k] = weight * grad.z;
+    }
+  }
+  grad_sigma[pixel] = by_sigma;
+  write_channels(p, pixel, by_gamma, 0.0f, background_weight, grad, channels);
+}
