@@ -89,7 +89,8 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("a file of results is read back as it was, and what is none is an error that says so") {
     const TempDir folder;
     const Json good = results(Json::array({row("cube128", timing(1, 2, 3), timing(4, 5, 6))}));
-    CHECK(read_results(folder.write("good.json", good.dump())) == good);
+    const Json read = read_results(folder.write("good.json", good.dump()));
+    CHECK(nlohmann::json(read) == nlohmann::json(good));  // but for the order of the keys
     const auto fails = [&](const Json& content, const char* part) {
       const auto file = folder.write("bad.json", content.dump());
       DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read_results(file), part);
