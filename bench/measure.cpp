@@ -14,7 +14,6 @@
 namespace dpr::bench {
 namespace {
 
-constexpr unsigned k_profiled_runs = 5;
 constexpr double k_giga = 1e9, k_milli = 1e-3;
 
 using Clock = std::chrono::steady_clock;
@@ -112,7 +111,7 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
   StageRuns forward, backward;
   {
     Profile profile(device);
-    Budget budget(std::min(options.repetitions, k_profiled_runs), options.max_seconds);
+    Budget budget(options.repetitions, options.max_seconds / 2);
     for (std::size_t run = 0; budget.next(); ++run) {
       row.forward();
       append(milliseconds_by_stage(profile.take()), run, forward);

@@ -104,9 +104,10 @@ TEST_SUITE("bench-smoke") {
     mesh.positions = {{-99, -99, -2}, {99, -99, -2}, {0, 99, -2}};
     mesh.faces = {{0, 1, 2}};
     scene.meshes.push_back({mesh});
-    Renderer renderer(open_device());
+    const Device device = open_device();
     const auto count = [&](const Smoothing& smoothing) {
       scene.smoothing = smoothing;
+      Renderer renderer(device);
       renderer.set_scene(scene);
       renderer.forward();
       return bench::count_work(renderer);
