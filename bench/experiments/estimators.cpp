@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <glm/gtc/matrix_transform.hpp>
 #include <map>
 #include <sstream>
 
@@ -57,21 +58,18 @@ void append(Values& values, glm::vec3 v) {
   for (int axis = 0; axis < 3; ++axis) values.push_back(static_cast<double>(v[axis]));
 }
 
-/// Renders a scene by any estimator, with the same d loss / d image: the squared error to the scene as it
-/// looks from further round, both exact.
-class Bench {
+/// Renders a scene by any estimator, with the same d loss / d image: that of the mean squared error between
+/// the exact image and the one that a camera turned about its axis sees.
+class Comparison {
  public:
-  Bench(const Device& device, Scene scene, const Smoothing& exact) : renderer_(device) {
+  Comparison(const Device& device, Scene scene, const Smoothing& exact) : renderer_(device) {
     scene.smoothing = exact;
     renderer_.set_scene(scene);
     renderer_.forward();
     grad_ = renderer_.image();
-    constexpr float k_turn = 0.35F;  // radians about the view direction
     View turned{scene.camera, {scene.meshes[0].transform}};
-    const glm::mat4 about_z(glm::vec4(std::cos(k_turn), std::sin(k_turn), 0, 0),
-                            glm::vec4(-std::sin(k_turn), std::cos(k_turn), 0, 0), glm::vec4(0, 0, 1, 0),
-                            glm::vec4(0, 0, 0, 1));
-    turned.camera.view = about_z * turned.camera.view;
+    constexpr float k_turn = 0.35F;  // radians
+    turned.camera.view = glm::rotate(glm::mat4(1), k_turn, glm::vec3(0, 0, 1)) * turned.camera.view;
     renderer_.set_views({&turned, 1});
     renderer_.forward();
     const Image target = renderer_.image();
@@ -108,14 +106,14 @@ class Bench {
 
 /// Root mean square over the seeds of the error relative to the exact member; the lower quartile of the
 /// times, to which whatever else the machine does only adds.
-Json measure(Bench& bench, Smoothing smoothing, unsigned seeds) {
+Json measure(Comparison& comparison, Smoothing smoothing, unsigned seeds) {
   double image = 0, gradient = 0;
   Values times;
-  bench.render(smoothing);  // kernels are compiled
+  comparison.render(smoothing);  // kernels are compiled
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     smoothing.seed = seed;
-    const Render found = bench.render(smoothing);
-    const Render& exact = bench.exact();
+    const Render found = comparison.render(smoothing);
+    const Render& exact = comparison.exact();
     image += std::pow(distance(found.image, exact.image) / norm(exact.image), 2);
     gradient += std::pow(distance(found.gradient, exact.gradient) / norm(exact.gradient), 2);
     times.push_back(found.milliseconds);
@@ -144,7 +142,7 @@ Smoothing exact_member(Smoothing scene, const Member& member) {
 /// All rows of a scene and member. What the library cannot sample is left out, with the reason.
 void measure_member(const Settings& settings, const Scene& scene, const std::string& scene_name,
                     const Member& member, const std::vector<unsigned>& samples, Json& rows, Json& left_out) {
-  Bench bench(settings.device, scene, exact_member(scene.smoothing, member));
+  Comparison comparison(settings.device, scene, exact_member(scene.smoothing, member));
   for (const Estimate& estimate : k_estimates) {
     for (const unsigned m : samples) {
       Json words = base_words(scene.smoothing, member);
@@ -157,7 +155,7 @@ void measure_member(const Settings& settings, const Scene& scene, const std::str
         left_out.push_back(row);
         continue;
       }
-      row.update(measure(bench, *smoothing, settings.smoke ? 2 : 16));
+      row.update(measure(comparison, *smoothing, settings.smoke ? 2 : 16));
       if (!settings.quiet) {
         std::printf("%-10s %-8s %-26s M %3u   image %9.2e   gradient %9.2e   %9.3f ms   error^2 x ms %9.2e\n",
                     scene_name.c_str(), member.name, estimate.name, m, row["image_error"].get<double>(),
