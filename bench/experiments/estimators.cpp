@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <glm/gtc/matrix_transform.hpp>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "cli/plot.hpp"
@@ -169,20 +170,24 @@ void measure_member(const Settings& settings, const Scene& scene, const std::str
 }
 
 /// The estimates by the median, over scenes, members and M, of error^2 x time of the gradient relative to the
-/// first estimate's: the best first.
+/// first estimate's: the best first. Only cells that every estimate has count: some need more samples than
+/// others.
 Json rank(const Json& rows) {
-  const auto cell = [](const Json& row) {
-    return row["scene"].get<std::string>() + row["member"].get<std::string>() + row["samples"].dump();
-  };
-  std::map<std::string, double> reference;
+  std::map<std::string, std::map<std::string, double>> cells;  // by scene, member and M; by estimate
+  std::set<std::string> estimates;
   for (const Json& row : rows) {
-    if (row["estimate"] == k_estimates[0].name) reference[cell(row)] = row["gradient_cost"].get<double>();
+    const std::string cell =
+        row["scene"].get<std::string>() + row["member"].get<std::string>() + row["samples"].dump();
+    const std::string estimate = row["estimate"].get<std::string>();
+    cells[cell][estimate] = row["gradient_cost"].get<double>();
+    estimates.insert(estimate);
   }
   std::map<std::string, Values> ratios;
-  for (const Json& row : rows) {
-    const auto found = reference.find(cell(row));
-    if (found == reference.end()) continue;
-    ratios[row["estimate"].get<std::string>()].push_back(row["gradient_cost"].get<double>() / found->second);
+  for (const auto& [cell, costs] : cells) {
+    if (costs.size() < estimates.size()) continue;
+    for (const auto& [estimate, cost] : costs) {
+      ratios[estimate].push_back(cost / costs.at(k_estimates[0].name));
+    }
   }
   std::vector<std::pair<double, std::string>> order;
   for (const auto& [estimate, values] : ratios) order.emplace_back(quantile(values, 0.5), estimate);
@@ -207,7 +212,8 @@ std::string figure(const Json& rows, int& panels) {
   panels = static_cast<int>(curves.size());
   std::ostringstream script;
   script << "set multiplot layout " << (panels + 1) / 2 << "," << std::min(panels, 2)
-         << "\nset grid\nset logscale xy\nset xlabel 'forward and backward, milliseconds'\n"
+         << "\nset grid\nset key outside right font ',9'\nset logscale xy\nset xlabel 'forward and backward, "
+            "milliseconds'\n"
          << "set ylabel 'relative error of the vertex gradient'\n";
   std::size_t index = 0;
   for (const auto& [title, estimates] : curves) {
@@ -243,7 +249,7 @@ void run_estimators(const Settings& settings) {
              {{"winner", winner}, {"ranking", ranking}, {"rows", rows}, {"left_out", left_out}});
   int panels = 0;
   const std::string script = figure(rows, panels);
-  draw_figure(settings, "estimators", 1200, 450 * ((panels + 1) / 2), script);
+  draw_figure(settings, "estimators", 1500, 450 * ((panels + 1) / 2), script);
   if (settings.quiet) return;
   for (const Json& entry : ranking) {
     std::printf("%-26s error^2 x time of the gradient, relative to %s: %.3f\n",
