@@ -44,10 +44,9 @@ double distance(const Values& a, const Values& b) {
   return std::sqrt(squares);
 }
 
-/// The value that a part of them lie below.
-double quantile(Values values, double part) {
+double median(Values values) {
   std::ranges::sort(values);
-  return values[static_cast<std::size_t>(part * static_cast<double>(values.size()))];
+  return values[values.size() / 2];
 }
 
 struct Render {
@@ -105,8 +104,8 @@ class Comparison {
   Render exact_;
 };
 
-/// Root mean square over the seeds of the error relative to the exact member; the lower quartile of the
-/// times, to which whatever else the machine does only adds.
+/// Root mean square over the seeds of the error relative to the exact member. The time is that of the fastest
+/// run: seeds change nothing in it, and whatever else the machine does only adds.
 Json measure(Comparison& comparison, Smoothing smoothing, unsigned seeds) {
   double image = 0, gradient = 0;
   Values times;
@@ -119,7 +118,7 @@ Json measure(Comparison& comparison, Smoothing smoothing, unsigned seeds) {
     gradient += std::pow(distance(found.gradient, exact.gradient) / norm(exact.gradient), 2);
     times.push_back(found.milliseconds);
   }
-  const double ms = quantile(times, 0.25);
+  const double ms = std::ranges::min(times);
   return {{"image_error", std::sqrt(image / seeds)},
           {"gradient_error", std::sqrt(gradient / seeds)},
           {"milliseconds", ms},
@@ -190,7 +189,7 @@ Json rank(const Json& rows) {
     }
   }
   std::vector<std::pair<double, std::string>> order;
-  for (const auto& [estimate, values] : ratios) order.emplace_back(quantile(values, 0.5), estimate);
+  for (const auto& [estimate, values] : ratios) order.emplace_back(median(values), estimate);
   std::ranges::sort(order);
   Json ranking = Json::array();
   for (const auto& [cost, estimate] : order) {
