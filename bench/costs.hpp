@@ -31,7 +31,7 @@ inline constexpr double k_exp = 18, k_log = 21;
 inline constexpr double k_normal_density = k_exp + 3;  // -0.5 x x, the constant
 inline constexpr double k_mills_ratio = 22;            // 1 mad, 1 quotient, 9 mads, 1 product
 inline constexpr double k_tail = k_normal_density + k_mills_ratio + 1;
-inline constexpr double k_cdf_ratio = k_tail + 3;                 // 1 - tail, 1 / mills, density / upper
+inline constexpr double k_cdf_density = k_tail + 1;               // 1 - tail
 inline constexpr double k_gaussian_log = k_tail + 2 * k_log + 7;  // occupancy_log: both branches, the hazard
 inline constexpr double k_logistic_log = k_exp + k_log + 5;
 /// AS 241: both branches; 2 operations make the uniform number.
@@ -70,17 +70,18 @@ inline constexpr double k_occupancy_backward_sample = k_normal_sample + 8;  // a
 
 // aggregate.cl, aggregate_joint.cl, aggregate_sampled.cl
 inline constexpr Cost k_aggregate_per_pixel{0, 4 + 16};
-inline constexpr Cost k_aggregate_per_fragment{0, 28};
+inline constexpr Cost k_aggregate_per_fragment{0, 28 + 16};  // with its slot
 inline constexpr Cost k_aggregate_backward_per_pixel{0, 4 + 16 + 20};
-inline constexpr Cost k_aggregate_backward_per_fragment{0, 28 + 20};
-/// t - beta, the prior, the product, the ratio, three colours; backward two passes, the second with its two
-/// sums.
-inline constexpr double k_barrier_slot = 1 + k_cdf_ratio + 8;
-inline constexpr double k_barrier_slot_backward = (1 + k_cdf_ratio + 4) + (1 + k_cdf_ratio + 6);
-/// Likewise with T_k and r_k (4), and in the second pass the sums for p.
-inline constexpr double k_joint_slot = 1 + k_cdf_ratio + 4 + 8;
-inline constexpr double k_joint_slot_backward = (1 + k_cdf_ratio + 4 + 4) + (1 + k_cdf_ratio + 4 + 17);
-inline constexpr double k_softmax_slot = k_exp + 9, k_softmax_slot_backward = k_exp + 22;
+inline constexpr Cost k_aggregate_backward_per_fragment{0, 28 + 16 + 20};
+/// The terms: t - beta, the prior, their quotient; joint: T_k (2), its inverse, two products, the ratio.
+inline constexpr double k_barrier_terms = 1 + k_cdf_density + 1;
+inline constexpr double k_joint_terms = 1 + k_cdf_density + 2 + 1 + 3 + 1;
+/// The image adds the product, the ratio and three colours to them; the gradients the product, two sums, and
+/// what the slot's own sums take.
+inline constexpr double k_barrier_slot = k_barrier_terms + 8, k_joint_slot = k_joint_terms + 8;
+inline constexpr double k_barrier_slot_backward = k_barrier_terms + 4 + 7;
+inline constexpr double k_joint_slot_backward = k_joint_terms + 4 + 15;
+inline constexpr double k_softmax_slot = k_exp + 8, k_softmax_slot_backward = 2 * k_exp + 5;
 /// The generator's integer operations, which take most of the time, count nothing.
 inline constexpr double k_sampled_slot = k_normal_sample + 4;
 inline constexpr double k_sampled_slot_backward = k_sampled_slot + k_normal_sample + 2;

@@ -9,13 +9,14 @@
 namespace dpr::bench {
 namespace {
 
-// The Gaussian rule, as kernels/quadrature.h has it.
+// The Gaussian rule, as kernels/prior_gaussian.h and quadrature.h have it.
 constexpr double k_reach = 9.5;                         // DPR_BARRIER_REACH
-constexpr std::size_t k_crowd = 6, k_throng = 40;       // DPR_CROWD, DPR_THRONG
-constexpr double k_nodes = 16, k_crowd_nodes = 32;      // DPR_BARRIER_NODES, DPR_CROWD_NODES
+constexpr double k_nodes = 16;                          // DPR_BARRIER_NODES
+constexpr std::size_t k_throng = 64;                    // DPR_THRONG
 constexpr double k_joint_reach = 9.6;                   // DPR_JOINT_BELOW + DPR_JOINT_ABOVE
+constexpr double k_crowd = 3, k_crowd_reach = 1.1;      // DPR_JOINT_CROWD, DPR_JOINT_CROWD_REACH
 constexpr double k_step = 0.67, k_crowd_step = 0.335;   // DPR_JOINT_STEP, DPR_JOINT_CROWD_STEP
-constexpr double k_block = 16;                          // DPR_NODE_LANES
+constexpr double k_block = 16;                          // DPR_WIDTH of aggregate_joint.cl on vectors
 constexpr double k_opaque = 1e-9, k_negligible = 1e-8;  // DPR_OPAQUE, DPR_NEGLIGIBLE
 
 /// The fragments of a frame, on the host.
@@ -56,32 +57,42 @@ Evaluations barrier_pixel(const Fragments& f, std::span<const cl_uint> run, cons
   for (const cl_uint k : run) largest = f.is_there(k) ? std::max(largest, beta(k)) : largest;
   std::size_t crowd = background > largest - k_reach ? 1 : 0;
   for (const cl_uint k : run) crowd += f.is_there(k) && beta(k) > largest - k_reach ? 1U : 0U;
-  const double nodes = (crowd > k_crowd ? k_crowd_nodes : k_nodes) * (crowd > k_throng ? 2 : 1);
+  if (crowd < 2) return {};  // a slot alone needs no integral
+  const double nodes = k_nodes * (crowd > k_throng ? 2 : 1);
   return {nodes * static_cast<double>(crowd), nodes * static_cast<double>(crowd)};
 }
 
-/// Joint: front to back, clusters of two and more at nodes that cover their depths.
+/// Joint: what covers, sorted by depth, front to back; clusters of two and more at nodes that span them.
 Evaluations joint_pixel(const Fragments& f, std::span<const cl_uint> run, const Smoothing& s,
                         const Camera& camera) {
   const double scale = 1.0 / (static_cast<double>(camera.zfar - camera.znear) * static_cast<double>(s.gamma));
+  const auto occupancy = [&](cl_uint k) { return static_cast<double>(f.occupancy[k]); };
+  double largest = 0;
+  for (const cl_uint k : run) largest = std::max(largest, occupancy(k));
+  std::vector<cl_uint> slots;
+  for (const cl_uint k : run) {
+    if (occupancy(k) > k_negligible * largest) slots.push_back(k);
+  }
+  std::ranges::sort(slots, {}, [&](cl_uint k) { return f.depth[k]; });
+  const auto depth = [&](std::size_t i) { return static_cast<double>(f.depth[slots[i]]); };
   Evaluations sum;
   double transparency = 1;
-  for (std::size_t first = 0; first < run.size() && transparency > k_opaque;) {
-    std::size_t last = first + 1;
-    const auto depth = [&](std::size_t i) { return static_cast<double>(f.depth[run[i]]); };
-    while (last < run.size() && (depth(last) - depth(last - 1)) * scale < k_joint_reach) ++last;
-    const double span = (depth(last - 1) - depth(first)) * scale + k_joint_reach;
-    const double step = last - first > k_crowd ? k_crowd_step : k_step;
-    const double nodes = std::ceil(span / (step * k_block)) * k_block;
-    for (std::size_t i = first; i < last; ++i) {
-      const double p = static_cast<double>(f.occupancy[run[i]]);
-      transparency *= std::max(1 - p, k_opaque);
-      if (last - first < 2) continue;
-      sum.forward += nodes;
-      sum.backward += p < k_negligible ? 0 : nodes;
+  for (std::size_t first = 0, last = 0; first < slots.size() && transparency > k_opaque; first = last) {
+    double covering = 0;
+    for (last = first;
+         last == first || (last < slots.size() && (depth(last) - depth(last - 1)) * scale < k_joint_reach);
+         ++last) {
+      covering += occupancy(slots[last]);
+      transparency *= std::max(1 - occupancy(slots[last]), k_opaque);
     }
-    first = last;
+    if (last - first < 2) continue;
+    const bool crowded = covering > k_crowd;
+    const double span =
+        (depth(last - 1) - depth(first)) * scale + (crowded ? k_crowd_reach : 1) * k_joint_reach;
+    const double nodes = std::ceil(span / ((crowded ? k_crowd_step : k_step) * k_block)) * k_block;
+    sum.forward += nodes * static_cast<double>(last - first);
   }
+  sum.backward = sum.forward;
   return sum;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <span>
 
@@ -14,10 +16,16 @@
 namespace dpr::bench {
 namespace {
 
-constexpr unsigned k_profiled_runs = 5;
 constexpr double k_giga = 1e9, k_milli = 1e-3;
 
 using Clock = std::chrono::steady_clock;
+
+/// To six digits: a file of results is read by people, and no timing has more.
+double rounded(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return std::strtod(text, nullptr);
+}
 
 double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -101,10 +109,12 @@ double median(std::vector<double> values) {
 void add_rates(const StageCost& cost, double milliseconds, const Peaks& peaks, Json& stage) {
   if (milliseconds <= 0) return;
   const Cost total = cost.forward + cost.backward;
-  stage["gflops"] = total.flops / (k_milli * milliseconds) / k_giga;
-  stage["gbytes_per_s"] = total.bytes / (k_milli * milliseconds) / k_giga;
-  stage["fraction_of_peak"] = stage["gflops"].get<double>() / peaks.gflops;
-  stage["fraction_of_bandwidth"] = stage["gbytes_per_s"].get<double>() / peaks.gbytes_per_s;
+  const double gflops = total.flops / (k_milli * milliseconds) / k_giga;
+  const double gbytes_per_s = total.bytes / (k_milli * milliseconds) / k_giga;
+  stage["gflops"] = rounded(gflops);
+  stage["gbytes_per_s"] = rounded(gbytes_per_s);
+  stage["fraction_of_peak"] = rounded(gflops / peaks.gflops);
+  stage["fraction_of_bandwidth"] = rounded(gbytes_per_s / peaks.gbytes_per_s);
 }
 
 void measure_stages(Row& row, const Device& device, const Peaks& peaks, const MeasureOptions& options,
@@ -112,7 +122,7 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
   StageRuns forward, backward;
   {
     Profile profile(device);
-    Budget budget(std::min(options.repetitions, k_profiled_runs), options.max_seconds);
+    Budget budget(options.repetitions, options.max_seconds / 2);
     for (std::size_t run = 0; budget.next(); ++run) {
       row.forward();
       append(milliseconds_by_stage(profile.take()), run, forward);
@@ -169,7 +179,10 @@ void measure_into(Json& result, const Device& device, const Peaks& peaks, const 
 Json quartiles(std::vector<double> values) {
   std::ranges::sort(values);
   const std::size_t n = values.size();
-  return {{"median", values[n / 2]}, {"q1", values[n / 4]}, {"q3", values[3 * n / 4]}, {"n", n}};
+  return {{"median", rounded(values[n / 2])},
+          {"q1", rounded(values[n / 4])},
+          {"q3", rounded(values[3 * n / 4])},
+          {"n", n}};
 }
 
 Json measure(const Device& device, const Peaks& peaks, const Workload& workload, const Variant& variant,

@@ -8,11 +8,12 @@
 namespace dpr::bench {
 
 struct MeasureOptions {
-  unsigned repetitions = 15;  ///< timed runs of a row, after one to warm up
-  double max_seconds = 30;    ///< a slow row stops repeating after that; at least one run is timed
+  unsigned repetitions = 15;  ///< timed runs of a row, after one to warm up; then as many of its stages
+  double max_seconds =
+      30;  ///< a slow row stops repeating after that, its stages after half; one run each is timed
 };
 
-/// One row of the results, as INTERFACES of the results file have it. A row that fails or does not fit is a
+/// One row of the results. A row that fails or does not fit is a
 /// row too: its "status" is "failed", "reason" says why, and there are no figures.
 Json measure(const Device& device, const Peaks& peaks, const Workload& workload, const Variant& variant,
              const MeasureOptions& options);

@@ -9,8 +9,10 @@ endif()
 set(flags -x cl -cl-std=CL1.2 -Xclang -finclude-default-header -fsyntax-only
           -Wall -Wextra -Wdouble-promotion -Werror -I ${KERNELS})
 set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16 -DDPR_VARIABLE_WIDTH)
-file(GLOB sources ${KERNELS}/*.cl ${MORE_KERNELS}/*.cl)
+file(GLOB sources ${KERNELS}/*.cl)
 set(failures 0)
+file(GLOB more_sources ${MORE_KERNELS}/*.cl)
+list(APPEND sources ${more_sources})
 foreach(source IN LISTS sources)
   foreach(options IN LISTS option_sets)
     execute_process(COMMAND ${CLANG} ${flags} ${options} ${source}

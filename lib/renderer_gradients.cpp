@@ -126,20 +126,19 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
   const std::size_t sigmas = channels(wanted.smoothing, 1);
-  const Summation sigma =
-      aggregate.perturbs_distances()
-          ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
-          : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma};
+  const Summation sigma = aggregate.perturbs_distances()
+                              ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
+                              : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma};
   // One wait for all of them.
-  const std::vector<std::vector<float>> sums = reduce.read(
-      {{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1, all_pixels,
-        aggregate.channels},
-       sigma,
-       {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
-        view_vertex_starts, transform.channels},
-       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
-       {bin.pairs, channels(lights, k_light_channels * shade.light_sets()), 1, faces, bin.pair_starts,
-        shade.light_channels}});
+  const std::vector<std::vector<float>> sums =
+      reduce.read({{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1,
+                    all_pixels, aggregate.channels},
+                   sigma,
+                   {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
+                    view_vertex_starts, transform.channels},
+                   {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
+                   {bin.pairs, channels(lights, k_light_channels * shade.light_sets()), 1, faces,
+                    bin.pair_starts, shade.light_channels}});
   const std::vector<float>& pixel_sums = sums[0];
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];

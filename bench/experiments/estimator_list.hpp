@@ -25,7 +25,6 @@ inline constexpr Estimate k_estimates[] = {
     {"rigid, antithetic", R"({"variance_reduction": "rigid", "draws": "antithetic"})"},
     {"leave_one_out, antithetic", R"({"variance_reduction": "leave_one_out", "draws": "antithetic"})"},
     {"rigid, stratified", R"({"variance_reduction": "rigid", "draws": "stratified"})"},
-    {"leave_one_out, stratified", R"({"variance_reduction": "leave_one_out", "draws": "stratified"})"},
 };
 
 /// `base`, a scene's "smoothing", with an estimate's words added. Nothing where the library has no such

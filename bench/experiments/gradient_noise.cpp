@@ -87,9 +87,9 @@ Json run_operator(const Settings& settings, const Operator& op, const std::vecto
 void run_gradient_noise(const Settings& settings) {
   const std::size_t repeats = settings.smoke ? 64 : 1024;
   std::vector<unsigned> samples;
-  for (unsigned m = 2; m <= (settings.smoke ? 8U : 512U); m *= 2) samples.push_back(m);
+  for (unsigned m = 4; m <= (settings.smoke ? 16U : 512U); m *= 2) samples.push_back(m);
   Json operators = Json::array();
-  std::string script = "set multiplot layout 2,2\nset grid\n";
+  std::string script = "set multiplot layout 2,2\nset grid\nset key outside right font ',9'\n";
   cli::Progress progress(static_cast<unsigned>(std::size(k_operators)), settings.quiet);
   for (const Operator& op : k_operators) {
     operators.push_back(run_operator(settings, op, samples, repeats));
@@ -98,7 +98,7 @@ void run_gradient_noise(const Settings& settings) {
   }
   write_data(settings, "gradient-noise",
              {{"repeats", repeats}, {"samples", samples}, {"operators", operators}});
-  draw_figure(settings, "gradient-noise", 1200, 900, script + "unset multiplot\n");
+  draw_figure(settings, "gradient-noise", 1500, 900, script + "unset multiplot\n");
 }
 
 }  // namespace dpr::experiments

@@ -72,14 +72,15 @@ std::string panels(const std::string& id, std::span<const double> x, std::span<c
     }
   }
   return data.str() + "set xlabel " + cli::gnuplot_quote(axis) + "\nset ylabel " + cli::gnuplot_quote(value) +
-         "\nset key top left\n" + plots[0].str() + "\nset ylabel " + cli::gnuplot_quote(derivative) + "\n" +
-         plots[1].str() + "\n";
+         "\nset key top left\nset yrange [0:1.05]\n" + plots[0].str() + "\nset yrange [0:*]\nset ylabel " +
+         cli::gnuplot_quote(derivative) + "\n" + plots[1].str() + "\n";
 }
 
 }  // namespace
 
 void run_operators(const Settings& settings) {
-  const int points = settings.smoke ? 25 : 401;
+  // An even number, because there is no derivative where the distance is exactly 0.
+  const int points = settings.smoke ? 24 : 400;
   std::vector<double> x;
   for (int i = 0; i < points; ++i) x.push_back(k_reach * (2.0 * i / (points - 1) - 1));
   const auto heavisides = heaviside_curves(settings.device, x);

@@ -34,7 +34,8 @@ bool is_sweep(const Json& row) { return row["workload"].get<std::string>().start
 /// What a legend calls a file: its device, and its commit where there are several files.
 std::string label_of(const Json& results, std::size_t files) {
   const std::string device = results["device"]["name"].get<std::string>();
-  return files > 1 ? device + ", " + results["commit"].get<std::string>() : device;
+  constexpr std::size_t k_short_commit = 7;
+  return files > 1 ? device + ", " + results["commit"].get<std::string>().substr(0, k_short_commit) : device;
 }
 
 double stage_ms(const Json& row, const std::string& stage) {
@@ -120,7 +121,7 @@ std::string curves(std::span<const Json> files, const Axis& axis,
 
 /// Long titles have no place on the curves.
 std::string key_place(std::span<const Json> files) {
-  return files.size() > 1 ? "outside bottom center vertical" : "top left";
+  return files.size() > 1 ? "below left Left reverse font ',9'" : "top left";
 }
 
 double median(const Json& timing) { return timing["median"].get<double>(); }
@@ -138,7 +139,7 @@ Plot scaling_plot(std::span<const Json> files) {
   }
   if (count == 0) return {};
   const int lines = (count + 1) / 2;
-  return {1200, 400 * lines + 60 * static_cast<int>(files.size() - 1),
+  return {1200, 400 * lines,
           "set multiplot layout " + std::to_string(lines) + "," + (count > 1 ? "2" : "1") +
               "\nset grid\nset logscale xy\nset key " + key_place(files) + "\nset ylabel 'milliseconds'\n" +
               panels + "unset multiplot\n"};

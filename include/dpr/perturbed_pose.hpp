@@ -26,18 +26,15 @@ struct PoseParameters {
 };
 
 struct PerturbedPoseOptions {
-  /// Control variate: nothing, the loss of the unperturbed pose, eq. (14), or for each sample the mean loss
-  /// of the samples that are independent of it.
-  enum class Baseline { none, rigid, leave_one_out };
-  /// independent; antithetic: pairs of Z and -Z, symmetric priors only; stratified: a Latin hypercube, each
-  /// parameter's marginal split in `samples` strata of equal probability (McKay, Beckman & Conover 1979).
-  enum class Draws { independent, antithetic, stratified };
-
   /// >= 0; what is 0 is not perturbed and has no gradient. d is the number of the others.
   PoseParameters scale{.mesh_rotation = glm::dvec3(0.1), .mesh_translation = glm::dvec3(0.1)};
   Prior prior = Prior::gaussian;  ///< any but uniform, whose density has no score
   std::uint32_t samples = 64;     ///< M, 1 to 4096: rigid renders of a batch
-  Baseline baseline = Baseline::leave_one_out;
+  /// What is subtracted from a loss: nothing, the loss of the unperturbed pose, eq. (14), or the mean loss of
+  /// the samples that are independent of it.
+  VarianceReduction variance_reduction = VarianceReduction::leave_one_out;
+  /// Stratified: a Latin hypercube, each parameter's marginal split in `samples` strata of equal probability
+  /// (McKay, Beckman & Conover 1979).
   Draws draws = Draws::antithetic;
   std::size_t mesh = 0;  ///< which mesh of the scene mesh_rotation and mesh_translation move
   LossWeights loss = LossWeights::only(LossKind::mse);

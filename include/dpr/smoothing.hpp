@@ -60,9 +60,10 @@ struct Smoothing {
 /// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform
 /// prior (its density is no exp(-nu), so it has no score), and one sampled and one exact stage in the joint
 /// composition.
-/// - A variable width needs the uniform prior, the exact estimator, Euclidean distances, the joint composition
-///   (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy says where such
-///   noise ends).
+/// - A variable width needs the uniform prior, the exact estimator, Euclidean distances, the joint
+/// composition
+///   (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy says where
+///   such noise ends).
 /// - Antithetic draws need symmetric priors, so not Gumbel's, and an even number of samples.
 /// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
 ///   half's value is correlated with the score. With stratified draws it is refused: every other sample's

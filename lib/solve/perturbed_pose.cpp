@@ -93,7 +93,7 @@ Scene rigid_scene(Scene scene) {
 }
 
 bool renders_rigid(const PerturbedPoseOptions& options) {
-  return options.baseline == PerturbedPoseOptions::Baseline::rigid;
+  return options.variance_reduction == VarianceReduction::rigid;
 }
 
 std::vector<Image> repeated(const Image& target, const PerturbedPoseOptions& options) {
@@ -101,7 +101,7 @@ std::vector<Image> repeated(const Image& target, const PerturbedPoseOptions& opt
 }
 
 NoiseOptions noise_options(const PerturbedPoseOptions& options, std::uint64_t seed) {
-  return {options.prior, options.baseline, options.draws, options.samples, seed};
+  return {options.prior, options.variance_reduction, options.draws, options.samples, seed};
 }
 
 }  // namespace

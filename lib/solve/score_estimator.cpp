@@ -12,9 +12,6 @@
 namespace dpr {
 namespace {
 
-using Baseline = PerturbedPoseOptions::Baseline;
-using Draws = PerturbedPoseOptions::Draws;
-
 constexpr std::uint32_t k_most_samples = 4096;
 
 /// What a random word is for: the third word of its counter.
@@ -61,10 +58,10 @@ Estimate mean_of_groups(std::span<const double> terms, std::size_t size) {
 /// mirror image depends on its noise, and the estimator would be biased.
 std::vector<double> excesses(const NoiseOptions& options, std::span<const double> values, double rigid) {
   std::vector<double> excess(values.begin(), values.end());
-  if (options.baseline == Baseline::rigid) {
+  if (options.variance_reduction == VarianceReduction::rigid) {
     for (double& e : excess) e -= rigid;
   }
-  if (options.baseline != Baseline::leave_one_out) return excess;
+  if (options.variance_reduction != VarianceReduction::leave_one_out) return excess;
   const std::size_t size = group_size(options.draws);
   const double total = std::accumulate(values.begin(), values.end(), 0.0);
   for (std::size_t first = 0; first < values.size(); first += size) {
@@ -108,9 +105,9 @@ void validate(const NoiseOptions& options) {
                             "a symmetric prior, or independent or stratified draws");
     }
   }
-  if (options.baseline != Baseline::leave_one_out) return;
+  if (options.variance_reduction != VarianceReduction::leave_one_out) return;
   if (options.draws == Draws::stratified) {
-    throw InvalidArgument("baseline (perturbed pose)", "leave_one_out with stratified draws",
+    throw InvalidArgument("variance_reduction (perturbed pose)", "leave_one_out with stratified draws",
                           "none or rigid: no sample of a Latin hypercube is independent of the others");
   }
   require(options.samples >= 2 * group_size(options.draws), "samples (perturbed pose)", options.samples,

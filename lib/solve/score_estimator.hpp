@@ -17,8 +17,8 @@ std::array<std::uint32_t, 4> philox4x32_10(std::array<std::uint32_t, 4> counter,
 
 struct NoiseOptions {
   Prior prior = Prior::gaussian;
-  PerturbedPoseOptions::Baseline baseline = PerturbedPoseOptions::Baseline::leave_one_out;
-  PerturbedPoseOptions::Draws draws = PerturbedPoseOptions::Draws::antithetic;
+  VarianceReduction variance_reduction = VarianceReduction::leave_one_out;
+  Draws draws = Draws::antithetic;
   std::uint32_t samples = 64;
   std::uint64_t seed = 1;
 };

@@ -58,8 +58,8 @@ class Aggregate {
       Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
              In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, In<cl_uint>, In<cl_float4>,
              Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>;
-  /// Exact kernels of either composition; the joint one sorts first. The forward pass leaves the pixels' slots for the
-  /// backward pass.
+  /// Exact kernels of either composition; the joint one sorts first. The forward pass leaves the pixels'
+  /// slots for the backward pass.
   struct Exact {
     Exact(Device::Impl& device, Composition composition, const std::string& options);
     std::optional<Kernel<cl_uint, In<cl_uint>, In<float>, Out<cl_uint>>> sort;

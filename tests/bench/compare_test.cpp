@@ -56,11 +56,11 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("rows are matched by what they are; failed and lonely ones are told") {
     Json failed = row("million", timing(1, 1, 1), timing(1, 1, 1));
     failed["status"] = "failed";
-    const Json a = results({row("cube128", timing(1, 1, 1), timing(2, 2, 2)),
-                            row("sphere64", timing(1, 1, 1), timing(1, 1, 1)), failed});
-    const Json b = results({row("views24", timing(1, 1, 1), timing(1, 1, 1)),
-                            row("million", timing(1, 1, 1), timing(1, 1, 1)),
-                            row("cube128", timing(3, 3, 3), timing(1, 1, 1))});
+    const Json a = results(Json::array({row("cube128", timing(1, 1, 1), timing(2, 2, 2)),
+                                        row("sphere64", timing(1, 1, 1), timing(1, 1, 1)), failed}));
+    const Json b = results(Json::array({row("views24", timing(1, 1, 1), timing(1, 1, 1)),
+                                        row("million", timing(1, 1, 1), timing(1, 1, 1)),
+                                        row("cube128", timing(3, 3, 3), timing(1, 1, 1))}));
     const Json comparison = compare(a, b);
     REQUIRE(comparison["rows"].size() == 1);
     const Json& only = comparison["rows"][0];
@@ -69,9 +69,9 @@ TEST_SUITE("bench-smoke") {
     CHECK(only["forward"]["verdict"] == "slower");
     CHECK(only["backward"]["ratio"].get<double>() == doctest::Approx(0.5));
     CHECK(only["backward"]["verdict"] == "faster");
-    CHECK(comparison["only_in_a"] == Json({"sphere64 gaussian barrier exact"}));
+    CHECK(comparison["only_in_a"] == Json::array({"sphere64 gaussian barrier exact"}));
     CHECK(comparison["only_in_b"] ==
-          Json({"views24 gaussian barrier exact", "million gaussian barrier exact"}));
+          Json::array({"views24 gaussian barrier exact", "million gaussian barrier exact"}));
     const std::string lines = dpr::bench::to_lines(comparison);
     CHECK(dpr::test::contains(lines, "1 faster  1 slower"));
     CHECK(dpr::test::contains(lines, "only in a: sphere64"));
@@ -83,13 +83,14 @@ TEST_SUITE("bench-smoke") {
     Json many = few;
     many["views"] = 64;
     CHECK(dpr::bench::row_name(few) != dpr::bench::row_name(many));
-    CHECK(compare(results({few, many}), results({many}))["rows"].size() == 1);
+    CHECK(compare(results(Json::array({few, many})), results(Json::array({many})))["rows"].size() == 1);
   }
 
   TEST_CASE("a file of results is read back as it was, and what is none is an error that says so") {
     const TempDir folder;
-    const Json good = results({row("cube128", timing(1, 2, 3), timing(4, 5, 6))});
-    CHECK(read_results(folder.write("good.json", good.dump())) == good);
+    const Json good = results(Json::array({row("cube128", timing(1, 2, 3), timing(4, 5, 6))}));
+    const Json read = read_results(folder.write("good.json", good.dump()));
+    CHECK(nlohmann::json(read) == nlohmann::json(good));  // but for the order of the keys
     const auto fails = [&](const Json& content, const char* part) {
       const auto file = folder.write("bad.json", content.dump());
       DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read_results(file), part);

@@ -23,8 +23,6 @@
 
 using namespace dpr;
 using dpr::test::reduced;
-using Baseline = PerturbedPoseOptions::Baseline;
-using Draws = PerturbedPoseOptions::Draws;
 
 namespace {
 
@@ -242,8 +240,8 @@ TEST_SUITE("unit") {
       for (std::size_t k = 0; k < 3; ++k) CHECK(pairs[3 * m + k] == -pairs[3 * (m + 1) + k]);
     }
     CHECK(pairs[0] != pairs[6]);
-    const std::vector<double> strata =
-        draw_noise({.baseline = Baseline::none, .draws = Draws::stratified, .samples = 16}, 3);
+    const std::vector<double> strata = draw_noise(
+        {.variance_reduction = VarianceReduction::none, .draws = Draws::stratified, .samples = 16}, 3);
     for (std::size_t k = 0; k < 3; ++k) {
       std::vector<bool> seen(16);
       for (std::size_t m = 0; m < 16; ++m) {
@@ -276,7 +274,8 @@ TEST_SUITE("statistical") {
     double worst = 0;
     for (const Prior prior : k_priors) {
       const std::vector<double> exact = exact_figures(f, prior).all();
-      for (const Baseline baseline : {Baseline::none, Baseline::rigid, Baseline::leave_one_out}) {
+      for (const VarianceReduction baseline :
+           {VarianceReduction::none, VarianceReduction::rigid, VarianceReduction::leave_one_out}) {
         for (const Draws draws : {Draws::independent, Draws::antithetic, Draws::stratified}) {
           NoiseOptions options{prior, baseline, draws, 8, 0};
           if (!is_allowed(options)) continue;
@@ -305,7 +304,7 @@ TEST_SUITE("statistical") {
     const Product f;
     const double exact = exact_figures(f, Prior::gaussian).sensitivity;
     const double rigid = f(std::vector<double>(f.dimensions()).data());
-    NoiseOptions options{Prior::gaussian, Baseline::rigid, Draws::antithetic, 4, 0};
+    NoiseOptions options{Prior::gaussian, VarianceReduction::rigid, Draws::antithetic, 4, 0};
     Statistics wrong_constant, half_pair, right;
     for (int run = 0; run < 4000; ++run) {
       options.seed = static_cast<std::uint64_t>(run);
@@ -318,7 +317,7 @@ TEST_SUITE("statistical") {
       wrong_constant.add({found + static_cast<double>(f.dimensions() - 1) * (mean - rigid)});
       // The mean of the three others as a baseline, the mirrored sample among them.
       NoiseOptions single = options;
-      single.baseline = Baseline::leave_one_out;
+      single.variance_reduction = VarianceReduction::leave_one_out;
       single.draws = Draws::independent;
       half_pair.add({estimate(single, values, noise, rigid).sensitivity.value});
     }
@@ -333,11 +332,11 @@ TEST_SUITE("statistical") {
     const std::vector<double> exact = exact_figures(f, Prior::gaussian).all();
     Statistics biased;
     for (int run = 0; run < 4000; ++run) {
-      NoiseOptions options{Prior::gaussian, Baseline::none, Draws::stratified, 4,
+      NoiseOptions options{Prior::gaussian, VarianceReduction::none, Draws::stratified, 4,
                            static_cast<std::uint64_t>(run)};
       const std::vector<double> noise = draw_noise(options, f.dimensions());
       options.draws = Draws::independent;
-      options.baseline = Baseline::leave_one_out;
+      options.variance_reduction = VarianceReduction::leave_one_out;
       biased.add(figures_of(estimate(options, values_of(f, noise), noise, 0)));
     }
     double worst = 0;
@@ -349,7 +348,7 @@ TEST_SUITE("statistical") {
       "the standard errors are those that repeated estimates have; of stratified draws at least those") {
     const Product f;
     for (const Draws draws : {Draws::independent, Draws::antithetic, Draws::stratified}) {
-      NoiseOptions options{Prior::gaussian, Baseline::rigid, draws, 64, 0};
+      NoiseOptions options{Prior::gaussian, VarianceReduction::rigid, draws, 64, 0};
       Statistics spread, errors;
       for (int run = 0; run < 600; ++run) {
         options.seed = static_cast<std::uint64_t>(run);
@@ -393,11 +392,11 @@ TEST_SUITE("statistical") {
       const double loss = table.mean([](double) { return 1.0; });
       const double gradient = table.mean([&](double z) { return z / scale; });
       const double sensitivity = table.mean([](double z) { return z * z - 1; });
-      for (const Baseline baseline : {Baseline::rigid, Baseline::leave_one_out}) {
+      for (const VarianceReduction baseline : {VarianceReduction::rigid, VarianceReduction::leave_one_out}) {
         PerturbedPoseOptions options;
         options.scale = scales[i];
         options.samples = static_cast<std::uint32_t>(reduced(1024, 32));
-        options.baseline = baseline;
+        options.variance_reduction = baseline;
         PerturbedPose perturbed(device, scene, target, options);
         const PerturbedPoseResult found = perturbed.evaluate(perturbed.scene_view(), 5);
         CAPTURE(i);
@@ -471,8 +470,8 @@ TEST_SUITE("robustness") {
     check({.samples = 0}, "samples (perturbed pose): got 0");
     check({.samples = 4098}, "samples (perturbed pose): got 4098");
     check({.draws = Draws::independent, .samples = 1}, "two independent draws");
-    CHECK_NOTHROW(
-        validate(NoiseOptions{.baseline = Baseline::none, .draws = Draws::independent, .samples = 1}));
+    CHECK_NOTHROW(validate(NoiseOptions{
+        .variance_reduction = VarianceReduction::none, .draws = Draws::independent, .samples = 1}));
   }
 
   TEST_CASE("wrong options and views are refused before any work") {
