@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dpr/smoothing.hpp"
+#include "support/reduced.hpp"
 
 namespace dpr::test {
 
@@ -74,7 +75,11 @@ inline std::vector<SamplingMode> sampling_modes(bool symmetric) {
   return modes;
 }
 
+/// In a simulator only the Gaussian prior goes through all modes.
 inline std::vector<SamplingMode> sampling_modes(Prior prior) {
+  if (is_reduced() && prior != Prior::gaussian) {
+    return {{VarianceReduction::rigid, Draws::independent}};
+  }
   return sampling_modes(prior != Prior::gumbel);
 }
 
