@@ -98,9 +98,8 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
   command
       .add_option("--memory-budget", options.memory_budget,
-                  "Device memory for fragments; larger frames are rendered in bands (default: a quarter; of "
-                  "a CPU's an "
-                  "eighth, at most 1024)")
+                  "Device memory for fragments; larger frames are rendered in bands "
+                  "(default: a quarter; of a CPU's an eighth, at most 1024)")
       ->check(CLI::Range(1, 1 << 30))
       ->type_name("MiB");
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
