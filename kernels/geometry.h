@@ -1,4 +1,5 @@
-// A pixel against a triangle: edge functions, signed squared distance, barycentrics. On lanes of pixels.
+// A pixel against a triangle: edge functions, signed squared distance, barycentrics. On lanes of pixels. Loops over the
+// three corners are unrolled: an index that varies would put the vectors into memory.
 #ifndef DPR_GEOMETRY_H
 #define DPR_GEOMETRY_H
 
@@ -83,6 +84,7 @@ static inline realn raw_barycentrics(const View3 v, const Triangle t, float scal
   n[1] = v.edge[1].side * scale * (perspective ? t.z2 * t.z0 : 1.0f);
   n[2] = v.edge[2].side * scale * (perspective ? t.z0 * t.z1 : 1.0f);
   const realn turn = choose(n[0] + n[1] + n[2] < 0.0f, (realn)(-1.0f), (realn)(1.0f));
+#pragma unroll
   for (int k = 0; k < 3; ++k) n[k] *= turn;
   return turn * scale;
 }

@@ -210,6 +210,7 @@ typedef struct {
 static inline void add_distance_gradient(const View3 v, intn inside, uint euclidean, realn grad, CornerGradients* g) {
   realn best = INFINITY, best_x = 0.0f, best_y = 0.0f;
   realn u[3] = {(realn)(0.0f), (realn)(0.0f), (realn)(0.0f)};
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     const realn along = closest_on_edge(v.edge[k]);
     realn qx, qy;
@@ -227,6 +228,7 @@ static inline void add_distance_gradient(const View3 v, intn inside, uint euclid
   // averages.
   const realn chain = euclidean ? choose(best > 0.0f, 0.5f * rsqrt(best), (realn)(0.0f)) : (realn)(1.0f);
   const realn factor = choose(inside, (realn)(-2.0f), (realn)(2.0f)) * chain * grad;
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     g->x[k] += factor * u[k] * best_x;
     g->y[k] += factor * u[k] * best_y;
@@ -240,6 +242,7 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, flo
   realn n[3], c[3];
   const realn side_scale = raw_barycentrics(v, t, scale, perspective, n);
   const realn inverse_sum = 1.0f / (max(n[0], 0.0f) + max(n[1], 0.0f) + max(n[2], 0.0f));
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     c[k] = max(n[k], 0.0f) * inverse_sum;
     g->z[k] += grad_depth * c[k];
@@ -248,6 +251,7 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, flo
   const realn mean = c[1] * h1 + c[2] * h2;
   const realn h[3] = {-mean, h1 - mean, h2 - mean};
   const float z[3] = {t.z0, t.z1, t.z2};
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;  // the ends of the edge opposite to vertex k
     const realn grad_n = choose(n[k] > 0.0f, h[k] * inverse_sum, (realn)(0.0f)) * side_scale;
@@ -279,6 +283,7 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
   CornerGradients g;
+#pragma unroll
   for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
   const Triangle t = triangles[pair_face[pair]];
   const float scale = inverse_area(t);
@@ -296,6 +301,7 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
                              choose(real_fragment, load_n(i, grad_bary1), zero),
                              choose(real_fragment, load_n(i, grad_bary2), zero), &g);
   }
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     grad_corners[9 * pair + 3 * k] = sum_lanes(g.x[k]);
     grad_corners[9 * pair + 3 * k + 1] = sum_lanes(g.y[k]);

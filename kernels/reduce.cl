@@ -2,12 +2,19 @@
 // would lose what is left. The order of additions is fixed, so the result is the same from run to run.
 #include "tile_lanes.h"
 
-/// Adds x to a sum and its running error where the mask says so (Neumaier 1974). Lanes left out keep their bits.
-static inline void compensated_add(realn* sum, realn* error, realn x, intn counts) {
+/// Adds x to a sum and its running error (Neumaier 1974). Adding zero changes no bit of either.
+static inline void compensated_add(realn* sum, realn* error, realn x) {
   const realn t = *sum + x;
-  const realn lost = choose(fabs(*sum) >= fabs(x), (*sum - t) + x, (x - t) + *sum);
-  *error = choose(counts, *error + lost, *error);
-  *sum = choose(counts, t, *sum);
+  *error += choose(fabs(*sum) >= fabs(x), (*sum - t) + x, (x - t) + *sum);
+  *sum = t;
+}
+
+/// A vector whose lanes from `last` on are zero.
+static inline realn load_until(uint first, uint last, global const float* values) {
+  if (last - first >= DPR_WIDTH) return load_n(first, values);
+  float lanes[DPR_WIDTH];
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane) lanes[lane] = first + lane < last ? values[first + lane] : 0.0f;
+  return load_n(0, lanes);
 }
 
 /// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel, segment, vector of
@@ -26,8 +33,7 @@ kernel void reduce_partial(const uint count, const uint channels, const uint seg
   global const float* of_channel = values + (size_t)channel * count;
   realn sum = 0.0f, error = 0.0f;
   for (uint k = starts[segment * stride] + slot; k < last; k += slots) {
-    const intn counts = DPR_LANE_INDEX < (intn)((int)min(last - k, (uint)DPR_WIDTH));
-    compensated_add(&sum, &error, load_n(k, of_channel), counts);
+    compensated_add(&sum, &error, load_until(k, last, of_channel));
   }
   global float* out = partial + (size_t)2 * slots * (channel * segments + segment) + slot;
   store_n(sum, 0, out);

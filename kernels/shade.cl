@@ -43,6 +43,7 @@ kernel void shade_backward(const FrameParams p, const uint last_pair, global con
   const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
   const realn zero = 0.0f;
   realn sum[9];
+#pragma unroll
   for (int k = 0; k < 9; ++k) sum[k] = zero;
   for (uint i = first; i < last; i += DPR_WIDTH) {
     const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
@@ -62,5 +63,6 @@ kernel void shade_backward(const FrameParams p, const uint last_pair, global con
     sum[7] += c2 * g;
     sum[8] += c2 * b;
   }
+#pragma unroll
   for (int k = 0; k < 9; ++k) grad_colors[9 * pair + k] = sum_lanes(sum[k]);
 }

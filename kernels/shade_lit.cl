@@ -1,10 +1,8 @@
 // Fragment colours with lights: base colour * factor + specular, where factor and specular come from the light at the
-// fragment (flat, Phong) or interpolate those at the corners (Gouraud). DPR_SHADING says which.
-#ifdef DPR_LANES
-#if DPR_LANES == 16
-#define DPR_WIDTH 8 /* runs of fragments are padded to the width of the rasterizer's vectors */
-#endif
-#endif
+// fragment (flat, Phong) or interpolate those at the corners (Gouraud). DPR_SHADING says which. Loops over the corners
+// are unrolled, as in geometry.h.
+#include "tile_lanes.h"
+
 #include "lighting.h"
 
 #ifndef DPR_SHADING
@@ -38,6 +36,7 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
   global const float4* corner = world + view * p.vertices;
   Surface s;
   s.eye = views[view].eye;
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     s.color[k] = splat3(colors[color[k]]);
     s.position[k] = splat3(corner[vertex[k]]);
@@ -108,6 +107,7 @@ typedef struct {
 } SurfaceGradients;
 
 static inline void add_corners(Vec3n grad[3], Vec3n g, const realn c[3]) {
+#pragma unroll
   for (int k = 0; k < 3; ++k) grad[k] = mad3n(g, c[k], grad[k]);
 }
 
@@ -163,6 +163,7 @@ static inline void flat_normal_backward(const float4 world[3], float4 grad_unit,
   const float4 n = flat_normal(world[0], world[1], world[2]);
   const float inverse = n.w > DPR_MIN_LENGTH ? 1.0f / n.w : 0.0f;
   const float3 g = (grad_unit.xyz - n.xyz * dot(n.xyz, grad_unit.xyz)) * inverse;
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     grad_position[k] += (float4)(cross(world[(k + 1) % 3].xyz - world[(k + 2) % 3].xyz, g), 0.0f);
   }
@@ -172,6 +173,7 @@ static inline void flat_normal_backward(const float4 world[3], float4 grad_unit,
 static inline void corners_backward(const Surface s, const LightingParams lp, global const Light* restrict lights,
                                     SurfaceGradients* g) {
   const realn share = 1.0f / DPR_WIDTH;  // each lane carries its part of the sum
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     const Vec3n grad_factor = scale3n(splat3(sum_vec3n(g->factor[k])), share);
     const Vec3n grad_specular = scale3n(splat3(sum_vec3n(g->specular[k])), share);
@@ -203,6 +205,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
   const Vec3n zero3 = splat3((float4)(0.0f));
   SurfaceGradients g;
+#pragma unroll
   for (int k = 0; k < 3; ++k) g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3;
   g.eye = zero3;
   const uint first = fragment_starts[pair];
@@ -220,6 +223,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
   }
   if (DPR_SHADING == DPR_GOURAUD) corners_backward(s, lp, lights, &g);
   float4 position[3];
+#pragma unroll
   for (int k = 0; k < 3; ++k) position[k] = sum_vec3n(g.position[k]);
   if (DPR_SHADING == DPR_FLAT) {
     const uint4 f = faces[pair_face[pair] % p.faces];
@@ -227,6 +231,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
     const float4 corners[3] = {view_world[f.x], view_world[f.y], view_world[f.z]};
     flat_normal_backward(corners, sum_vec3n(g.normal[0]) + sum_vec3n(g.normal[1]) + sum_vec3n(g.normal[2]), position);
   }
+#pragma unroll
   for (int k = 0; k < 3; ++k) {
     vstore3(sum_vec3n(g.color[k]).xyz, 0, grad_colors + 9 * pair + 3 * k);
     vstore3(position[k].xyz, 0, grad_positions + 9 * pair + 3 * k);
@@ -286,12 +291,14 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
       continue;
     }
     const realn c[3] = {1.0f - c1 - c2, c1, c2};
+#pragma unroll
     for (int k = 0; k < 3; ++k) {
       add_light_gradient(lp, lights[light], s.eye, s.position[k], s.normal[k], scale3n(grad_factor, c[k]),
                          scale3n(grad, c[k]), sum);
     }
   }
   global float* of_light = channels + (size_t)light * (DPR_LIGHT_CHANNELS + 3) * pairs;
+#pragma unroll
   for (uint k = 0; k < 4; ++k) {
     const float4 v = sum_vec3n(sum[k]);
     of_light[(3 * k) * pairs + pair] = v.x;

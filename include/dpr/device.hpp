@@ -38,10 +38,10 @@ class Device {
   std::size_t allocated_bytes() const;
   std::size_t peak_allocated_bytes() const;
 
-  /// Memory for the fragments of a frame, bytes: unless set, a quarter of the device's; an eighth of a CPU's,
-  /// which is the whole machine's. A frame with more fragments is rendered in bands of tile rows, forward and
-  /// backward, with the same results bit by bit. What grows with the scene, the image and the number of
-  /// triangles in each tile comes on top.
+  /// Memory for the fragments of a frame, bytes. Unless set: a quarter of the device's; of a CPU's, which is
+  /// the whole machine's, an eighth and at most 1 GiB. A frame with more fragments is rendered in bands of
+  /// tile rows, forward and backward, with the same results bit by bit. What grows with the scene, the image
+  /// and the number of triangles in each tile comes on top.
   std::size_t memory_budget() const;
   /// For all that use the device, from their next forward() on, which throws InvalidArgument if one row of
   /// tiles does not fit. Throws InvalidArgument for 0.

@@ -104,10 +104,9 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       .add_option("--device", options.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
   command
-      .add_option(
-          "--memory-budget", options.memory_budget,
-          "Device memory for fragments; larger frames are rendered in bands (default: a quarter of a GPU's, "
-          "an eighth of a CPU's)")
+      .add_option("--memory-budget", options.memory_budget,
+                  "Device memory for fragments; larger frames are rendered in bands "
+                  "(default: a quarter; of a CPU's an eighth, at most 1024)")
       ->check(CLI::Range(1, 1 << 30))
       ->type_name("MiB");
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");

@@ -34,6 +34,12 @@ unsigned choose_lanes(const DeviceInfo& info, const cl::Device& device) {
   return device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() >= 16 ? 16 : 8;
 }
 
+/// A CPU's memory is the whole machine's, and other programs' too.
+std::size_t default_memory_budget(const DeviceInfo& info) {
+  constexpr std::size_t k_most_of_cpu = std::size_t{1} << 30;
+  return info.type == "cpu" ? std::min(info.memory_bytes / 8, k_most_of_cpu) : info.memory_bytes / 4;
+}
+
 std::vector<FoundDevice> find_devices() {
   std::vector<cl::Platform> platforms;
   const int error = cl::Platform::get(&platforms);
@@ -110,7 +116,7 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   impl->context = context;
   impl->queue = queue;
   impl->info = describe(cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()), device);
-  impl->memory_budget = impl->info.memory_bytes / (impl->info.type == "cpu" ? 8 : 4);
+  impl->memory_budget = default_memory_budget(impl->info);
   return Device(std::move(impl));
 }
 

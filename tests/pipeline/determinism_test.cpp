@@ -69,12 +69,14 @@ bool is_finite(const Result& result) {
   return true;
 }
 
-/// What a renderer holds that grows with the fragments of a band.
+/// What a renderer holds that grows with the fragments of a band, without what every buffer has for the loads
+/// of whole vectors.
 std::size_t fragment_memory(const Renderer::Impl& m) {
+  constexpr std::size_t k_padding = 32 * sizeof(float);
   std::size_t bytes = 0;
   for (const Buffer<cl_uint>* buffer :
        {&m.rasterize.list, &m.rasterize.fragment_pair, &m.rasterize.fragment_pixel}) {
-    bytes += buffer->capacity_bytes();
+    bytes += buffer->capacity_bytes() - k_padding;
   }
   for (const Buffer<float>* buffer :
        {&m.rasterize.distance, &m.rasterize.depth, &m.rasterize.bary1, &m.rasterize.bary2, &m.shade.red,
@@ -82,7 +84,7 @@ std::size_t fragment_memory(const Renderer::Impl& m) {
         &m.occupancy.occupancy, &m.occupancy.grad_distance, &m.aggregate.grad_depth,
         &m.aggregate.grad_log_occupancy, &m.aggregate.grad_color.red, &m.aggregate.grad_color.green,
         &m.aggregate.grad_color.blue}) {
-    bytes += buffer->capacity_bytes();
+    bytes += buffer->capacity_bytes() - k_padding;
   }
   return bytes;
 }
