@@ -14,10 +14,7 @@ Aggregate::Exact::Exact(Device::Impl& device, Composition composition, const std
               composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
       backward(device, file_of(composition),
                composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward",
-               options) {
-  if (composition == Composition::joint)
-    sort.emplace(device, file_of(composition), "aggregate_joint_sort", options);
-}
+               options) {}
 
 Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
     : forward(device, "aggregate_sampled.cl", "aggregate_sampled_forward", options),
@@ -60,11 +57,10 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
   const shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
-  Rasterize& r = in.rasterize;
+  const Rasterize& r = in.rasterize;
   if (exact_) {
     slots_.resize(device_, r.listed_fragments + a.pixels);
     slot_counts_.resize(device_, a.pixels);
-    if (exact_->sort) (*exact_->sort)(a.pixels, a.pixels, r.pixel_starts, r.depth, r.list);
     exact_->forward(a.pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                     in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
                     in.shade.blue, slots_, slot_counts_, image);
