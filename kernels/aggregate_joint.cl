@@ -19,7 +19,7 @@
 #define DPR_JOINT
 #include "integrate.h"
 
-#define DPR_OPAQUE 1e-9f
+#define DPR_OPAQUE 1e-12f
 
 /// Fragments that cover less than this of what the pixel's most covering one does are left out.
 #define DPR_NEGLIGIBLE 1e-8f
