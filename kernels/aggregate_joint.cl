@@ -1,12 +1,13 @@
-// The joint composition, exactly: the expected rigid image when distances and depths are both perturbed, by the integrals
-// of integrate.h with beta = zeta / gamma. What no fragment covers is the background: w_0 = prod (1 - p_k), and dL/dp_k
-// has a further - g_0 prod_{l != k} (1 - p_l).
+// The joint composition, exactly: the expected rigid image when distances and depths are both perturbed, by
+// the integrals of integrate.h with beta = zeta / gamma. What no fragment covers is the background: w_0 =
+// prod (1 - p_k), and dL/dp_k has a further - g_0 prod_{l != k} (1 - p_l).
 //
-// A pixel's fragments, sorted by depth, fall into clusters: runs whose neighbours' noise overlaps. Between clusters the
-// integral is the front-to-back product, so each cluster is integrated alone, weighed by what is in front of it; and
-// for its gradients everything behind it is one background whose g_0 is what would be seen there. Fragments alone need
-// no integral. Reached when the transparency in front falls below DPR_OPAQUE, the rest is left out: an error of at most
-// that in the weights. Errors: tests/stages/aggregate_joint_test.cpp.
+// A pixel's fragments, sorted by depth, fall into clusters: runs whose neighbours' noise overlaps. Between
+// clusters the integral is the front-to-back product, so each cluster is integrated alone, weighed by what is
+// in front of it; and for its gradients everything behind it is one background whose g_0 is what would be
+// seen there. Fragments alone need no integral. Reached when the transparency in front falls below
+// DPR_OPAQUE, the rest is left out: an error of at most that in the weights. Errors:
+// tests/stages/aggregate_joint_test.cpp.
 #ifndef DPR_LANES
 #define DPR_LANES 8
 #endif
@@ -18,52 +19,46 @@
 #define DPR_JOINT
 #include "integrate.h"
 
-#define DPR_OPAQUE 1e-9f
+#define DPR_OPAQUE 1e-12f
 
 /// Fragments that cover less than this of what the pixel's most covering one does are left out.
 #define DPR_NEGLIGIBLE 1e-8f
 
-/// Runs up to this length are sorted by insertion.
+/// Up to so many slots are sorted by insertion.
 #define DPR_INSERTION_SORT 24
 
-static inline int comes_before(float depth_a, uint a, float depth_b, uint b) {
-  return depth_a < depth_b || (depth_a == depth_b && a < b);
+/// By view depth, which a slot's beta holds until it is in a cluster; equal depths by fragment.
+static inline int comes_before(const Slot a, const Slot b) {
+  return a.beta < b.beta || (a.beta == b.beta && a.fragment < b.fragment);
 }
 
-static inline void sift_down(global uint* run, global const float* depth, uint root, uint count) {
-  const uint moved = run[root];
+static inline void sift_down(global Slot* slots, uint root, uint count) {
+  const Slot moved = slots[root];
   for (uint child; (child = 2 * root + 1) < count; root = child) {
-    if (child + 1 < count && comes_before(depth[run[child]], run[child], depth[run[child + 1]], run[child + 1])) ++child;
-    if (!comes_before(depth[moved], moved, depth[run[child]], run[child])) break;
-    run[root] = run[child];
+    if (child + 1 < count && comes_before(slots[child], slots[child + 1])) ++child;
+    if (!comes_before(moved, slots[child])) break;
+    slots[root] = slots[child];
   }
-  run[root] = moved;
+  slots[root] = moved;
 }
 
-/// Sorts every pixel's fragments by depth, equal depths by number. Insertion for short runs, heap sort for long ones.
-/// One work-item per pixel.
-/// in out  list  uint[...]
-kernel void aggregate_joint_sort(const uint pixels, global const uint* restrict starts,
-                                 global const float* restrict depth, global uint* restrict list) {
-  const uint pixel = (uint)get_global_id(0);
-  if (pixel >= pixels) return;
-  global uint* run = list + starts[pixel];
-  const uint count = starts[pixel + 1] - starts[pixel];
+/// Insertion for few, heap sort for many.
+static inline void sort_slots(global Slot* slots, uint count) {
   if (count <= DPR_INSERTION_SORT) {
     for (uint i = 1; i < count; ++i) {
-      const uint moved = run[i];
+      const Slot moved = slots[i];
       uint k = i;
-      for (; k > 0 && comes_before(depth[moved], moved, depth[run[k - 1]], run[k - 1]); --k) run[k] = run[k - 1];
-      run[k] = moved;
+      for (; k > 0 && comes_before(moved, slots[k - 1]); --k) slots[k] = slots[k - 1];
+      slots[k] = moved;
     }
     return;
   }
-  for (uint root = count / 2; root-- > 0;) sift_down(run, depth, root, count);
+  for (uint root = count / 2; root-- > 0;) sift_down(slots, root, count);
   for (uint end = count - 1; end > 0; --end) {
-    const uint furthest = run[0];
-    run[0] = run[end];
-    run[end] = furthest;
-    sift_down(run, depth, 0, end);
+    const Slot furthest = slots[0];
+    slots[0] = slots[end];
+    slots[end] = furthest;
+    sift_down(slots, 0, end);
   }
 }
 
@@ -74,9 +69,10 @@ typedef struct {
   float coverage;      // 1 - that, added up so that coverages far below 1 keep their digits
 } Cluster;
 
-/// The fragments that cover, as slots in the order of the lists, with their view depths in place of the betas. Left out
-/// are those that cover less than DPR_NEGLIGIBLE of what another does: an error of at most that, relative to the pixel's
-/// coverage, so that the smallest difference to the background keeps its sign. Returns how many are left.
+/// The fragments that cover, as slots sorted by depth, with their view depths in place of the betas. Left out
+/// are those that cover less than DPR_NEGLIGIBLE of what another does: an error of at most that, relative to
+/// the pixel's coverage, so that the smallest difference to the background keeps its sign. Returns how many
+/// are left.
 static inline uint gather_slots(const Fragments f, uint first, uint last, global Slot* slots) {
   float largest = 0.0f;
   for (uint i = first; i < last; ++i) largest = max(largest, f.occupancy[f.list[i]]);
@@ -87,11 +83,13 @@ static inline uint gather_slots(const Fragments f, uint first, uint last, global
     slots[count] = s;
     count += s.occupancy > DPR_NEGLIGIBLE * largest;
   }
+  sort_slots(slots, count);
   return count;
 }
 
-/// The cluster that begins with the first of `count` slots that hold view depths, which become betas relative to the
-/// first's. It ends where the noise of two neighbours in depth does not overlap: the nearer one is always in front.
+/// The cluster that begins with the first of `count` slots that hold view depths, which become betas relative
+/// to the first's. It ends where the noise of two neighbours in depth does not overlap: the nearer one is
+/// always in front.
 static inline Cluster first_cluster(global Slot* slots, uint count, float depth_scale) {
   Cluster c = {{slots, 0, 0.0f}, 1.0f, 0.0f};
   const float nearest = slots[0].beta;
@@ -118,11 +116,12 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
   return sum.w > 0.0f ? sum.xyz * (c.coverage / sum.w) : sum.xyz;
 }
 
-/// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, but: `list` is sorted by depth; a pixel's slots
-/// begin at starts[pixel], and those are left that anything is seen of.
+/// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, but a pixel's slots begin at
+/// starts[pixel], sorted by depth, and those are left that anything is seen of.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
-                                    global const float* restrict depth, global const float* restrict log_occupancy,
+                                    global const float* restrict depth,
+                                    global const float* restrict log_occupancy,
                                     global const float* restrict occupancy, global const float* restrict red,
                                     global const float* restrict green, global const float* restrict blue,
                                     global Slot* restrict slots, global uint* restrict slot_counts,
@@ -156,9 +155,10 @@ static inline Slots cluster_before(global Slot* slots, uint end, float* in_front
   return run;
 }
 
-/// Gradients within a cluster that nothing hides, with `behind` the g of what lies behind it. Adds up, per fragment:
-/// w_k / p_k, dL/dbeta_k, dL/dp_k. Returns what is seen of the cluster and behind.
-static inline float cluster_gradients(Slots run, const Fragments f, float3 grad, float behind, SlotGradients* out) {
+/// Gradients within a cluster that nothing hides, with `behind` the g of what lies behind it. Adds up, per
+/// fragment: w_k / p_k, dL/dbeta_k, dL/dp_k. Returns what is seen of the cluster and behind.
+static inline float cluster_gradients(Slots run, const Fragments f, float3 grad, float behind,
+                                      SlotGradients* out) {
   float transparency = 1.0f;
   for (uint i = 0; i < run.count; ++i) transparency *= slot_transparency(run.slot[i]);
   for (uint i = 0; i < run.count; ++i) {
@@ -176,18 +176,17 @@ static inline float cluster_gradients(Slots run, const Fragments f, float3 grad,
   return transparency * behind + integrate_gradients(run, out).y;
 }
 
-/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic.
-/// Buffers as in aggregate.cl and the forward pass.
-kernel void aggregate_joint_backward(const AggregateParams p, global const ViewParams* restrict views,
-                                     global const uint* restrict starts, global const uint* restrict list,
-                                     global const float* restrict depth, global const float* restrict log_occupancy,
-                                     global const float* restrict occupancy, global const float* restrict red,
-                                     global const float* restrict green, global const float* restrict blue,
-                                     global Slot* restrict slots, global const uint* restrict slot_counts,
-                                     global const float4* restrict grad_image, global float* restrict grad_depth,
-                                     global float* restrict grad_log_occupancy, global float* restrict grad_red,
-                                     global float* restrict grad_green, global float* restrict grad_blue,
-                                     global float* restrict channels) {
+/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
+/// Deterministic. Buffers as in aggregate.cl and the forward pass.
+kernel void aggregate_joint_backward(
+    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
+    global const uint* restrict list, global const float* restrict depth,
+    global const float* restrict log_occupancy, global const float* restrict occupancy,
+    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
+    global Slot* restrict slots, global const uint* restrict slot_counts,
+    global const float4* restrict grad_image, global float* restrict grad_depth,
+    global float* restrict grad_log_occupancy, global float* restrict grad_red,
+    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.pixels) return;
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
@@ -214,7 +213,8 @@ kernel void aggregate_joint_backward(const AggregateParams p, global const ViewP
       const Slot s = run.slot[i];
       const uint k = s.fragment;
       const float weight = grad_red[k] * s.occupancy * in_front, grad_beta = grad_depth[k] * in_front;
-      // d beta / d gamma = -beta / gamma; shifting a whole cluster changes nothing, so betas count from its first.
+      // d beta / d gamma = -beta / gamma; shifting a whole cluster changes nothing, so betas count from its
+      // first.
       grad_gamma -= grad_beta * s.beta / p.gamma;
       grad_depth[k] = -grad_beta * depth_scale;
       grad_log_occupancy[k] *= s.occupancy * in_front;

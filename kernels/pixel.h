@@ -6,7 +6,7 @@
 #include "shared_types.h"
 
 /// 1 - p is kept above this, so that products without one factor are quotients.
-#define DPR_MIN_TRANSPARENCY 1e-9f
+#define DPR_MIN_TRANSPARENCY 1e-12f
 
 /// Fragments by way of the pixels' lists.
 typedef struct {

@@ -57,7 +57,7 @@ static inline realn gaussian_score(realn z) { return z; }
 #define DPR_JOINT_BELOW 4.8f
 #define DPR_JOINT_ABOVE 4.8f
 #define DPR_JOINT_STEP 0.67f
-#define DPR_JOINT_CROWD_STEP 0.335f
+#define DPR_JOINT_CROWD_STEP 0.3f
 
 #define DPR_INVERSE_SQRT_2PI 0.398942280f
 #define DPR_LOG_SQRT_2PI 0.918938533f

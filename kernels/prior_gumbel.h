@@ -16,7 +16,7 @@ static inline realn gumbel_score(realn z) { return 1.0f - exp_n(-z); }
 
 #define DPR_RULE DPR_RULE_SMOOTH
 #define DPR_SOFTMAX 1
-#define DPR_BARRIER_REACH 17.0f /* exp(-17) = 4e-8 */
+#define DPR_BARRIER_REACH 20.0f /* exp(-20) = 2e-9 */
 /// As in prior_gaussian.h.
 #define DPR_JOINT_BELOW 3.0f
 #define DPR_JOINT_ABOVE 14.0f

@@ -21,10 +21,7 @@ Aggregate::Exact::Exact(Device::Impl& device, Composition composition, const std
               composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
       backward(device, file_of(composition),
                composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward",
-               options) {
-  if (composition == Composition::joint)
-    sort.emplace(device, file_of(composition), "aggregate_joint_sort", options);
-}
+               options) {}
 
 Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
     : forward(device, "aggregate_sampled.cl", "aggregate_sampled_forward", options),
@@ -78,9 +75,8 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   const shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
   const Range pixels = in.rasterize.pixels(in.p);
-  Rasterize& r = in.rasterize;
+  const Rasterize& r = in.rasterize;
   if (exact_) {
-    if (exact_->sort) (*exact_->sort)(pixels, pixels.last(), r.pixel_starts, r.depth, r.list);
     slots_.resize(device_, r.listed_fragments + a.pixels);
     slot_counts_.resize(device_, a.pixels);
     exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,

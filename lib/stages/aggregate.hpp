@@ -12,12 +12,12 @@
 
 namespace dpr {
 
-/// Everything of a frame that aggregation reads; the joint composition sorts the rasterizer's lists by depth.
+/// Everything of a frame that aggregation reads.
 struct AggregateInputs {
   const shared::FrameParams& p;
   const DeviceViews& views;
   const Bin& bin;
-  Rasterize& rasterize;
+  const Rasterize& rasterize;
   const Occupancy& occupancy;
   const Shade& shade;
 };
@@ -58,11 +58,9 @@ class Aggregate {
       Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
              In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, In<cl_uint>, In<cl_float4>,
              Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>;
-  /// Exact kernels of either composition; the joint one sorts first. The forward pass leaves the pixels'
-  /// slots for the backward pass.
+  /// Exact kernels of either composition. The forward pass leaves the pixels' slots for the backward pass.
   struct Exact {
     Exact(Device::Impl& device, Composition composition, const std::string& options);
-    std::optional<Kernel<cl_uint, In<cl_uint>, In<float>, Out<cl_uint>>> sort;
     ForwardKernel forward;
     BackwardKernel backward;
   };

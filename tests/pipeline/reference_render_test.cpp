@@ -217,8 +217,6 @@ TEST_SUITE("pipeline") {
       for (const Prior depth : k_noisy_priors) {
         if (reduced(1, 0) == 0 && occupancy != depth) continue;
         for (const Composition composition : {Composition::barrier, Composition::joint}) {
-          // The joint integrals with Cauchy noise are not offered: see robustness/api_test.cpp.
-          if (depth == Prior::cauchy && composition == Composition::joint) continue;
           Scene scene = scene_of(random_soup(14, 6), size, size);
           scene.smoothing.occupancy_prior = occupancy;
           scene.smoothing.depth_prior = depth;

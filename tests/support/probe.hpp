@@ -1,8 +1,8 @@
 // The device of the tests, and kernels of a test's own with the text of the shared headers in front.
 #pragma once
 
-#include <initializer_list>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <set>
 #include <string>
@@ -53,6 +53,7 @@ inline std::string header_text(std::string_view name, std::set<std::string, std:
   return out;
 }
 
+/// A kernel file with all it includes.
 inline std::string header_text(std::string_view name) {
   std::set<std::string, std::less<>> included;
   return header_text(name, included);
