@@ -1,7 +1,6 @@
 // An object's pose from one image.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
 #include <span>
@@ -39,7 +38,7 @@ struct LeastSquares {
   unsigned rotations = 1152;
   unsigned coarsest = 16;   ///< > 0: pixels on the short side of the coarsest level, which doubles up to the scene's
   unsigned iterations = 10;  ///< > 0: at most, a level
-  float blur = 0.5F;        ///< > 0: of the edges, in pixels of the level
+  float blur = 0.25F;       ///< > 0: of the edges, in pixels of the level
   float blur_end = 0.1F;    ///< > 0: the same at the very end
   /// Scale of a Geman-McClure loss r^2 / (1 + (r / scale)^2) of a pixel's colour difference r, for clutter and
   /// occlusion: what differs by more hardly counts. 0: squares.
@@ -63,8 +62,8 @@ struct PoseOptions {
   std::variant<LeastSquares, Descent> method;
   bool solve_translation = false;
   bool solve_focal = false;  ///< a factor on the camera's focal length too; LeastSquares only
-  /// In (0, 1): the target counts as explained once the loss is below that part of the initial pose's, or, in a
-  /// search, of the median over the rotations tried; both at the finest level.
+  /// In (0, 1): the target counts as explained once the loss is below that part of what a wrong pose leaves: in
+  /// descents the initial one, in least squares the median over rotations; both at the finest level.
   float explained = 0.1F;
 };
 
@@ -73,11 +72,11 @@ struct PoseIteration {
   unsigned iteration = 0;  ///< counted through all descents or levels
   unsigned descent = 0;    ///< 0, or the number of the restart
   double loss = 0;         ///< of the best hypothesis; comparable between iterations of one size and smoothing
-  float sigma = 0, gamma = 0;
-  std::uint32_t samples = 0;
+  Smoothing smoothing;
   int width = 0, height = 0;  ///< of the images compared
   unsigned hypotheses = 1;    ///< that were turned together
   Pose pose;                  ///< of the best
+  double focal_scale = 1;     ///< of the best
 };
 
 /// A pose that was found, and how well it explains the target.
@@ -114,6 +113,8 @@ class PoseSolver {
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;
+  /// Of one descent, or through all levels: how often the callback may be called at most.
+  unsigned most_iterations() const;
   /// From an initial pose. Of poses that explain the target equally well, the nearest to it is the result. Throws
   /// InvalidArgument if the initial rotation is none.
   PoseResult solve(const Pose& initial, const Callback& callback = {}) const;

@@ -16,7 +16,6 @@ constexpr double k_least_damping = 1e-7, k_most_damping = 10;
 
 constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches no further
 constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
-constexpr double k_still_decrease = 1e-3;    // of the loss
 
 /// The lower Cholesky factor of a symmetric matrix; false if it is not positive definite to rounding.
 bool factorize(std::array<double, k_most * k_most>& a, std::size_t n) {
@@ -72,7 +71,6 @@ bool next_step(Trial& trial, const PoseSpace& space, double pixel_ndc, PoseSpace
 void judge(Trial& trial, const Hypothesis& hypothesis, const NormalEquations& equations) {
   const double before = trial.candidate->equations.loss;
   if (equations.loss < before) {
-    trial.still = before - equations.loss < k_still_decrease * before;
     *trial.candidate = {hypothesis, equations};
     trial.damping = std::max(trial.damping * k_damping_fall, k_least_damping);
   } else {

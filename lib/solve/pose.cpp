@@ -66,6 +66,11 @@ Pose PoseSolver::scene_pose() const {
   return {polar_decomposition(glm::dmat3(transform)).rotation, glm::dvec3(transform[3])};
 }
 
+unsigned PoseSolver::most_iterations() const {
+  if (const auto* descent = std::get_if<Descent>(&options_.method)) return descent->iterations;
+  return dpr::most_iterations(std::get<LeastSquares>(options_.method), scene_);
+}
+
 PoseResult PoseSolver::solve(const Pose& initial, const Callback& callback) const {
   if (std::holds_alternative<LeastSquares>(options_.method)) return solve(std::span(&initial, 1), callback);
   require_rotation(initial.rotation);

@@ -14,8 +14,9 @@ namespace {
 constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
-// Of a pixel: how far the rim of the object moves for a difference. Small beside the blur, large beside rounding.
-constexpr double k_difference_pixels = 0.1;
+// Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the residual
+// does not see; a shorter one would drown in rounding.
+constexpr double k_difference = 0.3;
 
 constexpr float k_channels = 3;
 
@@ -90,7 +91,7 @@ std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
 }
 
 std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hypotheses) {
-  const PoseSpace::Step step = space_.step_lengths(k_difference_pixels * pixel_ndc());
+  const PoseSpace::Step step = space_.step_lengths(k_difference * static_cast<double>(scene_.smoothing.sigma));
   std::vector<View> views;
   for (const Hypothesis& hypothesis : hypotheses) {
     views.push_back(space_.view(hypothesis, scene_.camera));

@@ -18,14 +18,30 @@ namespace {
 constexpr std::array<std::size_t, 4> k_beam{96, 24, 12, 8};
 // Hypotheses that move the object's rim by less than this against each other are one.
 constexpr double k_same_pixels = 0.5;
-// Losses that differ by no more than this part tell no pose from another: what the pixels' grid makes of one pose or
-// its symmetric twin.
-constexpr double k_equal_losses = 0.1;
+// Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the pixels' grid
+// makes that much of one pose or its symmetric twin.
+constexpr double k_equal_losses = 1e-3;
 
 // Losses beyond this multiple of the best one are given up before the next level.
 constexpr double k_hopeless = 3;
 
 bool by_loss(const Candidate& a, const Candidate& b) { return a.equations.loss < b.equations.loss; }
+
+struct LevelShape {
+  int short_side;
+  float blur;
+};
+
+/// The resolution doubles; the last level is the finest once more, with the final blur.
+std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {
+  const int full = std::min(scene.width, scene.height);
+  std::vector<LevelShape> shapes{{full, options.blur}};
+  while (static_cast<unsigned>(shapes.front().short_side / 2) >= options.coarsest) {
+    shapes.insert(shapes.begin(), {(shapes.front().short_side + 1) / 2, options.blur});
+  }
+  shapes.push_back({full, options.blur_end});
+  return shapes;
+}
 
 /// One fit at work: the candidates on their way through the levels.
 class Fit {
@@ -46,12 +62,12 @@ class Fit {
  private:
   void start(PoseLevel& level);
   /// Refines all candidates at a level and keeps the best distinct ones. False if the callback stopped it.
-  bool work(PoseLevel& level, std::size_t keep);
+  bool work(PoseLevel& level, std::size_t keep, bool goes_on);
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void finish(PoseLevel& level, bool anywhere);
-  void choose_equals(bool anywhere);
+  void choose_equals(double wrong, bool anywhere);
   std::vector<double> covariance(const PoseLevel& level, const NormalEquations& equations) const;
-  double reference_loss(PoseLevel& level, bool anywhere) const;
+  double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
 
   const Device& device_;
@@ -66,27 +82,17 @@ class Fit {
   PoseResult result_;
 };
 
-/// Short sides of the levels, the finest last.
-std::vector<int> level_sizes(const Scene& scene, unsigned coarsest) {
-  const int full = std::min(scene.width, scene.height);
-  std::vector<int> sizes{full};
-  while (sizes.front() / 2 >= static_cast<int>(std::min(coarsest, 1U << 30))) {
-    sizes.insert(sizes.begin(), (sizes.front() + 1) / 2);
-  }
-  return sizes;
-}
-
 PoseResult Fit::run(bool anywhere) {
-  const std::vector<int> sizes = level_sizes(scene_, method_.coarsest);
+  const std::vector<LevelShape> levels = level_shapes(scene_, method_);
   bool goes_on = true;
-  for (std::size_t i = 0; i < sizes.size() && goes_on; ++i) {
-    PoseLevel level(device_, scene_, target_, method_, space_, sizes[i], method_.blur);
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const bool is_last = i + 1 == levels.size();
+    if (!goes_on && !is_last) continue;
+    PoseLevel level(device_, scene_, target_, method_, space_, levels[i].short_side, levels[i].blur);
     if (i == 0) start(level);
-    goes_on = work(level, k_beam[std::min(i + 1, k_beam.size() - 1)]);
+    goes_on = work(level, k_beam[std::min(i + 1, k_beam.size() - 1)], goes_on);
+    if (is_last) finish(level, anywhere);
   }
-  PoseLevel finest(device_, scene_, target_, method_, space_, sizes.back(), method_.blur_end);
-  if (goes_on) work(finest, k_beam.back()); 
-  finish(finest, anywhere);
   return result_;
 }
 
@@ -106,9 +112,9 @@ void Fit::start(PoseLevel& level) {
   for (const Pose& pose : initial_) candidates_.push_back({{pose}});
 }
 
-bool Fit::work(PoseLevel& level, std::size_t keep) {
-  const bool goes_on =
-      refine(level, space_, candidates_, method_.iterations, [&] { return report(level); });
+bool Fit::work(PoseLevel& level, std::size_t keep, bool goes_on) {
+  const unsigned iterations = goes_on ? method_.iterations : 0;  // stopped: only judged at this level
+  goes_on = refine(level, space_, candidates_, iterations, [&] { return report(level); }) && goes_on;
   std::ranges::stable_sort(candidates_, by_loss);
   keep_distinct(level, keep);
   return goes_on;
@@ -129,23 +135,24 @@ void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
 
 bool Fit::report(const PoseLevel& level) {
   const Candidate& best = *std::ranges::min_element(candidates_, by_loss);
-  const Smoothing& smoothing = level.smoothing();
-  result_.history.push_back({static_cast<unsigned>(result_.history.size()), 0, best.equations.loss, smoothing.sigma,
-                             smoothing.gamma, smoothing.samples, level.width(), level.height(),
-                             static_cast<unsigned>(candidates_.size()), best.hypothesis.pose});
+  result_.history.push_back({static_cast<unsigned>(result_.history.size()), 0, best.equations.loss, level.smoothing(),
+                             level.width(), level.height(), static_cast<unsigned>(candidates_.size()),
+                             best.hypothesis.pose, best.hypothesis.focal_scale});
   return !callback_ || callback_(result_.history.back());
 }
 
 void Fit::finish(PoseLevel& level, bool anywhere) {
-  choose_equals(anywhere);
+  const double wrong = wrong_loss(level);
+  choose_equals(wrong, anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = covariance(level, candidates_.front().equations);
-  result_.explained = result_.loss <= static_cast<double>(options_.explained) * reference_loss(level, anywhere);
+  result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong;
 }
 
 /// The poses that explain the target as well as the best, the one to return first.
-void Fit::choose_equals(bool anywhere) {
-  const double enough = candidates_.front().equations.loss * (1 + k_equal_losses);
+void Fit::choose_equals(double wrong, bool anywhere) {
+  const double best = candidates_.front().equations.loss;
+  const double enough = best + k_equal_losses * std::max(wrong - best, 0.0);
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > enough; });
   if (!anywhere) {
     const Hypothesis first{initial_.front()};
@@ -166,14 +173,12 @@ std::vector<double> Fit::covariance(const PoseLevel& level, const NormalEquation
   return space_.to_world(inverse);
 }
 
-/// What a pose leaves that explains nothing: the initial one, or the middle one of the grid's.
-double Fit::reference_loss(PoseLevel& level, bool anywhere) const {
-  constexpr std::size_t k_enough = 31;  // for a median at the finest level, where renders are dear
+/// What a pose leaves that explains nothing: the median over rotations.
+double Fit::wrong_loss(PoseLevel& level) const {
+  constexpr std::size_t k_enough = 31;  // the finest level's renders are dear
   std::vector<Hypothesis> poses;
-  if (anywhere) {
-    for (const glm::dmat3& rotation : rotation_grid(k_enough)) poses.push_back({{rotation, initial_.front().translation}});
-  } else {
-    poses.push_back({initial_.front()});
+  for (const glm::dmat3& rotation : rotation_grid(k_enough)) {
+    poses.push_back({{rotation, candidates_.front().hypothesis.pose.translation}});
   }
   std::vector<double> losses = level.losses(poses);
   std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
@@ -188,6 +193,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
   require(options.coarsest > 0, "coarsest (pose)", options.coarsest, "at least 1");
   require(options.iterations > 0, "iterations (pose)", options.iterations, "at least 1");
   require(options.blur > 0 && std::isfinite(options.blur), "blur (pose)", options.blur, "a finite number above 0");
+  require(options.blur_end > 0 && std::isfinite(options.blur_end), "blur_end (pose)", options.blur_end,
+          "a finite number above 0");
   require(options.robust >= 0 && std::isfinite(options.robust), "robust (pose)", options.robust,
           "a finite number, at least 0");
   const Image& mask = options.mask;
@@ -202,6 +209,10 @@ void validate(const LeastSquares& options, const Scene& scene) {
     sum += static_cast<double>(pixel.x);
   }
   require(sum > 0, "sum of the mask (pose)", sum, "a pixel above 0");
+}
+
+unsigned most_iterations(const LeastSquares& options, const Scene& scene) {
+  return options.iterations * static_cast<unsigned>(level_shapes(scene, options).size());
 }
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,

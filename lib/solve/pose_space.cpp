@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "solve/polar.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr {
 namespace {
@@ -74,18 +75,8 @@ double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
 }
 
 View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
-  View result{camera, {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
-  if (!focal_) return result;
-  if (auto& k = result.camera.intrinsics) {
-    const auto scale = static_cast<float>(hypothesis.focal_scale);
-    k->fx *= scale;
-    k->fy *= scale;
-  } else {
-    const double half = glm::radians(static_cast<double>(camera.fov_y_degrees)) / 2;
-    result.camera.fov_y_degrees =
-        static_cast<float>(glm::degrees(2 * std::atan(std::tan(half) / hypothesis.focal_scale)));
-  }
-  return result;
+  return {focal_ ? zoomed(camera, hypothesis.focal_scale) : camera,
+          {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
 }
 
 std::vector<double> PoseSpace::to_world(std::span<const double> covariance) const {

@@ -68,4 +68,15 @@ Camera resample(const Camera& camera, int width, int height, int new_width, int 
   return result;
 }
 
+Camera zoomed(Camera camera, double scale) {
+  if (auto& k = camera.intrinsics) {
+    k->fx *= static_cast<float>(scale);
+    k->fy *= static_cast<float>(scale);
+  } else {
+    const double half_angle = 0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees));
+    camera.fov_y_degrees = static_cast<float>(glm::degrees(2 * std::atan(std::tan(half_angle) / scale)));
+  }
+  return camera;
+}
+
 }  // namespace dpr

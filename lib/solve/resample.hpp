@@ -12,4 +12,7 @@ Image resample(const Image& image, int width, int height);
 /// The camera that sees the same picture in images of another size.
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);
 
+/// The camera with another focal length, `scale` times as long.
+Camera zoomed(Camera camera, double scale);
+
 }  // namespace dpr
