@@ -21,7 +21,7 @@ int main(int,char**argv){
   std::vector<double> z;
   for(int i=0;i<n;++i){ auto&p=problems[(size_t)i]; Image target=bench::make_target(camera,set,p);
     PoseSolver solver(device,scene,target,options);
-    static std::vector<double> cpu(10000); double c0=(double)clock()/1e6; PoseSolver::Callback cb=[&](const PoseIteration&it){ static int last=0; static double lastc=0; double c=(double)clock()/1e6; if(it.iteration==0){last=0;lastc=c0;} if(it.width!=last||1) cpu[(size_t)last]+=c-lastc; lastc=c; last=it.width; return true;};
+    static std::vector<double> cpu(10000); double c0=(double)clock()/1e6; PoseSolver::Callback cb=[&](const PoseIteration&it){ static int last=0; static double lastc=0; double c=(double)clock()/1e6; if(it.iteration==0){last=0;lastc=c0;} if(true) cpu[(size_t)last]+=c-lastc; lastc=c; last=it.width; return true;};
  PoseResult r= set.initial_degrees>0? solver.solve(p.initial,cb): solver.search(cb); double cputime=(double)clock()/1e6-c0; if(i==n-1) for(size_t k=0;k<10000;++k) if(cpu[k]>0) printf("level %zu: %.3f cpu s a problem\n",k,cpu[k]/n);
     double e=angle_degrees(r.pose.rotation,p.truth.rotation); double d=bench::differing_pixels(camera.render(r.pose),target);
     double te=glm::length(r.pose.translation-p.truth.translation)/6.7;

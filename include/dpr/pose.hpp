@@ -87,6 +87,7 @@ struct PoseHypothesis {
 };
 
 struct PoseResult : PoseHypothesis {
+  Pose start;  ///< the (first) initial pose; in a search the scene's
   /// All poses that explain the target as well, this one first: more than one where the object's symmetry, or what is
   /// hidden of it, leaves them open. LeastSquares only.
   std::vector<PoseHypothesis> equals;

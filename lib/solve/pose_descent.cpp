@@ -175,6 +175,7 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
   Objective objective(device, scene, target, descent.loss);
 
   PoseResult result;
+  result.start = initial;
   Smoothing finest = scene.smoothing;
   double enough = 0;
   for (unsigned i = 0; i <= descent.restarts; ++i) {

@@ -83,6 +83,7 @@ class Fit {
 };
 
 PoseResult Fit::run(bool anywhere) {
+  result_.start = initial_.front();
   const std::vector<LevelShape> levels = level_shapes(scene_, method_);
   bool goes_on = true;
   for (std::size_t i = 0; i < levels.size(); ++i) {
