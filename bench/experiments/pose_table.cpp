@@ -30,7 +30,8 @@ int main(int,char**argv){
     if(env("V",0)>0|| e>5) printf("%3d err %7.3f sd %.3f te %.4f diff %.4f loss %.3e expl %d equals %zu nearest-equal %.2f it %u %.3fs\n",i,e,sd,te,d,r.loss,r.explained,r.equals.size(),en,r.iterations,r.seconds);
     if(env("V",0)>1) for(auto&h:r.history) printf("   it %u size %d hyps %u loss %.4e err %.3f\n",h.iteration,h.width,h.hypotheses,h.loss,angle_degrees(h.pose.rotation,p.truth.rotation));
     fflush(stdout);
-    errs.push_back(e); times.push_back(cputime); sum+=e; solved+=e<10; s2+=e<2; s5+=(e<5); tr+=(e<5&&te<0.02); same+= (e<10||d<1e-3);}
+    z.push_back(e/sd); errs.push_back(e); times.push_back(cputime); sum+=e; solved+=e<10; s2+=e<2; s5+=(e<5); tr+=(e<5&&te<0.02); same+= (e<10||d<1e-3);}
   std::sort(errs.begin(),errs.end()); std::sort(times.begin(),times.end());
+  std::sort(z.begin(),z.end()); printf("err/sd median %.2f p90 %.2f\n", z[z.size()/2], z[z.size()*9/10]);
   printf("== n %d <10: %d  <5: %d <2: %d  6d: %d  solved-or-same: %d avg %.3f median %.3f p90 %.3f cpu med %.3f max %.3f\n",n,solved,s5,s2,tr,same,sum/n,errs[errs.size()/2],errs[errs.size()*9/10],times[times.size()/2],times.back());
 }

@@ -93,7 +93,8 @@ struct PoseResult : PoseHypothesis {
   std::vector<PoseHypothesis> equals;
   /// Row-major covariance of a small motion: rotation vector on the left (world axes, radians), then, if solved for,
   /// the translation (world), then, if solved for, the logarithm of the focal length. From the final Hessian and the
-  /// residual, as if pixels erred independently. Empty where it is not known. LeastSquares only.
+  /// residuals at edges, as if pixels erred independently: it knows nothing of errors of the scene or of another valley.
+  /// Empty where the image leaves a parameter open. LeastSquares only.
   std::vector<double> covariance;
   unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose

@@ -7,8 +7,6 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_most = PoseSpace::k_most_parameters;
-
 // Marquardt's factor on the diagonal: where it begins, how it falls and rises, and where hope ends.
 constexpr double k_first_damping = 1e-2;
 constexpr double k_damping_fall = 0.2, k_damping_rise = 8;
@@ -18,7 +16,7 @@ constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches
 constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
 
 /// The lower Cholesky factor of a symmetric matrix; false if it is not positive definite to rounding.
-bool factorize(std::array<double, k_most * k_most>& a, std::size_t n) {
+bool factorize(PoseSpace::Matrix& a, std::size_t n) {
   constexpr double k_rounding = 1e-12;
   for (std::size_t j = 0; j < n; ++j) {
     const double diagonal = a[j * n + j];
@@ -36,7 +34,7 @@ bool factorize(std::array<double, k_most * k_most>& a, std::size_t n) {
 }
 
 /// Solves L L^T x = b in place.
-void substitute(const std::array<double, k_most * k_most>& factor, std::size_t n, PoseSpace::Step& b) {
+void substitute(const PoseSpace::Matrix& factor, std::size_t n, PoseSpace::Step& b) {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < i; ++k) b[i] -= factor[i * n + k] * b[k];
     b[i] /= factor[i * n + i];
@@ -90,17 +88,23 @@ bool damped_step(const NormalEquations& equations, std::size_t parameters, doubl
   return true;
 }
 
-std::vector<double> inverse_hessian(const NormalEquations& equations, std::size_t parameters) {
+std::vector<double> covariance(const NormalEquations& equations, std::size_t parameters) {
   auto factor = equations.hessian;
   if (!factorize(factor, parameters)) return {};
-  std::vector<double> inverse(parameters * parameters);
-  for (std::size_t column = 0; column < parameters; ++column) {
-    PoseSpace::Step unit{};
-    unit[column] = 1;
-    substitute(factor, parameters, unit);
-    for (std::size_t row = 0; row < parameters; ++row) inverse[row * parameters + column] = unit[row];
+  // H^-1 from both sides: on the columns of S, then on the columns of the transpose of what comes out.
+  std::vector<double> result(equations.scatter.begin(),
+                             equations.scatter.begin() + static_cast<std::ptrdiff_t>(parameters * parameters));
+  for (int side = 0; side < 2; ++side) {
+    std::vector<double> solved(parameters * parameters);
+    for (std::size_t column = 0; column < parameters; ++column) {
+      PoseSpace::Step x{};
+      for (std::size_t row = 0; row < parameters; ++row) x[row] = result[row * parameters + column];
+      substitute(factor, parameters, x);
+      for (std::size_t row = 0; row < parameters; ++row) solved[column * parameters + row] = x[row];
+    }
+    result = solved;
   }
-  return inverse;
+  return result;
 }
 
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, unsigned iterations,

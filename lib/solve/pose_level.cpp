@@ -146,14 +146,17 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
     // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is positive.
     const float slope = 1 / (1 + squared * inverse_scale_squared_);
     const float weight = weights_[i] * slope * slope;
+    std::array<double, PoseSpace::k_most_parameters> score{};
     for (std::size_t k = 0; k < n; ++k) {
       const cl_float4& a = jacobian[k];
-      result.gradient[k] += static_cast<double>(
-          weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+      score[k] = static_cast<double>(weight *
+                                     (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+      result.gradient[k] += score[k];
       for (std::size_t l = 0; l <= k; ++l) {
         const cl_float4& b = jacobian[l];
         result.hessian[k * n + l] +=
             static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
+        result.scatter[k * n + l] += score[k] * score[l];
       }
     }
   }
@@ -162,6 +165,7 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
     result.gradient[k] *= scale;
     for (std::size_t l = 0; l <= k; ++l) {
       result.hessian[l * n + k] = result.hessian[k * n + l] *= scale;
+      result.scatter[l * n + k] = result.scatter[k * n + l] *= scale * scale;
     }
   }
   result.loss = loss(images);

@@ -16,8 +16,9 @@ namespace dpr {
 /// The loss about a hypothesis to second order, by Gauss and Newton.
 struct NormalEquations {
   double loss = 0;
-  PoseSpace::Step gradient{};                                                             ///< of half the loss
-  std::array<double, PoseSpace::k_most_parameters * PoseSpace::k_most_parameters> hessian{};  ///< row-major, of half the loss
+  PoseSpace::Step gradient{};      ///< of half the loss
+  PoseSpace::Matrix hessian{};     ///< of half the loss
+  PoseSpace::Matrix scatter{};     ///< sum over pixels of the outer products of what each adds to the gradient
 };
 
 class PoseLevel {
@@ -36,8 +37,6 @@ class PoseLevel {
   int height() const { return scene_.height; }
   const Smoothing& smoothing() const { return scene_.smoothing; }
   double pixel_ndc() const;
-  /// The weights of all pixels together: how many pixels count.
-  double weight() const { return weight_; }
 
  private:
   /// Renders views in batches that fit the device and hands every image to a visitor, in order.

@@ -66,7 +66,6 @@ class Fit {
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void finish(PoseLevel& level, bool anywhere);
   void choose_equals(double wrong, bool anywhere);
-  std::vector<double> covariance(const PoseLevel& level, const NormalEquations& equations) const;
   double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
 
@@ -146,7 +145,8 @@ void Fit::finish(PoseLevel& level, bool anywhere) {
   const double wrong = wrong_loss(level);
   choose_equals(wrong, anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
-  result_.covariance = covariance(level, candidates_.front().equations);
+  result_.covariance = covariance(candidates_.front().equations, space_.size());
+  if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
   result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong;
 }
 
@@ -162,16 +162,6 @@ void Fit::choose_equals(double wrong, bool anywhere) {
   for (const auto& [hypothesis, equations] : candidates_) {
     result_.equals.push_back({hypothesis.pose, hypothesis.focal_scale, equations.loss});
   }
-}
-
-/// The residual's variance times the inverse Hessian of half the sum of squares.
-std::vector<double> Fit::covariance(const PoseLevel& level, const NormalEquations& equations) const {
-  constexpr double k_channels = 3;
-  const double degrees_of_freedom = k_channels * level.weight() - static_cast<double>(space_.size());
-  std::vector<double> inverse = inverse_hessian(equations, space_.size());
-  if (degrees_of_freedom <= 0) return {};
-  for (double& c : inverse) c *= equations.loss / degrees_of_freedom;
-  return space_.to_world(inverse);
 }
 
 /// What a pose leaves that explains nothing: the median over rotations.

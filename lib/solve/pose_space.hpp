@@ -22,6 +22,7 @@ class PoseSpace {
  public:
   static constexpr std::size_t k_most_parameters = 7;
   using Step = std::array<double, k_most_parameters>;
+  using Matrix = std::array<double, k_most_parameters * k_most_parameters>;  ///< [size()][size()], row-major
 
   /// `initial` tells how far away the object is.
   PoseSpace(const Scene& scene, const Pose& initial, bool translation, bool focal);
