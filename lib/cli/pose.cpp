@@ -13,11 +13,12 @@ namespace dpr::cli {
 namespace {
 
 const char* const k_least_squares_group = "Least squares (--method least_squares, the default)";
-const char* const k_descent_group = "Descent (--method descent; any of these, or of the smoothing's, implies it)";
+const char* const k_descent_group =
+    "Descent (--method descent; any of these, or of the smoothing's, implies it)";
 
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal", output,
-                                                     report;
+  std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal",
+                                                     output, report;
   std::optional<std::string> method;
   bool search = false;
   PoseOptions solver;
@@ -67,7 +68,8 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   options.solver.method = options.descent;
 }
 
-PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rotation, bool search, bool quiet) {
+PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rotation, bool search,
+                 bool quiet) {
   const PoseSolver::Callback callback = progress_callback(solver.most_iterations(), quiet);
   if (search) return solver.search(callback);
   Pose initial = solver.scene_pose();
@@ -81,7 +83,8 @@ void print(const std::string& file, const PoseResult& result) {
   if (result.equals.size() > 1) {
     std::printf("%zu poses explain the target equally well; all are in the file.\n", result.equals.size());
   }
-  if (!result.explained) std::printf("The target is not explained: the loss stayed near that of a wrong pose.\n");
+  if (!result.explained)
+    std::printf("The target is not explained: the loss stayed near that of a wrong pose.\n");
 }
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
@@ -109,17 +112,19 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
   const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
     return command.add_option(name, value, description)->group(k_least_squares_group)->type_name(type);
   };
-  add("--rotations", method.rotations, "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default",
-      "N");
+  add("--rotations", method.rotations,
+      "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
   add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
   add("--level-iterations", method.iterations, "How many steps a level at most; 10 by default", "N");
   add("--blur", method.blur, "Of the edges, in pixels of the level; 0.25 by default", "FLOAT");
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
   add("--robust", method.robust,
-      "For clutter and occlusion: colour difference beyond which a pixel hardly counts, such as 0.1; 0 (default): all "
+      "For clutter and occlusion: colour difference beyond which a pixel hardly counts, such as 0.1; 0 "
+      "(default): all "
       "count",
       "FLOAT");
-  add("--mask", options.mask, "Image whose first channel is the weight of every pixel, in [0, 1]", "MASK.png");
+  add("--mask", options.mask, "Image whose first channel is the weight of every pixel, in [0, 1]",
+      "MASK.png");
   command
       .add_flag("--focal", options.solver.solve_focal, "Look for a factor on the camera's focal length too")
       ->group(k_least_squares_group);
@@ -135,7 +140,8 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
   add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
   add("--optimizer", options.optimizer, "How steps are made; adam by default", "adam|sgd");
   add("--schedule", options.schedule,
-      "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; anneal by "
+      "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
+      "anneal by "
       "default",
       "anneal|adaptive");
   add("--learning-rate", method.optimizer.learning_rate, "Size of the first steps; 0.05 by default", "FLOAT");
@@ -153,10 +159,11 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
       ->type_name("T.exr");
   CLI::Option* initial =
       command
-          ->add_option("--initial-rotation", options->initial_rotation,
-                       "Rotation vector of the object-to-world rotation to start from, in radians (default: the "
-                       "rotation of the scene's transform); of poses that explain the target equally well the "
-                       "nearest to it is the result")
+          ->add_option(
+              "--initial-rotation", options->initial_rotation,
+              "Rotation vector of the object-to-world rotation to start from, in radians (default: the "
+              "rotation of the scene's transform); of poses that explain the target equally well the "
+              "nearest to it is the result")
           ->type_name("RX,RY,RZ");
   command->add_flag("--search", options->search, "Nothing is known of the rotation")->excludes(initial);
   command->add_flag("--translation", options->solver.solve_translation, "Look for the translation too");
@@ -168,7 +175,8 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
   add_least_squares_options(*command, *options);
   add_descent_options(*command, *options);
   add_common_options(*command, common);
-  command->footer("Example: dpr pose --scene scene.json --target target.exr --search -o pose.json --report report");
+  command->footer(
+      "Example: dpr pose --scene scene.json --target target.exr --search -o pose.json --report report");
   command->callback([command, options, &common] { run(*command, *options, common); });
 }
 

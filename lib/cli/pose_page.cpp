@@ -53,9 +53,11 @@ void write_numbers(std::ostream& out, const PoseResult& result, const std::optio
   out << "<table>\n";
   write_row(out, "rotation vector, radians", vector_text(vector_from_rotation(result.pose.rotation)));
   write_row(out, "translation", vector_text(result.pose.translation));
-  if (result.focal_scale != 1) write_row(out, "focal length", format("%.6g of the scene's", result.focal_scale));
+  if (result.focal_scale != 1)
+    write_row(out, "focal length", format("%.6g of the scene's", result.focal_scale));
   if (truth) {
-    write_row(out, "error at the start, degrees", format("%.3f", angle_degrees(result.start.rotation, *truth)));
+    write_row(out, "error at the start, degrees",
+              format("%.3f", angle_degrees(result.start.rotation, *truth)));
     write_row(out, "error at the end, degrees", format("%.3f", angle_degrees(result.pose.rotation, *truth)));
   }
   write_row(out, "loss", format("%.4g", result.loss));
@@ -68,7 +70,8 @@ void write_numbers(std::ostream& out, const PoseResult& result, const std::optio
 void write_equals(std::ostream& out, const PoseResult& result) {
   if (result.equals.size() < 2) return;
   out << "<h2>Poses that explain the target equally well</h2>\n<table>\n"
-      << "<tr><th>rotation vector, radians</th><th>translation</th><th>degrees from the result</th><th>loss</th></tr>\n";
+      << "<tr><th>rotation vector, radians</th><th>translation</th><th>degrees from the "
+         "result</th><th>loss</th></tr>\n";
   for (const PoseHypothesis& other : result.equals) {
     out << "<tr><td>" << vector_text(vector_from_rotation(other.pose.rotation)) << "</td><td>"
         << vector_text(other.pose.translation) << "</td><td>"

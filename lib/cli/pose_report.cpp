@@ -101,10 +101,14 @@ Json to_json(const PoseHypothesis& hypothesis) {
 
 Json to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
   const Smoothing& smoothing = step.smoothing;
-  Json entry{{"iteration", step.iteration},         {"descent", step.descent},
-             {"loss", step.loss},                   {"sigma", number(smoothing.sigma)},
-             {"gamma", number(smoothing.gamma)},    {"samples", smoothing.samples},
-             {"width", step.width},                 {"height", step.height},
+  Json entry{{"iteration", step.iteration},
+             {"descent", step.descent},
+             {"loss", step.loss},
+             {"sigma", number(smoothing.sigma)},
+             {"gamma", number(smoothing.gamma)},
+             {"samples", smoothing.samples},
+             {"width", step.width},
+             {"height", step.height},
              {"hypotheses", step.hypotheses}};
   if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
   return entry;
@@ -115,8 +119,9 @@ Json covariance_to_json(const std::vector<double>& covariance) {
   const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
   Json rows = Json::array();
   for (std::size_t i = 0; i < size; ++i) {
-    rows.push_back(Json(std::vector<double>(covariance.begin() + static_cast<std::ptrdiff_t>(i * size),
-                                            covariance.begin() + static_cast<std::ptrdiff_t>((i + 1) * size))));
+    rows.push_back(
+        Json(std::vector<double>(covariance.begin() + static_cast<std::ptrdiff_t>(i * size),
+                                 covariance.begin() + static_cast<std::ptrdiff_t>((i + 1) * size))));
   }
   return rows;
 }
@@ -127,8 +132,8 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);
   return [progress, iterations](const PoseIteration& step) {
     char text[96];
-    std::snprintf(text, sizeof text, "descent %u  %dx%d  %u poses  loss %.4e  sigma %.1e", step.descent + 1, step.width,
-                  step.height, step.hypotheses, step.loss, number(step.smoothing.sigma));
+    std::snprintf(text, sizeof text, "descent %u  %dx%d  %u poses  loss %.4e  sigma %.1e", step.descent + 1,
+                  step.width, step.height, step.hypotheses, step.loss, number(step.smoothing.sigma));
     progress->update(step.iteration % iterations + 1, text);
     return true;
   };

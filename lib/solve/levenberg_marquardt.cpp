@@ -78,7 +78,8 @@ void judge(Trial& trial, const Hypothesis& hypothesis, const NormalEquations& eq
 
 }  // namespace
 
-bool damped_step(const NormalEquations& equations, std::size_t parameters, double damping, PoseSpace::Step& step) {
+bool damped_step(const NormalEquations& equations, std::size_t parameters, double damping,
+                 PoseSpace::Step& step) {
   auto factor = equations.hessian;
   for (std::size_t i = 0; i < parameters; ++i) factor[i * parameters + i] *= 1 + damping;
   step = {};
@@ -92,8 +93,9 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
   auto factor = equations.hessian;
   if (!factorize(factor, parameters)) return {};
   // H^-1 from both sides: on the columns of S, then on the columns of the transpose of what comes out.
-  std::vector<double> result(equations.scatter.begin(),
-                             equations.scatter.begin() + static_cast<std::ptrdiff_t>(parameters * parameters));
+  std::vector<double> result(
+      equations.scatter.begin(),
+      equations.scatter.begin() + static_cast<std::ptrdiff_t>(parameters * parameters));
   for (int side = 0; side < 2; ++side) {
     std::vector<double> solved(parameters * parameters);
     for (std::size_t column = 0; column < parameters; ++column) {

@@ -58,7 +58,8 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
   if (options_.solve_focal) require_least_squares(options_, "focal length (pose)");
   std::visit([&](const auto& method) { validate(method, scene_); }, options_.method);
   const double determinant = glm::determinant(glm::dmat3(scene_.meshes.front().transform));
-  require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant, "a value other than 0");
+  require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,
+          "a value other than 0");
 }
 
 Pose PoseSolver::scene_pose() const {

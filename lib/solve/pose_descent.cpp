@@ -124,9 +124,9 @@ struct Found {
   bool stopped = false;  // by the callback
 };
 
-Found descend_from(Objective& objective, const Descent& options, bool with_translation, Pose pose, const Smoothing& start,
-                     unsigned descent, const PoseSolver::Callback& callback,
-                     std::vector<PoseIteration>& history) {
+Found descend_from(Objective& objective, const Descent& options, bool with_translation, Pose pose,
+                   const Smoothing& start, unsigned descent, const PoseSolver::Callback& callback,
+                   std::vector<PoseIteration>& history) {
   Optimizer optimizer(options.optimizer);
   Schedule schedule(options, start);
   Found best{pose, start};
@@ -136,8 +136,8 @@ Found descend_from(Objective& objective, const Descent& options, bool with_trans
     const Smoothing& smoothing = best.smoothing;
     const double loss = objective.evaluate(pose, i);
     if (i == 0 || loss < best_loss) std::tie(best.pose, best_loss) = std::tie(pose, loss);
-    history.push_back({static_cast<unsigned>(history.size()), descent, loss, smoothing,
-                       objective.width(), objective.height(), 1, pose});
+    history.push_back({static_cast<unsigned>(history.size()), descent, loss, smoothing, objective.width(),
+                       objective.height(), 1, pose});
     if (callback && !callback(history.back())) {
       best.stopped = true;
       break;

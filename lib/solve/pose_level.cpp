@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
-// Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the residual
-// does not see; a shorter one would drown in rounding.
+// Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the
+// residual does not see; a shorter one would drown in rounding.
 constexpr double k_difference = 0.3;
 
 constexpr float k_channels = 3;
@@ -24,8 +24,8 @@ int scaled(int size, int short_side, int shorter) {
   return std::max(1, static_cast<int>(std::lround(static_cast<double>(size) * shorter / short_side)));
 }
 
-/// The solver's own member of the family: the expected rigid image, edges blurred by a fixed part of a pixel, depths
-/// by the same length in the world.
+/// The solver's own member of the family: the expected rigid image, edges blurred by a fixed part of a pixel,
+/// depths by the same length in the world.
 Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, double blur_pixels) {
   const double blur_ndc = blur_pixels * 2 / std::min(scene.width, scene.height);
   const double blur_world = blur_ndc * space.radius() / space.radius_ndc();
@@ -49,8 +49,8 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, int short_side, fl
 
 }  // namespace
 
-PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
-                     const PoseSpace& space, int short_side, float blur)
+PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
+                     const LeastSquares& options, const PoseSpace& space, int short_side, float blur)
     : space_(space), scene_(level_scene(scene, space, short_side, blur)), renderer_(device) {
   renderer_.set_scene(scene_);
   for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
@@ -91,7 +91,8 @@ std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
 }
 
 std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hypotheses) {
-  const PoseSpace::Step step = space_.step_lengths(k_difference * static_cast<double>(scene_.smoothing.sigma));
+  const PoseSpace::Step step =
+      space_.step_lengths(k_difference * static_cast<double>(scene_.smoothing.sigma));
   std::vector<View> views;
   for (const Hypothesis& hypothesis : hypotheses) {
     views.push_back(space_.view(hypothesis, scene_.camera));
@@ -103,9 +104,8 @@ std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hy
   }
   std::vector<NormalEquations> result(hypotheses.size());
   const std::size_t together = space_.size() + 1;
-  render(views, together, [&](std::size_t i, const cl_float4* images) {
-    accumulate(images, step, result[i / together]);
-  });
+  render(views, together,
+         [&](std::size_t i, const cl_float4* images) { accumulate(images, step, result[i / together]); });
   return result;
 }
 
@@ -122,7 +122,8 @@ double PoseLevel::loss(const cl_float4* image) const {
   return sum / (static_cast<double>(k_channels) * weight_);
 }
 
-void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step, NormalEquations& result) const {
+void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
+                           NormalEquations& result) const {
   const std::size_t n = space_.size(), pixels = target_.size();
   std::array<float, PoseSpace::k_most_parameters> inverse_step{};
   for (std::size_t k = 0; k < n; ++k) inverse_step[k] = static_cast<float>(1 / step[k]);
@@ -143,14 +144,15 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
       residual[c] = image.s[c] - target_[i].s[c];
       squared += residual[c] * residual[c];
     }
-    // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is positive.
+    // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is
+    // positive.
     const float slope = 1 / (1 + squared * inverse_scale_squared_);
     const float weight = weights_[i] * slope * slope;
     std::array<double, PoseSpace::k_most_parameters> score{};
     for (std::size_t k = 0; k < n; ++k) {
       const cl_float4& a = jacobian[k];
-      score[k] = static_cast<double>(weight *
-                                     (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+      score[k] =
+          static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
       result.gradient[k] += score[k];
       for (std::size_t l = 0; l <= k; ++l) {
         const cl_float4& b = jacobian[l];

@@ -1,4 +1,5 @@
-// One level of the pose solver's pyramid: renders hypotheses at its resolution and compares them with the target.
+// One level of the pose solver's pyramid: renders hypotheses at its resolution and compares them with the
+// target.
 #pragma once
 
 #include <CL/opencl.hpp>
@@ -16,9 +17,9 @@ namespace dpr {
 /// The loss about a hypothesis to second order, by Gauss and Newton.
 struct NormalEquations {
   double loss = 0;
-  PoseSpace::Step gradient{};      ///< of half the loss
-  PoseSpace::Matrix hessian{};     ///< of half the loss
-  PoseSpace::Matrix scatter{};     ///< sum over pixels of the outer products of what each adds to the gradient
+  PoseSpace::Step gradient{};   ///< of half the loss
+  PoseSpace::Matrix hessian{};  ///< of half the loss
+  PoseSpace::Matrix scatter{};  ///< sum over pixels of the outer products of what each adds to the gradient
 };
 
 class PoseLevel {
@@ -26,7 +27,6 @@ class PoseLevel {
   /// `short_side`: in pixels, of its images; `blur`: of the edges, in those pixels.
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
             const PoseSpace& space, int short_side, float blur);
-
 
   /// The mean squared error over colour channels and pixels, or its robust version, of every hypothesis.
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);

@@ -14,12 +14,13 @@
 namespace dpr {
 namespace {
 
-// How many hypotheses are turned at the coarsest level and at each one after it; the last number holds for all further.
+// How many hypotheses are turned at the coarsest level and at each one after it; the last number holds for
+// all further.
 constexpr std::array<std::size_t, 4> k_beam{96, 24, 12, 8};
 // Hypotheses that move the object's rim by less than this against each other are one.
 constexpr double k_same_pixels = 0.5;
-// Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the pixels' grid
-// makes that much of one pose or its symmetric twin.
+// Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the
+// pixels' grid makes that much of one pose or its symmetric twin.
 constexpr double k_equal_losses = 1e-3;
 
 // Losses beyond this multiple of the best one are given up before the next level.
@@ -135,9 +136,10 @@ void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
 
 bool Fit::report(const PoseLevel& level) {
   const Candidate& best = *std::ranges::min_element(candidates_, by_loss);
-  result_.history.push_back({static_cast<unsigned>(result_.history.size()), 0, best.equations.loss, level.smoothing(),
-                             level.width(), level.height(), static_cast<unsigned>(candidates_.size()),
-                             best.hypothesis.pose, best.hypothesis.focal_scale});
+  result_.history.push_back({static_cast<unsigned>(result_.history.size()), 0, best.equations.loss,
+                             level.smoothing(), level.width(), level.height(),
+                             static_cast<unsigned>(candidates_.size()), best.hypothesis.pose,
+                             best.hypothesis.focal_scale});
   return !callback_ || callback_(result_.history.back());
 }
 
@@ -157,7 +159,8 @@ void Fit::choose_equals(double wrong, bool anywhere) {
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > enough; });
   if (!anywhere) {
     const Hypothesis first{initial_.front()};
-    std::ranges::stable_sort(candidates_, {}, [&](const Candidate& c) { return space_.distance(c.hypothesis, first); });
+    std::ranges::stable_sort(candidates_, {},
+                             [&](const Candidate& c) { return space_.distance(c.hypothesis, first); });
   }
   for (const auto& [hypothesis, equations] : candidates_) {
     result_.equals.push_back({hypothesis.pose, hypothesis.focal_scale, equations.loss});
@@ -183,7 +186,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
   require(options.rotations <= k_most_rotations, "rotations (pose)", options.rotations, "at most 2^24");
   require(options.coarsest > 0, "coarsest (pose)", options.coarsest, "at least 1");
   require(options.iterations > 0, "iterations (pose)", options.iterations, "at least 1");
-  require(options.blur > 0 && std::isfinite(options.blur), "blur (pose)", options.blur, "a finite number above 0");
+  require(options.blur > 0 && std::isfinite(options.blur), "blur (pose)", options.blur,
+          "a finite number above 0");
   require(options.blur_end > 0 && std::isfinite(options.blur_end), "blur_end (pose)", options.blur_end,
           "a finite number above 0");
   require(options.robust >= 0 && std::isfinite(options.robust), "robust (pose)", options.robust,
@@ -191,7 +195,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
   const Image& mask = options.mask;
   if (mask.pixels.empty()) return;
   if (mask.width != scene.width || mask.height != scene.height) {
-    throw InvalidArgument("size of the mask (pose)", std::to_string(mask.width) + "x" + std::to_string(mask.height),
+    throw InvalidArgument("size of the mask (pose)",
+                          std::to_string(mask.width) + "x" + std::to_string(mask.height),
                           std::to_string(scene.width) + "x" + std::to_string(scene.height) + ", the scene's");
   }
   double sum = 0;

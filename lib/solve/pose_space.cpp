@@ -20,7 +20,8 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, bool translation, 
       focal_(focal),
       size_(k_translation + (translation ? 3 : 0) + (focal ? 1 : 0)) {
   const glm::dmat4 view(scene.camera.view);
-  camera_axes_ = glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
+  camera_axes_ =
+      glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
   double squared_radius = 0;
   for (const glm::vec3& p : scene.meshes.front().mesh.positions) {
     const glm::dvec3 q = stretch_ * glm::dvec3(p);
@@ -28,7 +29,8 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, bool translation, 
   }
   radius_ = std::sqrt(std::max(squared_radius, 1e-30));
   // An object about or behind the camera still needs units to move in.
-  distance_ = std::max(-(view * glm::dvec4(initial.translation, 1.0)).z, static_cast<double>(scene.camera.znear));
+  distance_ =
+      std::max(-(view * glm::dvec4(initial.translation, 1.0)).z, static_cast<double>(scene.camera.znear));
   const glm::vec2 scale = projection(scene.camera, scene.width, scene.height).scale;
   radius_ndc_ = radius_ / distance_ * static_cast<double>(std::max(scale.x, scale.y));
 }

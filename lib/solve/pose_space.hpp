@@ -16,8 +16,8 @@ struct Hypothesis {
   double focal_scale = 1;
 };
 
-/// Steps in the tangent space at a hypothesis: a rotation vector on the left (radians); then, if asked for, the
-/// translation along the camera's axes; then, if asked for, the logarithm of the focal length.
+/// Steps in the tangent space at a hypothesis: a rotation vector on the left (radians); then, if asked for,
+/// the translation along the camera's axes; then, if asked for, the logarithm of the focal length.
 class PoseSpace {
  public:
   static constexpr std::size_t k_most_parameters = 7;
@@ -39,8 +39,10 @@ class PoseSpace {
   /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
   std::vector<double> to_world(std::span<const double> covariance) const;
 
-  double radius() const { return radius_; }      ///< of the object about its origin, world
-  double distance() const { return distance_; }  ///< of the object's origin from the camera, along its view direction
+  double radius() const { return radius_; }  ///< of the object about its origin, world
+  double distance() const {
+    return distance_;
+  }  ///< of the object's origin from the camera, along its view direction
   double radius_ndc() const { return radius_ndc_; }
 
  private:

@@ -7,8 +7,8 @@
 
 namespace dpr {
 
-/// `count` rotations, any number: super-Fibonacci spirals, Alexa 2022, Super-Fibonacci Spirals: Fast, Low-Discrepancy
-/// Sampling of SO(3). Without randomness.
+/// `count` rotations, any number: super-Fibonacci spirals, Alexa 2022, Super-Fibonacci Spirals: Fast,
+/// Low-Discrepancy Sampling of SO(3). Without randomness.
 std::vector<glm::dmat3> rotation_grid(std::size_t count);
 
 }  // namespace dpr

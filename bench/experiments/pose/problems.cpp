@@ -1,5 +1,5 @@
 // Pose problems from seeds.
-#include "experiments/pose_problems.hpp"
+#include "experiments/pose/problems.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +48,8 @@ class Random {
 
 /// What a mesh without colours shows of itself.
 void color_by_position(Mesh& mesh) {
-  for (const glm::vec3& p : mesh.positions) mesh.vertex_colors.push_back(glm::clamp(0.5F + 0.4F * p, 0.0F, 1.0F));
+  for (const glm::vec3& p : mesh.positions)
+    mesh.vertex_colors.push_back(glm::clamp(0.5F + 0.4F * p, 0.0F, 1.0F));
 }
 
 /// Moves the bounding box's centre to the origin and makes the rim as far away as the cube's corners.
@@ -109,7 +110,8 @@ void occlude(Image& image, const Image& rigid, double part, Random& random) {
 }
 
 nlohmann::ordered_json to_json(const Pose& pose) {
-  return {{"rotation_matrix", cli::rows_to_json(pose.rotation)}, {"translation", cli::to_json(pose.translation)}};
+  return {{"rotation_matrix", cli::rows_to_json(pose.rotation)},
+          {"translation", cli::to_json(pose.translation)}};
 }
 
 Pose pose_from_json(const nlohmann::json& json) {
@@ -133,9 +135,10 @@ std::vector<PoseProblem> make_pose_problems(const PoseProblemSet& set, std::size
     problem.seed = set.seed ^ (i << 32);
     problem.truth.rotation = random.rotation();
     const glm::dvec3 axis = random.direction(), aside = random.direction();
-    problem.initial.rotation = set.initial_degrees > 0
-                                   ? rotation_from_vector(glm::radians(set.initial_degrees) * axis) * problem.truth.rotation
-                                   : random.rotation();
+    problem.initial.rotation =
+        set.initial_degrees > 0
+            ? rotation_from_vector(glm::radians(set.initial_degrees) * axis) * problem.truth.rotation
+            : random.rotation();
     problem.initial.translation = set.translation_error * k_pose_camera_distance * aside;
     problems.push_back(problem);
   }
@@ -190,15 +193,20 @@ double differing_pixels(const Image& a, const Image& b) {
 }
 
 nlohmann::ordered_json to_json(const PoseProblemSet& set) {
-  return {{"object", set.object},     {"initial_degrees", set.initial_degrees}, {"translation_error", set.translation_error},
-          {"occluded", set.occluded}, {"clutter", set.clutter},                 {"seed", set.seed}};
+  return {{"object", set.object},
+          {"initial_degrees", set.initial_degrees},
+          {"translation_error", set.translation_error},
+          {"occluded", set.occluded},
+          {"clutter", set.clutter},
+          {"seed", set.seed}};
 }
 
 void write_pose_problems(const std::filesystem::path& file, const PoseProblemSet& set,
                          const std::vector<PoseProblem>& problems) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const PoseProblem& problem : problems) {
-    list.push_back({{"seed", problem.seed}, {"truth", to_json(problem.truth)}, {"initial", to_json(problem.initial)}});
+    list.push_back(
+        {{"seed", problem.seed}, {"truth", to_json(problem.truth)}, {"initial", to_json(problem.initial)}});
   }
   cli::write_json(file, {{"set", to_json(set)}, {"problems", list}});
 }
