@@ -144,7 +144,8 @@ Found descend_from(Objective& objective, const Descent& options, bool with_trans
     }
     const SceneGradient gradient = objective.gradient();
     descend(pose, optimizer, gradient.views.front().transforms.front(), with_translation);
-    if (schedule.update(i, gradient.gamma, best.smoothing, optimizer)) {
+    const bool is_last = i + 1 == options.iterations;  // no level without an iteration
+    if (!is_last && schedule.update(i, gradient.gamma, best.smoothing, optimizer)) {
       objective.set_smoothing(best.smoothing);
       best_loss = objective.evaluate(best.pose, i);  // its loss so far is of another level
     }

@@ -23,8 +23,9 @@ constexpr double k_same_pixels = 0.5;
 // pixels' grid makes that much of one pose or its symmetric twin.
 constexpr double k_equal_losses = 1e-3;
 
-// Losses beyond this multiple of the best one are given up before the next level.
-constexpr double k_hopeless = 3;
+// Hypotheses are given up before the next level where their loss is beyond this multiple of the best one and,
+// besides, this part of what a wrong pose leaves: the best may fit its pixels by luck.
+constexpr double k_hopeless_ratio = 3, k_hopeless_part = 0.02;
 
 bool by_loss(const Candidate& a, const Candidate& b) { return a.equations.loss < b.equations.loss; }
 
@@ -66,7 +67,7 @@ class Fit {
   bool work(PoseLevel& level, std::size_t keep, bool goes_on);
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void finish(PoseLevel& level, bool anywhere);
-  void choose_equals(double wrong, bool anywhere);
+  void choose_equals(bool anywhere);
   double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
 
@@ -79,6 +80,7 @@ class Fit {
   std::vector<Pose> initial_;
   PoseSpace space_;
   std::vector<Candidate> candidates_;
+  double wrong_ = 0;  // loss of a pose that explains nothing, at the coarsest or the finest level
   PoseResult result_;
 };
 
@@ -99,6 +101,7 @@ PoseResult Fit::run(bool anywhere) {
 
 /// The initial poses, and the best of the grid.
 void Fit::start(PoseLevel& level) {
+  wrong_ = wrong_loss(level);
   std::vector<Hypothesis> grid;
   for (const glm::dmat3& rotation : rotation_grid(method_.rotations)) {
     grid.push_back({{rotation, initial_.front().translation}});
@@ -130,7 +133,7 @@ void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
     if (!is_known && kept.size() < count) kept.push_back(candidate);
   }
   candidates_ = std::move(kept);
-  const double hopeless = k_hopeless * candidates_.front().equations.loss;
+  const double hopeless = k_hopeless_ratio * candidates_.front().equations.loss + k_hopeless_part * wrong_;
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > hopeless; });
 }
 
@@ -144,18 +147,18 @@ bool Fit::report(const PoseLevel& level) {
 }
 
 void Fit::finish(PoseLevel& level, bool anywhere) {
-  const double wrong = wrong_loss(level);
-  choose_equals(wrong, anywhere);
+  wrong_ = wrong_loss(level);
+  choose_equals(anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = covariance(candidates_.front().equations, space_.size());
   if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
-  result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong;
+  result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong_;
 }
 
 /// The poses that explain the target as well as the best, the one to return first.
-void Fit::choose_equals(double wrong, bool anywhere) {
+void Fit::choose_equals(bool anywhere) {
   const double best = candidates_.front().equations.loss;
-  const double enough = best + k_equal_losses * std::max(wrong - best, 0.0);
+  const double enough = best + k_equal_losses * std::max(wrong_ - best, 0.0);
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > enough; });
   if (!anywhere) {
     const Hypothesis first{initial_.front()};
@@ -172,7 +175,7 @@ double Fit::wrong_loss(PoseLevel& level) const {
   constexpr std::size_t k_enough = 31;  // the finest level's renders are dear
   std::vector<Hypothesis> poses;
   for (const glm::dmat3& rotation : rotation_grid(k_enough)) {
-    poses.push_back({{rotation, candidates_.front().hypothesis.pose.translation}});
+    poses.push_back({{rotation, initial_.front().translation}});
   }
   std::vector<double> losses = level.losses(poses);
   std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
