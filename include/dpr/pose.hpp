@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <glm/glm.hpp>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -28,63 +29,110 @@ glm::dvec3 vector_from_rotation(const glm::dmat3& rotation);
 /// The angle between two rotations, degrees, in [0, 180].
 double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
 
-struct PoseOptions {
+/// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
+/// difference between render and target, with Jacobians from differences of images rendered in the same
+/// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
+/// composition with a blur that follows the pixels; the scene's is not used.
+struct LeastSquares {
+  /// Rotations tried at the coarsest level, spread evenly over all; 0: only the poses that solve() is given.
+  unsigned rotations = 1152;
+  unsigned coarsest =
+      16;  ///< > 0: pixels on the short side of the coarsest level, which doubles up to the scene's
+  unsigned iterations = 10;  ///< > 0: at most, a level
+  float blur = 0.25F;        ///< > 0: of the edges, in pixels of the level
+  float blur_end = 0.1F;     ///< > 0: the same at the very end
+  /// Scale of a Geman-McClure loss r^2 / (1 + (r / scale)^2) of a pixel's colour difference r, for clutter
+  /// and occlusion: what differs by more hardly counts. 0: squares.
+  float robust = 0;
+  /// Weight of every pixel, in [0, 1], in its first channel; of the target's size. Empty: 1.
+  Image mask;
+};
+
+/// One hypothesis, by an optimizer on the exact gradients of the scene's own smoothing.
+struct Descent {
   unsigned iterations = 200;
   OptimizerOptions optimizer;
   /// How the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has
   /// it.
   std::variant<AnnealSchedule, AdaptiveSchedule> schedule;
   LossWeights loss = LossWeights::only(LossKind::mse);
-  bool solve_translation = false;
   /// Further descents, each from a rotation turned away from the initial one, as long as the target is not
-  /// explained: as long as the loss is above that part of the initial pose's loss, both under the finest
-  /// smoothing reached.
+  /// explained.
   unsigned restarts = 6;
-  float explained = 0.1F;  ///< in (0, 1)
 };
 
-/// One iteration: the pose it evaluated, and under which smoothing.
+struct PoseOptions {
+  std::variant<LeastSquares, Descent> method;
+  bool solve_translation = false;
+  bool solve_focal = false;  ///< a factor on the camera's focal length too; LeastSquares only
+  /// In (0, 1): the target counts as explained once the loss is below that part of what a wrong pose leaves:
+  /// in descents the initial one, in least squares the median over rotations; both at the finest level.
+  float explained = 0.1F;
+};
+
+/// One iteration: the pose it evaluated, and how.
 struct PoseIteration {
-  unsigned iteration = 0;  ///< counted through all descents
+  unsigned iteration = 0;  ///< counted through all descents or levels
   unsigned descent = 0;    ///< 0, or the number of the restart
-  double loss = 0;
-  float sigma = 0, gamma = 0;
-  std::uint32_t samples = 0;
-  Pose pose;
+  double loss = 0;  ///< of the best hypothesis; comparable between iterations of one size and smoothing
+  Smoothing smoothing;
+  int width = 0, height = 0;  ///< of the images compared
+  unsigned hypotheses = 1;    ///< that were turned together
+  Pose pose;                  ///< of the best
+  double focal_scale = 1;     ///< of the best
 };
 
-struct PoseResult {
-  /// The best of the last smoothing level of the best descent; losses of different levels are never compared.
+/// A pose that was found, and how well it explains the target.
+struct PoseHypothesis {
   Pose pose;
-  double loss = 0;          ///< at the finest level
-  unsigned iterations = 0;  ///< of all descents
+  double focal_scale = 1;  ///< factor on the scene's focal length
+  double loss = 0;         ///< at the finest level
+};
+
+struct PoseResult : PoseHypothesis {
+  Pose start;  ///< the (first) initial pose; in a search the scene's
+  /// All poses that explain the target as well, this one first: more than one where the object's symmetry, or
+  /// what is hidden of it, leaves them open. LeastSquares only.
+  std::vector<PoseHypothesis> equals;
+  /// Row-major covariance of a small motion: rotation vector on the left (world axes, radians), then, if
+  /// solved for, the translation (world), then, if solved for, the logarithm of the focal length. From the
+  /// final Hessian and the residuals at edges, as if pixels erred independently: it knows nothing of errors
+  /// of the scene or of another valley. Empty where the image leaves a parameter open. LeastSquares only.
+  std::vector<double> covariance;
+  unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose
-  bool explained = false;   ///< the loss fell below PoseOptions::explained of the initial pose's
+  bool explained = false;   ///< see PoseOptions::explained
   double seconds = 0;
   std::vector<PoseIteration> history;
 };
 
-/// Finds the pose of the scene's only mesh by gradient descent on the loss between render and target.
+/// Finds the pose of the scene's only mesh from one image.
 class PoseSolver {
  public:
   /// Called once an iteration; false stops the solver, which then returns the best so far.
   using Callback = std::function<bool(const PoseIteration&)>;
 
-  /// Throws InvalidArgument if the scene has not exactly one mesh, its transform is singular, or the target's
-  /// size differs from the scene's.
+  /// Throws InvalidArgument if the scene has not exactly one mesh, its transform is singular, the sizes of
+  /// target or mask differ from the scene's, or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;
+  /// Of one descent, or through all levels: how often the callback may be called at most.
+  unsigned most_iterations() const;
+  /// From an initial pose. Of poses that explain the target equally well, the nearest to it is the result.
   /// Throws InvalidArgument if the initial rotation is none.
   PoseResult solve(const Pose& initial, const Callback& callback = {}) const;
+  /// From several initial poses at once (at least one). LeastSquares only.
+  PoseResult solve(std::span<const Pose> initial, const Callback& callback = {}) const;
+  /// From an unknown rotation; the translation starts from the scene's. LeastSquares with rotations only.
+  PoseResult search(const Callback& callback = {}) const;
 
  private:
   Device device_;
   Scene scene_;
   Image target_;
   PoseOptions options_;
-  glm::dmat3 stretch_;  ///< what is left of the transform's linear part without its rotation
 };
 
 }  // namespace dpr

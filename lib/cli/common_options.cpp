@@ -1,6 +1,7 @@
 // The options that the commands share, and how they change a scene.
 #include "cli/common_options.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "cli/text.hpp"
@@ -10,9 +11,8 @@ namespace dpr::cli {
 namespace {
 
 void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
-  const std::string group = "Smoothing (each replaces the scene's value)";
   const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
-    command.add_option(name, value, description)->group(group)->type_name(type);
+    command.add_option(name, value, description)->group(k_smoothing_group)->type_name(type);
   };
   const char* const priors = "gaussian|cauchy|logistic|gumbel|uniform";
   const char* const estimators = "exact|monte_carlo";
@@ -91,6 +91,12 @@ void resize(Scene& scene, glm::ivec2 size) {
 }
 
 }  // namespace
+
+bool gives_any(const CLI::App& command, const std::string& group) {
+  return std::ranges::any_of(command.get_options(), [&](const CLI::Option* option) {
+    return option->get_group() == group && option->count() > 0;
+  });
+}
 
 void add_output_options(CLI::App& command, CommonOptions& options) {
   auto* quiet = command.add_flag("--quiet", options.quiet, "Print errors only");

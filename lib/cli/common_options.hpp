@@ -28,6 +28,11 @@ struct CommonOptions {
   bool verbose = false, quiet = false;
 };
 
+/// The help group of the smoothing's flags.
+inline constexpr const char* k_smoothing_group = "Smoothing (each replaces the scene's value)";
+/// Whether the command line gave any option of a help group.
+bool gives_any(const CLI::App& command, const std::string& group);
+
 /// --verbose and --quiet.
 void add_output_options(CLI::App& command, CommonOptions& options);
 /// Those, and all that a command that renders understands.

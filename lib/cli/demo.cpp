@@ -46,19 +46,20 @@ glm::dvec3 random_axis(std::uint64_t seed) {
   }
 }
 
-void run(const std::string& folder, const CommonOptions& common) {
+void run(const CLI::App& command, const std::string& folder, const CommonOptions& common) {
   make_folder(folder);
   Scene scene = cube_scene();
   apply(common, scene);
   const Device device = open_device(common);
   const Image target = render_rigidly(device, scene);
-  const PoseOptions options;
+  PoseOptions options;
+  if (gives_any(command, k_smoothing_group)) options.method = Descent{};  // least squares brings its own
   const PoseSolver solver(device, scene, target, options);
   const Pose truth = solver.scene_pose();
 
   const glm::dvec3 turn = glm::radians(k_start_degrees) * random_axis(common.seed.value_or(k_axis_seed));
   const Pose start{rotation_from_vector(turn) * truth.rotation, truth.translation};
-  const PoseResult result = solver.solve(start, progress_callback(options.iterations, common.quiet));
+  const PoseResult result = solver.solve(start, progress_callback(solver.most_iterations(), common.quiet));
   write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(result, truth.rotation));
   write_pose_report(folder, device, scene, target, result, common.quiet, truth.rotation);
   if (!common.quiet) {
@@ -79,7 +80,7 @@ void add_demo_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR");
   add_common_options(*command, common);
   command->footer("Example: dpr demo -o demo-output");
-  command->callback([folder, &common] { run(*folder, common); });
+  command->callback([command, folder, &common] { run(*command, *folder, common); });
 }
 
 }  // namespace dpr::cli

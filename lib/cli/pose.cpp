@@ -12,10 +12,18 @@
 namespace dpr::cli {
 namespace {
 
+const char* const k_least_squares_group = "Least squares (--method least_squares, the default)";
+const char* const k_descent_group =
+    "Descent (--method descent; any of these, or of the smoothing's, implies it)";
+
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
-                                               report;
+  std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal",
+                                                     output, report;
+  std::optional<std::string> method;
+  bool search = false;
   PoseOptions solver;
+  LeastSquares least_squares;
+  Descent descent;
 };
 
 OptimizerKind parse_optimizer(const std::string& word) {
@@ -30,7 +38,56 @@ std::variant<AnnealSchedule, AdaptiveSchedule> parse_schedule(const std::string&
   throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
 }
 
-void run(PoseCommandOptions& options, const CommonOptions& common) {
+/// The method that is asked for, by name or by an option that only one of them has.
+bool wants_descent(const CLI::App& command, const std::optional<std::string>& method) {
+  const bool descends = gives_any(command, k_descent_group) || gives_any(command, k_smoothing_group);
+  if (!method) return descends;
+  if (*method != "least_squares" && *method != "descent") {
+    throw InvalidArgument("--method (command line)", "\"" + *method + "\"", "least_squares or descent");
+  }
+  if (*method == "least_squares" && descends) {
+    throw InvalidArgument("--method (command line)", "least_squares with an option of the descent's",
+                          "--method descent, or none of its options");
+  }
+  return *method == "descent";
+}
+
+void choose_method(const CLI::App& command, PoseCommandOptions& options) {
+  if (!wants_descent(command, options.method)) {
+    if (!options.mask.empty()) options.least_squares.mask = read_image(options.mask);
+    options.solver.method = options.least_squares;
+    return;
+  }
+  if (options.search || gives_any(command, k_least_squares_group)) {
+    throw InvalidArgument("--method (command line)", "descent with an option of least squares'",
+                          "options of one method");
+  }
+  options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
+  options.descent.optimizer.kind = parse_optimizer(options.optimizer);
+  options.descent.schedule = parse_schedule(options.schedule);
+  options.solver.method = options.descent;
+}
+
+PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rotation, bool search,
+                 bool quiet) {
+  const PoseSolver::Callback callback = progress_callback(solver.most_iterations(), quiet);
+  if (search) return solver.search(callback);
+  Pose initial = solver.scene_pose();
+  if (rotation) initial.rotation = *rotation;
+  return solver.solve(initial, callback);
+}
+
+void print(const std::string& file, const PoseResult& result) {
+  std::printf("%s: loss %.6g after %u iterations, %.1f s\n", file.c_str(), result.loss, result.iterations,
+              result.seconds);
+  if (result.equals.size() > 1) {
+    std::printf("%zu poses explain the target equally well; all are in the file.\n", result.equals.size());
+  }
+  if (!result.explained)
+    std::printf("The target is not explained: the loss stayed near that of a wrong pose.\n");
+}
+
+void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // What can be wrong about the output is found out before the work, not after it.
   { const TemporaryFile writable(options.output); }
   if (!options.report.empty()) make_folder(options.report);
@@ -39,50 +96,55 @@ void run(PoseCommandOptions& options, const CommonOptions& common) {
     rotation =
         rotation_from_vector(parse_vector(options.initial_rotation, "--initial-rotation (command line)"));
   }
+  choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
   const Image target = read_image(options.target);
-  options.solver.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
-  options.solver.optimizer.kind = parse_optimizer(options.optimizer);
-  options.solver.schedule = parse_schedule(options.schedule);
-
   const Device device = open_device(common);
   const PoseSolver solver(device, scene, target, options.solver);
-  Pose initial = solver.scene_pose();
-  if (rotation) initial.rotation = *rotation;
-  const PoseResult result = solver.solve(initial, progress_callback(options.solver.iterations, common.quiet));
+  const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   write_json(options.output, pose_to_json(result));
   if (!options.report.empty()) write_pose_report(options.report, device, scene, target, result, common.quiet);
-  if (!common.quiet) {
-    std::printf("%s: %s loss %.6g after %u iterations, %.1f s\n", options.output.c_str(),
-                options.loss.c_str(), result.loss, result.iterations, result.seconds);
-    if (!result.explained) {
-      std::printf("The target is not explained: the loss stayed above %g of the initial pose's.\n",
-                  options.solver.explained);
-    }
-  }
+  if (!common.quiet) print(options.output, result);
 }
 
-void add_solver_options(CLI::App& command, PoseCommandOptions& options) {
-  PoseOptions& solver = options.solver;
-  command.add_flag("--translation", solver.solve_translation, "Look for the translation too");
-  command.add_option("--loss", options.loss, "What is made small; mse by default")
-      ->type_name("mse|l1|silhouette");
-  command.add_option("--iterations", solver.iterations, "How many steps; 200 by default")->type_name("N");
+void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
+  LeastSquares& method = options.least_squares;
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    return command.add_option(name, value, description)->group(k_least_squares_group)->type_name(type);
+  };
+  add("--rotations", method.rotations,
+      "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
+  add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
+  add("--level-iterations", method.iterations, "How many steps a level at most; 10 by default", "N");
+  add("--blur", method.blur, "Of the edges, in pixels of the level; 0.25 by default", "FLOAT");
+  add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
+  add("--robust", method.robust,
+      "For clutter and occlusion: colour difference beyond which a pixel hardly counts, such as 0.1; 0 "
+      "(default): all "
+      "count",
+      "FLOAT");
+  add("--mask", options.mask, "Image whose first channel is the weight of every pixel, in [0, 1]",
+      "MASK.png");
   command
-      .add_option("--restarts", solver.restarts,
-                  "Further descents while the target is not explained; 6 by default")
-      ->type_name("N");
-  command.add_option("--optimizer", options.optimizer, "How steps are made; adam by default")
-      ->type_name("adam|sgd");
-  command
-      .add_option("--schedule", options.schedule,
-                  "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive "
-                  "schedule; anneal by default")
-      ->type_name("anneal|adaptive");
-  command
-      .add_option("--learning-rate", solver.optimizer.learning_rate,
-                  "Size of the first steps; 0.05 by default")
-      ->type_name("FLOAT");
+      .add_flag("--focal", options.solver.solve_focal, "Look for a factor on the camera's focal length too")
+      ->group(k_least_squares_group);
+}
+
+void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
+  Descent& method = options.descent;
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    return command.add_option(name, value, description)->group(k_descent_group)->type_name(type);
+  };
+  add("--loss", options.loss, "What is made small; mse by default", "mse|l1|silhouette");
+  add("--iterations", method.iterations, "How many steps; 200 by default", "N");
+  add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
+  add("--optimizer", options.optimizer, "How steps are made; adam by default", "adam|sgd");
+  add("--schedule", options.schedule,
+      "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
+      "anneal by "
+      "default",
+      "anneal|adaptive");
+  add("--learning-rate", method.optimizer.learning_rate, "Size of the first steps; 0.05 by default", "FLOAT");
 }
 
 }  // namespace
@@ -95,18 +157,27 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
   command->add_option("--target", options->target, "Image that shows the pose")
       ->required()
       ->type_name("T.exr");
-  command
-      ->add_option("--initial-rotation", options->initial_rotation,
-                   "Rotation vector of the object-to-world rotation to start from, in radians (default: the "
-                   "rotation of the scene's transform)")
-      ->type_name("RX,RY,RZ");
+  CLI::Option* initial =
+      command
+          ->add_option(
+              "--initial-rotation", options->initial_rotation,
+              "Rotation vector of the object-to-world rotation to start from, in radians (default: the "
+              "rotation of the scene's transform); of poses that explain the target equally well the "
+              "nearest to it is the result")
+          ->type_name("RX,RY,RZ");
+  command->add_flag("--search", options->search, "Nothing is known of the rotation")->excludes(initial);
+  command->add_flag("--translation", options->solver.solve_translation, "Look for the translation too");
+  command->add_option("--method", options->method, "How the pose is found; least_squares by default")
+      ->type_name("least_squares|descent");
   command->add_option("-o,--output", options->output, "Pose to write")->required()->type_name("P.json");
-  command->add_option("--report", options->report, "Folder for pictures and plots")->type_name("DIR");
-  add_solver_options(*command, *options);
+  command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")
+      ->type_name("DIR");
+  add_least_squares_options(*command, *options);
+  add_descent_options(*command, *options);
   add_common_options(*command, common);
   command->footer(
-      "Example: dpr pose --scene scene.json --target target.exr --initial-rotation 0.5,0,0 -o pose.json");
-  command->callback([options, &common] { run(*options, common); });
+      "Example: dpr pose --scene scene.json --target target.exr --search -o pose.json --report report");
+  command->callback([command, options, &common] { run(*command, *options, common); });
 }
 
 }  // namespace dpr::cli

@@ -2,15 +2,18 @@
 #include "cli/pose_report.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <memory>
 
 #include "cli/plot.hpp"
+#include "cli/pose_page.hpp"
 #include "cli/progress.hpp"
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -23,11 +26,13 @@ class PoseCamera {
   PoseCamera(const Device& device, Scene scene)
       : renderer_(device),
         stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+        camera_(scene.camera),
         view_{scene.camera, {glm::mat4(1.0F)}} {
     renderer_.set_scene(scene);
   }
 
-  Image render(const Pose& pose, const Smoothing& smoothing) {
+  Image render(const Pose& pose, double focal_scale, const Smoothing& smoothing) {
+    view_.camera = zoomed(camera_, focal_scale);
     view_.transforms.front() = affine(pose.rotation * stretch_, pose.translation);
     renderer_.set_views({&view_, 1});
     renderer_.set_smoothing(smoothing);
@@ -38,6 +43,7 @@ class PoseCamera {
  private:
   Renderer renderer_;
   glm::dmat3 stretch_;
+  Camera camera_;
   View view_;
 };
 
@@ -54,7 +60,7 @@ Image difference(const Image& a, const Image& b) {
 }
 
 /// Iterations of the descent that found the pose, at equal distances, first and last among them.
-Image strip(PoseCamera& camera, const Smoothing& base, const PoseResult& result) {
+Image strip(PoseCamera& camera, const PoseResult& result) {
   std::vector<PoseIteration> history;
   std::ranges::copy_if(result.history, std::back_inserter(history),
                        [&](const PoseIteration& step) { return step.descent == result.descent; });
@@ -63,32 +69,61 @@ Image strip(PoseCamera& camera, const Smoothing& base, const PoseResult& result)
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t last = history.size() - 1;
     const PoseIteration& step = history[count > 1 ? i * last / (count - 1) : last];
-    Smoothing smoothing = base;
-    if (smoothing.blur_radius) *smoothing.blur_radius *= step.sigma / base.sigma;
-    smoothing.sigma = step.sigma;
-    smoothing.gamma = step.gamma;
-    smoothing.samples = step.samples;
-    images.push_back(opaque(camera.render(step.pose, smoothing)));
+    images.push_back(opaque(camera.render(step.pose, step.focal_scale, step.smoothing)));
   }
   return hstack(images);
 }
 
 bool plot_history(const std::filesystem::path& file, const std::vector<PoseIteration>& history,
-                  const std::optional<glm::dmat3>& truth) {
+                  const glm::dmat3& start, const std::optional<glm::dmat3>& truth) {
   constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
   std::vector<double> x;
   Curve loss{"loss", {}}, angle{"angle", {}}, sigma{"sigma", {}}, gamma{"gamma", {}};
   for (const PoseIteration& step : history) {
     x.push_back(step.iteration);
     loss.y.push_back(std::max(step.loss, k_smallest));
-    sigma.y.push_back(number(step.sigma));
-    gamma.y.push_back(number(step.gamma));
+    sigma.y.push_back(number(step.smoothing.sigma));
+    gamma.y.push_back(number(step.smoothing.gamma));
     angle.y.push_back(truth ? angle_degrees(step.pose.rotation, *truth)
-                            : angle_degrees(step.pose.rotation, history.front().pose.rotation));
+                            : angle_degrees(step.pose.rotation, start));
   }
   const char* const angle_label = truth ? "degrees from the truth" : "degrees from the start";
   return plot(file, "iteration", x,
               {{"loss", true, {loss}}, {angle_label, false, {angle}}, {"smoothing", true, {sigma, gamma}}});
+}
+
+Json to_json(const PoseHypothesis& hypothesis) {
+  return {{"rotation_matrix", rows_to_json(hypothesis.pose.rotation)},
+          {"translation", cli::to_json(hypothesis.pose.translation)},
+          {"focal_scale", hypothesis.focal_scale},
+          {"loss", hypothesis.loss}};
+}
+
+Json to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
+  const Smoothing& smoothing = step.smoothing;
+  Json entry{{"iteration", step.iteration},
+             {"descent", step.descent},
+             {"loss", step.loss},
+             {"sigma", number(smoothing.sigma)},
+             {"gamma", number(smoothing.gamma)},
+             {"samples", smoothing.samples},
+             {"width", step.width},
+             {"height", step.height},
+             {"hypotheses", step.hypotheses}};
+  if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
+  return entry;
+}
+
+/// A list of rows.
+Json covariance_to_json(const std::vector<double>& covariance) {
+  const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < size; ++i) {
+    rows.push_back(
+        Json(std::vector<double>(covariance.begin() + static_cast<std::ptrdiff_t>(i * size),
+                                 covariance.begin() + static_cast<std::ptrdiff_t>((i + 1) * size))));
+  }
+  return rows;
 }
 
 }  // namespace
@@ -97,32 +132,27 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);
   return [progress, iterations](const PoseIteration& step) {
     char text[96];
-    std::snprintf(text, sizeof text, "descent %u  loss %.4e  sigma %.1e  gamma %.1e", step.descent + 1,
-                  step.loss, number(step.sigma), number(step.gamma));
+    std::snprintf(text, sizeof text, "descent %u  %dx%d  %u poses  loss %.4e  sigma %.1e", step.descent + 1,
+                  step.width, step.height, step.hypotheses, step.loss, number(step.smoothing.sigma));
     progress->update(step.iteration % iterations + 1, text);
     return true;
   };
 }
 
 Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth) {
-  Json json;
-  json["rotation_matrix"] = rows_to_json(result.pose.rotation);
-  json["translation"] = to_json(result.pose.translation);
-  json["loss"] = result.loss;
+  Json json = to_json(result);
   json["explained"] = result.explained;
   json["iterations"] = result.iterations;
   json["seconds"] = result.seconds;
   if (truth) {
-    json["angle_error_degrees"] = {{"start", angle_degrees(result.history.front().pose.rotation, *truth)},
+    json["angle_error_degrees"] = {{"start", angle_degrees(result.start.rotation, *truth)},
                                    {"end", angle_degrees(result.pose.rotation, *truth)}};
   }
+  json["covariance"] = covariance_to_json(result.covariance);
+  Json& equals = json["hypotheses"] = Json::array();
+  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis));
   Json& history = json["history"] = Json::array();
-  for (const PoseIteration& step : result.history) {
-    Json entry{{"iteration", step.iteration}, {"descent", step.descent},     {"loss", step.loss},
-               {"sigma", number(step.sigma)}, {"gamma", number(step.gamma)}, {"samples", step.samples}};
-    if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
-    history.push_back(entry);
-  }
+  for (const PoseIteration& step : result.history) history.push_back(to_json(step, truth));
   return json;
 }
 
@@ -131,15 +161,15 @@ void write_pose_report(const std::filesystem::path& folder, const Device& device
                        const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
   PoseCamera camera(device, scene);
-  const Image end = camera.render(result.pose, rigid_smoothing());
+  const Image end = camera.render(result.pose, result.focal_scale, rigid_smoothing());
   write_image(folder / "target.png", opaque(target));
-  write_image(folder / "start.png", opaque(camera.render(result.history.front().pose, rigid_smoothing())));
+  write_image(folder / "start.png", opaque(camera.render(result.start, 1, rigid_smoothing())));
   write_image(folder / "end.png", opaque(end));
   write_image(folder / "difference.png", opaque(difference(end, target)));
-  write_image(folder / "iterations.png", strip(camera, scene.smoothing, result));
-  if (!plot_history(folder / "plot.png", result.history, truth) && !quiet) {
-    std::printf("plot.png is left out: gnuplot is not installed\n");
-  }
+  write_image(folder / "iterations.png", strip(camera, result));
+  const bool is_plotted = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
+  if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
+  write_pose_page(folder / "index.html", result, is_plotted, truth);
 }
 
 void make_folder(const std::filesystem::path& folder) {

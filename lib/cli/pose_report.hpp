@@ -10,14 +10,16 @@
 
 namespace dpr::cli {
 
-/// A callback for the solver that shows how far it is. It must not outlive the returned object's copies.
+/// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
+/// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 
 /// pose.json. With the true rotation, the angle errors too.
 Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
 
-/// Writes target, start, end, difference, iterations and plot (all PNG) into a folder, which is made if need
-/// be. Start and end are rendered rigidly, the iterations as the solver saw them. Throws IoError.
+/// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
+/// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
+/// them. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const Device& device, const Scene& scene,
                        const Image& target, const PoseResult& result, bool quiet,
                        const std::optional<glm::dmat3>& truth = {});

@@ -1,24 +1,30 @@
-// The pose solver on the coloured cube, and what it refuses.
+// The pose solver on the coloured cube: both methods, and what it refuses.
 #include "dpr/pose.hpp"
 
 #include <doctest/doctest.h>
 
-#include <cstdlib>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
+#include <utility>
 
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
+#include "support/reduced.hpp"
 
 namespace {
 
-bool reduced() { return std::getenv("DPR_TEST_REDUCED") != nullptr; }
+using dpr::test::is_reduced;
+using dpr::test::reduced;
 
 dpr::Scene cube_scene(int size) {
   dpr::Scene scene;
   scene.width = scene.height = size;
   scene.camera = dpr::orbit_camera(6.7F, 30, 120);
   scene.meshes.push_back({dpr::make_cube(), glm::mat4(1.0F)});
+  scene.smoothing = dpr::smoothing_preset("joint_gaussian");
   return scene;
 }
 
@@ -32,89 +38,244 @@ dpr::Image rigid_target(const dpr::Device& device, dpr::Scene scene) {
 
 const glm::dvec3 k_axis = glm::normalize(glm::dvec3(1, 2, -1));
 
-dpr::Pose turned(double degrees) { return {dpr::rotation_from_vector(glm::radians(degrees) * k_axis), {}}; }
+dpr::Pose turned(double degrees, const glm::dvec3& axis = k_axis) {
+  return {dpr::rotation_from_vector(glm::radians(degrees) * axis), {}};
+}
 
-dpr::PoseOptions options(unsigned iterations) {
-  dpr::PoseOptions result;
-  result.iterations = iterations;
-  if (reduced()) result.restarts = 0;
-  return result;
+dpr::LeastSquares least_squares() {
+  dpr::LeastSquares method;
+  if (is_reduced()) method.rotations = 4, method.iterations = 1, method.coarsest = 16;
+  return method;
+}
+
+dpr::PoseOptions descent(unsigned iterations) {
+  dpr::Descent method;
+  method.iterations = iterations;
+  if (is_reduced()) method.restarts = 0;
+  return {.method = method};
+}
+
+double error_degrees(const dpr::PoseResult& result, const dpr::Pose& truth = {}) {
+  return dpr::angle_degrees(result.pose.rotation, truth.rotation);
 }
 
 }  // namespace
 
 TEST_SUITE("pipeline") {
-  TEST_CASE("from 30 degrees the cube's rotation is found") {
+  TEST_CASE("least squares: the cube's rotation is found from afar, and its error is known") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced() ? 16 : 64);
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options(reduced() ? 3 : 200));
-    const dpr::PoseResult result = solver.solve(turned(30));
-    if (!reduced()) CHECK(result.explained);  // losses of different smoothing do not compare
+    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = least_squares()});
+    unsigned calls = 0;
+    const dpr::PoseResult result = solver.solve(turned(110), [&](const dpr::PoseIteration& step) {
+      CHECK(step.iteration == calls);
+      ++calls;
+      return true;
+    });
+    CHECK(result.iterations == calls);
     CHECK(result.iterations == result.history.size());
+    CHECK(result.iterations <= solver.most_iterations());
+    CHECK(result.history.back().width == scene.width);
+    CHECK(dpr::angle_degrees(result.start.rotation, turned(110).rotation) < 1e-6);
     CHECK(result.seconds > 0);
-    const double error = dpr::angle_degrees(result.pose.rotation, glm::dmat3(1.0));
-    CHECK(error < (reduced() ? 30.0 : 3.0));
+    if (is_reduced()) return;
+    CHECK(error_degrees(result) < 0.5);
+    CHECK(result.explained);
+    CHECK(result.equals.size() == 1);
+    REQUIRE(result.covariance.size() == 9);
+    const double deviation = std::sqrt(result.covariance[0] + result.covariance[4] + result.covariance[8]);
+    CHECK(glm::degrees(deviation) > 0.01);
+    CHECK(error_degrees(result) < 4 * glm::degrees(deviation));
   }
 
-  TEST_CASE("the translation is found too, and the scale of the transform is kept apart") {
+  TEST_CASE("least squares: nothing needs to be known of the rotation") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(reduced() ? 16 : 64);
+    dpr::Scene scene = cube_scene(reduced(64, 16));
+    for (const double degrees : {70.0, 140.0}) {
+      if (is_reduced() && degrees > 100) break;
+      scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(degrees).rotation));
+      const dpr::Image target = rigid_target(device, scene);
+      scene.meshes.front().transform = glm::mat4(1.0F);
+      const dpr::PoseResult result =
+          dpr::PoseSolver(device, scene, target, {.method = least_squares()}).search();
+      if (is_reduced()) break;
+      CHECK(error_degrees(result, turned(degrees)) < 0.5);
+      CHECK(result.explained);
+    }
+  }
+
+  TEST_CASE("least squares: translation and scale") {
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(reduced(64, 16));
     glm::mat4& transform = scene.meshes.front().transform;
     transform = glm::translate(glm::mat4(1.0F), glm::vec3(0.3F, -0.2F, 0.1F)) *
                 glm::rotate(glm::mat4(1.0F), 0.4F, glm::vec3(k_axis)) *
                 glm::scale(glm::mat4(1.0F), glm::vec3(0.8F));
-    // Sizes must tell distances: this composition neither swells nor cuts its skirt off at the blur radius.
-    scene.smoothing = dpr::smoothing_preset("joint_gaussian");
-    dpr::PoseOptions with_translation = options(reduced() ? 3 : 400);
-    with_translation.solve_translation = true;
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), with_translation);
-
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene),
+                                 {.method = least_squares(), .solve_translation = true});
     const dpr::Pose truth = solver.scene_pose();
     CHECK(dpr::angle_degrees(truth.rotation, dpr::rotation_from_vector(0.4 * k_axis)) < 1e-4);
     CHECK(glm::length(truth.translation - glm::dvec3(0.3, -0.2, 0.1)) < 1e-6);
 
     dpr::Pose start = truth;
-    start.rotation = turned(15).rotation * start.rotation;
-    start.translation += glm::dvec3(-0.1, 0.1, 0.1);
+    start.rotation = turned(50).rotation * start.rotation;
+    start.translation += glm::dvec3(-0.4, 0.3, 0.3);  // 9% of the distance
     const dpr::PoseResult result = solver.solve(start);
-    if (reduced()) return;
+    if (is_reduced()) return;
     CHECK(result.explained);
-    CHECK(dpr::angle_degrees(result.pose.rotation, truth.rotation) < 3);
-    CHECK(glm::length(result.pose.translation - truth.translation) < 0.15);  // 2% of the distance
+    CHECK(error_degrees(result, truth) < 1);
+    CHECK(glm::length(result.pose.translation - truth.translation) < 0.05);
+    REQUIRE(result.covariance.size() == 36);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double deviation = std::sqrt(result.covariance[static_cast<std::size_t>(7 * (axis + 3))]);
+      CHECK(std::abs(result.pose.translation[axis] - truth.translation[axis]) < 5 * deviation);
+    }
   }
 
-  TEST_CASE("the best pose is the best of the last smoothing level") {
+  TEST_CASE("least squares: the focal length") {
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Image target = rigid_target(device, scene);
+    scene.camera.fov_y_degrees = 66;
+    const dpr::PoseSolver solver(device, scene, target, {.method = least_squares(), .solve_focal = true});
+    const dpr::PoseResult result = solver.solve(turned(30));
+    if (is_reduced()) return;
+    CHECK(error_degrees(result) < 1);
+    const double expected = std::tan(glm::radians(33.0)) / std::tan(glm::radians(30.0));
+    CHECK(result.focal_scale == doctest::Approx(expected).epsilon(0.01));
+  }
+
+  TEST_CASE("least squares: all poses that give the image are told, the nearest one first") {
+    if (is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(64);
+    scene.camera = dpr::orbit_camera(6.7F, 4, 5);  // sees one side alone: four rotations show the same
+    const glm::dvec3 normal(0, 0, 1);
+    const double first = 11;  // no edge along the pixels' grid
+    scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(first, normal).rotation));
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene));
+    for (const double degrees : {0.0, 90.0, 180.0, 270.0}) {
+      const dpr::PoseResult result = solver.solve(turned(first + degrees + 20, normal));
+      CHECK(result.equals.size() == 4);
+      CHECK(error_degrees(result, turned(first + degrees, normal)) < 2);
+      for (const double other : {0.0, 90.0, 180.0, 270.0}) {
+        CHECK(std::ranges::any_of(result.equals, [&](const dpr::PoseHypothesis& found) {
+          return dpr::angle_degrees(found.pose.rotation, turned(first + other, normal).rotation) < 2;
+        }));
+      }
+    }
+  }
+
+  TEST_CASE("least squares: a hidden part misleads unless it is masked or the loss is robust") {
+    const dpr::Device device = dpr::open_device();
+    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::Image target = rigid_target(device, scene);
+    dpr::Image mask(scene.width, scene.height, glm::vec4(1));
+    for (int row = 0; row < scene.height; ++row) {
+      for (int column = scene.width * 9 / 16; column < scene.width; ++column) {
+        target.at(column, row) = glm::vec4(0.9F, 0.1F, 0.8F, 1);
+        mask.at(column, row) = glm::vec4(0);
+      }
+    }
+    const auto error = [&](const dpr::LeastSquares& method) {
+      return error_degrees(dpr::PoseSolver(device, scene, target, {.method = method}).solve(turned(40)));
+    };
+    dpr::LeastSquares masked = least_squares(), robust = least_squares();
+    masked.mask = mask;
+    robust.robust = 0.1F;
+    const std::array errors{error(least_squares()), error(masked), error(robust)};
+    if (is_reduced()) return;
+    CHECK(errors[0] > 5);
+    CHECK(errors[1] < 1);
+    CHECK(errors[2] < 3);
+  }
+
+  TEST_CASE("least squares: several initial poses and no others") {
+    const dpr::Device device = dpr::open_device();
+    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::LeastSquares local = least_squares();
+    local.rotations = 0;
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = local});
+    const std::array<dpr::Pose, 2> poses{turned(150), turned(15)};
+    const dpr::PoseResult result = solver.solve(poses);
+    CHECK(result.history.front().hypotheses == 2);
+    CHECK_THROWS_AS(solver.search(), dpr::InvalidArgument);
+    if (is_reduced()) return;
+    CHECK(error_degrees(result) < 0.5);
+    CHECK(error_degrees(solver.solve(turned(150))) > 30);  // one valley, and that a wrong one
+  }
+
+  TEST_CASE("descent: from 30 degrees the cube's rotation is found") {
+    const dpr::Device device = dpr::open_device();
+    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), descent(is_reduced() ? 3 : 200));
+    const dpr::PoseResult result = solver.solve(turned(30));
+    if (!is_reduced()) CHECK(result.explained);  // losses of different smoothing do not compare
+    CHECK(result.iterations == result.history.size());
+    CHECK(result.seconds > 0);
+    CHECK(error_degrees(result) < (is_reduced() ? 30.0 : 3.0));
+  }
+
+  TEST_CASE("descent: the translation is found too") {
+    const dpr::Device device = dpr::open_device();
+    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::PoseOptions options = descent(is_reduced() ? 3 : 400);
+    options.solve_translation = true;
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options);
+    dpr::Pose start = turned(15);
+    start.translation = glm::dvec3(-0.1, 0.1, 0.1);
+    const dpr::PoseResult result = solver.solve(start);
+    if (is_reduced()) return;
+    CHECK(result.explained);
+    CHECK(error_degrees(result) < 3);
+    CHECK(glm::length(result.pose.translation) < 0.15);  // 2% of the distance
+  }
+
+  TEST_CASE("descent: the best pose is the best of the last smoothing level") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(16);
-    dpr::PoseOptions eager = options(reduced() ? 4 : 30);
-    eager.schedule = dpr::AdaptiveSchedule{.start = 1, .interval = 1};
-    eager.restarts = 0;
+    dpr::PoseOptions eager = descent(is_reduced() ? 4 : 30);
+    std::get<dpr::Descent>(eager.method).schedule = dpr::AdaptiveSchedule{.start = 1, .interval = 1};
+    std::get<dpr::Descent>(eager.method).restarts = 0;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), eager);
     const dpr::PoseResult result = solver.solve(turned(20));
     for (const dpr::PoseIteration& step : result.history) {
-      if (step.sigma == result.history.back().sigma) CHECK(result.loss <= step.loss);
+      if (step.smoothing.sigma == result.history.back().smoothing.sigma) CHECK(result.loss <= step.loss);
     }
   }
 
   TEST_CASE("a callback that returns false stops the solver at once") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(16);
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options(10));
-    const dpr::PoseResult result =
-        solver.solve(turned(20), [](const dpr::PoseIteration& step) { return step.iteration < 2; });
-    CHECK(result.iterations == 3);
-    CHECK(result.history.front().sigma == scene.smoothing.sigma);
-    CHECK(dpr::angle_degrees(result.history.front().pose.rotation, turned(20).rotation) < 1e-9);
+    const dpr::Image target = rigid_target(device, scene);
+    const auto stop = [](const dpr::PoseIteration& step) { return step.iteration < 1; };
+    const dpr::PoseResult descended =
+        dpr::PoseSolver(device, scene, target, descent(10)).solve(turned(20), stop);
+    CHECK(descended.iterations == 2);
+    CHECK(descended.history.front().smoothing.sigma == scene.smoothing.sigma);
+    CHECK(dpr::angle_degrees(descended.history.front().pose.rotation, turned(20).rotation) < 1e-9);
+
+    dpr::LeastSquares method = least_squares();
+    method.rotations = 4;
+    const dpr::PoseResult fitted =
+        dpr::PoseSolver(device, scene, target, {.method = method}).solve(turned(20), stop);
+    CHECK(fitted.iterations == 2);
+    CHECK(std::isfinite(fitted.loss));
   }
 
   TEST_CASE("a solver's answer is the same every time") {
     const dpr::Device device = dpr::open_device();
     dpr::Scene scene = cube_scene(16);
+    const dpr::Image target = rigid_target(device, scene);
     scene.smoothing = dpr::smoothing_preset("paper_gaussian");
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options(4));
-    const dpr::PoseResult first = solver.solve(turned(20)), second = solver.solve(turned(20));
-    CHECK(first.loss == second.loss);
-    CHECK(first.pose.rotation == second.pose.rotation);
+    dpr::LeastSquares method = least_squares();
+    method.rotations = 16;
+    for (const dpr::PoseOptions& options : {descent(4), dpr::PoseOptions{.method = method}}) {
+      const dpr::PoseSolver solver(device, scene, target, options);
+      const dpr::PoseResult first = solver.solve(turned(20)), second = solver.solve(turned(20));
+      CHECK(first.loss == second.loss);
+      CHECK(first.pose.rotation == second.pose.rotation);
+    }
   }
 }
 
@@ -127,8 +288,20 @@ TEST_SUITE("robustness") {
                              const dpr::PoseOptions& wanted) {
       CHECK_THROWS_AS(dpr::PoseSolver(device, scene, image, wanted), dpr::InvalidArgument);
     };
+    const auto refuses_descent = [&](auto change) {
+      dpr::Descent method;
+      change(method);
+      refuses(good, target, {.method = method});
+    };
+    const auto refuses_least_squares = [&](auto change) {
+      dpr::LeastSquares method;
+      change(method);
+      refuses(good, target, {.method = method});
+    };
+    const float nan = std::numeric_limits<float>::quiet_NaN();
 
     refuses(good, dpr::Image(16, 17), {});
+    refuses(good, dpr::Image(16, 16, glm::vec4(nan)), {});
     dpr::Scene scene = good;
     scene.meshes.push_back(scene.meshes.front());
     refuses(scene, target, {});
@@ -137,27 +310,49 @@ TEST_SUITE("robustness") {
     scene = good;
     scene.meshes.front().transform[1] = glm::vec4(0);
     refuses(scene, target, {});
+    refuses(good, target, {.method = dpr::LeastSquares{}, .explained = 1});
+    refuses(good, target, {.method = dpr::Descent{}, .solve_focal = true});
 
-    refuses(good, target, options(0));
-    dpr::PoseOptions wrong;
-    wrong.optimizer.learning_rate = -1;
-    refuses(good, target, wrong);
-    wrong = {};
-    wrong.schedule = dpr::AdaptiveSchedule{.interval = 0};
-    refuses(good, target, wrong);
-    wrong = {};
-    wrong.schedule = dpr::AnnealSchedule{.levels = 0};
-    refuses(good, target, wrong);
-    wrong = {};
-    wrong.explained = 1;
-    refuses(good, target, wrong);
+    refuses_descent([](dpr::Descent& d) { d.iterations = 0; });
+    refuses_descent([](dpr::Descent& d) { d.optimizer.learning_rate = -1; });
+    refuses_descent([](dpr::Descent& d) { d.schedule = dpr::AdaptiveSchedule{.interval = 0}; });
+    refuses_descent([](dpr::Descent& d) { d.schedule = dpr::AnnealSchedule{.levels = 0}; });
+
+    refuses_least_squares([](dpr::LeastSquares& m) { m.rotations = 1U << 25; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.coarsest = 0; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.iterations = 0; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.blur = 0; });
+    refuses_least_squares([&](dpr::LeastSquares& m) { m.blur_end = nan; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.robust = -1; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 17, glm::vec4(1)); });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 16, glm::vec4(0)); });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 16, glm::vec4(2)); });
   }
 
-  TEST_CASE("an initial rotation that is none is refused") {
-    const dpr::PoseSolver solver(dpr::open_device(), cube_scene(16), dpr::Image(16, 16));
-    CHECK_THROWS_AS(solver.solve({glm::dmat3(2.0), {}}), dpr::InvalidArgument);
-    CHECK_THROWS_AS(solver.solve({glm::dmat3(-1.0), {}}), dpr::InvalidArgument);
-    const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THROWS_AS(solver.solve({glm::dmat3(nan), {}}), dpr::InvalidArgument);
+  TEST_CASE("an initial rotation that is none is refused, and so is a search by descent") {
+    const dpr::Device device = dpr::open_device();
+    for (const dpr::PoseOptions& options : {dpr::PoseOptions{}, descent(1)}) {
+      const dpr::PoseSolver solver(device, cube_scene(16), dpr::Image(16, 16), options);
+      CHECK_THROWS_AS(solver.solve({glm::dmat3(2.0), {}}), dpr::InvalidArgument);
+      CHECK_THROWS_AS(solver.solve({glm::dmat3(-1.0), {}}), dpr::InvalidArgument);
+      const double nan = std::numeric_limits<double>::quiet_NaN();
+      CHECK_THROWS_AS(solver.solve({glm::dmat3(nan), {}}), dpr::InvalidArgument);
+      CHECK_THROWS_AS(solver.solve(std::span<const dpr::Pose>()), dpr::InvalidArgument);
+    }
+    const dpr::PoseSolver descending(device, cube_scene(16), dpr::Image(16, 16), descent(1));
+    CHECK_THROWS_AS(descending.search(), dpr::InvalidArgument);
+  }
+
+  TEST_CASE("an image of nothing has an answer: finite, not explained, nothing known of its error") {
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(16);
+    scene.meshes.front().transform[3] = glm::vec4(0, 100, 0, 1);  // out of sight
+    dpr::LeastSquares method = least_squares();
+    method.rotations = 4;
+    const dpr::PoseResult result =
+        dpr::PoseSolver(device, scene, dpr::Image(16, 16, glm::vec4(0.5F)), {.method = method}).search();
+    CHECK(std::isfinite(result.loss));
+    CHECK_FALSE(result.explained);
+    CHECK(result.covariance.empty());
   }
 }

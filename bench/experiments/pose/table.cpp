@@ -1,0 +1,152 @@
+// Rows of a pose experiment.
+#include "experiments/pose/table.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <fstream>
+
+#include "cli/progress.hpp"
+#include "dpr/error.hpp"
+#include "experiments/pose/methods.hpp"
+
+namespace dpr::bench {
+namespace {
+
+using cli::Json;
+
+constexpr int k_schema = 1;
+constexpr double k_same_image = 1e-3;  // part of the pixels: below it, two poses show the same
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values.empty() ? 0 : values[values.size() / 2];
+}
+
+std::vector<double> column(const Json& rows, const char* name) {
+  std::vector<double> values;
+  for (const Json& row : rows) values.push_back(row.at(name).get<double>());
+  return values;
+}
+
+template <typename Condition>
+double part(const Json& rows, const Condition& condition) {
+  if (rows.empty()) return 0;
+  const auto count = std::ranges::count_if(rows, condition);
+  return static_cast<double>(count) / static_cast<double>(rows.size());
+}
+
+Json summary(const Json& rows) {
+  const auto below = [&](double degrees) {
+    return part(rows, [&](const Json& row) { return row.at("end_degrees") < degrees; });
+  };
+  const std::vector<double> angles = column(rows, "end_degrees");
+  double sum = 0;
+  for (const double angle : angles) sum += angle;
+  const auto same = [](const Json& row) {
+    return row.at("end_degrees") < 10 || row.at("differing_pixels") < k_same_image;
+  };
+  const auto in_space = [](const Json& row) {
+    return row.at("end_degrees") < 5 && row.at("end_translation") < 0.02;
+  };
+  return {{"problems", rows.size()},
+          {"below_10_degrees", below(10)},
+          {"below_10_degrees_or_same_image", part(rows, same)},
+          {"below_5_degrees", below(5)},
+          {"below_5_degrees_and_2_percent", part(rows, in_space)},
+          {"below_2_degrees", below(2)},
+          {"average_degrees", angles.empty() ? 0.0 : sum / static_cast<double>(angles.size())},
+          {"median_degrees", median(angles)},
+          {"median_seconds", median(column(rows, "seconds"))},
+          {"median_cpu_seconds", median(column(rows, "cpu_seconds"))}};
+}
+
+/// One problem solved.
+Json solve_row(const Device& device, const Scene& scene, RigidCamera& camera, const PoseRun& run,
+               std::size_t index) {
+  const PoseProblem& problem = run.problems[index];
+  const Image target = make_target(camera, run.set, problem);
+  const std::clock_t start = std::clock();
+  const PoseResult result = solve_problem(run.method, device, scene, run.set, problem, target, run.smoke);
+  const double cpu_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  double nearest = angle_degrees(result.pose.rotation, problem.truth.rotation);
+  const double end = nearest;
+  for (const PoseHypothesis& other : result.equals) {
+    nearest = std::min(nearest, angle_degrees(other.pose.rotation, problem.truth.rotation));
+  }
+  return {{"problem", index},
+          {"start_degrees", angle_degrees(problem.initial.rotation, problem.truth.rotation)},
+          {"end_degrees", end},
+          {"end_translation",
+           glm::length(result.pose.translation - problem.truth.translation) / k_pose_camera_distance},
+          {"nearest_equal_degrees", nearest},
+          {"equals", result.equals.size()},
+          {"loss", result.loss},
+          {"explained", result.explained},
+          {"differing_pixels", differing_pixels(camera.render(result.pose), camera.render(problem.truth))},
+          {"iterations", result.iterations},
+          {"seconds", result.seconds},
+          {"cpu_seconds", cpu_seconds}};
+}
+
+Json head(const Device& device, const PoseRun& run) {
+  const DeviceInfo& info = device.info();
+  return {
+      {"schema", k_schema},
+      {"commit", DPR_COMMIT},
+      {"device", {{"platform", info.platform}, {"name", info.name}, {"compute_units", info.compute_units}}},
+      {"method", run.method},
+      {"set", to_json(run.set)},
+      {"size", run.size},
+      {"smoke", run.smoke}};
+}
+
+/// The rows of an earlier run of the same.
+Json earlier_rows(const std::filesystem::path& file, const Json& wanted) {
+  std::ifstream stream(file);
+  if (!stream) return Json::array();
+  try {
+    const Json json = Json::parse(stream);
+    for (const char* key : {"schema", "method", "set", "size", "smoke"}) {
+      if (json.at(key) != wanted.at(key)) {
+        throw InvalidArgument(file.string() + " (pose experiment)", std::string("another ") + key,
+                              "a run of the same, or no file");
+      }
+    }
+    return json.at("rows");
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(file, std::string("no results of a pose experiment: ") + error.what());
+  }
+}
+
+}  // namespace
+
+Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::path& file) {
+  Scene scene = pose_scene(run.set.object);
+  scene.width = scene.height = run.size;
+  RigidCamera camera(device, scene);
+  Json results = head(device, run);
+  Json rows = earlier_rows(file, results);
+  const auto count = static_cast<unsigned>(run.problems.size());
+  cli::Progress progress(count, run.quiet);
+  for (std::size_t i = rows.size(); i < run.problems.size(); ++i) {
+    rows.push_back(solve_row(device, scene, camera, run, i));
+    results["summary"] = summary(rows);
+    results["rows"] = rows;
+    cli::write_json(file, results);
+    char text[64];
+    std::snprintf(text, sizeof text, "%s  %.2f degrees, %.2f s", run.method.c_str(),
+                  rows.back()["end_degrees"].get<double>(), rows.back()["seconds"].get<double>());
+    progress.update(static_cast<unsigned>(i + 1), text);
+  }
+  results["summary"] = summary(rows);
+  results["rows"] = rows;
+  return results;
+}
+
+std::vector<double> final_angles(const Json& results) {
+  std::vector<double> angles = column(results.at("rows"), "end_degrees");
+  std::ranges::sort(angles);
+  return angles;
+}
+
+}  // namespace dpr::bench

@@ -1,0 +1,30 @@
+// Levenberg-Marquardt steps of many hypotheses at once.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "solve/pose_level.hpp"
+
+namespace dpr {
+
+/// A hypothesis at work.
+struct Candidate {
+  Hypothesis hypothesis;
+  NormalEquations equations{};  ///< at the hypothesis, of the level worked on
+};
+
+/// The step -(H + damping diag(H))^-1 g; false where H is not positive definite even so.
+bool damped_step(const NormalEquations& equations, std::size_t parameters, double damping,
+                 PoseSpace::Step& step);
+/// Covariance H^-1 S H^-1 of the parameters, S being the scatter of the pixels' gradients: what White 1980
+/// and Huber 1967 take for residuals of unequal size, as these are: large at edges, nothing elsewhere.
+/// Row-major [parameters]^2; empty where H is not positive definite to rounding.
+std::vector<double> covariance(const NormalEquations& equations, std::size_t parameters);
+
+/// Turns every candidate until it stands still, at most `iterations` times, all in the same launches.
+/// `report` is called after each iteration; false stops. Returns false if it was stopped.
+bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, unsigned iterations,
+            const std::function<bool()>& report);
+
+}  // namespace dpr

@@ -1,0 +1,176 @@
+// Images of hypotheses against the target, and the derivatives of their difference.
+#include "solve/pose_level.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer_impl.hpp"
+#include "solve/resample.hpp"
+
+namespace dpr {
+namespace {
+
+// A batch as large as keeps a device busy; the bounds keep its memory small.
+constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
+constexpr std::size_t k_most_faces = std::size_t{1} << 20;
+
+// Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the
+// residual does not see; a shorter one would drown in rounding.
+constexpr double k_difference = 0.3;
+
+constexpr float k_channels = 3;
+
+int scaled(int size, int short_side, int shorter) {
+  return std::max(1, static_cast<int>(std::lround(static_cast<double>(size) * shorter / short_side)));
+}
+
+/// The solver's own member of the family: the expected rigid image, edges blurred by a fixed part of a pixel,
+/// depths by the same length in the world.
+Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, double blur_pixels) {
+  const double blur_ndc = blur_pixels * 2 / std::min(scene.width, scene.height);
+  const double blur_world = blur_ndc * space.radius() / space.radius_ndc();
+  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  smoothing.distance = DistanceMetric::euclidean;
+  smoothing.sigma = static_cast<float>(blur_ndc);
+  smoothing.gamma = static_cast<float>(blur_world) / (scene.camera.zfar - scene.camera.znear);
+  return smoothing;
+}
+
+Scene level_scene(const Scene& scene, const PoseSpace& space, int short_side, float blur) {
+  const int full = std::min(scene.width, scene.height);
+  Scene result = scene;
+  result.width = scaled(scene.width, full, short_side);
+  result.height = scaled(scene.height, full, short_side);
+  result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
+  result.smoothing = level_smoothing(result, space, static_cast<double>(blur));
+  result.gradients = {false, false, false, false, false, false, false};
+  return result;
+}
+
+}  // namespace
+
+PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
+                     const LeastSquares& options, const PoseSpace& space, int short_side, float blur)
+    : space_(space), scene_(level_scene(scene, space, short_side, blur)), renderer_(device) {
+  renderer_.set_scene(scene_);
+  for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
+    target_.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  weights_.assign(target_.size(), 1.0F);
+  if (!options.mask.pixels.empty()) {
+    const Image mask = resample(options.mask, scene_.width, scene_.height);
+    std::ranges::transform(mask.pixels, weights_.begin(), [](const glm::vec4& p) { return p.x; });
+  }
+  for (const float w : weights_) weight_ += static_cast<double>(w);
+  if (options.robust > 0) inverse_scale_squared_ = 1 / (options.robust * options.robust);
+}
+
+double PoseLevel::pixel_ndc() const { return 2.0 / std::min(scene_.width, scene_.height); }
+
+template <typename Visitor>
+void PoseLevel::render(std::span<const View> views, std::size_t images_together, const Visitor& visit) {
+  const std::size_t pixels = target_.size(), faces = scene_.meshes.front().mesh.faces.size();
+  const std::size_t fitting = std::min(k_most_pixels / pixels, k_most_faces / faces);
+  const std::size_t batch = std::max(fitting / images_together, std::size_t{1}) * images_together;
+  for (std::size_t first = 0; first < views.size(); first += batch) {
+    const auto part = views.subspan(first, std::min(batch, views.size() - first));
+    renderer_.set_views(part);
+    renderer_.forward();
+    images_.resize(part.size() * pixels);
+    renderer_.impl().aggregate.image.download(images_);
+    for (std::size_t i = 0; i < part.size(); i += images_together) visit(first + i, &images_[i * pixels]);
+  }
+}
+
+std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
+  std::vector<View> views;
+  for (const Hypothesis& hypothesis : hypotheses) views.push_back(space_.view(hypothesis, scene_.camera));
+  std::vector<double> result(views.size());
+  render(views, 1, [&](std::size_t i, const cl_float4* image) { result[i] = loss(image); });
+  return result;
+}
+
+std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hypotheses) {
+  const PoseSpace::Step step =
+      space_.step_lengths(k_difference * static_cast<double>(scene_.smoothing.sigma));
+  std::vector<View> views;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    views.push_back(space_.view(hypothesis, scene_.camera));
+    for (std::size_t k = 0; k < space_.size(); ++k) {
+      PoseSpace::Step one{};
+      one[k] = step[k];
+      views.push_back(space_.view(space_.moved(hypothesis, one), scene_.camera));
+    }
+  }
+  std::vector<NormalEquations> result(hypotheses.size());
+  const std::size_t together = space_.size() + 1;
+  render(views, together,
+         [&](std::size_t i, const cl_float4* images) { accumulate(images, step, result[i / together]); });
+  return result;
+}
+
+double PoseLevel::loss(const cl_float4* image) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < target_.size(); ++i) {
+    float squared = 0;
+    for (int c = 0; c < 3; ++c) {
+      const float r = image[i].s[c] - target_[i].s[c];
+      squared += r * r;
+    }
+    sum += static_cast<double>(weights_[i] * squared / (1 + squared * inverse_scale_squared_));
+  }
+  return sum / (static_cast<double>(k_channels) * weight_);
+}
+
+void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
+                           NormalEquations& result) const {
+  const std::size_t n = space_.size(), pixels = target_.size();
+  std::array<float, PoseSpace::k_most_parameters> inverse_step{};
+  for (std::size_t k = 0; k < n; ++k) inverse_step[k] = static_cast<float>(1 / step[k]);
+  std::array<cl_float4, PoseSpace::k_most_parameters> jacobian{};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const cl_float4 image = images[i];
+    bool still = true;  // most pixels show no edge: nothing there depends on the pose
+    for (std::size_t k = 0; k < n; ++k) {
+      const cl_float4 moved = images[(k + 1) * pixels + i];
+      for (int c = 0; c < 3; ++c) {
+        jacobian[k].s[c] = (moved.s[c] - image.s[c]) * inverse_step[k];
+        still = still && moved.s[c] == image.s[c];
+      }
+    }
+    if (still) continue;
+    float residual[3], squared = 0;
+    for (int c = 0; c < 3; ++c) {
+      residual[c] = image.s[c] - target_[i].s[c];
+      squared += residual[c] * residual[c];
+    }
+    // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is
+    // positive.
+    const float slope = 1 / (1 + squared * inverse_scale_squared_);
+    const float weight = weights_[i] * slope * slope;
+    std::array<double, PoseSpace::k_most_parameters> score{};
+    for (std::size_t k = 0; k < n; ++k) {
+      const cl_float4& a = jacobian[k];
+      score[k] =
+          static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+      result.gradient[k] += score[k];
+      for (std::size_t l = 0; l <= k; ++l) {
+        const cl_float4& b = jacobian[l];
+        result.hessian[k * n + l] +=
+            static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
+        result.scatter[k * n + l] += score[k] * score[l];
+      }
+    }
+  }
+  const double scale = 1 / (static_cast<double>(k_channels) * weight_);
+  for (std::size_t k = 0; k < n; ++k) {
+    result.gradient[k] *= scale;
+    for (std::size_t l = 0; l <= k; ++l) {
+      result.hessian[l * n + k] = result.hessian[k * n + l] *= scale;
+      result.scatter[l * n + k] = result.scatter[k * n + l] *= scale * scale;
+    }
+  }
+  result.loss = loss(images);
+}
+
+}  // namespace dpr

@@ -1,0 +1,101 @@
+// Tangent steps of poses.
+#include "solve/pose_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "solve/polar.hpp"
+#include "solve/resample.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_translation = 3;  // where its parameters begin
+
+}  // namespace
+
+PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, bool translation, bool focal)
+    : stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+      translation_(translation),
+      focal_(focal),
+      size_(k_translation + (translation ? 3 : 0) + (focal ? 1 : 0)) {
+  const glm::dmat4 view(scene.camera.view);
+  camera_axes_ =
+      glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
+  double squared_radius = 0;
+  for (const glm::vec3& p : scene.meshes.front().mesh.positions) {
+    const glm::dvec3 q = stretch_ * glm::dvec3(p);
+    squared_radius = std::max(squared_radius, glm::dot(q, q));
+  }
+  radius_ = std::sqrt(std::max(squared_radius, 1e-30));
+  // An object about or behind the camera still needs units to move in.
+  distance_ =
+      std::max(-(view * glm::dvec4(initial.translation, 1.0)).z, static_cast<double>(scene.camera.znear));
+  const glm::vec2 scale = projection(scene.camera, scene.width, scene.height).scale;
+  radius_ndc_ = radius_ / distance_ * static_cast<double>(std::max(scale.x, scale.y));
+}
+
+Hypothesis PoseSpace::moved(const Hypothesis& from, const Step& step) const {
+  Hypothesis result = from;
+  const glm::dmat3 turned = rotation_from_vector({step[0], step[1], step[2]}) * from.pose.rotation;
+  result.pose.rotation = polar_decomposition(turned).rotation;  // keeps rounding errors from adding up
+  if (translation_) {
+    result.pose.translation +=
+        camera_axes_ * glm::dvec3(step[k_translation], step[k_translation + 1], step[k_translation + 2]);
+  }
+  if (focal_) result.focal_scale *= std::exp(step[size_ - 1]);
+  return result;
+}
+
+PoseSpace::Step PoseSpace::step_lengths(double ndc) const {
+  const double fraction = ndc / radius_ndc_;  // of the object's radius
+  Step lengths{};
+  std::fill_n(lengths.begin(), k_translation, fraction);
+  if (translation_) {
+    lengths[k_translation] = lengths[k_translation + 1] = fraction * radius_;
+    lengths[k_translation + 2] = fraction * distance_;  // towards the camera an object only grows
+  }
+  if (focal_) lengths[size_ - 1] = fraction;
+  return lengths;
+}
+
+double PoseSpace::length(const Step& step) const {
+  const Step unit = step_lengths(1);
+  double greatest = 0;
+  for (std::size_t i = 0; i < size_; ++i) greatest = std::max(greatest, std::abs(step[i]) / unit[i]);
+  return greatest;
+}
+
+double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
+  const glm::dvec3 r = vector_from_rotation(b.pose.rotation * glm::transpose(a.pose.rotation));
+  Step step{r.x, r.y, r.z};
+  if (translation_) {
+    const glm::dvec3 t = glm::transpose(camera_axes_) * (b.pose.translation - a.pose.translation);
+    for (int i = 0; i < 3; ++i) step[k_translation + static_cast<std::size_t>(i)] = t[i];
+  }
+  return length(step);
+}
+
+View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
+  return {focal_ ? zoomed(camera, hypothesis.focal_scale) : camera,
+          {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
+}
+
+std::vector<double> PoseSpace::to_world(std::span<const double> covariance) const {
+  std::vector<double> result(covariance.begin(), covariance.end());
+  if (!translation_) return result;
+  // C <- A C A^T, where A turns the translation's block and leaves the rest.
+  const auto turn = [&](auto element) {
+    for (std::size_t other = 0; other < size_; ++other) {
+      glm::dvec3 t;
+      for (int i = 0; i < 3; ++i) t[i] = element(k_translation + static_cast<std::size_t>(i), other);
+      t = camera_axes_ * t;
+      for (int i = 0; i < 3; ++i) element(k_translation + static_cast<std::size_t>(i), other) = t[i];
+    }
+  };
+  turn([&](std::size_t i, std::size_t j) -> double& { return result[i * size_ + j]; });
+  turn([&](std::size_t i, std::size_t j) -> double& { return result[j * size_ + i]; });
+  return result;
+}
+
+}  // namespace dpr

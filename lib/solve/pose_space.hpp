@@ -1,0 +1,55 @@
+// The parameters a pose solver turns, and in which units.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "dpr/pose.hpp"
+#include "dpr/renderer.hpp"
+
+namespace dpr {
+
+/// What is looked for: a pose, and the factor on the camera's focal length.
+struct Hypothesis {
+  Pose pose;
+  double focal_scale = 1;
+};
+
+/// Steps in the tangent space at a hypothesis: a rotation vector on the left (radians); then, if asked for,
+/// the translation along the camera's axes; then, if asked for, the logarithm of the focal length.
+class PoseSpace {
+ public:
+  static constexpr std::size_t k_most_parameters = 7;
+  using Step = std::array<double, k_most_parameters>;
+  using Matrix = std::array<double, k_most_parameters * k_most_parameters>;  ///< [size()][size()], row-major
+
+  /// `initial` tells how far away the object is.
+  PoseSpace(const Scene& scene, const Pose& initial, bool translation, bool focal);
+
+  std::size_t size() const { return size_; }
+  Hypothesis moved(const Hypothesis& from, const Step& step) const;
+  /// How far each parameter goes to move the object's rim by a fraction `ndc` of the image.
+  Step step_lengths(double ndc) const;
+  /// The greatest of the steps' lengths over those that move the rim by 1 NDC.
+  double length(const Step& step) const;
+  /// The same between two hypotheses, rotation and translation counted.
+  double distance(const Hypothesis& a, const Hypothesis& b) const;
+  View view(const Hypothesis& hypothesis, const Camera& camera) const;
+  /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
+  std::vector<double> to_world(std::span<const double> covariance) const;
+
+  double radius() const { return radius_; }  ///< of the object about its origin, world
+  double distance() const {
+    return distance_;
+  }  ///< of the object's origin from the camera, along its view direction
+  double radius_ndc() const { return radius_ndc_; }
+
+ private:
+  glm::dmat3 stretch_, camera_axes_;
+  bool translation_, focal_;
+  std::size_t size_;
+  double radius_, distance_, radius_ndc_;
+};
+
+}  // namespace dpr

@@ -1,0 +1,82 @@
+// Area resampling, one direction after the other.
+#include "solve/resample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace dpr {
+namespace {
+
+struct Tap {
+  int pixel;
+  float weight;
+};
+
+/// The pixels under a new pixel, and how much of it each covers.
+std::vector<Tap> taps(int index, int size, int new_size) {
+  const double scale = static_cast<double>(size) / new_size;
+  const double begin = index * scale, end = (index + 1) * scale;
+  std::vector<Tap> result;
+  for (int i = static_cast<int>(begin); i < size && i < end; ++i) {
+    const double covered = std::min(end, i + 1.0) - std::max(begin, static_cast<double>(i));
+    if (covered > 0) result.push_back({i, static_cast<float>(covered / scale)});
+  }
+  return result;
+}
+
+Image resample_columns(const Image& image, int width) {
+  Image result(width, image.height);
+  for (int column = 0; column < width; ++column) {
+    for (const auto& [source, weight] : taps(column, image.width, width)) {
+      for (int row = 0; row < image.height; ++row) result.at(column, row) += weight * image.at(source, row);
+    }
+  }
+  return result;
+}
+
+Image resample_rows(const Image& image, int height) {
+  Image result(image.width, height);
+  for (int row = 0; row < height; ++row) {
+    for (const auto& [source, weight] : taps(row, image.height, height)) {
+      for (int column = 0; column < image.width; ++column) {
+        result.at(column, row) += weight * image.at(column, source);
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Image resample(const Image& image, int width, int height) {
+  if (width == image.width && height == image.height) return image;
+  return resample_rows(resample_columns(image, width), height);
+}
+
+Camera resample(const Camera& camera, int width, int height, int new_width, int new_height) {
+  if (width == new_width && height == new_height) return camera;
+  // In pixels, whatever the camera was given by: the ratio of the sides may change by rounding.
+  const double focal = 0.5 * height / std::tan(0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees)));
+  Intrinsics k{static_cast<float>(focal), static_cast<float>(focal), 0.5F * static_cast<float>(width),
+               0.5F * static_cast<float>(height)};
+  if (camera.intrinsics) k = *camera.intrinsics;
+  const float x = static_cast<float>(new_width) / static_cast<float>(width);
+  const float y = static_cast<float>(new_height) / static_cast<float>(height);
+  Camera result = camera;
+  result.intrinsics = Intrinsics{k.fx * x, k.fy * y, k.cx * x, k.cy * y};
+  return result;
+}
+
+Camera zoomed(Camera camera, double scale) {
+  if (auto& k = camera.intrinsics) {
+    k->fx *= static_cast<float>(scale);
+    k->fy *= static_cast<float>(scale);
+  } else {
+    const double half_angle = 0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees));
+    camera.fov_y_degrees = static_cast<float>(glm::degrees(2 * std::atan(std::tan(half_angle) / scale)));
+  }
+  return camera;
+}
+
+}  // namespace dpr

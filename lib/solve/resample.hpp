@@ -1,0 +1,18 @@
+// Images and cameras at another resolution.
+#pragma once
+
+#include "dpr/camera.hpp"
+#include "dpr/image.hpp"
+
+namespace dpr {
+
+/// The mean over the area of every new pixel; linear in the image, alpha included. Sizes at least 1.
+Image resample(const Image& image, int width, int height);
+
+/// The camera that sees the same picture in images of another size.
+Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);
+
+/// The camera with another focal length, `scale` times as long.
+Camera zoomed(Camera camera, double scale);
+
+}  // namespace dpr
