@@ -222,6 +222,7 @@ kernel void aggregate_joint_backward(
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;
       grad_blue[k] = weight * grad.z;
+      run.slot[i].grad = i == 0 ? in_front : -1.0f;  // as it was: the next backward pass reads it again
     }
     last -= run.count;
   }

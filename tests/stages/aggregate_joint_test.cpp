@@ -129,6 +129,23 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("exact aggregation: a second backward pass finds the same, bit by bit") {
+    const std::vector<SyntheticPixel> pixels = dpr::test::make_pixels(1e-2F, 12);
+    const std::vector<cl_float4> grad_image = dpr::test::make_grad_image(pixels.size(), 5);
+    for (const dpr::Composition composition : {dpr::Composition::barrier, dpr::Composition::joint}) {
+      Smoothing smoothing = joint(Prior::gaussian, 1e-2F);
+      smoothing.composition = composition;
+      SyntheticFrame frame(pixels);
+      frame.forward(smoothing, dpr::test::k_background);
+      const SyntheticFrame::Gradients first = frame.backward(dpr::test::k_background, grad_image);
+      const SyntheticFrame::Gradients second = frame.backward(dpr::test::k_background, grad_image);
+      CHECK(first.depth == second.depth);
+      CHECK(first.log_occupancy == second.log_occupancy);
+      CHECK(first.red == second.red);
+      CHECK(first.gamma == second.gamma);
+    }
+  }
+
   TEST_CASE("joint aggregation: far apart it is front-to-back compositing, colour and alpha agree") {
     const SyntheticFragment front{2.0F, 0.25F, glm::vec3(1, 0, 0)}, back{50.0F, 0.5F, glm::vec3(0, 1, 0)};
     SyntheticFrame frame({{back, front}, {front}, {}});
