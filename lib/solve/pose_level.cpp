@@ -67,6 +67,25 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   return result;
 }
 
+/// What a pixel adds to gradient, and to the lower triangles of Hessian and scatter.
+void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], float weight,
+               NormalEquations& result) {
+  const std::size_t n = jacobian.size();
+  PoseSpace::Step score{};
+  for (std::size_t k = 0; k < n; ++k) {
+    const cl_float4& a = jacobian[k];
+    score[k] =
+        static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+    result.gradient[k] += score[k];
+    for (std::size_t l = 0; l <= k; ++l) {
+      const cl_float4& b = jacobian[l];
+      result.hessian[k * n + l] +=
+          static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
+      result.scatter[k * n + l] += score[k] * score[l];
+    }
+  }
+}
+
 }  // namespace
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
@@ -167,20 +186,7 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
     // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is
     // positive.
     const float slope = 1 / (1 + squared * inverse_scale_squared_);
-    const float weight = weights_[i] * slope * slope;
-    std::array<double, PoseSpace::k_most_parameters> score{};
-    for (std::size_t k = 0; k < n; ++k) {
-      const cl_float4& a = jacobian[k];
-      score[k] =
-          static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
-      result.gradient[k] += score[k];
-      for (std::size_t l = 0; l <= k; ++l) {
-        const cl_float4& b = jacobian[l];
-        result.hessian[k * n + l] +=
-            static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
-        result.scatter[k * n + l] += score[k] * score[l];
-      }
-    }
+    add_pixel(std::span(jacobian).first(n), residual, weights_[i] * slope * slope, result);
   }
   const double scale = 1 / (static_cast<double>(k_channels) * weight_);
   for (std::size_t k = 0; k < n; ++k) {
