@@ -24,34 +24,73 @@ int scaled(int size, int short_side, int shorter) {
   return std::max(1, static_cast<int>(std::lround(static_cast<double>(size) * shorter / short_side)));
 }
 
-/// The solver's own member of the family: the expected rigid image, edges blurred by a fixed part of a pixel,
-/// depths by the same length in the world.
-Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, double blur_pixels) {
-  const double blur_ndc = blur_pixels * 2 / std::min(scene.width, scene.height);
-  const double blur_world = blur_ndc * space.radius() / space.radius_ndc();
+/// The side of a triangle of mean area, world.
+double mean_side(const Scene& scene, const PoseSpace& space) {
+  const Mesh& mesh = scene.meshes.front().mesh;
+  double area = 0, squared_radius = 0;
+  for (const glm::uvec3& face : mesh.faces) {
+    const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
+    area += glm::length(glm::cross(b - a, c - a)) / 2;
+  }
+  for (const glm::vec3& p : mesh.positions) squared_radius = std::max(squared_radius, double{glm::dot(p, p)});
+  const double scale = squared_radius > 0 ? space.radius() / std::sqrt(squared_radius) : 1;
+  return scale * std::sqrt(2 * area / static_cast<double>(mesh.faces.size()));
+}
+
+/// The solver's own member of the family: the expected rigid image, edges blurred by a part of a pixel,
+/// depths by the same length in the world. Triangles have noise of their own, so those smaller than the blur
+/// would fade: it is no more than a part of their side.
+Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const LeastSquares& options,
+                          float blur) {
+  constexpr double k_of_side = 0.25;
+  const double pixel_ndc = 2.0 / std::min(scene.width, scene.height);
+  const double world_per_ndc = space.radius() / space.radius_ndc();
+  const double side_pixels = mean_side(scene, space) / world_per_ndc / pixel_ndc;
+  const double least = static_cast<double>(std::min(blur, options.blur_end));
+  const double blur_ndc = std::clamp(k_of_side * side_pixels, least, static_cast<double>(blur)) * pixel_ndc;
   Smoothing smoothing = smoothing_preset("joint_gaussian");
   smoothing.distance = DistanceMetric::euclidean;
   smoothing.sigma = static_cast<float>(blur_ndc);
-  smoothing.gamma = static_cast<float>(blur_world) / (scene.camera.zfar - scene.camera.znear);
+  smoothing.gamma = static_cast<float>(blur_ndc * world_per_ndc) / (scene.camera.zfar - scene.camera.znear);
   return smoothing;
 }
 
-Scene level_scene(const Scene& scene, const PoseSpace& space, int short_side, float blur) {
+Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares& options, int short_side,
+                  float blur) {
   const int full = std::min(scene.width, scene.height);
   Scene result = scene;
   result.width = scaled(scene.width, full, short_side);
   result.height = scaled(scene.height, full, short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
-  result.smoothing = level_smoothing(result, space, static_cast<double>(blur));
+  result.smoothing = level_smoothing(result, space, options, blur);
   result.gradients = {false, false, false, false, false, false, false};
   return result;
+}
+
+/// What a pixel adds to gradient, and to the lower triangles of Hessian and scatter.
+void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], float weight,
+               NormalEquations& result) {
+  const std::size_t n = jacobian.size();
+  PoseSpace::Step score{};
+  for (std::size_t k = 0; k < n; ++k) {
+    const cl_float4& a = jacobian[k];
+    score[k] =
+        static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
+    result.gradient[k] += score[k];
+    for (std::size_t l = 0; l <= k; ++l) {
+      const cl_float4& b = jacobian[l];
+      result.hessian[k * n + l] +=
+          static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
+      result.scatter[k * n + l] += score[k] * score[l];
+    }
+  }
 }
 
 }  // namespace
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
                      const LeastSquares& options, const PoseSpace& space, int short_side, float blur)
-    : space_(space), scene_(level_scene(scene, space, short_side, blur)), renderer_(device) {
+    : space_(space), scene_(level_scene(scene, space, options, short_side, blur)), renderer_(device) {
   renderer_.set_scene(scene_);
   for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
     target_.push_back({{p.x, p.y, p.z, p.w}});
@@ -147,20 +186,7 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
     // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is
     // positive.
     const float slope = 1 / (1 + squared * inverse_scale_squared_);
-    const float weight = weights_[i] * slope * slope;
-    std::array<double, PoseSpace::k_most_parameters> score{};
-    for (std::size_t k = 0; k < n; ++k) {
-      const cl_float4& a = jacobian[k];
-      score[k] =
-          static_cast<double>(weight * (a.s[0] * residual[0] + a.s[1] * residual[1] + a.s[2] * residual[2]));
-      result.gradient[k] += score[k];
-      for (std::size_t l = 0; l <= k; ++l) {
-        const cl_float4& b = jacobian[l];
-        result.hessian[k * n + l] +=
-            static_cast<double>(weight * (a.s[0] * b.s[0] + a.s[1] * b.s[1] + a.s[2] * b.s[2]));
-        result.scatter[k * n + l] += score[k] * score[l];
-      }
-    }
+    add_pixel(std::span(jacobian).first(n), residual, weights_[i] * slope * slope, result);
   }
   const double scale = 1 / (static_cast<double>(k_channels) * weight_);
   for (std::size_t k = 0; k < n; ++k) {

@@ -172,7 +172,7 @@ void Fit::choose_equals(bool anywhere) {
 
 /// What a pose leaves that explains nothing: the median over rotations.
 double Fit::wrong_loss(PoseLevel& level) const {
-  constexpr std::size_t k_enough = 31;  // the finest level's renders are dear
+  constexpr std::size_t k_enough = 15;  // the finest level's renders are dear
   std::vector<Hypothesis> poses;
   for (const glm::dmat3& rotation : rotation_grid(k_enough)) {
     poses.push_back({{rotation, initial_.front().translation}});

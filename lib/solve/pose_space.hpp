@@ -40,9 +40,6 @@ class PoseSpace {
   std::vector<double> to_world(std::span<const double> covariance) const;
 
   double radius() const { return radius_; }  ///< of the object about its origin, world
-  double distance() const {
-    return distance_;
-  }  ///< of the object's origin from the camera, along its view direction
   double radius_ndc() const { return radius_ndc_; }
 
  private:

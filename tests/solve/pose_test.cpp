@@ -44,7 +44,7 @@ dpr::Pose turned(double degrees, const glm::dvec3& axis = k_axis) {
 
 dpr::LeastSquares least_squares() {
   dpr::LeastSquares method;
-  if (is_reduced()) method.rotations = 4, method.iterations = 1, method.coarsest = 16;
+  if (is_reduced()) method.rotations = 2, method.iterations = 1, method.coarsest = 8;
   return method;
 }
 
@@ -64,7 +64,7 @@ double error_degrees(const dpr::PoseResult& result, const dpr::Pose& truth = {})
 TEST_SUITE("pipeline") {
   TEST_CASE("least squares: the cube's rotation is found from afar, and its error is known") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Scene scene = cube_scene(reduced(64, 8));
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = least_squares()});
     unsigned calls = 0;
     const dpr::PoseResult result = solver.solve(turned(110), [&](const dpr::PoseIteration& step) {
@@ -90,7 +90,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("least squares: nothing needs to be known of the rotation") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::Scene scene = cube_scene(reduced(64, 8));
     for (const double degrees : {70.0, 140.0}) {
       if (is_reduced() && degrees > 100) break;
       scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(degrees).rotation));
@@ -106,7 +106,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("least squares: translation and scale") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::Scene scene = cube_scene(reduced(64, 8));
     glm::mat4& transform = scene.meshes.front().transform;
     transform = glm::translate(glm::mat4(1.0F), glm::vec3(0.3F, -0.2F, 0.1F)) *
                 glm::rotate(glm::mat4(1.0F), 0.4F, glm::vec3(k_axis)) *
@@ -134,7 +134,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("least squares: the focal length") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(reduced(64, 16));
+    dpr::Scene scene = cube_scene(reduced(64, 8));
     const dpr::Image target = rigid_target(device, scene);
     scene.camera.fov_y_degrees = 66;
     const dpr::PoseSolver solver(device, scene, target, {.method = least_squares(), .solve_focal = true});
@@ -168,7 +168,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("least squares: a hidden part misleads unless it is masked or the loss is robust") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Scene scene = cube_scene(reduced(64, 8));
     dpr::Image target = rigid_target(device, scene);
     dpr::Image mask(scene.width, scene.height, glm::vec4(1));
     for (int row = 0; row < scene.height; ++row) {
@@ -192,7 +192,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("least squares: several initial poses and no others") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Scene scene = cube_scene(reduced(64, 8));
     dpr::LeastSquares local = least_squares();
     local.rotations = 0;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = local});
@@ -207,7 +207,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("descent: from 30 degrees the cube's rotation is found") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Scene scene = cube_scene(reduced(64, 8));
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), descent(is_reduced() ? 3 : 200));
     const dpr::PoseResult result = solver.solve(turned(30));
     if (!is_reduced()) CHECK(result.explained);  // losses of different smoothing do not compare
@@ -218,7 +218,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("descent: the translation is found too") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(reduced(64, 16));
+    const dpr::Scene scene = cube_scene(reduced(64, 8));
     dpr::PoseOptions options = descent(is_reduced() ? 3 : 400);
     options.solve_translation = true;
     const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options);
@@ -233,7 +233,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("descent: the best pose is the best of the last smoothing level") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(16);
+    const dpr::Scene scene = cube_scene(reduced(16, 8));
     dpr::PoseOptions eager = descent(is_reduced() ? 4 : 30);
     std::get<dpr::Descent>(eager.method).schedule = dpr::AdaptiveSchedule{.start = 1, .interval = 1};
     std::get<dpr::Descent>(eager.method).restarts = 0;
@@ -246,7 +246,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("a callback that returns false stops the solver at once") {
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(16);
+    const dpr::Scene scene = cube_scene(reduced(16, 8));
     const dpr::Image target = rigid_target(device, scene);
     const auto stop = [](const dpr::PoseIteration& step) { return step.iteration < 1; };
     const dpr::PoseResult descended =
@@ -256,7 +256,7 @@ TEST_SUITE("pipeline") {
     CHECK(dpr::angle_degrees(descended.history.front().pose.rotation, turned(20).rotation) < 1e-9);
 
     dpr::LeastSquares method = least_squares();
-    method.rotations = 4;
+    method.rotations = 2;
     const dpr::PoseResult fitted =
         dpr::PoseSolver(device, scene, target, {.method = method}).solve(turned(20), stop);
     CHECK(fitted.iterations == 2);
@@ -265,11 +265,11 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("a solver's answer is the same every time") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(16);
+    dpr::Scene scene = cube_scene(reduced(16, 8));
     const dpr::Image target = rigid_target(device, scene);
     scene.smoothing = dpr::smoothing_preset("paper_gaussian");
     dpr::LeastSquares method = least_squares();
-    method.rotations = 16;
+    method.rotations = reduced(16, 2);
     for (const dpr::PoseOptions& options : {descent(4), dpr::PoseOptions{.method = method}}) {
       const dpr::PoseSolver solver(device, scene, target, options);
       const dpr::PoseResult first = solver.solve(turned(20)), second = solver.solve(turned(20));
@@ -345,12 +345,13 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("an image of nothing has an answer: finite, not explained, nothing known of its error") {
     const dpr::Device device = dpr::open_device();
-    dpr::Scene scene = cube_scene(16);
+    const int size = reduced(16, 8);
+    dpr::Scene scene = cube_scene(size);
     scene.meshes.front().transform[3] = glm::vec4(0, 100, 0, 1);  // out of sight
     dpr::LeastSquares method = least_squares();
-    method.rotations = 4;
+    method.rotations = 2;
     const dpr::PoseResult result =
-        dpr::PoseSolver(device, scene, dpr::Image(16, 16, glm::vec4(0.5F)), {.method = method}).search();
+        dpr::PoseSolver(device, scene, dpr::Image(size, size, glm::vec4(0.5F)), {.method = method}).search();
     CHECK(std::isfinite(result.loss));
     CHECK_FALSE(result.explained);
     CHECK(result.covariance.empty());

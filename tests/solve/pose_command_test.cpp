@@ -1,0 +1,143 @@
+// dpr pose: what its flags do, what its files hold, and which flags do not go together. Runs where the
+// environment variable DPR_CLI names the command.
+#include <doctest/doctest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "dpr/image.hpp"
+#include "dpr/mesh.hpp"
+#include "support/messages.hpp"
+#include "support/reduced.hpp"
+#include "support/temp_dir.hpp"
+
+namespace {
+
+using dpr::test::contains;
+using dpr::test::TempDir;
+using nlohmann::json;
+
+const char* command_path() { return dpr::test::is_reduced() ? nullptr : std::getenv("DPR_CLI"); }
+
+bool is_skipped() {
+  if (command_path() != nullptr) return false;
+  MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
+  return true;
+}
+
+/// Runs `dpr ARGUMENTS` in the folder; what it prints is in the files out and err there.
+int run(const TempDir& folder, const std::string& arguments) {
+  const std::string line = "cd '" + folder.path().string() + "' && '" + command_path() + "' " + arguments +
+                           " >out 2>err </dev/null";
+  const int result = std::system(line.c_str());
+  return WIFEXITED(result) ? WEXITSTATUS(result) : -1;
+}
+
+/// scene.json, and target.exr: the cube turned by 0.8 radians about y.
+void write_inputs(const TempDir& folder) {
+  dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+  const auto scene = [](const char* transform) {
+    return std::string(
+               R"({"width": 64, "height": 48, "camera": {"view": [[1,0,0,0],[0,0.8,-0.6,0],[0,0.6,0.8,-6],
+      [0,0,0,1]]}, "meshes": [{"file": "cube.ply", "transform": )") +
+           transform + "}]}";
+  };
+  folder.write("scene.json", scene("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"));
+  folder.write("truth.json", scene("[[0.696707,0,0.717356,0],[0,1,0,0],[-0.717356,0,0.696707,0],[0,0,0,1]]"));
+  REQUIRE(run(folder, "render --scene truth.json --preset rigid -o target.exr --quiet") == 0);
+}
+
+/// R[0][0] and R[0][2] of the truth are cos 0.8 and sin 0.8.
+void check_is_truth(const json& pose) {
+  CHECK(pose["rotation_matrix"][0][0].get<double>() == doctest::Approx(0.696707).epsilon(0.02));
+  CHECK(pose["rotation_matrix"][0][2].get<double>() == doctest::Approx(0.717356).epsilon(0.02));
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("dpr pose --search finds the pose; its file and its report hold what they promise") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    REQUIRE(run(folder,
+                "pose --scene scene.json --target target.exr --search --translation -o pose.json "
+                "--report report") == 0);
+    const json pose = json::parse(folder.read("pose.json"));
+    check_is_truth(pose);
+    CHECK(pose["translation"].size() == 3);
+    CHECK(pose["loss"].get<double>() < 1e-3);
+    CHECK(pose["explained"] == true);
+    CHECK(pose["focal_scale"] == 1.0);
+    CHECK(pose["covariance"].size() == 6);
+    CHECK(pose["covariance"][5].size() == 6);
+    REQUIRE(pose["hypotheses"].size() >= 1);
+    CHECK(pose["hypotheses"][0]["rotation_matrix"] == pose["rotation_matrix"]);
+    REQUIRE(pose["history"].size() == pose["iterations"].get<std::size_t>());
+    for (const char* key :
+         {"iteration", "loss", "sigma", "gamma", "samples", "width", "height", "hypotheses"}) {
+      CHECK(pose["history"][0].contains(key));
+    }
+    const std::string page = folder.read("report/index.html");
+    for (const char* picture : {"target.png", "start.png", "end.png", "difference.png", "iterations.png"}) {
+      CHECK(std::filesystem::is_regular_file(folder / ("report/" + std::string(picture))));
+      CHECK(contains(page, "src=\"" + std::string(picture) + "\""));
+    }
+    CHECK_FALSE(contains(page, "http"));  // opens without a network
+  }
+
+  TEST_CASE("dpr pose: mask, robust loss, focal length and the grid's size") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    dpr::write_image(folder / "mask.png", dpr::Image(64, 48, glm::vec4(1)));
+    REQUIRE(run(folder,
+                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --mask mask.png "
+                "--robust 0.2 --focal --rotations 0 --coarsest 24 --level-iterations 12 --blur 0.3 "
+                "--blur-end 0.15 -o pose.json --quiet") == 0);
+    const json pose = json::parse(folder.read("pose.json"));
+    check_is_truth(pose);
+    CHECK(pose["focal_scale"].get<double>() == doctest::Approx(1).epsilon(0.03));
+    CHECK(pose["covariance"].size() == 4);
+    CHECK(pose["history"][0]["hypotheses"] == 1);
+    CHECK(pose["history"][0]["height"] == 24);
+  }
+
+  TEST_CASE("dpr pose: an option of the descent's, or of the smoothing's, implies it") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    for (const char* option : {"--method descent", "--schedule anneal", "--sigma 1e-3"}) {
+      REQUIRE(run(folder, std::string("pose --scene scene.json --target target.exr --composition joint "
+                                      "--iterations 4 --restarts 0 -o pose.json --quiet ") +
+                              option) == 0);
+      const json pose = json::parse(folder.read("pose.json"));
+      CHECK(pose["iterations"] == 4);
+      CHECK(pose["history"][0]["width"] == 64);
+      CHECK(pose["covariance"].empty());
+    }
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("dpr pose: what does not go together is an error of one line") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    for (const char* options :
+         {"--method least_squares --iterations 4", "--method least_squares --sigma 1e-3", "--method newton",
+          "--search --schedule anneal", "--mask target.exr --iterations 4", "--mask missing.png", "--blur 0",
+          "--search --rotations 0", "--robust -1"}) {
+      CAPTURE(options);
+      CHECK(run(folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options) ==
+            1);
+      const std::string error = folder.read("err");
+      CAPTURE(error);
+      CHECK(error.starts_with("dpr: error: "));
+      CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));
+    }
+  }
+}
