@@ -226,7 +226,7 @@ TEST_SUITE("pipeline") {
     renderer.forward();
     const AuxiliaryOutputs whole = auxiliary_outputs(renderer);
     const std::size_t enough = device.memory_budget();
-    device.set_memory_budget(renderer.statistics().fragments * 50);
+    device.set_memory_budget(renderer.statistics().fragments * 70);
     renderer.forward();
     REQUIRE(renderer.statistics().bands > 1);
     const AuxiliaryOutputs found = auxiliary_outputs(renderer);
