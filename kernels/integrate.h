@@ -52,7 +52,7 @@ static inline Terms slot_terms(const Slot s, realn t) {
   realn cdf, density;
   prior_cdf_density(t - s.beta, &cdf, &density);
 #ifdef DPR_JOINT
-  terms.passing = fma_n(cdf, (realn)(s.occupancy), (realn)(slot_transparency(s)));
+  terms.passing = mad(cdf, s.occupancy, (realn)(slot_transparency(s)));
   const realn inverse = 1.0f / terms.passing;
   terms.density = density * inverse;
   terms.absent = (cdf - 1.0f) * inverse;
@@ -87,15 +87,15 @@ static inline float4 integrate_colors(const Slots run, const Fragments f, float3
         const realn ratio = slot_ratio(s, terms);
         const float3 color = slot_color(s, f, background);
         product *= terms.passing;
-        r = fma_n(ratio, (realn)(color.x), r);
-        g = fma_n(ratio, (realn)(color.y), g);
-        b = fma_n(ratio, (realn)(color.z), b);
+        r = mad(ratio, color.x, r);
+        g = mad(ratio, color.y, g);
+        b = mad(ratio, color.z, b);
         sum += ratio;
       }
-      red = fma_n(product, r, red);
-      green = fma_n(product, g, green);
-      blue = fma_n(product, b, blue);
-      mass = fma_n(product, sum, mass);
+      red = mad(product, r, red);
+      green = mad(product, g, green);
+      blue = mad(product, b, blue);
+      mass = mad(product, sum, mass);
     }
   } while (next_stretch(run, &stretch));
   return sum_lanes_of_4(red, green, blue, mass);
@@ -106,9 +106,9 @@ static inline void add_gradients(const Slot s, const Terms terms, realn product,
                                  SlotGradients* out) {
   const realn share = product * terms.density;
   const realn ratio = slot_ratio(s, terms);
-  const realn by_beta = product * ratio * fma_n((realn)(s.grad), ratio_sum, -grad_sum);
+  const realn by_beta = product * ratio * mad(s.grad, ratio_sum, -grad_sum);
 #ifdef DPR_JOINT
-  const realn by_occupancy = fma_n((realn)(s.grad), share, product * terms.absent * fma_n((realn)(-s.grad), ratio, grad_sum));
+  const realn by_occupancy = mad(s.grad, share, product * terms.absent * mad(-s.grad, ratio, grad_sum));
   const float4 sums = sum_lanes_of_4(share, by_beta, by_occupancy, (realn)(0.0f));
   out->occupancy[s.fragment] += sums.z;
 #else
@@ -139,7 +139,7 @@ static inline float2 integrate_gradients(const Slots run, SlotGradients* out) {
         const realn ratio = slot_ratio(s, terms);
         product *= terms.passing;
         ratio_sum += ratio;
-        grad_sum = fma_n(ratio, (realn)(s.grad), grad_sum);
+        grad_sum = mad(ratio, s.grad, grad_sum);
       }
       mass += product * ratio_sum;
       seen += product * grad_sum;

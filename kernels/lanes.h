@@ -11,13 +11,6 @@
 #define DPR_WIDTH DPR_LANES /* the width of this file's vectors */
 #endif
 
-/// a * b + c in one instruction. `mad` is two on PoCL, `fma` a library call where the hardware has none.
-#ifdef __FMA__
-#define fma_n fma
-#else
-#define fma_n mad
-#endif
-
 #define DPR_CONCAT_(a, b) a##b
 #define DPR_CONCAT(a, b) DPR_CONCAT_(a, b)
 
@@ -109,14 +102,14 @@ static inline realn choose(intn condition, realn a, realn b) { return select(b, 
 static inline realn exp_in_range(realn x) {
   const realn n = rint(x * M_LOG2E_F);
   // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
-  const realn f = fma_n(n, (realn)(-1.42860677e-6f), fma_n(n, (realn)(-0.693145752f), x));
+  const realn f = mad(n, -1.42860677e-6f, mad(n, -0.693145752f, x));
   realn p = 0.00138368784f;
-  p = fma_n(p, f, (realn)(0.00837481394f));
-  p = fma_n(p, f, (realn)(0.0416682251f));
-  p = fma_n(p, f, (realn)(0.166664198f));
-  p = fma_n(p, f, (realn)(0.499999911f));
-  p = fma_n(p, f, (realn)(1.0f));
-  p = fma_n(p, f, (realn)(1.0f));
+  p = mad(p, f, 0.00837481394f);
+  p = mad(p, f, 0.0416682251f);
+  p = mad(p, f, 0.166664198f);
+  p = mad(p, f, 0.499999911f);
+  p = mad(p, f, 1.0f);
+  p = mad(p, f, 1.0f);
   return p * as_realn((convert_intn(n) + 127) << 23);
 }
 #endif
@@ -150,14 +143,14 @@ static inline realn log_n(realn x) {
   const intn exponent = (bits - 0x3f3504f3) >> 23; /* of x / sqrt(1/2) */
   const realn f = as_realn(bits - (exponent << 23)) - 1.0f;
   realn p = 0.0870029986f;
-  p = fma_n(p, f, (realn)(-0.142672828f));
-  p = fma_n(p, f, (realn)(0.149147247f));
-  p = fma_n(p, f, (realn)(-0.165776079f));
-  p = fma_n(p, f, (realn)(0.1996307f));
-  p = fma_n(p, f, (realn)(-0.250013364f));
-  p = fma_n(p, f, (realn)(0.333339106f));
+  p = mad(p, f, -0.142672828f);
+  p = mad(p, f, 0.149147247f);
+  p = mad(p, f, -0.165776079f);
+  p = mad(p, f, 0.1996307f);
+  p = mad(p, f, -0.250013364f);
+  p = mad(p, f, 0.333339106f);
   const realn f2 = f * f;
-  return fma_n(convert_realn(exponent), (realn)(M_LN2_F), fma_n(f2 * f, p, fma_n(f2, (realn)(-0.5f), f)));
+  return mad(convert_realn(exponent), M_LN2_F, mad(f2 * f, p, mad(f2, -0.5f, f)));
 #endif
 }
 

@@ -46,14 +46,14 @@ static inline realn cauchy_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
 static inline realn atan_over_pi(realn z) {
   const realn s = z * z;
   realn p = 0.00284993788f;
-  p = fma_n(p, s, (realn)(-0.0160688814f));
-  p = fma_n(p, s, (realn)(0.0426920466f));
-  p = fma_n(p, s, (realn)(-0.0750435144f));
-  p = fma_n(p, s, (realn)(0.106409691f));
-  p = fma_n(p, s, (realn)(-0.142036572f));
-  p = fma_n(p, s, (realn)(0.199926212f));
-  p = fma_n(p, s, (realn)(-0.333330721f));
-  p = fma_n(p, s, (realn)(1.0f));
+  p = mad(p, s, -0.0160688814f);
+  p = mad(p, s, 0.0426920466f);
+  p = mad(p, s, -0.0750435144f);
+  p = mad(p, s, 0.106409691f);
+  p = mad(p, s, -0.142036572f);
+  p = mad(p, s, 0.199926212f);
+  p = mad(p, s, -0.333330721f);
+  p = mad(p, s, 1.0f);
   return M_1_PI_F * z * p;
 }
 

@@ -68,17 +68,17 @@ static inline realn normal_density(realn x) { return DPR_INVERSE_SQRT_2PI * exp_
 /// Mills' ratio (1 - Phi(x)) / phi(x) for x >= 0: a polynomial in 1 / (1 + x / 4), fitted for the least relative error
 /// on [0, 40]; 4e-7 in single precision. The ratio has no tail to lose digits in, unlike 1 - Phi.
 static inline realn mills_ratio(realn x) {
-  const realn t = 1.0f / fma_n(x, (realn)(0.25f), (realn)(1.0f));
+  const realn t = 1.0f / mad(x, 0.25f, 1.0f);
   realn p = 0.0513891429f;
-  p = fma_n(p, t, (realn)(-0.210481346f));
-  p = fma_n(p, t, (realn)(0.253442824f));
-  p = fma_n(p, t, (realn)(-0.0926696435f));
-  p = fma_n(p, t, (realn)(0.166857034f));
-  p = fma_n(p, t, (realn)(0.145618275f));
-  p = fma_n(p, t, (realn)(0.204882696f));
-  p = fma_n(p, t, (realn)(0.234275714f));
-  p = fma_n(p, t, (realn)(0.249999255f));
-  p = fma_n(p, t, (realn)(0.250000209f));
+  p = mad(p, t, -0.210481346f);
+  p = mad(p, t, 0.253442824f);
+  p = mad(p, t, -0.0926696435f);
+  p = mad(p, t, 0.166857034f);
+  p = mad(p, t, 0.145618275f);
+  p = mad(p, t, 0.204882696f);
+  p = mad(p, t, 0.234275714f);
+  p = mad(p, t, 0.249999255f);
+  p = mad(p, t, 0.250000209f);
   return p * t;
 }
 
