@@ -65,6 +65,7 @@ Scene make_scene(const Definition& d) {
   scene.smoothing.sigma = d.sigma;
   scene.smoothing.gamma = d.gamma;
   scene.smoothing.blur_radius = k_blur_radius_in_sigma * d.sigma;
+  scene.smoothing.variance_reduction = VarianceReduction::rigid;
   return scene;
 }
 

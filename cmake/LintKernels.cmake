@@ -1,4 +1,4 @@
-# Compiles every kernel with clang as strict OpenCL C 1.2, in every width, and fails with all that it reports.
+# Compiles every kernel with clang as strict OpenCL C 1.2, in every width and for every prior, and fails with all that it reports.
 # Arguments: CLANG, the compiler (or ...-NOTFOUND); KERNELS, the folder, whose headers
 # are included; MORE_KERNELS, another one.
 if(NOT CLANG)
@@ -8,7 +8,8 @@ endif()
 
 set(flags -x cl -cl-std=CL1.2 -Xclang -finclude-default-header -fsyntax-only
           -Wall -Wextra -Wdouble-promotion -Werror -I ${KERNELS})
-set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16 -DDPR_VARIABLE_WIDTH)
+set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16 -DDPR_VARIABLE_WIDTH
+                   -DDPR_PRIOR=1 -DDPR_PRIOR=2 -DDPR_PRIOR=3 -DDPR_PRIOR=4)
 file(GLOB sources ${KERNELS}/*.cl)
 set(failures 0)
 file(GLOB more_sources ${MORE_KERNELS}/*.cl)

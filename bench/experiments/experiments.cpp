@@ -11,6 +11,7 @@ void run_operators(const Settings& settings);
 void run_gradient_noise(const Settings& settings);
 void run_gallery(const Settings& settings);
 void run_estimators(const Settings& settings);
+void run_devices(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -19,7 +20,8 @@ std::span<const Experiment> experiments() {
       {"gradient-noise", "The operators' gradients as M samples estimate them, and their spread (Figure 3)",
        run_gradient_noise},
       {"gallery", "Renders for growing sigma and gamma, each composition (Figure 2)", run_gallery},
-      {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators}};
+      {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators},
+      {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices}};
   return k_experiments;
 }
 

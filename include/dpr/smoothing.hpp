@@ -46,7 +46,7 @@ struct Smoothing {
   Estimator occupancy_estimator = Estimator::exact;
   Estimator aggregation_estimator = Estimator::exact;
   std::uint32_t samples = 8;  ///< 1 to 2^20, of Monte Carlo
-  VarianceReduction variance_reduction = VarianceReduction::rigid;
+  VarianceReduction variance_reduction = VarianceReduction::leave_one_out;
   Draws draws = Draws::independent;
   std::uint64_t seed = 1;  ///< the noise is a pure function of seed, view, pixel, face, sample and stage
   float occupancy_threshold = 1e-4F;  ///< in (0, 0.5): sets the blur radius where none is given

@@ -113,9 +113,9 @@ class Kernel {
     const std::size_t local = device_->local_size();
     const std::size_t global = (range.count + local - 1) / local * local;
     cl::Event finished;
-    const int error = device_->queue.enqueueNDRangeKernel(
-        kernel_, cl::NDRange(range.first), cl::NDRange(global), cl::NDRange(local), nullptr,
-        device_->profile != nullptr ? &finished : nullptr);
+    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NDRange(range.first),
+                                                          cl::NDRange(global), cl::NDRange(local), nullptr,
+                                                          device_->profile != nullptr ? &finished : nullptr);
     if (error != CL_SUCCESS) {
       throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) +
                                    " work-items in groups of " + std::to_string(local));

@@ -106,4 +106,16 @@ TEST_SUITE("bench-smoke") {
     CHECK(data["ranking"].front()["estimate"] == data["winner"]);
     CHECK(data["ranking"].front()["gradient_cost_relative"].get<double>() <= 1);
   }
+
+  TEST_CASE("devices: a row for every number of parts, and one is the measure of all") {
+    const TempDir folder;
+    const Json data = run(folder, "devices");
+    if (data.is_null()) return;
+    REQUIRE(data["rows"].size() >= 1);
+    CHECK(data["rows"][0]["speedup"] == 1.0);
+    for (std::size_t i = 0; i < data["rows"].size(); ++i) {
+      CHECK(data["rows"][i]["devices"] == i + 1);
+      CHECK(data["rows"][i]["views_per_second"].get<double>() > 0);
+    }
+  }
 }
