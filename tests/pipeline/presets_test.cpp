@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dpr/dpr.hpp"
+#include "pipeline/fragments.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "reference/occupancy.hpp"
@@ -19,36 +20,6 @@ using namespace dpr::test::pipeline;
 using dpr::test::reduced;
 
 namespace {
-
-/// What the rasterizer and the shading say of a fragment.
-struct Fragment {
-  std::size_t index = 0;
-  double distance = 0, depth = 0;
-  glm::dvec3 color{0.0};
-};
-
-using Pixel = std::vector<Fragment>;
-
-/// The fragments of every pixel of the last frame.
-std::vector<Pixel> pixels_of(const Renderer& renderer) {
-  const Renderer::Impl& m = renderer.impl();
-  const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
-  const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
-                           red = m.shade.red.download(), green = m.shade.green.download(),
-                           blue = m.shade.blue.download();
-  std::vector<Pixel> pixels(starts.size() - 1);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    for (cl_uint at = starts[i]; at < starts[i + 1]; ++at) {
-      const cl_uint k = list[at];
-      pixels[i].push_back(
-          {k,
-           static_cast<double>(distance[k]),
-           static_cast<double>(depth[k]),
-           {static_cast<double>(red[k]), static_cast<double>(green[k]), static_cast<double>(blue[k])}});
-    }
-  }
-  return pixels;
-}
 
 /// Two triangles, one partly in front of the other, with colours of their own.
 Scene two_triangles(int width, int height) {
@@ -65,11 +36,6 @@ Scene two_triangles(int width, int height) {
   scene.smoothing = Smoothing{};
   scene.meshes[0].transform = glm::mat4(1.0F);
   return scene;
-}
-
-double zeta(const Scene& scene, double depth) {
-  const double znear = static_cast<double>(scene.camera.znear), zfar = static_cast<double>(scene.camera.zfar);
-  return (zfar - depth) / (zfar - znear);
 }
 
 double largest_error(const glm::vec4& found, const glm::dvec3& color, double alpha) {

@@ -1,0 +1,49 @@
+// What the rasterizer and the shading say of a frame's fragments, pixel by pixel, in double precision: what
+// independent evaluations of a member of the family start from.
+#pragma once
+
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "renderer_impl.hpp"
+
+namespace dpr::test::pipeline {
+
+struct Fragment {
+  std::size_t index = 0;           ///< in the stages' buffers
+  double distance = 0, depth = 0;  ///< signed, in the unit of sigma; view space
+  glm::dvec3 color{0.0};
+};
+
+using Pixel = std::vector<Fragment>;
+
+/// The fragments of every pixel of the last frame, which is one band.
+inline std::vector<Pixel> pixels_of(const Renderer& renderer) {
+  const Renderer::Impl& m = renderer.impl();
+  const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
+  const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
+                           red = m.shade.red.download(), green = m.shade.green.download(),
+                           blue = m.shade.blue.download();
+  std::vector<Pixel> pixels(starts.size() - 1);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    for (cl_uint at = starts[i]; at < starts[i + 1]; ++at) {
+      const cl_uint k = list[at];
+      pixels[i].push_back(
+          {k,
+           static_cast<double>(distance[k]),
+           static_cast<double>(depth[k]),
+           {static_cast<double>(red[k]), static_cast<double>(green[k]), static_cast<double>(blue[k])}});
+    }
+  }
+  return pixels;
+}
+
+/// Normalised depth: 1 at znear, 0 at zfar.
+inline double zeta(const Scene& scene, double depth) {
+  const double znear = static_cast<double>(scene.camera.znear), zfar = static_cast<double>(scene.camera.zfar);
+  return (zfar - depth) / (zfar - znear);
+}
+
+}  // namespace dpr::test::pipeline
