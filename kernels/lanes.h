@@ -67,10 +67,12 @@ static inline int any_lane(int16 condition) {
 }
 #endif
 
+static inline float4 add_neighbours(float4 a, float4 b) {
+  return (float4)(a.x, a.z, b.x, b.z) + (float4)(a.y, a.w, b.y, b.w);
+}
 /// The sums over the lanes of four vectors at once: the transpose costs less than four sums.
 static inline float4 sum_lanes_of_4x4(float4 a, float4 b, float4 c, float4 d) {
-  const float4 ab = (float4)(a.xz + a.yw, b.xz + b.yw), cd = (float4)(c.xz + c.yw, d.xz + d.yw);
-  return (float4)(ab.xz + ab.yw, cd.xz + cd.yw);
+  return add_neighbours(add_neighbours(a, b), add_neighbours(c, d));
 }
 #if DPR_WIDTH == 4
 static inline float4 sum_lanes_of_4(float4 a, float4 b, float4 c, float4 d) { return sum_lanes_of_4x4(a, b, c, d); }
