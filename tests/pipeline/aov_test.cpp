@@ -219,7 +219,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("aov: frames in bands show the same") {
     Device device = open_device();
-    Scene scene = two_meshes(reduced(40, 12), reduced(40, 20));
+    Scene scene = two_meshes(40, 40);
     scene.smoothing.composition = Composition::joint;
     Renderer renderer(device);
     renderer.set_scene(scene);

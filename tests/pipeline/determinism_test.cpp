@@ -171,7 +171,7 @@ TEST_SUITE("pipeline") {
     for (const std::uint32_t samples : {8U, 128U}) {
       const Device device = open_device();
       Scene scene = sampled_scene();
-      scene.smoothing.samples = reduced(1, 0) == 1 ? samples : samples / 8;
+      scene.smoothing.samples = reduced(1, 0) == 1 ? samples : samples / 4;
       Renderer renderer(device);
       renderer.set_scene(scene);
       render(renderer);

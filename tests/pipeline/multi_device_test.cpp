@@ -98,6 +98,14 @@ std::vector<Device> halves() {
   }
 }
 
+/// The default device so many times; once in a simulator that cannot be used from several threads.
+std::vector<Device> devices(std::size_t count) {
+  const Device first = open_device();
+  std::vector<Device> list{first};
+  while (list.size() < count && first.info().platform != "Oclgrind") list.push_back(open_device());
+  return list;
+}
+
 Scene sampled(Scene scene) {
   scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
   return scene;
@@ -112,7 +120,7 @@ TEST_SUITE("pipeline") {
       const Result one = render({open_device()}, scene, views);
       REQUIRE(one.values.size() > views);
       CHECK(same_bits(one, render({open_device()}, scene, views)));
-      const Result three = render({open_device(), open_device(), open_device()}, scene, views);
+      const Result three = render(devices(3), scene, views);
       CHECK(same_bits(one, three));
       CHECK(total(three.views_rendered) == 3 * views);
       Scene other = scene;
@@ -144,7 +152,7 @@ TEST_SUITE("pipeline") {
       const Device device = open_device();
       const std::vector<Image> targets = random_images(scene, views);
       const LossWeights weights{.mse = 1.0F, .l1 = 0.3F, .silhouette = 0.5F};
-      MultiDeviceRenderer several({device, open_device()});
+      MultiDeviceRenderer several(devices(2));
       several.set_scene(scene);
       several.set_views(ring(scene, views));
       several.set_loss(weights, targets);
@@ -183,7 +191,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 100000), "compute_units");
 
     const Scene scene = small_scene();
-    MultiDeviceRenderer renderer({open_device(), open_device()});
+    MultiDeviceRenderer renderer(devices(2));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.render(), "set_scene");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views(ring(scene, 2)), "set_scene");
     renderer.set_scene(scene);
