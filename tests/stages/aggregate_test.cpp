@@ -89,7 +89,8 @@ TEST_SUITE("gradient") {
       CAPTURE(std::string(c.name));
       AggregateErrors good, bad;
       const std::vector<SyntheticPixel> pixels = dpr::test::make_pixels(1e-2F, 4);
-      const std::vector<SyntheticPixel> few(pixels.begin(), pixels.begin() + 45);
+      const std::vector<SyntheticPixel> few(pixels.begin(),
+                                            pixels.begin() + (dpr::test::is_reduced() ? 8 : 45));
       compare_with_reference(few, barrier(c.prior, 1e-2F, 1), good);
       compare_with_reference(few, barrier(c.prior, 1e-2F, 1), bad, 1.03F);
       CHECK(passes(good, c));
@@ -97,7 +98,8 @@ TEST_SUITE("gradient") {
       CHECK(bad.color.error > c.color);
       CHECK(bad.grad_depth.error > c.beta);
       CHECK(bad.grad_log_occupancy.error > c.beta);
-      CHECK(bad.grad_gamma.error > c.gamma);
+      // A few pixels may have one slot each, and no gradient of gamma.
+      if (!dpr::test::is_reduced()) CHECK(bad.grad_gamma.error > c.gamma);
       CHECK(bad.grad_alpha.error > c.alpha);
     }
   }
