@@ -94,7 +94,7 @@ static inline uintn permute(uintn i, uint count, uint seed) {
 static inline realn stratify(const Sampling s, const NoiseName name, uint block, realn u) {
   const uint4 counter = (uint4)(name.pixel, name.face, DPR_PERMUTATION_BLOCK, name.stream);
   const uint8 words = philox4x32_10(counter, (uint2)(s.seed_low, s.seed_high));
-  const uintn hashed = permute(min(sample_index(block), s.samples - 1), s.samples, words.s0);
+  const uintn hashed = permute(min(sample_index(block), (uintn)(s.samples - 1)), s.samples, words.s0);
   const uintn rotated = hashed + words.s1 % s.samples;
   const uintn stratum = rotated - select((uintn)(0), (uintn)(s.samples), rotated >= s.samples);
   return clamp((convert_realn(stratum) + u) / (float)s.samples, DPR_LOWEST_UNIFORM, DPR_HIGHEST_UNIFORM);

@@ -41,9 +41,12 @@ SyntheticPixel make_pixel(const std::vector<std::pair<float, float>>& depths_and
 }
 
 /// Depths within a gamma or two, 1 apart being one; on either side of their edges, one far inside, one far
-/// outside.
+/// outside. The background shows in fewer than one sample in a thousand; the reduced number of pixels needs
+/// it more often to tell a standard error.
 const SyntheticPixel k_pixel =
-    make_pixel({{2.4F, 0.3F}, {2.0F, -0.8F}, {3.1F, 1.1F}, {2.9F, 9.0F}, {2.2F, -30.0F}, {2.7F, 0.0F}});
+    dpr::test::is_reduced()
+        ? make_pixel({{2.4F, -0.3F}, {2.0F, -0.8F}, {3.1F, 0.4F}, {2.2F, -30.0F}})
+        : make_pixel({{2.4F, 0.3F}, {2.0F, -0.8F}, {3.1F, 1.1F}, {2.9F, 9.0F}, {2.2F, -30.0F}, {2.7F, 0.0F}});
 
 Smoothing sampled_joint(Prior occupancy, Prior depth, SamplingMode mode, std::uint32_t samples,
                         std::uint64_t seed = 1) {
