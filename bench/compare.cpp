@@ -59,7 +59,7 @@ std::string verdict(const Json& first, const Json& second) {
     if ((*timing)["n"].get<unsigned>() < k_least_runs) return "unclear";
   }
   if (second["q3"].get<double>() < first["q1"].get<double>()) return "faster";
-  return second["q1"].get<double>() > first["q3"].get<double>() ? "slower" : "same";
+  return second["q1"].get<double>() > first["q3"].get<double>() ? "slower" : "unclear";
 }
 
 Json compare(const Json& a, const Json& b) {

@@ -7,10 +7,10 @@
 
 namespace dpr::bench {
 
-/// What two timings {"median", "q1", "q3", "n"} say of each other. "faster" or "slower" (the second than the
-/// first) if the medians differ by more than 5% and the middle halves of the runs do not overlap: the
-/// second's q3 lies below the first's q1, or its q1 above the first's q3. "unclear" if the medians differ by
-/// more than 5% but either timing has fewer than 5 runs, whose quartiles say little. "same" else.
+/// What two timings {"median", "q1", "q3", "n"} say of each other. "same" if the medians differ by no more
+/// than 5%. "faster" or "slower" (the second than the first) if they do and the middle halves of the runs do
+/// not overlap: the second's q3 lies below the first's q1, or its q1 above the first's q3. "unclear" where
+/// they overlap, or where either timing has fewer than 5 runs, whose quartiles say little.
 std::string verdict(const Json& first, const Json& second);
 
 /// {"a", "b": provenance; "rows": [{"row", "forward", "backward": {"a_ms", "b_ms", "ratio", "verdict"}}],

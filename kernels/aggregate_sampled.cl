@@ -13,14 +13,11 @@
 /// The face index that names the background's noise.
 #define DPR_BACKGROUND_FACE 0xffffffffu
 
-/// What a pixel's slots have in common.
+/// What a pixel's slots have in common, and what names their noise.
 typedef struct {
-  uint first, last;    // the pixel's run of the fragment lists
+  BarrierPixel barrier;
   uint view, in_view;  // the pixel's view, and its number in it
-  float nearest;       // view depth of the nearest fragment
-  float depth_scale;   // d beta / d (nearest - depth)
-  float inverse_alpha;
-  float background;    // beta of the background slot
+  int slots;           // beside the background's
   int rigid;           // the winner without noise
 } Pixel;
 
@@ -30,34 +27,28 @@ typedef struct {
 } FaceOf;
 
 /// A slot is a place in the pixel's run, or -1 for the background.
-static inline uint fragment_of(const Pixel q, const Fragments f, int slot) { return f.list[q.first + (uint)slot]; }
-
-static inline float depth_beta(const Pixel q, float depth) { return (q.nearest - depth) * q.depth_scale; }
+static inline uint fragment_of(const Pixel q, const Fragments f, int slot) {
+  return f.list[q.barrier.first + (uint)slot];
+}
 
 /// DPR_LOG_ZERO for a fragment with p = 0.
 static inline float slot_beta(const Pixel q, const Fragments f, int slot) {
-  if (slot < 0) return q.background;
+  if (slot < 0) return q.barrier.background;
   const uint k = fragment_of(q, f, slot);
   const float log_p = f.log_occupancy[k];
-  return log_p > DPR_LOG_ZERO ? depth_beta(q, f.depth[k]) + log_p * q.inverse_alpha : DPR_LOG_ZERO;
+  return log_p > DPR_LOG_ZERO ? barrier_beta(q.barrier, f.depth[k], log_p) : DPR_LOG_ZERO;
 }
 
 static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                global const uint* restrict starts, const Fragments f) {
   Pixel q;
+  q.barrier = load_barrier_pixel(p, pixel, views, starts, f);
   q.view = pixel / p.pixels_per_view;
   q.in_view = pixel - q.view * p.pixels_per_view;
-  global const ViewParams* view = views + q.view;
-  q.first = starts[pixel];
-  q.last = starts[pixel + 1];
-  q.nearest = INFINITY;
-  for (uint i = q.first; i < q.last; ++i) q.nearest = min(q.nearest, f.depth[f.list[i]]);
-  q.depth_scale = view->inverse_range / p.gamma;
-  q.inverse_alpha = 1.0f / p.alpha;
-  q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
+  q.slots = (int)(q.barrier.last - q.barrier.first);
   q.rigid = -1;
-  float largest = q.background;
-  for (int slot = 0; slot < (int)(q.last - q.first); ++slot) {
+  float largest = q.barrier.background;
+  for (int slot = 0; slot < q.slots; ++slot) {
     const float beta = slot_beta(q, f, slot);
     if (beta <= largest) continue;
     largest = beta;
@@ -91,7 +82,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
   Lead lead;
   lead.winner = (intn)(q.rigid);
   lead.largest = (realn)(-INFINITY);
-  for (int turn = -2; turn < (int)(q.last - q.first); ++turn) {
+  for (int turn = -2; turn < q.slots; ++turn) {
     if (turn == q.rigid) continue;
     const int slot = turn == -2 ? q.rigid : turn;
     const float beta = slot_beta(q, f, slot);
@@ -136,7 +127,7 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
       sum += slot_color(p, q, f, winners[lane]);
     }
   }
-  image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - run_transparency(f, q.first, q.last));
+  image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - q.barrier.transparency);
 }
 
 /// y of every sample of a block, relative to `rigid`, and 1 to the weight of each winner.
@@ -160,7 +151,9 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
                                 float3 grad, global float* weight, global float* by_score, global float* score_sum,
                                 ScaleSums* gamma) {
   float y_sum = 0.0f;
-  for (uint i = q.first; i < q.last; ++i) weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
+  for (uint i = q.barrier.first; i < q.barrier.last; ++i) {
+    weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
+  }
   const float rigid = p.sampling.baseline * dot(grad, slot_color(p, q, f, q.rigid));
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     realn cache[DPR_NOISE_CACHE];
@@ -169,7 +162,7 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
     y_sum += sum_lanes(y);
-    for (int slot = -1; slot < (int)(q.last - q.first); ++slot) {
+    for (int slot = -1; slot < q.slots; ++slot) {
       if (!could_win(lead, slot_beta(q, f, slot))) continue;
       const realn noise = slot + 1 < DPR_NOISE_CACHE
                               ? cache[slot + 1]
@@ -204,9 +197,8 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
     const Pixel q = load_pixel(p, pixel, views, starts, f);
     ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
     const float y_sum = add_samples(p, q, f, face, grad.xyz, grad_red, grad_depth, grad_log_occupancy, &gamma);
-    const float transparency = run_transparency(f, q.first, q.last);
     grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
-    for (uint i = q.first; i < q.last; ++i) {
+    for (uint i = q.barrier.first; i < q.barrier.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] / (float)p.sampling.samples;
       const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], y_sum);
@@ -214,12 +206,13 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;
       grad_blue[k] = weight * grad.z;
-      grad_depth[k] = -grad_beta * q.depth_scale;
-      grad_log_occupancy[k] = grad_beta * q.inverse_alpha + grad.w * alpha_sensitivity(f, k, transparency);
+      grad_depth[k] = -grad_beta * q.barrier.depth_scale;
+      grad_log_occupancy[k] =
+          grad_beta * q.barrier.inverse_alpha + grad.w * alpha_sensitivity(f, k, q.barrier.transparency);
       if (log_occupancy[k] <= DPR_LOG_ZERO) continue;
       // b = zeta + (gamma / alpha) ln p depends on gamma and alpha by itself.
-      grad_gamma += grad_beta * log_occupancy[k] * q.inverse_alpha / p.gamma;
-      grad_alpha -= grad_beta * log_occupancy[k] * q.inverse_alpha * q.inverse_alpha;
+      grad_gamma += grad_beta * log_occupancy[k] * q.barrier.inverse_alpha / p.gamma;
+      grad_alpha -= grad_beta * log_occupancy[k] * q.barrier.inverse_alpha * q.barrier.inverse_alpha;
     }
   }
   write_channels(p, pixel, grad_gamma, grad_alpha, background_weight, grad, channels);

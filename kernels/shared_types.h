@@ -142,10 +142,9 @@ typedef struct OccupancyParams {
   DPR_SHARED_NAME(OccupancyParams)
   float sigma;
   Sampling sampling;
-  uint width;           /* pixels, to name a pixel's noise */
-  uint faces;           /* of one view */
-  uint pixels_per_view; /* width * height */
-  uint first_view;      /* of the batch that names the noise */
+  uint width;      /* pixels, to name a pixel's noise */
+  uint faces;      /* of one view */
+  uint first_view; /* of the batch that names the noise */
 } OccupancyParams;
 
 /// The perturbation of depths, and what a pixel's colour is made of.

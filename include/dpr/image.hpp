@@ -41,6 +41,9 @@ Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr);
 /// image without pixels.
 void write_image(const std::filesystem::path& file, const Image& image);
 
+/// The same with alpha 1: for viewers, which would blend colours by the silhouette that were blended already.
+Image opaque(Image image);
+
 /// Images side by side, with a gap between them, for strips. All must have the same height. Empty in, empty
 /// out.
 Image hstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));

@@ -38,7 +38,7 @@ struct LeastSquares {
   unsigned rotations = 1152;
   unsigned coarsest =
       16;  ///< > 0: pixels on the short side of the coarsest level, which doubles up to the scene's
-  unsigned iterations = 10;  ///< > 0: at most, a level
+  unsigned iterations = 10;  ///< > 0: at most, a level; four times as many while the best still falls
   float blur = 0.25F;        ///< > 0: of the edges, in pixels of the level
   float blur_end = 0.1F;     ///< > 0: the same at the very end
   /// Scale of a Geman-McClure loss r^2 / (1 + (r / scale)^2) of a pixel's colour difference r, for clutter

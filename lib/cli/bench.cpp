@@ -57,7 +57,7 @@ std::string footer() {
   return text +
          "--compare calls a row faster or slower where the medians differ by more than 5% and the middle "
          "halves of the\n"
-         "runs do not overlap; unclear with fewer than 5 runs; the same else.\n"
+         "runs do not overlap; unclear where they do, or with fewer than 5 runs; the same within 5%.\n"
          "Example: dpr bench --workload sphere256 -o results.json";
 }
 

@@ -19,7 +19,7 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   add("--preset", s.preset, "Take all values from a named member of the family",
       "softras|opendr|nmr|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
   add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
-  add("--depth-prior", s.depth_prior, "Noise of the depth", "gaussian|cauchy|logistic|gumbel");
+  add("--depth-prior", s.depth_prior, "Noise of the depth", priors);
   add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");
   add("--gamma", s.gamma, "Scale of the depth noise; depth is 1 at znear, 0 at zfar", "FLOAT");
   add("--alpha", s.alpha, "Weight of the barrier", "FLOAT");
@@ -142,6 +142,16 @@ Scene read_scene(const std::string& file, const CommonOptions& options) {
   Scene scene = dpr::read_scene(file);
   apply(options, scene);
   return scene;
+}
+
+Image read_target(const std::string& file, const LossWeights& weights) {
+  Image target = read_image(file);
+  const bool shows_silhouette = std::ranges::any_of(target.pixels, [](const auto& p) { return p.a < 1; });
+  if (weights.silhouette > 0 && !shows_silhouette) {
+    throw InvalidArgument("--target " + file + " (command line)", "no alpha, or 1 everywhere",
+                          "an image whose alpha is the silhouette, such as an .exr of dpr render");
+  }
+  return target;
 }
 
 }  // namespace dpr::cli

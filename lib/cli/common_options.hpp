@@ -7,6 +7,8 @@
 #include <string>
 
 #include "dpr/device.hpp"
+#include "dpr/image.hpp"
+#include "dpr/loss.hpp"
 #include "dpr/scene.hpp"
 
 namespace dpr::cli {
@@ -44,5 +46,8 @@ Device open_device(const CommonOptions& options);
 void apply(const CommonOptions& options, Scene& scene);
 /// read_scene() and apply().
 Scene read_scene(const std::string& file, const CommonOptions& options);
+/// The image to compare a render with. Throws IoError, and InvalidArgument where silhouettes are to be
+/// compared and the file shows none: it has no alpha, or 1 everywhere.
+Image read_target(const std::string& file, const LossWeights& weights);
 
 }  // namespace dpr::cli

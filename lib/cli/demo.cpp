@@ -7,6 +7,7 @@
 #include "cli/commands.hpp"
 #include "cli/pose_report.hpp"
 #include "dpr/renderer.hpp"
+#include "solve/polar.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -14,11 +15,24 @@ namespace {
 constexpr double k_start_degrees = 50;
 constexpr std::uint64_t k_axis_seed = 1;
 
+/// The coloured cube with its colours at the vertices, which an OBJ file can hold: no two sides share one.
+Mesh demo_cube() {
+  Mesh cube = make_cube();
+  cube.vertex_colors.resize(cube.positions.size());
+  for (std::size_t face = 0; face < cube.faces.size(); ++face) {
+    for (int corner = 0; corner < 3; ++corner) {
+      cube.vertex_colors[cube.faces[face][corner]] = cube.face_colors[face];
+    }
+  }
+  cube.face_colors.clear();
+  return cube;
+}
+
 /// The scene of the paper's pose experiments, with the light where the camera sees what it does.
 Scene cube_scene() {
   Scene scene;
   scene.camera = orbit_camera(6.7F, 30, 120);
-  scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
+  scene.meshes.push_back({demo_cube(), glm::mat4(1.0F)});
   Lights lights;
   lights.point = {{.position = {3, 5, -4}, .diffuse = glm::vec3(0.5F), .specular = glm::vec3(0.1F)}};
   scene.lights = lights;
@@ -46,6 +60,33 @@ glm::dvec3 random_axis(std::uint64_t seed) {
   }
 }
 
+/// A scene file of the demo's scene, with the cube in a pose.
+Json scene_to_json(const Scene& scene, const Pose& pose) {
+  const PointLight& light = scene.lights->point.front();
+  const auto vector = [](glm::vec3 v) { return Json::array({number(v.x), number(v.y), number(v.z)}); };
+  const glm::dmat4 transform(affine(pose.rotation, pose.translation));
+  return {{"width", scene.width},
+          {"height", scene.height},
+          {"camera",
+           {{"view", rows_to_json(glm::dmat4(scene.camera.view))},
+            {"fov_y_degrees", number(scene.camera.fov_y_degrees)}}},
+          {"meshes", Json::array({{{"file", "cube.obj"}, {"transform", rows_to_json(transform)}}})},
+          {"lights",
+           {{"point", Json::array({{{"position", vector(light.position)},
+                                    {"diffuse", vector(light.diffuse)},
+                                    {"specular", vector(light.specular)}}})}}},
+          {"smoothing", {{"preset", "joint_gaussian"}}}};
+}
+
+/// What the other commands take, so that they can be tried on it.
+void write_inputs(const std::filesystem::path& folder, const Scene& scene, const Pose& truth,
+                  const Pose& start, const Image& target) {
+  write_mesh(folder / "cube.obj", scene.meshes.front().mesh);
+  write_json(folder / "truth.json", scene_to_json(scene, truth));
+  write_json(folder / "scene.json", scene_to_json(scene, start));
+  write_image(folder / "target.exr", target);
+}
+
 void run(const CLI::App& command, const std::string& folder, const CommonOptions& common) {
   make_folder(folder);
   Scene scene = cube_scene();
@@ -60,7 +101,8 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   const glm::dvec3 turn = glm::radians(k_start_degrees) * random_axis(common.seed.value_or(k_axis_seed));
   const Pose start{rotation_from_vector(turn) * truth.rotation, truth.translation};
   const PoseResult result = solver.solve(start, progress_callback(solver.most_iterations(), common.quiet));
-  write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(result, truth.rotation));
+  write_inputs(folder, scene, truth, start, target);
+  write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(scene, result, truth.rotation));
   write_pose_report(folder, device, scene, target, result, common.quiet, truth.rotation);
   if (!common.quiet) {
     std::printf("%s: from %.1f to %.2f degrees from the truth in %u iterations, %.1f s\n", folder.c_str(),

@@ -60,6 +60,14 @@ Json rows_to_json(const glm::dmat3& matrix) {
   return rows;
 }
 
+Json rows_to_json(const glm::dmat4& matrix) {
+  Json rows = Json::array();
+  for (int row = 0; row < 4; ++row) {
+    rows.push_back(Json::array({matrix[0][row], matrix[1][row], matrix[2][row], matrix[3][row]}));
+  }
+  return rows;
+}
+
 std::string to_text(const Json& json) {
   std::string text;
   append(text, json, 0);

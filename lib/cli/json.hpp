@@ -18,6 +18,7 @@ Json to_json(const glm::dvec3& v);
 Json to_json(const std::vector<glm::vec3>& vectors);
 /// A list of rows.
 Json rows_to_json(const glm::dmat3& matrix);
+Json rows_to_json(const glm::dmat4& matrix);
 
 /// Objects and lists of lists over several lines, lists of numbers on one.
 std::string to_text(const Json& json);

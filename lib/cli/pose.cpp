@@ -16,6 +16,9 @@ const char* const k_least_squares_group = "Least squares (--method least_squares
 const char* const k_descent_group =
     "Descent (--method descent; any of these, or of the smoothing's, implies it)";
 
+/// What the paper gives its schedule, which shrinks the smoothing by a tenth every 50 iterations.
+constexpr unsigned k_adaptive_iterations = 800;
+
 struct PoseCommandOptions {
   std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal",
                                                      output, report;
@@ -59,12 +62,18 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
     return;
   }
   if (options.search || gives_any(command, k_least_squares_group)) {
-    throw InvalidArgument("--method (command line)", "descent with an option of least squares'",
-                          "options of one method");
+    throw InvalidArgument("--method (command line)",
+                          std::string("descent with ") +
+                              (options.search ? "--search, which is" : "an option of") + " least squares'",
+                          "options of one method; those of the descent and of the smoothing imply it");
   }
   options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
   options.descent.optimizer.kind = parse_optimizer(options.optimizer);
   options.descent.schedule = parse_schedule(options.schedule);
+  if (std::holds_alternative<AdaptiveSchedule>(options.descent.schedule) &&
+      command.count("--iterations") == 0) {
+    options.descent.iterations = k_adaptive_iterations;
+  }
   options.solver.method = options.descent;
 }
 
@@ -80,11 +89,14 @@ PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rota
 void print(const std::string& file, const PoseResult& result) {
   std::printf("%s: loss %.6g after %u iterations, %.1f s\n", file.c_str(), result.loss, result.iterations,
               result.seconds);
-  if (result.equals.size() > 1) {
-    std::printf("%zu poses explain the target equally well; all are in the file.\n", result.equals.size());
+  if (!result.explained) {
+    std::printf(
+        "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
+        "be "
+        "wrong, or colours, lights, clutter or occlusion may differ from the scene's.\n");
+  } else if (result.equals.size() > 1) {
+    std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }
-  if (!result.explained)
-    std::printf("The target is not explained: the loss stayed near that of a wrong pose.\n");
 }
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
@@ -98,11 +110,11 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   }
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
-  const Image target = read_image(options.target);
+  const Image target = read_target(options.target, options.descent.loss);
   const Device device = open_device(common);
   const PoseSolver solver(device, scene, target, options.solver);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
-  write_json(options.output, pose_to_json(result));
+  write_json(options.output, pose_to_json(scene, result));
   if (!options.report.empty()) write_pose_report(options.report, device, scene, target, result, common.quiet);
   if (!common.quiet) print(options.output, result);
 }
@@ -115,7 +127,8 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
   add("--rotations", method.rotations,
       "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
   add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
-  add("--level-iterations", method.iterations, "How many steps a level at most; 10 by default", "N");
+  add("--level-iterations", method.iterations,
+      "How many steps a level, more while the best pose still improves; 10 by default", "N");
   add("--blur", method.blur, "Of the edges, in pixels of the level; 0.25 by default", "FLOAT");
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
   add("--robust", method.robust,
@@ -136,7 +149,7 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
     return command.add_option(name, value, description)->group(k_descent_group)->type_name(type);
   };
   add("--loss", options.loss, "What is made small; mse by default", "mse|l1|silhouette");
-  add("--iterations", method.iterations, "How many steps; 200 by default", "N");
+  add("--iterations", method.iterations, "How many steps; 200 by default, 800 with --schedule adaptive", "N");
   add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
   add("--optimizer", options.optimizer, "How steps are made; adam by default", "adam|sgd");
   add("--schedule", options.schedule,

@@ -20,12 +20,17 @@ namespace {
 
 constexpr std::size_t k_strip_length = 8;
 
+/// What the scene's transform holds beside rotation and translation: its scale.
+glm::dmat3 stretch_of(const Scene& scene) {
+  return polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch;
+}
+
 /// Renders the scene's mesh in any pose.
 class PoseCamera {
  public:
   PoseCamera(const Device& device, Scene scene)
       : renderer_(device),
-        stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+        stretch_(stretch_of(scene)),
         camera_(scene.camera),
         view_{scene.camera, {glm::mat4(1.0F)}} {
     renderer_.set_scene(scene);
@@ -92,9 +97,12 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
               {{"loss", true, {loss}}, {angle_label, false, {angle}}, {"smoothing", true, {sigma, gamma}}});
 }
 
-Json to_json(const PoseHypothesis& hypothesis) {
-  return {{"rotation_matrix", rows_to_json(hypothesis.pose.rotation)},
-          {"translation", cli::to_json(hypothesis.pose.translation)},
+Json to_json(const PoseHypothesis& hypothesis, const glm::dmat3& stretch) {
+  const Pose& pose = hypothesis.pose;
+  return {{"rotation_matrix", rows_to_json(pose.rotation)},
+          {"rotation", cli::to_json(vector_from_rotation(pose.rotation))},
+          {"translation", cli::to_json(pose.translation)},
+          {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch, pose.translation)))},
           {"focal_scale", hypothesis.focal_scale},
           {"loss", hypothesis.loss}};
 }
@@ -139,8 +147,9 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   };
 }
 
-Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth) {
-  Json json = to_json(result);
+Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
+  const glm::dmat3 stretch = stretch_of(scene);
+  Json json = to_json(result, stretch);
   json["explained"] = result.explained;
   json["iterations"] = result.iterations;
   json["seconds"] = result.seconds;
@@ -150,7 +159,7 @@ Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& tru
   }
   json["covariance"] = covariance_to_json(result.covariance);
   Json& equals = json["hypotheses"] = Json::array();
-  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis));
+  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis, stretch));
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) history.push_back(to_json(step, truth));
   return json;

@@ -14,8 +14,8 @@ namespace dpr::cli {
 /// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 
-/// pose.json. With the true rotation, the angle errors too.
-Json pose_to_json(const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
+/// pose.json, of a fit to the scene's only mesh. With the true rotation, the angle errors too.
+Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw

@@ -72,6 +72,7 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   constexpr int k_size = 256;
   Scene scene;
   scene.width = scene.height = k_size;
+  scene.smoothing = smoothing_preset("joint_gaussian");
   scene.meshes.push_back({read_mesh(options.mesh), glm::mat4(1.0F)});
   apply(common, scene);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
@@ -87,13 +88,9 @@ void run(const RenderOptions& options, CommonOptions& common) {
   Renderer renderer(open_device(common));
   renderer.set_scene(scene);
   renderer.forward();
-  Image image = renderer.image();
-  // Colours are those over the background already: with the silhouette as alpha, viewers would blend once
-  // more.
-  if (std::filesystem::path(options.output).extension() != ".exr") {
-    for (glm::vec4& pixel : image.pixels) pixel.a = 1;
-  }
-  write_image(options.output, image);
+  const Image image = renderer.image();
+  const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
+  write_image(options.output, keeps_silhouette ? image : opaque(image));
   const RenderStatistics statistics = renderer.statistics();
   aovs.write(renderer);
   if (!common.quiet) {
@@ -146,6 +143,9 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->type_name("NAME[,NAME]");
   add_common_options(*command, common);
   command->get_option("--rigid")->excludes(command->get_option("--preset"));
+  for (const char* const fitted : {"--elevation", "--azimuth"}) {
+    command->get_option(fitted)->excludes(command->get_option("--scene"));
+  }
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");
   command->callback([options, &common] {
     if (options->mesh.empty() && options->scene.empty()) throw CLI::RequiredError("MESH or --scene");

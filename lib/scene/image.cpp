@@ -152,6 +152,11 @@ void write_image(const std::filesystem::path& file, const Image& image) {
   temporary.commit();
 }
 
+Image opaque(Image image) {
+  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
+  return image;
+}
+
 Image hstack(const std::vector<Image>& images, int gap, glm::vec4 fill) {
   if (images.empty()) return {};
   if (gap < 0) throw InvalidArgument("gap (hstack)", std::to_string(gap), "a number of pixels >= 0");

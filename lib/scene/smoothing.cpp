@@ -112,7 +112,8 @@ void validate_sampling(const Smoothing& s) {
   }
   if (s.variance_reduction != VarianceReduction::leave_one_out) return;
   if (s.draws == Draws::stratified) {
-    throw InvalidArgument("variance_reduction (smoothing)", "leave_one_out with stratified draws",
+    throw InvalidArgument("variance_reduction (smoothing)",
+                          "leave_one_out (the default) with stratified draws",
                           "none or rigid: stratified samples are not independent of each other");
   }
   const std::uint32_t least = paired ? 4 : 2;

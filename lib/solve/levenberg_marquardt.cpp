@@ -69,11 +69,24 @@ bool next_step(Trial& trial, const PoseSpace& space, double pixel_ndc, PoseSpace
 void judge(Trial& trial, const Hypothesis& hypothesis, const NormalEquations& equations) {
   const double before = trial.candidate->equations.loss;
   if (equations.loss < before) {
-    *trial.candidate = {hypothesis, equations};
+    trial.candidate->hypothesis = hypothesis;
+    trial.candidate->equations = equations;
     trial.damping = std::max(trial.damping * k_damping_fall, k_least_damping);
   } else {
     trial.damping *= k_damping_rise;
   }
+}
+
+double least_loss(const std::vector<Candidate>& candidates) {
+  const auto loss = [](const Candidate& candidate) { return candidate.equations.loss; };
+  return std::ranges::min(candidates, {}, loss).equations.loss;
+}
+
+/// Whether the best candidate is still on its way: losses of all iterations so far.
+bool still_falls(const std::vector<double>& losses) {
+  constexpr std::size_t k_last = 3;
+  constexpr double k_least_fall = 0.03;  // over the last iterations
+  return losses.size() > k_last && losses.back() < (1 - k_least_fall) * losses[losses.size() - 1 - k_last];
 }
 
 }  // namespace
@@ -120,7 +133,10 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
   std::vector<NormalEquations> equations = level.linearize(hypotheses);
   for (std::size_t i = 0; i < trials.size(); ++i) candidates[i].equations = equations[i];
 
-  for (unsigned iteration = 0; iteration < iterations; ++iteration) {
+  std::vector<double> losses;
+  for (unsigned iteration = 0; iteration < k_patience * iterations; ++iteration) {
+    losses.push_back(least_loss(candidates));
+    if (iteration >= iterations && !still_falls(losses)) break;
     if (!report()) return false;
     std::vector<Trial*> moving;
     hypotheses.clear();

@@ -12,7 +12,11 @@ namespace dpr {
 struct Candidate {
   Hypothesis hypothesis;
   NormalEquations equations{};  ///< at the hypothesis, of the level worked on
+  bool is_initial = false;      ///< descends from the first pose that was given
 };
+
+/// How many times as often as asked the candidates are turned while the best one still falls.
+inline constexpr unsigned k_patience = 4;
 
 /// The step -(H + damping diag(H))^-1 g; false where H is not positive definite even so.
 bool damped_step(const NormalEquations& equations, std::size_t parameters, double damping,
@@ -22,7 +26,8 @@ bool damped_step(const NormalEquations& equations, std::size_t parameters, doubl
 /// Row-major [parameters]^2; empty where H is not positive definite to rounding.
 std::vector<double> covariance(const NormalEquations& equations, std::size_t parameters);
 
-/// Turns every candidate until it stands still, at most `iterations` times, all in the same launches.
+/// Turns every candidate until it stands still, at most `iterations` times, or k_patience times as often while the
+/// best still falls; all in the same launches.
 /// `report` is called after each iteration; false stops. Returns false if it was stopped.
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, unsigned iterations,
             const std::function<bool()>& report);

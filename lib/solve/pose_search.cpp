@@ -114,6 +114,7 @@ void Fit::start(PoseLevel& level) {
   std::ranges::stable_sort(candidates_, by_loss);
   candidates_.resize(std::min(candidates_.size(), k_beam.front()));
   for (const Pose& pose : initial_) candidates_.push_back({{pose}});
+  candidates_[candidates_.size() - initial_.size()].is_initial = true;
 }
 
 bool Fit::work(PoseLevel& level, std::size_t keep, bool goes_on) {
@@ -127,10 +128,14 @@ bool Fit::work(PoseLevel& level, std::size_t keep, bool goes_on) {
 void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates_) {
-    const bool is_known = std::ranges::any_of(kept, [&](const Candidate& other) {
+    const auto same = std::ranges::find_if(kept, [&](const Candidate& other) {
       return space_.distance(candidate.hypothesis, other.hypothesis) < k_same_pixels * level.pixel_ndc();
     });
-    if (!is_known && kept.size() < count) kept.push_back(candidate);
+    if (same != kept.end()) {
+      same->is_initial = same->is_initial || candidate.is_initial;
+    } else if (kept.size() < count || candidate.is_initial) {  // which may be the nearest of many equals
+      kept.push_back(candidate);
+    }
   }
   candidates_ = std::move(kept);
   const double hopeless = k_hopeless_ratio * candidates_.front().equations.loss + k_hopeless_part * wrong_;
@@ -165,8 +170,8 @@ void Fit::choose_equals(bool anywhere) {
     std::ranges::stable_sort(candidates_, {},
                              [&](const Candidate& c) { return space_.distance(c.hypothesis, first); });
   }
-  for (const auto& [hypothesis, equations] : candidates_) {
-    result_.equals.push_back({hypothesis.pose, hypothesis.focal_scale, equations.loss});
+  for (const Candidate& c : candidates_) {
+    result_.equals.push_back({c.hypothesis.pose, c.hypothesis.focal_scale, c.equations.loss});
   }
 }
 
@@ -211,7 +216,7 @@ void validate(const LeastSquares& options, const Scene& scene) {
 }
 
 unsigned most_iterations(const LeastSquares& options, const Scene& scene) {
-  return options.iterations * static_cast<unsigned>(level_shapes(scene, options).size());
+  return k_patience * options.iterations * static_cast<unsigned>(level_shapes(scene, options).size());
 }
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,

@@ -57,7 +57,6 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   o.sampling = sampling_params(smoothing_);
   o.width = p.width;
   o.faces = p.faces;
-  o.pixels_per_view = p.width * p.height;
   o.first_view = p.first_view;
   return o;
 }

@@ -37,9 +37,9 @@ TEST_SUITE("bench-smoke") {
     const Json base = timing(9, 10, 11);
     CHECK(verdict(base, base) == "same");
     CHECK(verdict(base, timing(7, 8, 8.9)) == "faster");
-    CHECK(verdict(base, timing(7, 8, 9.1)) == "same");  // the halves touch
+    CHECK(verdict(base, timing(7, 8, 9.1)) == "unclear");  // the halves touch
     CHECK(verdict(base, timing(11.1, 12, 13)) == "slower");
-    CHECK(verdict(base, timing(10.9, 12, 13)) == "same");
+    CHECK(verdict(base, timing(10.9, 12, 13)) == "unclear");
     const Json narrow = timing(9.99, 10, 10.01);
     CHECK(verdict(narrow, timing(10.3, 10.4, 10.5)) == "same");  // 4%
     CHECK(verdict(narrow, timing(10.5, 10.6, 10.7)) == "slower");

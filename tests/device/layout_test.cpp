@@ -84,7 +84,6 @@ std::vector<Entry> entries() {
           DPR_FIELD(OccupancyParams, sampling),
           DPR_FIELD(OccupancyParams, width),
           DPR_FIELD(OccupancyParams, faces),
-          DPR_FIELD(OccupancyParams, pixels_per_view),
           DPR_FIELD(OccupancyParams, first_view),
           DPR_SIZE(AggregateParams),
           DPR_FIELD(AggregateParams, background),

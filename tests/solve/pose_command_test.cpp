@@ -69,6 +69,9 @@ TEST_SUITE("pipeline") {
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
     CHECK(pose["translation"].size() == 3);
+    CHECK(pose["rotation"].size() == 3);
+    REQUIRE(pose["transform"].size() == 4);
+    CHECK(pose["transform"][0][3].get<double>() == doctest::Approx(pose["translation"][0].get<double>()));
     CHECK(pose["loss"].get<double>() < 1e-3);
     CHECK(pose["explained"] == true);
     CHECK(pose["focal_scale"] == 1.0);
