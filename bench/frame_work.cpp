@@ -113,7 +113,7 @@ Evaluations count_pixel(const Fragments& f, std::span<const cl_uint> run, const 
 }  // namespace
 
 FrameWork count_work(const Renderer& renderer) {
-  const Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = renderer.impl();
   r.require_forward("count_work");
   const std::size_t pixels_per_view = std::size_t{r.frame.width} * r.frame.height;
   FrameWork work;
