@@ -100,9 +100,14 @@ static inline realn square(realn x) { return x * x; }
 static inline realn choose(intn condition, realn a, realn b) { return select(b, a, condition); }
 
 #if DPR_WIDTH != 1
+/// 1.5 * 2^23: added to a number below 2^22 in magnitude it leaves the nearest integer in the low bits. PoCL's rint() and
+/// the conversion to int are a dozen instructions.
+#define DPR_ROUNDING 12582912.0f
+
 /// 2^round(x / ln 2) times a polynomial of the rest (least maximum error on |f| <= ln 2 / 2), for -87 <= x <= 88.
 static inline realn exp_in_range(realn x) {
-  const realn n = rint(x * M_LOG2E_F);
+  const realn shifted = mad(x, M_LOG2E_F, DPR_ROUNDING);
+  const realn n = shifted - DPR_ROUNDING;
   // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
   const realn f = mad(n, -1.42860677e-6f, mad(n, -0.693145752f, x));
   realn p = 0.00138368784f;
@@ -112,7 +117,7 @@ static inline realn exp_in_range(realn x) {
   p = mad(p, f, 0.499999911f);
   p = mad(p, f, 1.0f);
   p = mad(p, f, 1.0f);
-  return p * as_realn((convert_intn(n) + 127) << 23);
+  return as_realn(as_intn(p) + (as_intn(shifted) << 23));  // p * 2^n: adds to the exponent
 }
 #endif
 
