@@ -161,4 +161,15 @@ static inline realn log_n(realn x) {
 #endif
 }
 
+/// ln(1 + x) for x from -1 to 1 with the relative precision of small x: what rounding 1 + x takes away is added to the
+/// logarithm. Exact there up to a factor of 1 + x, which counts only where x is no longer small.
+static inline realn log1p_n(realn x) {
+#if DPR_WIDTH == 1
+  return log1p(x);
+#else
+  const realn sum = 1.0f + x;
+  return log_n(sum) + (x - (sum - 1.0f));
+#endif
+}
+
 #endif
