@@ -4,8 +4,8 @@
 //
 // Operations: +, -, *, /, sqrt and rsqrt count 1, a mad 2, on every lane that holds a pixel, a fragment or a
 // node. Comparisons, selections, min, max, abs, conversions, integers and indices count nothing, nor does
-// what is uniform to a triangle. exp_n is 18 operations (1 product, 8 mads, 1 product), log_n 21 (1
-// difference, 9 mads, 2 products); a library exp or log1p is taken for as many.
+// what is uniform to a triangle. exp_n is 19 operations (9 mads, 1 difference), log_n 21 (1 difference, 9 mads,
+// 2 products), log1p_n 4 more; a library exp is taken for as many.
 //
 // Bytes: every element of a buffer that a kernel needs, once, even where a cache or a second pass would have
 // it come twice or not at all.
@@ -27,13 +27,13 @@ inline Cost operator+(Cost a, Cost b) { return {a.flops + b.flops, a.bytes + b.b
 inline Cost operator*(double count, Cost each) { return {count * each.flops, count * each.bytes}; }
 
 /// The Gaussian prior's parts (kernels/priors.h).
-inline constexpr double k_exp = 18, k_log = 21;
+inline constexpr double k_exp = 19, k_log = 21, k_log1p = k_log + 4;
 inline constexpr double k_normal_density = k_exp + 3;  // -0.5 x x, the constant
 inline constexpr double k_mills_ratio = 22;            // 1 mad, 1 quotient, 9 mads, 1 product
 inline constexpr double k_tail = k_normal_density + k_mills_ratio + 1;
 inline constexpr double k_cdf_density = k_tail + 1;               // 1 - tail
-inline constexpr double k_gaussian_log = k_tail + 2 * k_log + 7;  // occupancy_log: both branches, the hazard
-inline constexpr double k_logistic_log = k_exp + k_log + 5;
+inline constexpr double k_gaussian_log = k_tail + k_log + k_log1p + 7;  // occupancy_log: both branches, the hazard
+inline constexpr double k_logistic_log = k_exp + k_log1p + 5;
 /// AS 241: both branches; 2 operations make the uniform number.
 inline constexpr double k_normal_sample = 2 + 3 + 14 + (k_log + 14);
 

@@ -2,22 +2,46 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <span>
+#include <stdexcept>
+#include <string>
 
+#include "device/kernel_sources.hpp"
 #include "renderer_impl.hpp"
 
 namespace dpr::bench {
 namespace {
 
-// The Gaussian rule, as kernels/prior_gaussian.h and quadrature.h have it.
-constexpr double k_reach = 9.5;                         // DPR_BARRIER_REACH
-constexpr double k_nodes = 16;                          // DPR_BARRIER_NODES
-constexpr std::size_t k_throng = 64;                    // DPR_THRONG
-constexpr double k_joint_reach = 9.6;                   // DPR_JOINT_BELOW + DPR_JOINT_ABOVE
-constexpr double k_crowd = 3, k_crowd_reach = 1.1;      // DPR_JOINT_CROWD, DPR_JOINT_CROWD_REACH
-constexpr double k_step = 0.67, k_crowd_step = 0.335;   // DPR_JOINT_STEP, DPR_JOINT_CROWD_STEP
-constexpr double k_block = 16;                          // DPR_WIDTH of aggregate_joint.cl on vectors
-constexpr double k_opaque = 1e-9, k_negligible = 1e-8;  // DPR_OPAQUE, DPR_NEGLIGIBLE
+/// A constant of the kernels, from their source.
+double kernel_constant(std::string_view file, std::string_view name) {
+  const std::string_view text = kernel_file(file);
+  const std::string definition = "#define " + std::string(name) + " ";
+  const std::size_t at = text.find(definition);
+  if (at == std::string_view::npos) throw std::logic_error(definition + "is not in " + std::string(file));
+  return std::strtod(text.data() + at + definition.size(), nullptr);
+}
+
+/// Where the Gaussian integrals are evaluated, as kernels/prior_gaussian.h and quadrature.h have it.
+struct Rule {
+  static double of_prior(std::string_view name) { return kernel_constant("prior_gaussian.h", name); }
+  static double of_any(std::string_view name) { return kernel_constant("quadrature.h", name); }
+  static double of_joint(std::string_view name) { return kernel_constant("aggregate_joint.cl", name); }
+
+  double reach = of_prior("DPR_BARRIER_REACH"), nodes = of_prior("DPR_BARRIER_NODES");
+  double throng = of_any("DPR_THRONG");
+  double joint_reach = of_prior("DPR_JOINT_BELOW") + of_prior("DPR_JOINT_ABOVE");
+  double crowd = of_any("DPR_JOINT_CROWD"), crowd_reach = of_any("DPR_JOINT_CROWD_REACH");
+  double step = of_prior("DPR_JOINT_STEP"), crowd_step = of_prior("DPR_JOINT_CROWD_STEP");
+  double opaque = of_joint("DPR_OPAQUE"), negligible = of_joint("DPR_NEGLIGIBLE");
+  double min_transparency = kernel_constant("pixel.h", "DPR_MIN_TRANSPARENCY");
+  double block = 16;  // DPR_WIDTH of aggregate_joint.cl on vectors
+};
+
+const Rule& rule() {
+  static const Rule gaussian;
+  return gaussian;
+}
 
 /// The fragments of a frame, on the host.
 struct Fragments {
@@ -55,11 +79,12 @@ Evaluations barrier_pixel(const Fragments& f, std::span<const cl_uint> run, cons
   double largest = static_cast<double>(s.background_depth / s.gamma);
   const double background = largest;
   for (const cl_uint k : run) largest = f.is_there(k) ? std::max(largest, beta(k)) : largest;
-  std::size_t crowd = background > largest - k_reach ? 1 : 0;
-  for (const cl_uint k : run) crowd += f.is_there(k) && beta(k) > largest - k_reach ? 1U : 0U;
+  std::size_t crowd = background > largest - rule().reach ? 1 : 0;
+  for (const cl_uint k : run) crowd += f.is_there(k) && beta(k) > largest - rule().reach ? 1U : 0U;
   if (crowd < 2) return {};  // a slot alone needs no integral
-  const double nodes = k_nodes * (crowd > k_throng ? 2 : 1);
-  return {nodes * static_cast<double>(crowd), nodes * static_cast<double>(crowd)};
+  const auto slots = static_cast<double>(crowd);
+  const double nodes = rule().nodes * (slots > rule().throng ? 2 : 1);
+  return {nodes * slots, nodes * slots};
 }
 
 /// Joint: what covers, sorted by depth, front to back; clusters of two and more at nodes that span them.
@@ -71,25 +96,26 @@ Evaluations joint_pixel(const Fragments& f, std::span<const cl_uint> run, const 
   for (const cl_uint k : run) largest = std::max(largest, occupancy(k));
   std::vector<cl_uint> slots;
   for (const cl_uint k : run) {
-    if (occupancy(k) > k_negligible * largest) slots.push_back(k);
+    if (occupancy(k) > rule().negligible * largest) slots.push_back(k);
   }
   std::ranges::sort(slots, {}, [&](cl_uint k) { return f.depth[k]; });
   const auto depth = [&](std::size_t i) { return static_cast<double>(f.depth[slots[i]]); };
   Evaluations sum;
   double transparency = 1;
-  for (std::size_t first = 0, last = 0; first < slots.size() && transparency > k_opaque; first = last) {
+  for (std::size_t first = 0, last = 0; first < slots.size() && transparency > rule().opaque; first = last) {
     double covering = 0;
-    for (last = first;
-         last == first || (last < slots.size() && (depth(last) - depth(last - 1)) * scale < k_joint_reach);
+    for (last = first; last == first ||
+                       (last < slots.size() && (depth(last) - depth(last - 1)) * scale < rule().joint_reach);
          ++last) {
       covering += occupancy(slots[last]);
-      transparency *= std::max(1 - occupancy(slots[last]), k_opaque);
+      transparency *= std::max(1 - occupancy(slots[last]), rule().min_transparency);
     }
     if (last - first < 2) continue;
-    const bool crowded = covering > k_crowd;
+    const bool crowded = covering > rule().crowd;
     const double span =
-        (depth(last - 1) - depth(first)) * scale + (crowded ? k_crowd_reach : 1) * k_joint_reach;
-    const double nodes = std::ceil(span / ((crowded ? k_crowd_step : k_step) * k_block)) * k_block;
+        (depth(last - 1) - depth(first)) * scale + (crowded ? rule().crowd_reach : 1) * rule().joint_reach;
+    const double nodes =
+        std::ceil(span / ((crowded ? rule().crowd_step : rule().step) * rule().block)) * rule().block;
     sum.forward += nodes * static_cast<double>(last - first);
   }
   sum.backward = sum.forward;
@@ -113,8 +139,11 @@ Evaluations count_pixel(const Fragments& f, std::span<const cl_uint> run, const 
 }  // namespace
 
 FrameWork count_work(const Renderer& renderer) {
-  const Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = renderer.impl();
   r.require_forward("count_work");
+  if (r.bands.size() > 1) {
+    throw InvalidArgument("bands (count_work)", std::to_string(r.bands.size()), "a frame in one");
+  }
   const std::size_t pixels_per_view = std::size_t{r.frame.width} * r.frame.height;
   FrameWork work;
   work.pairs = static_cast<double>(r.bin.pairs);

@@ -17,7 +17,8 @@ struct FrameWork {
 
 /// Counts the renderer's last frame on the host, by the rules of kernels/quadrature.h and the aggregate
 /// kernels: nodes of crowded pixels, slots out of reach, clusters of the joint composition. Downloads the
-/// fragments. Throws InvalidArgument before the first forward().
+/// fragments. Throws InvalidArgument before the first forward(), and for a frame of several bands, of which
+/// only the last one's fragments are there.
 FrameWork count_work(const Renderer& renderer);
 
 }  // namespace dpr::bench

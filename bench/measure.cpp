@@ -130,16 +130,18 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
       append(milliseconds_by_stage(profile.take()), run, backward);
     }
   }
-  const FrameWork work = count_work(row.renderer);
+  // In several bands a backward pass renders them again, and only the last one's fragments are there to
+  // count.
+  const bool has_rates = row.renderer.statistics().bands == 1;
+  const FrameWork work = has_rates ? count_work(row.renderer) : FrameWork{};
   Json& stages = result["stages"] = Json::object();
   for (const std::string_view name : k_stages) {
     const std::string stage(name);
     if (!forward.contains(stage) && !backward.contains(stage)) continue;
     const double forward_ms = median(forward[stage]), backward_ms = median(backward[stage]);
     stages[stage] = {{"forward_ms", forward_ms}, {"backward_ms", backward_ms}};
-    if (const auto cost = stage_cost(stage, work, row.renderer.scene().smoothing)) {
-      add_rates(*cost, forward_ms + backward_ms, peaks, stages[stage]);
-    }
+    const auto cost = stage_cost(stage, work, row.renderer.scene().smoothing);
+    if (has_rates && cost) add_rates(*cost, forward_ms + backward_ms, peaks, stages[stage]);
   }
 }
 
@@ -169,7 +171,9 @@ void measure_into(Json& result, const Device& device, const Peaks& peaks, const 
   measure_passes(row, options, result);
   const std::size_t device_bytes = device.peak_allocated_bytes(), resident_bytes = peak_resident_bytes();
   measure_stages(row, device, peaks, options, result);
-  result["fragments"] = row.renderer.statistics().fragments;
+  const RenderStatistics statistics = row.renderer.statistics();
+  result["fragments"] = statistics.fragments;
+  result["bands"] = statistics.bands;
   result["peak_device_bytes"] = device_bytes;
   result["peak_rss_bytes"] = resident_bytes;
 }

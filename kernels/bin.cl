@@ -1,5 +1,7 @@
 // (tile, triangle) pairs: counted, then listed in face order, sorted by tile (sort.cl), then linked. Pairs are numbered
 // by tile, so that what belongs to a tile lies together; faces list theirs, so that gradients are gathered in order.
+// The host launches for as many pairs as it has made room for; how many there are, the device alone need know. Where
+// they do not fit there are none, and the host, which learns it later, starts over.
 #include "shared_types.h"
 
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge.
@@ -41,15 +43,21 @@ kernel void bin_count(const FrameParams p, global const Triangle* restrict trian
 }
 
 /// Lists the tiles of every triangle, each at a place of its own. One work-item per (view, face).
+/// in   room        places that there are
 /// in   offsets     uint[view * face + 1]  exclusive scan of the counts
+/// out  pairs       uint[1]               how many there are; 0 where they do not fit
 /// out  place_face  uint[place]           view * faces + face
 /// out  place_tile  uint[place]           view * tiles + tile
 /// out  places      uint[place]           the place itself: what sorting permutes
-kernel void bin_fill(const FrameParams p, global const Triangle* restrict triangles,
-                     global const uint* restrict offsets, global uint* restrict place_face,
-                     global uint* restrict place_tile, global uint* restrict places) {
+kernel void bin_fill(const FrameParams p, const uint room, global const Triangle* restrict triangles,
+                     global const uint* restrict offsets, global uint* restrict pairs,
+                     global uint* restrict place_face, global uint* restrict place_tile,
+                     global uint* restrict places) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
+  const uint total = offsets[p.views * p.faces];
+  if (i == 0) pairs[0] = total > room ? 0 : total;
+  if (total > room) return;
   const Triangle t = triangles[i];
   if (t.orientation == 0.0f) return;
   const uint first_tile = i / p.faces * p.tiles_x * p.tiles_y;
@@ -65,15 +73,22 @@ kernel void bin_fill(const FrameParams p, global const Triangle* restrict triang
   }
 }
 
-/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item per pair.
+/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item for every pair there is room
+/// for.
+/// in   pairs       uint[1]
 /// in   places      uint[pair]   where the pair's face lists it
 /// in   place_face  uint[place]
-/// out  pair_face   uint[pair]   view * faces + face
+/// out  pair_face   uint[room]   view * faces + face; 0 where there is no pair
 /// out  face_pairs  uint[place]  the pairs of every face, by tile
-kernel void bin_link(const uint pairs, global const uint* restrict places, global const uint* restrict place_face,
-                     global uint* restrict pair_face, global uint* restrict face_pairs) {
+kernel void bin_link(const uint room, global const uint* restrict pairs, global const uint* restrict places,
+                     global const uint* restrict place_face, global uint* restrict pair_face,
+                     global uint* restrict face_pairs) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= room) return;
+  if (pair >= pairs[0]) {
+    pair_face[pair] = 0;
+    return;
+  }
   pair_face[pair] = place_face[places[pair]];
   face_pairs[places[pair]] = pair;
 }

@@ -100,9 +100,14 @@ static inline realn square(realn x) { return x * x; }
 static inline realn choose(intn condition, realn a, realn b) { return select(b, a, condition); }
 
 #if DPR_WIDTH != 1
+/// 1.5 * 2^23: added to a number below 2^22 in magnitude it leaves the nearest integer in the low bits. PoCL's rint() and
+/// the conversion to int are a dozen instructions.
+#define DPR_ROUNDING 12582912.0f
+
 /// 2^round(x / ln 2) times a polynomial of the rest (least maximum error on |f| <= ln 2 / 2), for -87 <= x <= 88.
 static inline realn exp_in_range(realn x) {
-  const realn n = rint(x * M_LOG2E_F);
+  const realn shifted = mad(x, M_LOG2E_F, DPR_ROUNDING);
+  const realn n = shifted - DPR_ROUNDING;
   // ln 2 in two parts, the first exact in few bits: n * ln 2 would lose the low bits of f.
   const realn f = mad(n, -1.42860677e-6f, mad(n, -0.693145752f, x));
   realn p = 0.00138368784f;
@@ -112,7 +117,7 @@ static inline realn exp_in_range(realn x) {
   p = mad(p, f, 0.499999911f);
   p = mad(p, f, 1.0f);
   p = mad(p, f, 1.0f);
-  return p * as_realn((convert_intn(n) + 127) << 23);
+  return as_realn(as_intn(p) + (as_intn(shifted) << 23));  // p * 2^n: adds to the exponent
 }
 #endif
 
@@ -153,6 +158,17 @@ static inline realn log_n(realn x) {
   p = mad(p, f, 0.333339106f);
   const realn f2 = f * f;
   return mad(convert_realn(exponent), M_LN2_F, mad(f2 * f, p, mad(f2, -0.5f, f)));
+#endif
+}
+
+/// ln(1 + x) for x from -1 to 1 with the relative precision of small x: what rounding 1 + x takes away is added to the
+/// logarithm. Exact there up to a factor of 1 + x, which counts only where x is no longer small.
+static inline realn log1p_n(realn x) {
+#if DPR_WIDTH == 1
+  return log1p(x);
+#else
+  const realn sum = 1.0f + x;
+  return log_n(sum) + (x - (sum - 1.0f));
 #endif
 }
 

@@ -47,14 +47,16 @@ static inline Perturbed perturb(realn distance, float sigma) {
 
 #endif
 
-/// One work-item per vector of fragments. Deterministic.
+/// One work-item for every vector of fragments there is room for. Deterministic.
+/// in   fragment_starts  uint[pair + 1]  up to `last_pair`: its last is the number of fragments
 /// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
 /// out  log_occupancy  float[fragment]  ln p, DPR_LOG_ZERO for p = 0
 /// out  occupancy      float[fragment]  p, in [0, 1]
-kernel void occupancy_forward(const OccupancyParams p, const uint fragments, global const float* restrict distance,
+kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
+                              global const uint* restrict fragment_starts, global const float* restrict distance,
                               global float* restrict log_occupancy, global float* restrict occupancy) {
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
-  if (i >= fragments) return;
+  if (i >= fragment_starts[last_pair]) return;
   const Perturbed v = perturb(load_n(i, distance), p.sigma);
   store_n(max(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
   store_n(v.p, i, occupancy);

@@ -101,7 +101,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   const realn tail = density * mills;
   const intn negative = x < 0.0f;
   const realn log_tail = log_n(mills) - 0.5f * x * x - DPR_LOG_SQRT_2PI;
-  *log_p = choose(negative, log_tail, log1p(-tail));
+  *log_p = choose(negative, log_tail, log1p_n(-tail));
   *hazard = choose(negative, 1.0f / mills, density / (1.0f - tail));
 }
 

@@ -38,7 +38,7 @@ static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   const intn small = u < 0.05f;
   const realn series = mad(u, mad(u, 1.0f / 24.0f, -0.5f), 0.0f);
   const realn survival = exp_n(-u);
-  *log_p = choose(small, x + series, log1p(-survival));
+  *log_p = choose(small, x + series, log1p_n(-survival));
   // d ln p / dx = u exp(-u) / (1 - exp(-u)) = u / (exp(u) - 1), 1 - u / 2 + u^2 / 12 for small u.
   *hazard = choose(small, mad(u, mad(u, 1.0f / 12.0f, -0.5f), 1.0f), u * survival / (1.0f - survival));
 }

@@ -45,7 +45,7 @@ static inline float prior_log_cdf_bound(float x, float* slope) {
 
 static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   const realn e = exp_n(-fabs(x));
-  *log_p = min(x, 0.0f) - log1p(e);
+  *log_p = min(x, 0.0f) - log1p_n(e);
   *hazard = choose(x < 0.0f, 1.0f / (1.0f + e), e / (1.0f + e));
 }
 

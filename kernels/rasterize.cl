@@ -35,14 +35,21 @@ static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint fir
 }
 
 /// Which pixels of its tile a triangle's blurred area covers: centre inside, or closer than the blur distance.
-/// One work-item per pair.
-/// out  masks   uint2[pair]  bit 8 * row + column
-/// out  counts  uint[pair]   covered pixels, rounded up to whole vectors
-kernel void rasterize_cover(const FrameParams p, const uint pairs, global const Triangle* restrict triangles,
-                            global const uint* restrict pair_face, global const uint* restrict pair_tile,
-                            global uint2* restrict masks, global uint* restrict counts) {
+/// One work-item for every pair there is room for; where there is no pair, nothing is covered.
+/// in   pairs   uint[1]      how many there are
+/// out  masks   uint2[room]  bit 8 * row + column
+/// out  counts  uint[room]   covered pixels, rounded up to whole vectors
+kernel void rasterize_cover(const FrameParams p, const uint room, global const uint* restrict pairs,
+                            global const Triangle* restrict triangles, global const uint* restrict pair_face,
+                            global const uint* restrict pair_tile, global uint2* restrict masks,
+                            global uint* restrict counts) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= room) return;
+  if (pair >= pairs[0]) {
+    masks[pair] = 0;
+    counts[pair] = 0;
+    return;
+  }
   const Triangle t = triangles[pair_face[pair]];
   const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
   const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
@@ -90,17 +97,33 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
 
 /// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
 /// more.
+/// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
 /// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
 /// in   pixel_starts     uint[pixel + 1]  exclusive scan of the counts
-/// out  rows  uint4[view * tiles_y + 1]   the first pair, fragment and list entry; w = 0
+/// out  rows  uint4[view * tiles_y + 1]   the first pair, fragment and list entry; w = the number of pairs
 kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
-                           global const uint* restrict fragment_starts, global const uint* restrict pixel_starts,
-                           global uint4* restrict rows) {
+                           global const uint* restrict pair_starts, global const uint* restrict fragment_starts,
+                           global const uint* restrict pixel_starts, global uint4* restrict rows) {
   const uint row = (uint)get_global_id(0);
   if (row > p.views * p.tiles_y) return;
   const uint pair = tile_starts[row * p.tiles_x];
   const uint pixel = (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
-  rows[row] = (uint4)(pair, fragment_starts[pair], pixel_starts[pixel], 0u);
+  rows[row] = (uint4)(pair, fragment_starts[pair], pixel_starts[pixel], pair_starts[p.views * p.faces]);
+}
+
+/// Empties a frame whose fragments do not fit into the room made for them, so that no later kernel writes behind a
+/// buffer's end. Any number of work-items.
+/// in   rows  uint4[last_row + 1]  whose last has the totals
+/// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
+kernel void rasterize_fit(const uint pairs, const uint pixels, const uint room, const uint list_room,
+                          const uint last_row, global const uint4* restrict rows, global uint2* restrict masks,
+                          global uint* restrict fragment_starts, global uint* restrict pixel_starts) {
+  const uint4 total = rows[last_row];
+  if (total.y <= room && total.z <= list_room) return;
+  const uint first = (uint)get_global_id(0), step = (uint)get_global_size(0);
+  for (uint i = first; i < pairs; i += step) masks[i] = 0;
+  for (uint i = first; i <= pairs; i += step) fragment_starts[i] = 0;
+  for (uint i = first; i <= pixels; i += step) pixel_starts[i] = 0;
 }
 
 /// Counts runs from a band's first element; those before and behind the band are empty. One work-item per run.

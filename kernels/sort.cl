@@ -1,36 +1,41 @@
 // A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a tile, still by
-// face. Nothing depends on the order in which work-items run.
+// face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on the device; the
+// host launches for as many as there is room for.
 #include "shared_types.h"
 
 #define DPR_SORT_DIGITS 256
 
 static inline uint sort_digit(uint key, uint shift) { return (key >> shift) & (DPR_SORT_DIGITS - 1); }
 
+/// Work-items, and columns of the histogram.
+static inline uint sort_blocks(uint room) { return room / DPR_SORT_BLOCK + (room % DPR_SORT_BLOCK != 0); }
+
 /// Counts the digits of every block. One work-item per block.
 /// out  histogram  uint[DPR_SORT_DIGITS][block]
-kernel void sort_histogram(const uint count, const uint shift, global const uint* restrict keys,
-                           global uint* restrict histogram) {
+kernel void sort_histogram(const uint room, const uint shift, global const uint* restrict count,
+                           global const uint* restrict keys, global uint* restrict histogram) {
   const uint block = (uint)get_global_id(0);
-  const uint blocks = (count + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
+  const uint blocks = sort_blocks(room);
   if (block >= blocks) return;
   uint counts[DPR_SORT_DIGITS];
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[d] = 0;
-  const uint last = min(count, (block + 1) * DPR_SORT_BLOCK);
+  const uint last = min(count[0], (block + 1) * DPR_SORT_BLOCK);
   for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) ++counts[sort_digit(keys[i], shift)];
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) histogram[d * blocks + block] = counts[d];
 }
 
 /// Moves every element to its place. One work-item per block.
 /// in   offsets  uint[DPR_SORT_DIGITS][block]  exclusive scan of the histogram
-kernel void sort_scatter(const uint count, const uint shift, global const uint* restrict keys,
-                         global const uint* restrict values, global const uint* restrict offsets,
-                         global uint* restrict sorted_keys, global uint* restrict sorted_values) {
+kernel void sort_scatter(const uint room, const uint shift, global const uint* restrict count,
+                         global const uint* restrict keys, global const uint* restrict values,
+                         global const uint* restrict offsets, global uint* restrict sorted_keys,
+                         global uint* restrict sorted_values) {
   const uint block = (uint)get_global_id(0);
-  const uint blocks = (count + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
+  const uint blocks = sort_blocks(room);
   if (block >= blocks) return;
   uint next[DPR_SORT_DIGITS];
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) next[d] = offsets[d * blocks + block];
-  const uint last = min(count, (block + 1) * DPR_SORT_BLOCK);
+  const uint last = min(count[0], (block + 1) * DPR_SORT_BLOCK);
   for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) {
     const uint target = next[sort_digit(keys[i], shift)]++;
     sorted_keys[target] = keys[i];
@@ -40,11 +45,11 @@ kernel void sort_scatter(const uint count, const uint shift, global const uint* 
 
 /// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one more.
 /// out  starts  uint[keys + 1]
-kernel void sort_ranges(const uint count, const uint keys, global const uint* restrict sorted_keys,
+kernel void sort_ranges(const uint keys, global const uint* restrict count, global const uint* restrict sorted_keys,
                         global uint* restrict starts) {
   const uint key = (uint)get_global_id(0);
   if (key > keys) return;
-  uint low = 0, high = count;
+  uint low = 0, high = count[0];
   while (low < high) {
     const uint middle = low + (high - low) / 2;
     if (sorted_keys[middle] < key) {

@@ -93,9 +93,10 @@ void Renderer::Impl::require_scene(const char* caller) const {
   if (!geometry) throw InvalidArgument(std::string(caller), "no scene", "set_scene() first");
 }
 
-void Renderer::Impl::require_forward(const char* caller) const {
+void Renderer::Impl::require_forward(const char* caller) {
   if (!rendered)
     throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
+  settle();
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
@@ -122,6 +123,7 @@ void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t firs
   const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size(), first_view);
   check_frame_size(wanted);
 
+  if (wanted.views != frame.views) last_counts.reset();
   frame = wanted;
   views.assign(new_views.begin(), new_views.end());
   device_views.cameras.upload(device.impl(), cameras);
@@ -145,16 +147,62 @@ void Renderer::Impl::forward() {
   rendered = false;
   transform.forward(frame, device_views, *geometry);
   setup.forward(frame, device_views, *geometry, transform.ndc);
-  bin.forward(frame, setup.triangles);
-  rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, device.memory_budget(), k_fragment_bytes);
-  for (const Band& band : bands) render(band);
+  room = expected_room();
+  if (room) {
+    forward_within(*room);
+  } else {
+    forward_measured();
+  }
   rendered = true;
   frame_number = ++frames_rendered;
 }
 
+/// None where the frame may have to be cut into bands: for that its sizes must be known.
+std::optional<FrameCounts> Renderer::Impl::expected_room() const {
+  if (!last_counts) return std::nullopt;
+  const FrameCounts expected = rasterize.room_for(*last_counts, bin);
+  if (with_headroom(expected.fragments) * k_fragment_bytes >= device.memory_budget()) return std::nullopt;
+  return expected;
+}
+
+void Renderer::Impl::forward_within(const FrameCounts& expected) {
+  bin.forward(frame, setup.triangles, expected.pairs);
+  rasterize.forward_within(expected, frame, setup.triangles, bin);
+  shade_and_aggregate();
+}
+
+void Renderer::Impl::forward_measured() {
+  last_counts.reset();
+  bin.forward(frame, setup.triangles);
+  rasterize.cover(frame, setup.triangles, bin);
+  bands = rasterize.cut(frame, device.memory_budget(), k_fragment_bytes);
+  for (const Band& band : bands) render(band);
+  if (bands.size() == 1) last_counts = rasterize.counted();
+}
+
+/// Learns whether the frame did fit into its room, and renders it again where it did not.
+void Renderer::Impl::settle() {
+  if (!room) return;
+  const FrameCounts found = rasterize.read_counts();
+  const bool fits = found.fit(*room);
+  room.reset();
+  if (fits) {
+    bin.pairs = found.pairs;
+    bands = {rasterize.set_counts(frame, found)};
+    last_counts = found;
+    return;
+  }
+  rendered = false;
+  forward_measured();
+  rendered = true;
+}
+
 void Renderer::Impl::render(const Band& band) {
   rasterize.forward(frame, setup.triangles, bin, band);
+  shade_and_aggregate();
+}
+
+void Renderer::Impl::shade_and_aggregate() {
   shade.forward(shade_inputs());
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);

@@ -18,6 +18,7 @@ void Renderer::set_scene(const Scene& scene) {
   Impl& m = *impl_;
   m.scene = scene;
   m.views.clear();
+  m.last_counts.reset();
   m.rendered = false;
   m.geometry.emplace(m.device.impl(), scene);
   m.shade.set_lights(scene.lights);
@@ -94,7 +95,7 @@ const Device& Renderer::device() const { return impl_->device; }
 void Renderer::forward() { impl_->forward(); }
 
 Image Renderer::image(std::size_t view) const {
-  const Impl& m = *impl_;
+  Impl& m = *impl_;
   m.require_forward("Renderer::image");
   if (view >= m.views.size()) {
     throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views.size()));
@@ -139,7 +140,7 @@ SceneGradient Renderer::backward(const ImageLoss& loss) {
 }
 
 RenderStatistics Renderer::statistics() const {
-  const Impl& m = *impl_;
+  Impl& m = *impl_;
   m.require_forward("Renderer::statistics");
   RenderStatistics s;
   s.faces = std::size_t{m.frame.views} * m.frame.faces;

@@ -26,22 +26,28 @@ struct Renderer::Impl {
 
   void set_views(std::span<const View> views, std::size_t first_view);
   void set_smoothing(const Smoothing& smoothing);
+  /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
+  /// blocks to read the sizes to allocate.
   void forward();
   SceneGradient backward(const Buffer<cl_float4>& grad_images);
   /// Fills `aov` for the last frame, if it does not hold that already.
   void render_aov();
 
-  /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it.
+  /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it. An image is
+  /// known to be complete after that: where the last frame's buffers were too small, the frame is rendered
+  /// again, and what forward() throws is thrown here.
   void require_scene(const char* caller) const;
-  void require_forward(const char* caller) const;
+  void require_forward(const char* caller);
   /// Held in buffers.
   std::size_t bytes() const;
 
   Device device;
   Scene scene;
   std::vector<View> views;
-  bool rendered = false;           // the stages hold the frame of the current scene
-  std::uint64_t frame_number = 0;  // which frame that is, among all renderers'
+  bool rendered = false;            // the stages hold the frame of the current scene, or it is on the way
+  std::optional<FrameCounts> room;  // that it was given, until it is known to fit
+  std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
+  std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
 
   std::optional<Geometry> geometry;
   DeviceViews device_views;
@@ -69,8 +75,14 @@ struct Renderer::Impl {
   ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
+  std::optional<FrameCounts> expected_room() const;
+  void forward_within(const FrameCounts& expected);
+  void forward_measured();
+  void settle();
+
   /// The stages from the fragments on: of a band, and backward of the one rendered last.
   void render(const Band& band);
+  void shade_and_aggregate();
   void differentiate(const Buffer<cl_float4>& grad_images);
 
   void read_mesh_gradients(SceneGradient& gradient);

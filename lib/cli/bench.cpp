@@ -95,7 +95,7 @@ void add_bench_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR")
       ->excludes(compare);
   command->add_option("files", options->files, "Files of results, for --report")->type_name("R.json");
-  command->add_option("--device", common.device, "cpu, gpu, an index or a part of the name");
+  add_device_options(*command, common);
   add_output_options(*command, common);
   command->footer(footer());
   command->callback([options, &common] { run(*options, common); });

@@ -60,6 +60,7 @@ Json results_head(const Device& device, const bench::Peaks& peaks, const bench::
   head.update(bench::provenance(device));
   head["device"]["peak_gflops"] = peaks.gflops;
   head["device"]["peak_gbytes_per_s"] = peaks.gbytes_per_s;
+  head["memory_budget_bytes"] = device.memory_budget();
   head["repetitions"] = options.repetitions;
   head["max_seconds"] = options.max_seconds;
   head["results"] = Json::array();

@@ -104,8 +104,7 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
       ->excludes(quiet);
 }
 
-void add_common_options(CLI::App& command, CommonOptions& options) {
-  add_output_options(command, options);
+void add_device_options(CLI::App& command, CommonOptions& options) {
   command
       .add_option("--device", options.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
@@ -115,6 +114,11 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
                   "(default: a quarter; of a CPU's an eighth, at most 1024)")
       ->check(CLI::Range(1, 1 << 30))
       ->type_name("MiB");
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  add_output_options(command, options);
+  add_device_options(command, options);
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
   command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N");
   add_smoothing_options(command, options.smoothing);

@@ -35,6 +35,8 @@ inline constexpr const char* k_smoothing_group = "Smoothing (each replaces the s
 /// Whether the command line gave any option of a help group.
 bool gives_any(const CLI::App& command, const std::string& group);
 
+/// --device and --memory-budget.
+void add_device_options(CLI::App& command, CommonOptions& options);
 /// --verbose and --quiet.
 void add_output_options(CLI::App& command, CommonOptions& options);
 /// Those, and all that a command that renders understands.

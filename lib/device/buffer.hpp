@@ -1,4 +1,4 @@
-// A typed device buffer that only grows.
+// A typed device buffer that only grows, and a read of one that the host need not wait for.
 #pragma once
 
 #include <algorithm>
@@ -47,6 +47,7 @@ class Buffer {
   /// Blocks until everything enqueued before has run.
   void download(std::span<T> values, std::size_t first = 0) const {
     if (values.empty()) return;
+    ++device_->host_waits;
     check_cl(device_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
                                               values.data()),
              "clEnqueueReadBuffer");
@@ -70,8 +71,11 @@ class Buffer {
   }
 
   std::size_t size() const { return size_; }
+  /// Elements that it was made for at least, without the rounding.
+  std::size_t room() const { return capacity_ - std::min(capacity_, 2 * k_padding); }
   std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
   const cl::Buffer& cl_buffer() const { return buffer_; }
+  Device::Impl* device() const { return device_; }  ///< null while nothing is allocated
 
  private:
   static constexpr std::size_t k_padding = 16;  // the widest vector
@@ -108,6 +112,42 @@ class Buffer {
   Device::Impl* device_ = nullptr;
   cl::Buffer buffer_;
   std::size_t capacity_ = 0, size_ = 0;
+};
+
+/// One element of a buffer on its way to the host.
+template <class T>
+class PendingRead {
+ public:
+  PendingRead() = default;
+  ~PendingRead() {
+    if (device_ != nullptr) arrived_.wait();  // it writes here
+  }
+  PendingRead(const PendingRead&) = delete;
+  PendingRead& operator=(const PendingRead&) = delete;
+
+  /// Does not block. What an earlier start() was to read is lost.
+  void start(const Buffer<T>& buffer, std::size_t index) {
+    device_ = buffer.device();
+    check_cl(device_->queue.enqueueReadBuffer(buffer.cl_buffer(), CL_FALSE, index * sizeof(T), sizeof(T),
+                                              &value_, nullptr, &arrived_),
+             "clEnqueueReadBuffer");
+    check_cl(device_->queue.flush(), "clFlush");
+  }
+
+  bool is_pending() const { return device_ != nullptr; }
+
+  /// Blocks until it has arrived, but not for what was enqueued after it.
+  T take() {
+    ++device_->host_waits;
+    device_ = nullptr;
+    check_cl(arrived_.wait(), "clWaitForEvents");
+    return value_;
+  }
+
+ private:
+  Device::Impl* device_ = nullptr;
+  cl::Event arrived_;
+  T value_{};
 };
 
 }  // namespace dpr

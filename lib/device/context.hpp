@@ -43,6 +43,7 @@ struct Device::Impl {
   }
 
   std::size_t allocated_bytes = 0, peak_allocated_bytes = 0;
+  std::size_t host_waits = 0;  ///< how often the host has waited to read from the device
   std::size_t memory_budget = 0;
 
  private:

@@ -94,7 +94,7 @@ ImageLoss& ImageLoss::operator=(ImageLoss&&) noexcept = default;
 
 double ImageLoss::evaluate(const Renderer& renderer) {
   Impl& m = *impl_;
-  const Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = renderer.impl();
   r.require_forward("ImageLoss::evaluate");
   if (r.frame.views != m.views) {
     throw InvalidArgument("targets (loss)", std::to_string(m.views) + " images",

@@ -115,6 +115,7 @@ void PoseLevel::render(std::span<const View> views, std::size_t images_together,
     const auto part = views.subspan(first, std::min(batch, views.size() - first));
     renderer_.set_views(part);
     renderer_.forward();
+    renderer_.impl().require_forward("PoseLevel");
     images_.resize(part.size() * pixels);
     renderer_.impl().aggregate.image.download(images_);
     for (std::size_t i = 0; i < part.size(); i += images_together) visit(first + i, &images_[i * pixels]);

@@ -11,23 +11,39 @@ Bin::Bin(Device::Impl& device)
       sort_(device) {}
 
 void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
+  count(p, triangles);
+  list(p, triangles,
+       read_total(pair_starts, std::size_t{p.views} * p.faces, "pairs of tiles and triangles (frame)"));
+}
+
+void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room) {
+  count(p, triangles);
+  list(p, triangles, room);
+}
+
+void Bin::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
   const std::size_t faces = std::size_t{p.views} * p.faces;
   counts_.resize(device_, faces);
   count_(faces, p, triangles, counts_);
   scan_(faces, counts_, pair_starts);
-  pairs = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
+}
 
+void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room) {
+  pairs = room;
+  pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
     buffer->resize(device_, pairs);
-  fill_(faces, p, triangles, pair_starts, place_face_, pair_tile, places_);
-  sort_(pairs, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places_, tile_starts);
-  link_(pairs, static_cast<cl_uint>(pairs), places_, place_face_, pair_face, face_pairs);
+  const auto n = static_cast<cl_uint>(pairs);
+  fill_(std::size_t{p.views} * p.faces, p, n, triangles, pair_starts, pair_count, place_face_, pair_tile,
+        places_);
+  sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places_, tile_starts);
+  link_(pairs, n, pair_count, places_, place_face_, pair_face, face_pairs);
 }
 
 std::size_t Bin::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
-  for (const Buffer<cl_uint>* buffer :
-       {&pair_face, &pair_tile, &tile_starts, &face_pairs, &pair_starts, &counts_, &place_face_, &places_}) {
+  for (const Buffer<cl_uint>* buffer : {&pair_count, &pair_face, &pair_tile, &tile_starts, &face_pairs,
+                                        &pair_starts, &counts_, &place_face_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

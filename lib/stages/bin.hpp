@@ -14,8 +14,12 @@ class Bin {
 
   /// Blocks to read the number of pairs.
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
+  /// With room for so many pairs, without waiting to learn how many there are. If they are more, there are
+  /// none.
+  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room);
 
-  std::size_t pairs = 0;
+  std::size_t pairs = 0;        ///< or how many there is room for, until it is known
+  Buffer<cl_uint> pair_count;   ///< [1] how many there are, 0 where they do not fit
   Buffer<cl_uint> pair_face;    ///< [pair] view * faces + face
   Buffer<cl_uint> pair_tile;    ///< [pair] view * tiles + tile
   Buffer<cl_uint> tile_starts;  ///< [view * tile + 1] runs of pairs
@@ -25,11 +29,15 @@ class Bin {
   std::size_t bytes() const;
 
  private:
+  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
+  void list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room);
+
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::Triangle>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
+  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>,
+         Out<cl_uint>, Out<cl_uint>>
       fill_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Scan scan_;
   Sort sort_;
   Buffer<cl_uint> counts_;               // [view * face]

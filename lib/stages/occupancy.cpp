@@ -67,8 +67,8 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
   const Range pairs = rasterize.pairs(bin);
   if (exact_) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    exact_->forward((rasterize.fragments + width - 1) / width, params(p),
-                    static_cast<cl_uint>(rasterize.fragments), rasterize.distance, log_occupancy, occupancy);
+    exact_->forward((rasterize.fragments + width - 1) / width, params(p), pairs.last(),
+                    rasterize.fragment_starts, rasterize.distance, log_occupancy, occupancy);
   } else {
     sampled_->forward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
                       rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);

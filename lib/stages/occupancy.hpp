@@ -34,7 +34,7 @@ class Occupancy {
   /// Kernels of the exact and of the sampled estimator, for one prior.
   struct Exact {
     Exact(Device::Impl& device, const std::string& options);
-    Kernel<shared::OccupancyParams, cl_uint, In<float>, Out<float>, Out<float>> forward;
+    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<float>, Out<float>, Out<float>> forward;
     Kernel<shared::OccupancyParams, cl_uint, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, Out<float>,
            Out<float>>
         backward;

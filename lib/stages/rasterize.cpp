@@ -9,6 +9,7 @@ Rasterize::Rasterize(Device::Impl& device)
       cover_(device, "rasterize.cl", "rasterize_cover"),
       count_(device, "rasterize.cl", "rasterize_count"),
       rows_(device, "rasterize.cl", "rasterize_rows"),
+      fit_(device, "rasterize.cl", "rasterize_fit"),
       rebase_(device, "rasterize.cl", "rasterize_rebase"),
       list_(device, "rasterize.cl", "rasterize_list"),
       forward_(device, "rasterize.cl", "rasterize_forward"),
@@ -22,28 +23,43 @@ std::size_t vectors_of_tile(const Device::Impl& device) {
   return std::size_t{DPR_TILE} * DPR_TILE / std::min<std::size_t>(device.info.lanes, DPR_TILE);
 }
 
+std::size_t pixels_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
+std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
+
+Band whole_frame(const shared::FrameParams& p, const FrameCounts& counts) {
+  return {tiles_of(p), counts.pairs, pixels_of(p), counts.fragments, counts.listed};
+}
+
 }  // namespace
 
-void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                       const Bin& bin) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
-  const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
+  const std::size_t pixels = pixels_of(p);
   masks.resize(device_, pairs);
   counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
-  cover_(pairs, p, pairs, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
+  cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
   scan_(pairs, counts_, fragment_starts);
-  const std::size_t tiles = std::size_t{p.views} * p.tiles_x * p.tiles_y;
-  count_(tiles * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
+  count_(tiles_of(p) * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
-  rows_(rows + 1, p, bin.tile_starts, fragment_starts, pixel_starts, device_rows_);
+  rows_(rows + 1, p, bin.tile_starts, bin.pair_starts, fragment_starts, pixel_starts, device_rows_);
+  in_bands_ = false;
+}
+
+void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                      const Bin& bin) {
+  count(p, triangles, bin);
   row_starts_.clear();
   for (const cl_uint4& row : device_rows_.download()) row_starts_.push_back({row.s[0], row.s[1], row.s[2]});
   check_total(row_starts_.back().fragment, "fragments (frame)");
   listed_fragments = row_starts_.back().listed;
-  in_bands_ = false;
+}
+
+FrameCounts Rasterize::counted() const {
+  return {row_starts_.back().pair, row_starts_.back().fragment, row_starts_.back().listed};
 }
 
 Band Rasterize::make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const {
@@ -105,7 +121,7 @@ void Rasterize::rebase(const Band& next) {
 
 void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                         const Bin& bin, const Band& next) {
-  if (next.tiles.count < std::size_t{p.views} * p.tiles_x * p.tiles_y) rebase(next);
+  if (next.tiles.count < tiles_of(p)) rebase(next);
   band = next;
   fragments = next.fragments.count;
   list.resize(device_, next.listed.count);
@@ -121,7 +137,40 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
 void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                         const Bin& bin) {
   cover(p, triangles, bin);
-  forward(p, triangles, bin, make_band(p, 0, row_starts_.size() - 1));
+  forward(p, triangles, bin, whole_frame(p, counted()));
+}
+
+void Rasterize::forward_within(const FrameCounts& room, const shared::FrameParams& p,
+                               const Buffer<shared::Triangle>& triangles, const Bin& bin) {
+  count(p, triangles, bin);
+  const std::size_t last_row = device_rows_.size() - 1;
+  last_row_.start(device_rows_, last_row);
+  fit_(device_.local_size() * device_.info.compute_units, static_cast<cl_uint>(bin.pairs),
+       static_cast<cl_uint>(pixels_of(p)), static_cast<cl_uint>(room.fragments),
+       static_cast<cl_uint>(room.listed), static_cast<cl_uint>(last_row), device_rows_, masks,
+       fragment_starts, pixel_starts);
+  listed_fragments = room.listed;
+  forward(p, triangles, bin, whole_frame(p, room));
+}
+
+FrameCounts Rasterize::read_counts() {
+  const cl_uint4 last = last_row_.take();
+  return {last.s[3], last.s[1], last.s[2]};
+}
+
+Band Rasterize::set_counts(const shared::FrameParams& p, const FrameCounts& counts) {
+  band = whole_frame(p, counts);
+  fragments = counts.fragments;
+  listed_fragments = counts.listed;
+  return *band;
+}
+
+FrameCounts Rasterize::room_for(const FrameCounts& counts, const Bin& bin) const {
+  const auto room = [](std::size_t count, std::size_t made_for) {
+    return std::min(with_headroom(count), std::max(count, made_for));
+  };
+  return {room(counts.pairs, bin.pair_face.room()), room(counts.fragments, distance.room()),
+          room(counts.listed, list.room())};
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,

@@ -11,6 +11,15 @@
 
 namespace dpr {
 
+/// How many of what grows and shrinks a frame holds, or has room for.
+struct FrameCounts {
+  std::size_t pairs = 0, fragments = 0, listed = 0;  ///< fragments with the padding of the pairs' runs
+
+  bool fit(const FrameCounts& room) const {
+    return pairs <= room.pairs && fragments <= room.fragments && listed <= room.listed;
+  }
+};
+
 /// A stretch of tile rows, all views' one after the other, whose fragments are on the device at the same
 /// time.
 struct Band {
@@ -24,6 +33,18 @@ class Rasterize {
 
   /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
   void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  /// The same and forward() of the whole frame without waiting to learn how many fragments there are. If
+  /// they, or the pairs, are more than there is room for, there are none.
+  void forward_within(const FrameCounts& room, const shared::FrameParams& p,
+                      const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  /// What forward_within() found. Blocks until the device has counted, not until it has rendered.
+  FrameCounts read_counts();
+  /// The whole frame as the band whose fragments these are, once their number is known.
+  Band set_counts(const shared::FrameParams& p, const FrameCounts& counts);
+  /// Of a frame that cover() counted.
+  FrameCounts counted() const;
+  /// Room for so much and a little more, in the buffers that are there.
+  FrameCounts room_for(const FrameCounts& counts, const Bin& bin) const;
   /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Throws
   /// InvalidArgument if one row of tiles does not fit.
   std::vector<Band> cut(const shared::FrameParams& p, std::size_t budget, std::size_t fragment_bytes) const;
@@ -46,15 +67,15 @@ class Rasterize {
   static constexpr std::size_t k_fragment_bytes =
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
 
-  std::optional<Band> band;                     ///< whose fragments these are
-  std::size_t fragments = 0;                    ///< of the band, with the padding of the pairs' runs
-  std::size_t listed_fragments = 0;             ///< of the frame, without
-  Buffer<cl_uint2> masks;                       ///< [pair] pixels of its tile that a pair covers
-  Buffer<cl_uint> fragment_starts;              ///< [pair + 1]
-  Buffer<cl_uint> pixel_starts;                 ///< [view * height * width + 1] runs of `list`
-  Buffer<cl_uint> list;                         ///< fragments by pixel
-  Buffer<cl_uint> fragment_pair;                ///< [fragment]
-  Buffer<cl_uint> fragment_pixel;               ///< [fragment] x | y << 16
+  std::optional<Band> band;          ///< whose fragments these are
+  std::size_t fragments = 0;         ///< of the band, with the padding of the pairs' runs; or room for them
+  std::size_t listed_fragments = 0;  ///< of the frame, without
+  Buffer<cl_uint2> masks;            ///< [pair] pixels of its tile that a pair covers
+  Buffer<cl_uint> fragment_starts;   ///< [pair + 1]
+  Buffer<cl_uint> pixel_starts;      ///< [view * height * width + 1] runs of `list`
+  Buffer<cl_uint> list;              ///< fragments by pixel
+  Buffer<cl_uint> fragment_pair;     ///< [fragment]
+  Buffer<cl_uint> fragment_pixel;    ///< [fragment] x | y << 16
   Buffer<float> distance, depth, bary1, bary2;  ///< [fragment]
   Buffer<float> grad_corners;                   ///< [pair][9] x, y (NDC) and view depth of the corners
 
@@ -68,13 +89,16 @@ class Rasterize {
 
   Band make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const;
   void rebase(const Band& next);
+  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, Out<cl_uint2>,
-         Out<cl_uint>>
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::Triangle>, In<cl_uint>, In<cl_uint>,
+         Out<cl_uint2>, Out<cl_uint>>
       cover_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>>
+      fit_;
   Kernel<cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
       list_;
@@ -87,6 +111,7 @@ class Rasterize {
   Scan scan_;
   Buffer<cl_uint> counts_;
   Buffer<cl_uint4> device_rows_;
+  PendingRead<cl_uint4> last_row_;
   std::vector<RowStart> row_starts_;  // [view * tiles_y + 1]
   bool in_bands_ = false;             // the starts above are a band's, those below the frame's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;

@@ -17,22 +17,22 @@ Sort::Sort(Device::Impl& device)
       scatter_(device, "sort.cl", "sort_scatter"),
       ranges_(device, "sort.cl", "sort_ranges") {}
 
-void Sort::operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys,
-                      Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
-  const std::size_t blocks = (count + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
-  const auto n = static_cast<cl_uint>(count);
+void Sort::operator()(std::size_t room, const Buffer<cl_uint>& count, std::size_t key_count,
+                      Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
+  const std::size_t blocks = (room + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
+  const auto n = static_cast<cl_uint>(room);
   counts_.resize(device_, k_digits * blocks);
-  other_keys_.resize(device_, count);
-  other_values_.resize(device_, count);
-  for (unsigned shift = 0; count > 0 && shift < 32 && (key_count - 1) >> shift != 0; shift += k_digit_bits) {
-    histogram_(blocks, n, shift, keys, counts_);
+  other_keys_.resize(device_, room);
+  other_values_.resize(device_, room);
+  for (unsigned shift = 0; room > 0 && shift < 32 && (key_count - 1) >> shift != 0; shift += k_digit_bits) {
+    histogram_(blocks, n, shift, count, keys, counts_);
     scan_(k_digits * blocks, counts_, offsets_);
-    scatter_(blocks, n, shift, keys, values, offsets_, other_keys_, other_values_);
+    scatter_(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
     std::swap(keys, other_keys_);
     std::swap(values, other_values_);
   }
   starts.resize(device_, key_count + 1);
-  ranges_(key_count + 1, n, static_cast<cl_uint>(key_count), keys, starts);
+  ranges_(key_count + 1, static_cast<cl_uint>(key_count), count, keys, starts);
 }
 
 std::size_t Sort::bytes() const {

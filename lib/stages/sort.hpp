@@ -10,19 +10,20 @@ class Sort {
  public:
   explicit Sort(Device::Impl& device);
 
-  /// Sorts keys below `key_count`, and values with them, in place. `starts` gets the run of every key:
-  /// [key_count + 1].
-  void operator()(std::size_t count, std::size_t key_count, Buffer<cl_uint>& keys, Buffer<cl_uint>& values,
-                  Buffer<cl_uint>& starts);
+  /// Sorts the first `count[0]` keys, all below `key_count`, and values with them, in place; `room` is what
+  /// they are at most. `starts` gets the run of every key: [key_count + 1].
+  void operator()(std::size_t room, const Buffer<cl_uint>& count, std::size_t key_count,
+                  Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts);
 
   std::size_t bytes() const;
 
  private:
   Device::Impl& device_;
   Scan scan_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> histogram_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> scatter_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> ranges_;
+  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> histogram_;
+  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>>
+      scatter_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> ranges_;
   Buffer<cl_uint> counts_, offsets_, other_keys_, other_values_;
 };
 

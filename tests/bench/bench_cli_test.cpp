@@ -78,6 +78,26 @@ TEST_SUITE("bench-smoke") {
     }
   }
 
+  TEST_CASE("bench: a frame in several bands has times, but no rates") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    const auto rasterize = [&](const std::string& budget) {
+      const Outcome measured =
+          bench(folder, {"--workload", "sphere20k", "--repetitions", "1", "--max-seconds", "0",
+                         "--memory-budget", budget, "-o", "r.json"});
+      CAPTURE(measured.err);
+      REQUIRE(measured.status == 0);
+      const dpr::bench::Json results = dpr::bench::read_results(folder / "r.json");
+      CHECK(results["memory_budget_bytes"].get<std::size_t>() == std::stoul(budget) << 20U);
+      CHECK((results["results"][0]["bands"].get<std::size_t>() > 1) == (budget == "64"));
+      return results["results"][0]["stages"]["rasterize"];
+    };
+    CHECK(rasterize("1024").contains("gflops"));
+    const dpr::bench::Json in_bands = rasterize("64");
+    CHECK(in_bands["forward_ms"].get<double>() > 0);
+    CHECK_FALSE(in_bands.contains("gflops"));
+  }
+
   TEST_CASE("bench: the help lists every workload") {
     if (is_skipped()) return;
     const Outcome help = bench(TempDir(), {"--help"});

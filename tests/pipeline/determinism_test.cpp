@@ -3,12 +3,10 @@
 // the first iteration, within the budget.
 #include <doctest/doctest.h>
 
-#include <cstring>
 #include <vector>
 
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
-#include "pipeline/scenes.hpp"
+#include "pipeline/determinism.hpp"
 #include "renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
@@ -18,46 +16,6 @@ using namespace dpr::test::pipeline;
 using dpr::test::reduced;
 
 namespace {
-
-/// Bit by bit: NaN equals itself, and 0 is not -0.
-bool same_bits(const Image& a, const Image& b) {
-  return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(glm::vec4)) == 0;
-}
-
-bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
-}
-
-bool same_bits(const SceneGradient& a, const SceneGradient& b) {
-  const std::vector<Block> blocks_a = blocks_of(a), blocks_b = blocks_of(b);
-  bool same = blocks_a.size() == blocks_b.size();
-  for (std::size_t i = 0; same && i < blocks_a.size(); ++i) {
-    same = same_bits(blocks_a[i].found, blocks_b[i].found);
-  }
-  return same;
-}
-
-struct Result {
-  Image image;
-  SceneGradient gradient;
-};
-
-bool same_bits(const Result& a, const Result& b) {
-  return same_bits(a.image, b.image) && same_bits(a.gradient, b.gradient);
-}
-
-Result render(Renderer& renderer) {
-  renderer.forward();
-  const Image grad = random_image(renderer.scene().width, renderer.scene().height, -1.0F, 1.0F);
-  return {renderer.image(), renderer.backward(std::span(&grad, 1))};
-}
-
-Result render(const Device& device, const Scene& scene) {
-  Renderer renderer(device);
-  renderer.set_scene(scene);
-  return render(renderer);
-}
 
 bool is_finite(const Result& result) {
   for (const glm::vec4& p : result.image.pixels) {
@@ -87,33 +45,6 @@ std::size_t fragment_memory(const Renderer::Impl& m) {
     bytes += buffer->capacity_bytes() - k_padding;
   }
   return bytes;
-}
-
-Scene test_scene() {
-  const int size = reduced(40, 9);
-  return scene_of(reduced(1, 0) == 1 ? make_icosphere(1, 1.3F) : make_cube(), size, size - 3);
-}
-
-Scene sampled_scene() {
-  Scene scene = test_scene();
-  scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
-  return scene;
-}
-
-Scene sampled_joint_scene() {
-  Scene scene = sampled_scene();
-  scene.smoothing.composition = Composition::joint;
-  scene.smoothing.variance_reduction = VarianceReduction::leave_one_out;
-  scene.smoothing.draws = Draws::antithetic;
-  return scene;
-}
-
-Scene joint_scene() {
-  Scene scene = test_scene();
-  scene.smoothing.composition = Composition::joint;
-  scene.lights = two_lights(Shading::phong);
-  scene.gradients.lights = true;
-  return scene;
 }
 
 }  // namespace

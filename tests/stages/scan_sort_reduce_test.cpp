@@ -64,13 +64,17 @@ struct Sorted {
   std::vector<cl_uint> keys, values, starts;
 };
 
-Sorted sort(const std::vector<cl_uint>& keys, std::size_t key_count) {
+/// With so much more room than there are keys.
+Sorted sort(const std::vector<cl_uint>& keys, std::size_t key_count, std::size_t spare = 0) {
   dpr::Sort operation(device_impl());
   std::vector<cl_uint> places(keys.size());
   std::iota(places.begin(), places.end(), 0U);
   Buffer<cl_uint> key_buffer = on_device(keys), value_buffer = on_device(places), starts;
   poison(starts, key_count + 1, k_poison);
-  operation(keys.size(), key_count, key_buffer, value_buffer, starts);
+  const Buffer<cl_uint> count = on_device({static_cast<cl_uint>(keys.size())});
+  operation(keys.size() + spare, count, key_count, key_buffer, value_buffer, starts);
+  key_buffer.resize(device_impl(), keys.size());
+  value_buffer.resize(device_impl(), keys.size());
   return {key_buffer.download(), value_buffer.download(), starts.download()};
 }
 
@@ -175,6 +179,7 @@ TEST_SUITE("unit") {
         CAPTURE(key_count);
         const auto keys = random_values(count, static_cast<cl_uint>(key_count), static_cast<unsigned>(count));
         CHECK(is_stably_sorted(keys, key_count, sort(keys, key_count)));
+        CHECK(is_stably_sorted(keys, key_count, sort(keys, key_count, 1 + count / 2)));
       }
     }
   }

@@ -1,0 +1,154 @@
+// A frame like the last one is enqueued without a wait of the host, and one that turns out larger than the
+// buffers are is rendered again by whoever asks for it: to the same bits as by a renderer that measured
+// first.
+#include <doctest/doctest.h>
+
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "dpr/opencl.hpp"
+#include "pipeline/determinism.hpp"
+#include "renderer_impl.hpp"
+#include "support/messages.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+
+namespace {
+
+/// How often forward() makes the host wait.
+std::size_t waits_of_forward(Renderer& renderer) {
+  const std::size_t& waits = renderer.device().impl().host_waits;
+  const std::size_t before = waits;
+  renderer.forward();
+  return waits - before;
+}
+
+std::vector<glm::vec3> scaled(const Scene& scene, float factor) {
+  std::vector<glm::vec3> positions = scene.meshes[0].mesh.positions;
+  for (glm::vec3& p : positions) p *= factor;
+  return positions;
+}
+
+/// The frame that forward() has enqueued, against that of a renderer which knows nothing of frames before.
+bool equals_fresh_render(Renderer& renderer) {
+  const Image grad = random_image(renderer.scene().width, renderer.scene().height, -1.0F, 1.0F);
+  const Image image = renderer.image();
+  const SceneGradient gradient = renderer.backward(std::span(&grad, 1));
+  Renderer fresh(renderer.device());
+  fresh.set_scene(renderer.scene());
+  fresh.set_views(renderer.views());
+  fresh.forward();
+  return same_bits(image, fresh.image()) && same_bits(gradient, fresh.backward(std::span(&grad, 1))) &&
+         renderer.statistics().pairs == fresh.statistics().pairs &&
+         renderer.statistics().fragments == fresh.statistics().fragments;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("host waits: none in the frames after the first") {
+    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene()}) {
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      CHECK(waits_of_forward(renderer) == 2);  // for the pairs, for the fragments
+      CHECK(equals_fresh_render(renderer));
+      for (const float factor : {1.0F, 0.9F, 0.8F, 0.8F}) {
+        CAPTURE(factor);
+        renderer.set_positions(0, scaled(scene, factor));
+        CHECK(waits_of_forward(renderer) == 0);
+        CHECK(equals_fresh_render(renderer));
+      }
+      // Nor where nobody looks at the frames between.
+      CHECK(waits_of_forward(renderer) == 0);
+      CHECK(waits_of_forward(renderer) == 0);
+      CHECK(equals_fresh_render(renderer));
+    }
+  }
+
+  TEST_CASE("host waits: a frame that grows suddenly is whole") {
+    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene()}) {
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      renderer.set_positions(0, scaled(scene, 0.2F));
+      renderer.forward();
+      for (const float factor : {1.0F, 0.2F, 1.5F}) {
+        CAPTURE(factor);
+        renderer.set_positions(0, scaled(scene, factor));
+        CHECK(waits_of_forward(renderer) == 0);
+        CHECK(equals_fresh_render(renderer));
+      }
+      // As many pairs, more fragments; and out of nothing.
+      Smoothing wide = scene.smoothing;
+      wide.sigma *= 4;
+      renderer.set_smoothing(wide);
+      renderer.forward();
+      CHECK(equals_fresh_render(renderer));
+      std::vector<glm::vec3> nowhere = scaled(scene, 1.0F);
+      for (glm::vec3& p : nowhere) p += glm::vec3(0.0F, 1e4F, 0.0F);
+      renderer.set_positions(0, nowhere);
+      renderer.forward();
+      CHECK(renderer.statistics().fragments == 0);
+      renderer.set_positions(0, scaled(scene, 1.0F));
+      renderer.forward();
+      CHECK(equals_fresh_render(renderer));
+    }
+  }
+
+  TEST_CASE("host waits: every reader gets the whole frame") {
+    const Device device = open_device();
+    const Scene scene = test_scene();
+    const Image target(scene.width, scene.height, glm::vec4(0.3F));
+    Renderer fresh(device);
+    fresh.set_scene(scene);
+    fresh.forward();
+    const auto grown = [&] {
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      renderer.set_positions(0, scaled(scene, 0.2F));
+      renderer.forward();
+      renderer.image();
+      renderer.set_positions(0, scene.meshes[0].mesh.positions);
+      renderer.forward();
+      return renderer;
+    };
+    ImageLoss loss(device, LossWeights::only(LossKind::mse), std::span(&target, 1));
+    const double wanted = loss.evaluate(fresh);
+    Renderer evaluated = grown();
+    CHECK(loss.evaluate(evaluated) == wanted);
+    Renderer differentiated = grown();
+    CHECK(same_bits(differentiated.backward(std::span(&target, 1)), fresh.backward(std::span(&target, 1))));
+    Renderer counted = grown();
+    CHECK(counted.statistics().fragments == fresh.statistics().fragments);
+    Renderer seen = grown();
+    CHECK(auxiliary_outputs(seen).depth == auxiliary_outputs(fresh).depth);
+    Renderer embedded = grown();
+    Image image(scene.width, scene.height);
+    const std::size_t bytes = image.pixels.size() * sizeof(glm::vec4);
+    const cl::Buffer buffer = image_buffer(embedded);
+    REQUIRE(device.impl().queue.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, image.pixels.data()) ==
+            CL_SUCCESS);
+    CHECK(same_bits(image, fresh.image()));
+  }
+
+  TEST_CASE("host waits: a frame that no budget allows is refused by whoever asks for it") {
+    Device device = open_device();
+    Scene scene = test_scene();
+    scene.smoothing.sigma = 1e-6F;  // few fragments in a small mesh, many times more in a large one
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    renderer.set_positions(0, scaled(scene, 0.05F));
+    renderer.forward();
+    renderer.image();
+    constexpr std::size_t k_ample = 200;  // bytes of a fragment, all buffers and their headroom
+    device.set_memory_budget((renderer.impl().rasterize.fragments + 1) * k_ample);
+    renderer.set_positions(0, scene.meshes[0].mesh.positions);
+    renderer.forward();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.image(), "memory budget (frame)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.image(), "forward() first");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.forward(), "memory budget (frame)");
+    device.set_memory_budget(std::size_t{1} << 30);
+    renderer.forward();
+    CHECK(equals_fresh_render(renderer));
+  }
+}
