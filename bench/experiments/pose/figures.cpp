@@ -70,15 +70,21 @@ std::vector<FigurePanel> figure5(const PoseRun& common, std::size_t count) {
   const auto run = [&](double degrees, const PoseMethod& method) {
     return make_run(common, count, "published_cube", degrees, method);
   };
-  FigurePanel variance{"20 degrees, fixed smoothing", {}, "samples M", 5};
-  for (const auto reduction : {VarianceReduction::rigid, VarianceReduction::none}) {
-    FigureCurve curve{reduction == VarianceReduction::rigid ? "variance reduction" : "none", {}, {}};
-    for (unsigned m = 1; m <= (common.smoke ? 2U : 64U); m *= 2) {
-      curve.x.push_back(m);
-      curve.runs.push_back(run(
-          20, {.name = "paper_gaussian", .samples = m, .variance_reduction = reduction, .adaptive = false}));
+  FigurePanel variance{"20 degrees, M samples throughout", {}, "samples M", 5};
+  for (const bool adapts : {true, false}) {
+    for (const auto reduction : {VarianceReduction::rigid, VarianceReduction::none}) {
+      FigureCurve curve{std::string(adapts ? "adaptive" : "fixed") + " smoothing, variance reduction " +
+                            (reduction == VarianceReduction::rigid ? "on" : "off"),
+                        {},
+                        {}};
+      for (unsigned m = 1; m <= (common.smoke ? 2U : 64U); m *= 2) {
+        curve.x.push_back(m);
+        curve.runs.push_back(run(
+            20,
+            {.name = "paper_gaussian", .samples = m, .variance_reduction = reduction, .adaptive = adapts}));
+      }
+      variance.curves.push_back(curve);
     }
-    variance.curves.push_back(curve);
   }
   FigurePanel adaptive{"80 degrees, M = 8 to begin with", {}};
   for (const bool adapts : {true, false}) {
@@ -177,7 +183,7 @@ std::string script(const Json& panels) {
     plots << "\n";
   }
   return data.str() + "set multiplot layout 1," + std::to_string(panels.size()) +
-         "\nset grid\nset yrange [0:1.02]\nset key below maxcols 2\n" + plots.str() + "unset multiplot\n";
+         "\nset grid\nset yrange [0:1.02]\nset key below maxcols 1\n" + plots.str() + "unset multiplot\n";
 }
 
 }  // namespace

@@ -58,7 +58,9 @@ Protocol protocol_of(const PoseMethod& method, const PoseProblemSet& set, bool s
     throw InvalidArgument("--translation-error (pose experiment)", "the method " + method.name,
                           "default or anneal: the published protocol only turns");
   }
-  Protocol protocol{.smoothing = member(method.name), .adaptive = method.adaptive};
+  Protocol protocol{.smoothing = member(method.name)};
+  if (!method.adaptive) protocol.schedule.reset();
+  if (protocol.schedule && method.samples) protocol.schedule->max_samples = *method.samples;
   Smoothing& smoothing = protocol.smoothing;
   smoothing.seed = set.seed;
   smoothing.variance_reduction = method.variance_reduction;

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "dpr/adaptive_smoothing.hpp"
 #include "dpr/loss.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/perturbed_pose.hpp"
@@ -14,9 +13,6 @@
 
 namespace dpr::bench {
 namespace {
-
-/// The published program first looks at the sensitivity after 150 iterations.
-constexpr AdaptiveSchedule k_schedule{.start = 149};
 
 struct Evaluation {
   double loss;
@@ -46,14 +42,15 @@ class PerturbedImage : public Objective {
         target_(target),
         smoothing_(protocol.smoothing),
         sensitivity_(protocol.sensitivity),
-        schedule_(k_schedule) {
+        schedule_(protocol.schedule.value_or(AdaptiveSchedule{})),
+        adapts_(protocol.schedule.has_value()) {
     scene.smoothing = smoothing_;
     scene.gradients = {.positions = false,
                        .colors = false,
                        .transform = true,
                        .camera = false,
                        .lights = false,
-                       .smoothing = protocol.adaptive,
+                       .smoothing = adapts_,
                        .background = false};
     renderer_.set_scene(scene);
   }
@@ -73,7 +70,7 @@ class PerturbedImage : public Objective {
   }
 
   bool adapt(unsigned iteration, double& learning_rate) override {
-    return schedule_.update(iteration, gamma_, smoothing_, learning_rate);
+    return adapts_ && schedule_.update(iteration, gamma_, smoothing_, learning_rate);
   }
 
  private:
@@ -97,6 +94,7 @@ class PerturbedImage : public Objective {
   Smoothing smoothing_;
   SensitivityConstant sensitivity_;
   AdaptiveSmoothing schedule_;
+  bool adapts_;
   double gamma_ = 0;  // dL/dgamma of the last evaluation
 };
 
@@ -106,7 +104,8 @@ class PerturbedRotation : public Objective {
       : scene_(scene),
         perturbed_(device, scene, target,
                    {.scale = scaled(k_first_scale), .samples = protocol.smoothing.samples}),
-        seed_(protocol.smoothing.seed) {}
+        seed_(protocol.smoothing.seed),
+        schedule_(protocol.schedule) {}
 
   Evaluation evaluate(const Pose& pose, unsigned iteration) override {
     const PerturbedPoseResult result = perturbed_.evaluate(view_of(scene_, pose), seed_ + iteration);
@@ -118,13 +117,13 @@ class PerturbedRotation : public Objective {
   /// The published rule, with what belongs to distances and depths applied to the one scale.
   bool adapt(unsigned iteration, double& learning_rate) override {
     constexpr double k_least_scale = 0.01;  // radians: at the cube's rim a third of a pixel
-    const bool due = iteration >= k_schedule.start &&
-                     (iteration - k_schedule.start) % k_schedule.interval == 0 && average_ > 0;
+    const bool due = schedule_ && iteration >= schedule_->start &&
+                     (iteration - schedule_->start) % schedule_->interval == 0 && average_ > 0;
     if (!due || scale_ <= k_least_scale) return false;
-    scale_ = std::max(scale_ / static_cast<double>(k_schedule.rate), k_least_scale);
+    scale_ = std::max(scale_ / static_cast<double>(schedule_->rate), k_least_scale);
     perturbed_.set_scale(scaled(scale_));
-    learning_rate = std::max(learning_rate / static_cast<double>(k_schedule.learning_rate_divisor),
-                             static_cast<double>(k_schedule.learning_rate_floor));
+    learning_rate = std::max(learning_rate / static_cast<double>(schedule_->learning_rate_divisor),
+                             static_cast<double>(schedule_->learning_rate_floor));
     return true;
   }
 
@@ -136,6 +135,7 @@ class PerturbedRotation : public Objective {
   Scene scene_;
   PerturbedPose perturbed_;
   std::uint64_t seed_;
+  std::optional<AdaptiveSchedule> schedule_;
   double scale_ = k_first_scale, average_ = 0;
 };
 
@@ -156,7 +156,7 @@ PoseResult descend(Objective& objective, const Protocol& protocol, const Pose& i
     const glm::dvec3 gradient = rotation_vector_gradient(r, now.gradient);
     const auto step = optimizer.step(std::array{gradient.x, gradient.y, gradient.z});
     r += glm::dvec3(step[0], step[1], step[2]);
-    if (protocol.adaptive && objective.adapt(i, learning_rate)) {
+    if (objective.adapt(i, learning_rate)) {
       optimizer.set_learning_rate(learning_rate);
       optimizer.restart();
     }

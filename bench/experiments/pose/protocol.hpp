@@ -1,6 +1,9 @@
 // The published protocol of the pose experiments: one descent on the rotation vector.
 #pragma once
 
+#include <optional>
+
+#include "dpr/adaptive_smoothing.hpp"
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
 #include "dpr/pose.hpp"
@@ -15,8 +18,10 @@ enum class SensitivityConstant { dimension, one };
 /// As published: Adam on the rotation vector, whose learning rate falls with the smoothing, on the mean
 /// squared error; fresh noise in every iteration; the pose with the lowest loss of all is the answer.
 struct Protocol {
-  Smoothing smoothing;   ///< to begin with
-  bool adaptive = true;  ///< eq. (17)-(18); otherwise smoothing, samples and learning rate stay
+  Smoothing smoothing;  ///< to begin with
+  /// Eq. (17)-(18); none: smoothing, samples and learning rate stay. The published program first looks at the
+  /// sensitivity after 150 iterations.
+  std::optional<AdaptiveSchedule> schedule = AdaptiveSchedule{.start = 149};
   SensitivityConstant sensitivity = SensitivityConstant::dimension;
   unsigned iterations = 800;
 };
