@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "renderer_impl.hpp"
+#include "scene/cluster_vertices.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr {
@@ -24,17 +25,36 @@ int scaled(int size, int short_side, int shorter) {
   return std::max(1, static_cast<int>(std::lround(static_cast<double>(size) * shorter / short_side)));
 }
 
-/// The side of a triangle of mean area, world.
-double mean_side(const Scene& scene, const PoseSpace& space) {
-  const Mesh& mesh = scene.meshes.front().mesh;
-  double area = 0, squared_radius = 0;
+/// World lengths over those of the object.
+double object_scale(const Mesh& mesh, const PoseSpace& space) {
+  double squared_radius = 0;
+  for (const glm::vec3& p : mesh.positions) squared_radius = std::max(squared_radius, double{glm::dot(p, p)});
+  return squared_radius > 0 ? space.radius() / std::sqrt(squared_radius) : 1;
+}
+
+/// The side of a triangle of mean area, object space.
+double mean_side(const Mesh& mesh) {
+  double area = 0;
   for (const glm::uvec3& face : mesh.faces) {
     const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
     area += glm::length(glm::cross(b - a, c - a)) / 2;
   }
-  for (const glm::vec3& p : mesh.positions) squared_radius = std::max(squared_radius, double{glm::dot(p, p)});
-  const double scale = squared_radius > 0 ? space.radius() / std::sqrt(squared_radius) : 1;
-  return scale * std::sqrt(2 * area / static_cast<double>(mesh.faces.size()));
+  return std::sqrt(2 * area / static_cast<double>(mesh.faces.size()));
+}
+
+/// The side of a pixel at the object, object space.
+double pixel_at_object(const Scene& scene, const PoseSpace& space) {
+  const double world_per_ndc = space.radius() / space.radius_ndc();
+  return world_per_ndc * 2.0 / std::min(scene.width, scene.height) /
+         object_scale(scene.meshes.front().mesh, space);
+}
+
+/// Triangles much smaller than the pixels cost time and show nothing.
+void simplify(Scene& scene, const PoseSpace& space) {
+  constexpr double k_fine = 0.4, k_cell = 0.6;  // of a pixel
+  Mesh& mesh = scene.meshes.front().mesh;
+  const double pixel = pixel_at_object(scene, space);
+  if (mean_side(mesh) < k_fine * pixel) mesh = cluster_vertices(mesh, static_cast<float>(k_cell * pixel));
 }
 
 /// The solver's own member of the family: the expected rigid image, edges blurred by a part of a pixel,
@@ -45,7 +65,7 @@ Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const Leas
   constexpr double k_of_side = 0.25;
   const double pixel_ndc = 2.0 / std::min(scene.width, scene.height);
   const double world_per_ndc = space.radius() / space.radius_ndc();
-  const double side_pixels = mean_side(scene, space) / world_per_ndc / pixel_ndc;
+  const double side_pixels = mean_side(scene.meshes.front().mesh) / pixel_at_object(scene, space);
   const double least = static_cast<double>(std::min(blur, options.blur_end));
   const double blur_ndc = std::clamp(k_of_side * side_pixels, least, static_cast<double>(blur)) * pixel_ndc;
   Smoothing smoothing = smoothing_preset("joint_gaussian");
@@ -62,6 +82,7 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.width = scaled(scene.width, full, short_side);
   result.height = scaled(scene.height, full, short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
+  simplify(result, space);
   result.smoothing = level_smoothing(result, space, options, blur);
   result.gradients = {false, false, false, false, false, false, false};
   return result;

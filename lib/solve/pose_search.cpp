@@ -15,8 +15,9 @@ namespace dpr {
 namespace {
 
 // How many hypotheses are turned at the coarsest level and at each one after it; the last number holds for
-// all further.
-constexpr std::array<std::size_t, 4> k_beam{96, 24, 12, 8};
+// all further. A robust loss says little of a pose until details show: more must stay.
+using Beam = std::array<std::size_t, 4>;
+constexpr Beam k_beam{96, 24, 12, 8}, k_robust_beam{192, 96, 32, 8};
 // Hypotheses that move the object's rim by less than this against each other are one.
 constexpr double k_same_pixels = 0.5;
 // Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the
@@ -56,6 +57,7 @@ class Fit {
         options_(options),
         method_(std::get<LeastSquares>(options.method)),
         callback_(callback),
+        beam_(method_.robust > 0 ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
         space_(scene, initial.front(), options.solve_translation, options.solve_focal) {}
 
@@ -77,6 +79,7 @@ class Fit {
   const PoseOptions& options_;
   const LeastSquares& method_;
   const PoseSolver::Callback& callback_;
+  const Beam& beam_;
   std::vector<Pose> initial_;
   PoseSpace space_;
   std::vector<Candidate> candidates_;
@@ -93,7 +96,7 @@ PoseResult Fit::run(bool anywhere) {
     if (!goes_on && !is_last) continue;
     PoseLevel level(device_, scene_, target_, method_, space_, levels[i].short_side, levels[i].blur);
     if (i == 0) start(level);
-    goes_on = work(level, k_beam[std::min(i + 1, k_beam.size() - 1)], goes_on);
+    goes_on = work(level, beam_[std::min(i + 1, beam_.size() - 1)], goes_on);
     if (is_last) finish(level, anywhere);
   }
   return result_;
@@ -112,7 +115,7 @@ void Fit::start(PoseLevel& level) {
     candidates_.back().equations.loss = losses[i];
   }
   std::ranges::stable_sort(candidates_, by_loss);
-  candidates_.resize(std::min(candidates_.size(), k_beam.front()));
+  candidates_.resize(std::min(candidates_.size(), beam_.front()));
   for (const Pose& pose : initial_) candidates_.push_back({{pose}});
   candidates_[candidates_.size() - initial_.size()].is_initial = true;
 }

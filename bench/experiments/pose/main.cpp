@@ -1,6 +1,5 @@
 // The pose experiments as a command: every method asked for on every set asked for; JSON and a figure.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -8,6 +7,7 @@
 #include "cli/plot.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
+#include "experiments/pose/figures.hpp"
 #include "experiments/pose/methods.hpp"
 #include "experiments/pose/table.hpp"
 
@@ -28,58 +28,29 @@ struct Options {
 constexpr std::size_t k_smoke_count = 2;
 constexpr int k_smoke_size = 32;
 
-std::string file_stem(const PoseRun& run) {
-  const PoseProblemSet& set = run.set;
-  char text[64];
-  std::snprintf(text, sizeof text, "-%g%s%s%s-seed%llu-", set.initial_degrees,
-                set.translation_error > 0 ? "-6d" : "", set.clutter ? "-clutter" : "",
-                set.occluded > 0 ? "-occluded" : "", static_cast<unsigned long long>(set.seed));
-  return std::filesystem::path(set.object).stem().string() + text + run.method;
-}
-
-/// The solved part against the threshold, 1 to 45 degrees: a curve a run.
-void draw(const std::filesystem::path& file,
-          const std::vector<std::pair<std::string, std::vector<double>>>& runs) {
-  constexpr int k_last = 45;
-  std::vector<double> thresholds;
-  for (int degrees = 1; degrees <= k_last; ++degrees) thresholds.push_back(degrees);
-  cli::Panel panel{"solved", false, {}};
-  for (const auto& [name, angles] : runs) {
-    cli::Curve curve{name, {}};
-    for (const double threshold : thresholds) {
-      const auto below = std::ranges::lower_bound(angles, threshold) - angles.begin();
-      curve.y.push_back(static_cast<double>(below) /
-                        static_cast<double>(std::max(angles.size(), std::size_t{1})));
-    }
-    panel.curves.push_back(curve);
-  }
-  cli::plot(file, "threshold, degrees", thresholds, {panel});
-}
-
-void print(const std::string& name, const cli::Json& s) {
-  const auto percent = [&](const char* key) { return 100 * s[key].get<double>(); };
-  std::printf(
-      "%-36s %3zu problems  below 10: %5.1f%% (or same image: %5.1f%%)  5: %5.1f%%  2: %5.1f%%  average "
-      "%7.3f  "
-      "median %7.3f  %6.2f s (%6.2f CPU s)\n",
-      name.c_str(), s["problems"].get<std::size_t>(), percent("below_10_degrees"),
-      percent("below_10_degrees_or_same_image"), percent("below_5_degrees"), percent("below_2_degrees"),
-      s["average_degrees"].get<double>(), s["median_degrees"].get<double>(),
-      s["median_seconds"].get<double>(), s["median_cpu_seconds"].get<double>());
-  std::fflush(stdout);
-}
-
-/// Every combination asked for, or the problems of a file.
-std::vector<PoseRun> runs_of(const Options& options) {
+PoseRun common_of(const Options& options) {
   PoseRun run;
   run.set = options.set;
   run.size = options.smoke ? k_smoke_size : options.size;
   run.smoke = options.smoke;
   run.quiet = options.quiet;
+  return run;
+}
+
+std::size_t count_of(const Options& options) { return options.smoke ? k_smoke_count : options.count; }
+
+/// The solved part against the threshold: a curve a run.
+void draw(const std::filesystem::path& file, const std::vector<cli::Curve>& curves) {
+  cli::plot(file, "threshold, degrees", shown_thresholds(), {cli::Panel{"solved", false, curves}});
+}
+
+/// Every combination asked for, or the problems of a file.
+std::vector<PoseRun> runs_of(const Options& options) {
+  PoseRun run = common_of(options);
   std::vector<PoseRun> runs;
   const auto add = [&] {
     for (const std::string& method : options.methods) {
-      run.method = method;
+      run.method.name = method;
       runs.push_back(run);
     }
   };
@@ -92,7 +63,7 @@ std::vector<PoseRun> runs_of(const Options& options) {
     for (const std::uint64_t seed : options.seeds) {
       run.set.initial_degrees = angle;
       run.set.seed = seed;
-      run.problems = make_pose_problems(run.set, options.smoke ? k_smoke_count : options.count);
+      run.problems = make_pose_problems(run.set, count_of(options));
       add();
     }
   }
@@ -100,56 +71,100 @@ std::vector<PoseRun> runs_of(const Options& options) {
 }
 
 void run(const Options& options) {
-  const std::filesystem::path folder = options.folder;
-  std::filesystem::create_directories(folder);
+  std::filesystem::create_directories(options.folder);
   const Device device = open_device(options.device);
-  std::vector<std::pair<std::string, std::vector<double>>> curves;
+  std::vector<cli::Curve> curves;
   for (const PoseRun& wanted : runs_of(options)) {
-    const std::string stem = file_stem(wanted);
-    write_pose_problems(folder / (stem.substr(0, stem.rfind('-')) + "-problems.json"), wanted.set,
-                        wanted.problems);
-    const cli::Json results = run_poses(device, wanted, folder / (stem + ".json"));
-    print(stem, results["summary"]);
-    curves.emplace_back(stem, final_angles(results));
+    const std::vector<double> angles = final_angles(run_poses(device, wanted, options.folder));
+    cli::Curve& curve = curves.emplace_back(cli::Curve{file_stem(wanted), {}});
+    for (const double threshold : shown_thresholds()) curve.y.push_back(solved_part(angles, threshold));
   }
-  draw(folder / "thresholds.png", curves);
+  draw(std::filesystem::path(options.folder) / "thresholds.png", curves);
+}
+
+void run_figure(const Options& options, const Figure& figure) {
+  std::filesystem::create_directories(options.folder);
+  make_figure(open_device(options.device), figure, common_of(options), count_of(options), options.folder);
 }
 
 }  // namespace
 }  // namespace dpr::bench
 
-int main(int argc, char** argv) {
-  CLI::App application(
-      "Pose experiments: methods on problems from seeds. An interrupted run goes on where it ended.");
-  dpr::bench::Options options;
-  application.add_option(
-      "--method", options.methods,
-      "default, softras, paper_gaussian, paper_cauchy, exact, joint, anneal; may be repeated");
-  application.add_option(
-      "--angle", options.angles,
+namespace {
+
+using dpr::bench::Figure;
+using dpr::bench::Options;
+
+/// What a run is made of; figures choose it themselves.
+void add_set_options(CLI::App& application, Options& options, const char* group) {
+  std::string methods = "May be repeated:";
+  for (const auto& [name, description] : dpr::bench::pose_method_names()) {
+    methods += "\n" + std::string(name) + ": " + std::string(description);
+  }
+  const auto add = [&](const char* name, auto& value, const std::string& description) {
+    application.add_option(name, value, description)->group(group);
+  };
+  add("--method", options.methods, methods);
+  add("--angle", options.angles,
       "Degrees between initial pose and truth, 0 for a uniform initial rotation; may be repeated");
-  application.add_option("--seed", options.seeds, "Seed of the problems; may be repeated");
-  application.add_option("--object", options.set.object, "cube, mailbox, bag or a mesh file");
-  application.add_option("--translation-error", options.set.translation_error,
-                         "Part of the camera's distance");
-  application.add_option("--occluded", options.set.occluded, "Part of the object that is hidden");
-  application.add_flag("--clutter", options.set.clutter, "Random discs instead of the background");
+  add("--seed", options.seeds, "Seed of the problems; may be repeated");
+  add("--object", options.set.object, "cube, published_cube, mailbox, bag or a mesh file");
+  add("--translation-error", options.set.translation_error, "Part of the camera's distance");
+  add("--occluded", options.set.occluded, "Part of the object that is hidden");
+  application.add_flag("--clutter", options.set.clutter, "Random discs instead of the background")
+      ->group(group);
+  add("--problems", options.problems, "A file of problems instead, as this command writes them");
+}
+
+/// The figure asked for, or none.
+const Figure* figure_of(const CLI::App& application, const char* set_group) {
+  for (const Figure& figure : dpr::bench::figures()) {
+    if (!application.got_subcommand(figure.name)) continue;
+    for (const CLI::Option* option : application.get_options()) {
+      if (option->get_group() == set_group && option->count() > 0) {
+        throw dpr::InvalidArgument(option->get_name() + " (command line)",
+                                   "beside " + std::string(figure.name), "none: a figure has its own runs");
+      }
+    }
+    return &figure;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  constexpr const char* k_set_group = "Runs (without a figure)";
+  CLI::App application(
+      "Pose experiments: methods on problems from seeds, or a figure of the paper. An interrupted run goes "
+      "on "
+      "where it ended.");
+  application.require_subcommand(0, 1);
+  application.fallthrough();
+  Options options;
+  add_set_options(application, options, k_set_group);
   application.add_option("--count", options.count, "Problems a set");
   application.add_option("--size", options.size, "Pixels a side");
-  application.add_option("--problems", options.problems,
-                         "A file of problems instead, as this command writes them");
   application.add_option("--device", options.device, "cpu, gpu, an index or a part of its name");
-  application.add_option("-o,--output", options.folder, "Folder for results and figure")->required();
+  application.add_option("-o,--output", options.folder, "Folder for results and figures")->required();
   application.add_flag("--smoke", options.smoke, "Two problems of few iterations, small images");
   application.add_flag("--quiet", options.quiet, "No progress");
+  for (const Figure& figure : dpr::bench::figures()) {
+    application.add_subcommand(figure.name, figure.description);
+  }
+  application.footer("Example: dpr_pose_table figure5 --count 20 -o figures");
   CLI11_PARSE(application, argc, argv);
   try {
-    dpr::bench::run(options);
+    if (const Figure* figure = figure_of(application, k_set_group)) {
+      dpr::bench::run_figure(options, *figure);
+    } else {
+      dpr::bench::run(options);
+    }
   } catch (const dpr::DeviceError& error) {
-    std::fprintf(stderr, "dpr: error: %s\n", error.what());
+    std::fprintf(stderr, "dpr_pose_table: error: %s\n", error.what());
     return 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "dpr: error: %s\n", error.what());
+    std::fprintf(stderr, "dpr_pose_table: error: %s\n", error.what());
     return 1;
   }
   return 0;

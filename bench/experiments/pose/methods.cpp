@@ -2,30 +2,24 @@
 #include "experiments/pose/methods.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 
 #include "dpr/error.hpp"
+#include "experiments/pose/protocol.hpp"
 
 namespace dpr::bench {
 namespace {
 
-/// One descent as published: MATHS of the paper's experiments, or Le Lidec et al. 2021, section 5.
-Descent published_protocol() {
-  Descent descent;
-  descent.iterations = 800;
-  descent.optimizer = {.learning_rate = 5e-2, .beta1 = 0.9, .beta2 = 0.999};
-  descent.schedule = AdaptiveSchedule{};
-  descent.restarts = 0;
-  return descent;
-}
+constexpr unsigned k_smoke_iterations = 3;
 
-Smoothing smoothing_of(std::string_view method) {
-  if (method == "exact") return Smoothing{};
-  if (method == "joint" || method == "anneal") return smoothing_preset("joint_gaussian");
-  return smoothing_preset(method);
-}
+using Solve = PoseResult (*)(const PoseMethod& method, const Device& device, const Scene& scene,
+                             const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                             bool smoke);
 
-PoseResult solve_by_default(const Device& device, const Scene& scene, const PoseProblemSet& set,
-                            const PoseProblem& problem, const Image& target) {
+PoseResult solve_by_default(const PoseMethod&, const Device& device, const Scene& scene,
+                            const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                            bool) {
   constexpr float k_outlier = 0.1F;  // colour difference
   LeastSquares method;
   if (set.clutter || set.occluded > 0) method.robust = k_outlier;
@@ -35,30 +29,122 @@ PoseResult solve_by_default(const Device& device, const Scene& scene, const Pose
                                                               : solver.search();
 }
 
-}  // namespace
-
-std::vector<std::string_view> pose_method_names() {
-  return {"default", "softras", "paper_gaussian", "paper_cauchy", "exact", "joint", "anneal"};
-}
-
-PoseResult solve_problem(std::string_view method, const Device& device, const Scene& scene,
-                         const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
-                         bool smoke) {
-  constexpr unsigned k_smoke_iterations = 3;
-  const auto names = pose_method_names();
-  if (std::ranges::find(names, method) == names.end()) {
-    throw InvalidArgument("--method (pose experiment)", "\"" + std::string(method) + "\"",
-                          "default, softras, paper_gaussian, paper_cauchy, exact, joint or anneal");
-  }
-  if (method == "default") return solve_by_default(device, scene, set, problem, target);
-  Descent descent = method == "anneal" ? Descent{} : published_protocol();
+PoseResult solve_by_annealing(const PoseMethod&, const Device& device, const Scene& scene,
+                              const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                              bool smoke) {
+  Descent descent;
   if (smoke) descent.iterations = k_smoke_iterations;
   Scene smoothed = scene;
-  smoothed.smoothing = smoothing_of(method);
-  smoothed.smoothing.seed = set.seed;
+  smoothed.smoothing = smoothing_preset("joint_gaussian");
   const PoseSolver solver(device, smoothed, target,
                           {.method = descent, .solve_translation = set.translation_error > 0});
   return solver.solve(problem.initial);
+}
+
+/// The members of the family that the published protocol is run with.
+Smoothing member(std::string_view name) {
+  Smoothing smoothing;  // exact, Gaussian, barrier
+  if (name == "exact" || name == "perturbed_pose") return smoothing;
+  if (name == "paper_gaussian_minus_one") return smoothing_preset("paper_gaussian");
+  if (!name.starts_with("joint")) return smoothing_preset(name);
+  smoothing = smoothing_preset("joint_gaussian");
+  if (name == "joint_logistic") smoothing.occupancy_prior = smoothing.depth_prior = Prior::logistic;
+  if (name == "joint_cauchy") smoothing.occupancy_prior = smoothing.depth_prior = Prior::cauchy;
+  return smoothing;
+}
+
+Protocol protocol_of(const PoseMethod& method, const PoseProblemSet& set, bool smoke) {
+  if (set.translation_error > 0) {
+    throw InvalidArgument("--translation-error (pose experiment)", "the method " + method.name,
+                          "default or anneal: the published protocol only turns");
+  }
+  Protocol protocol{.smoothing = member(method.name)};
+  if (!method.adaptive) protocol.schedule.reset();
+  if (protocol.schedule && method.samples) protocol.schedule->max_samples = *method.samples;
+  Smoothing& smoothing = protocol.smoothing;
+  smoothing.seed = set.seed;
+  smoothing.variance_reduction = method.variance_reduction;
+  smoothing.samples = method.samples.value_or(smoothing.samples);
+  if (method.sigma) {
+    if (smoothing.blur_radius) *smoothing.blur_radius *= *method.sigma / smoothing.sigma;
+    smoothing.sigma = *method.sigma;
+  }
+  if (method.gamma) smoothing.gamma = *method.gamma;
+  if (method.name == "paper_gaussian_minus_one") protocol.sensitivity = SensitivityConstant::one;
+  if (smoke) protocol.iterations = k_smoke_iterations;
+  return protocol;
+}
+
+PoseResult solve_as_published(const PoseMethod& method, const Device& device, const Scene& scene,
+                              const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                              bool smoke) {
+  return descend_as_published(device, scene, target, protocol_of(method, set, smoke), problem.initial);
+}
+
+PoseResult solve_on_perturbed_pose(const PoseMethod& method, const Device& device, const Scene& scene,
+                                   const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                                   bool smoke) {
+  return descend_on_perturbed_pose(device, scene, target, protocol_of(method, set, smoke), problem.initial);
+}
+
+struct Known {
+  MethodName name;
+  Solve solve;
+};
+
+constexpr std::array k_methods{
+    Known{{"default",
+           "what users get: least squares, robust where the set hides or clutters something; it "
+           "searches where the initial rotation is uniform"},
+          solve_by_default},
+    Known{{"softras", "the published protocol with this preset"}, solve_as_published},
+    Known{{"paper_gaussian", "the same"}, solve_as_published},
+    Known{{"paper_cauchy", "the same"}, solve_as_published},
+    Known{{"paper_gaussian_minus_one", "the same with the published constant in the sensitivity"},
+          solve_as_published},
+    Known{{"exact", "the protocol with the exact Gaussian estimator"}, solve_as_published},
+    Known{{"joint", "the protocol with the exact joint composition"}, solve_as_published},
+    Known{{"joint_logistic", "the same with logistic noise"}, solve_as_published},
+    Known{{"joint_cauchy", "the same with Cauchy noise"}, solve_as_published},
+    Known{{"perturbed_pose", "the protocol with noise on the rotation instead"}, solve_on_perturbed_pose},
+    Known{{"anneal", "this library's descent: annealed smoothing, joint composition, restarts"},
+          solve_by_annealing}};
+
+}  // namespace
+
+std::vector<MethodName> pose_method_names() {
+  std::vector<MethodName> names;
+  for (const Known& known : k_methods) names.push_back(known.name);
+  return names;
+}
+
+std::string label(const PoseMethod& method) {
+  std::string text = method.name;
+  const auto add = [&](const char* format, double value) {
+    char part[32];
+    std::snprintf(part, sizeof part, format, value);
+    text += part;
+  };
+  if (method.samples) add("-m%g", *method.samples);
+  if (method.sigma) add("-sigma%g", static_cast<double>(*method.sigma));
+  if (method.gamma) add("-gamma%g", static_cast<double>(*method.gamma));
+  if (method.variance_reduction != VarianceReduction::rigid) {
+    text += "-" + std::string(to_string(method.variance_reduction));
+  }
+  if (!method.adaptive) text += "-fixed";
+  return text;
+}
+
+PoseResult solve_problem(const PoseMethod& method, const Device& device, const Scene& scene,
+                         const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                         bool smoke) {
+  const auto known = std::ranges::find(k_methods, method.name, [](const Known& k) { return k.name.name; });
+  if (known == k_methods.end()) {
+    std::string names;
+    for (const Known& k : k_methods) names += (names.empty() ? "" : ", ") + std::string(k.name.name);
+    throw InvalidArgument("--method (pose experiment)", "\"" + method.name + "\"", names);
+  }
+  return known->solve(method, device, scene, set, problem, target, smoke);
 }
 
 }  // namespace dpr::bench

@@ -1,6 +1,8 @@
 // The ways in which the pose experiments solve their problems.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,20 +12,28 @@
 
 namespace dpr::bench {
 
-/// - default: what users get: least squares, robust where the set hides or clutters something; it searches
-/// where the
-///   initial rotation is uniform
-/// - softras, paper_gaussian, paper_cauchy: the published protocol with these presets: 800 iterations of Adam
-/// with a
-///   learning rate of 5e-2, the adaptive schedule, samples from 8 to 128, one descent; the best pose is the
-///   answer
-/// - exact, joint: the same protocol with the exact Gaussian estimator, in the barrier and the joint
-/// composition
-/// - anneal: this library's descent: annealed smoothing, joint composition, restarts
-std::vector<std::string_view> pose_method_names();
+/// A method by name, and where a figure varies the published protocol, how.
+struct PoseMethod {
+  std::string name = "default";
+  std::optional<std::uint32_t> samples = {};  ///< throughout; left out: 8, and more as the smoothing shrinks
+  std::optional<float> sigma = {}, gamma = {};  ///< to begin with
+  VarianceReduction variance_reduction = VarianceReduction::rigid;
+  bool adaptive = true;  ///< the smoothing shrinks
+};
 
-/// Throws InvalidArgument for an unknown name, and for a set that the method has no answer to.
-PoseResult solve_problem(std::string_view method, const Device& device, const Scene& scene,
+struct MethodName {
+  std::string_view name, description;
+};
+
+/// All methods.
+std::vector<MethodName> pose_method_names();
+
+/// Name and variation as a part of a file's name.
+std::string label(const PoseMethod& method);
+
+/// Solves one problem. The published protocol's noise depends on the set's seed. Throws InvalidArgument for
+/// an unknown name, and for a translation with a method that only turns.
+PoseResult solve_problem(const PoseMethod& method, const Device& device, const Scene& scene,
                          const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
                          bool smoke);
 

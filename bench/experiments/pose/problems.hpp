@@ -16,7 +16,7 @@ namespace dpr::bench {
 
 /// A family of problems. Together with a seed it says everything.
 struct PoseProblemSet {
-  std::string object = "cube";   ///< cube, mailbox, bag, or a mesh file
+  std::string object = "cube";   ///< cube, published_cube, mailbox, bag, or a mesh file
   double initial_degrees = 50;   ///< angle between initial pose and truth; 0: the initial rotation is uniform
   double translation_error = 0;  ///< length of the initial pose's error, a part of the camera's distance
   double occluded = 0;           ///< part of the object hidden behind a patch, in [0, 1)

@@ -2,6 +2,7 @@
 #include "experiments/pose/table.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <ctime>
 #include <fstream>
 
@@ -94,7 +95,7 @@ Json head(const Device& device, const PoseRun& run) {
       {"schema", k_schema},
       {"commit", DPR_COMMIT},
       {"device", {{"platform", info.platform}, {"name", info.name}, {"compute_units", info.compute_units}}},
-      {"method", run.method},
+      {"method", label(run.method)},
       {"set", to_json(run.set)},
       {"size", run.size},
       {"smoke", run.smoke}};
@@ -118,9 +119,35 @@ Json earlier_rows(const std::filesystem::path& file, const Json& wanted) {
   }
 }
 
+void print(const std::string& name, const Json& s) {
+  const auto percent = [&](const char* key) { return 100 * s[key].get<double>(); };
+  std::printf(
+      "%-36s %3zu problems  below 10: %5.1f%% (or same image: %5.1f%%)  5: %5.1f%%  2: %5.1f%%  average "
+      "%7.3f  "
+      "median %7.3f  %6.2f s (%6.2f CPU s)\n",
+      name.c_str(), s["problems"].get<std::size_t>(), percent("below_10_degrees"),
+      percent("below_10_degrees_or_same_image"), percent("below_5_degrees"), percent("below_2_degrees"),
+      s["average_degrees"].get<double>(), s["median_degrees"].get<double>(),
+      s["median_seconds"].get<double>(), s["median_cpu_seconds"].get<double>());
+  std::fflush(stdout);
+}
+
 }  // namespace
 
-Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::path& file) {
+std::string file_stem(const PoseRun& run) {
+  const PoseProblemSet& set = run.set;
+  char text[64];
+  std::snprintf(text, sizeof text, "-%g%s%s%s-seed%llu-", set.initial_degrees,
+                set.translation_error > 0 ? "-6d" : "", set.clutter ? "-clutter" : "",
+                set.occluded > 0 ? "-occluded" : "", static_cast<unsigned long long>(set.seed));
+  return std::filesystem::path(set.object).stem().string() + text + label(run.method);
+}
+
+Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::path& folder) {
+  const std::string stem = file_stem(run);
+  const std::filesystem::path file = folder / (stem + ".json");
+  const std::string set_stem = stem.substr(0, stem.size() - label(run.method).size());
+  write_pose_problems(folder / (set_stem + "problems.json"), run.set, run.problems);
   Scene scene = pose_scene(run.set.object);
   scene.width = scene.height = run.size;
   RigidCamera camera(device, scene);
@@ -134,12 +161,13 @@ Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::
     results["rows"] = rows;
     cli::write_json(file, results);
     char text[64];
-    std::snprintf(text, sizeof text, "%s  %.2f degrees, %.2f s", run.method.c_str(),
+    std::snprintf(text, sizeof text, "%s  %.2f degrees, %.2f s", label(run.method).c_str(),
                   rows.back()["end_degrees"].get<double>(), rows.back()["seconds"].get<double>());
     progress.update(static_cast<unsigned>(i + 1), text);
   }
   results["summary"] = summary(rows);
   results["rows"] = rows;
+  print(stem, results["summary"]);
   return results;
 }
 
@@ -147,6 +175,19 @@ std::vector<double> final_angles(const Json& results) {
   std::vector<double> angles = column(results.at("rows"), "end_degrees");
   std::ranges::sort(angles);
   return angles;
+}
+
+double solved_part(const std::vector<double>& angles, double threshold) {
+  if (angles.empty()) return 0;
+  const auto below = std::ranges::lower_bound(angles, threshold) - angles.begin();
+  return static_cast<double>(below) / static_cast<double>(angles.size());
+}
+
+std::vector<double> shown_thresholds() {
+  constexpr int k_last = 45;
+  std::vector<double> thresholds;
+  for (int degrees = 1; degrees <= k_last; ++degrees) thresholds.push_back(degrees);
+  return thresholds;
 }
 
 }  // namespace dpr::bench

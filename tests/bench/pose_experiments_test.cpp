@@ -1,0 +1,113 @@
+// The pose experiments: problems are what their set says, and the published protocol's derivative is one.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "dpr/error.hpp"
+#include "experiments/pose/figures.hpp"
+#include "experiments/pose/problems.hpp"
+#include "experiments/pose/protocol.hpp"
+#include "support/temp_dir.hpp"
+
+namespace {
+
+using dpr::bench::PoseProblem;
+using dpr::bench::PoseProblemSet;
+
+/// Any smooth function of a rotation: <A, R>.
+double linear_function(const glm::dmat3& a, const glm::dmat3& rotation) {
+  return glm::dot(a[0], rotation[0]) + glm::dot(a[1], rotation[1]) + glm::dot(a[2], rotation[2]);
+}
+
+template <typename Function>
+glm::dvec3 central_differences(const Function& f) {
+  constexpr double k_step = 1e-5;
+  glm::dvec3 result;
+  for (int i = 0; i < 3; ++i) {
+    glm::dvec3 step(0);
+    step[i] = k_step;
+    result[i] = (f(step) - f(-step)) / (2 * k_step);
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_SUITE("gradient") {
+  TEST_CASE("the rotation vector's gradient follows from that of a rotation on the left, at any angle") {
+    const glm::dmat3 a(0.3, -1.2, 0.7, 2.1, 0.4, -0.5, -0.9, 1.1, 0.2);
+    const glm::dvec3 axis = glm::normalize(glm::dvec3(1, -2, 0.5));
+    for (const double angle : {0.0, 1e-6, 1e-3, 0.5, 2.0, 3.1, 4.5, 6.2}) {
+      CAPTURE(angle);
+      const glm::dvec3 r = angle * axis;
+      const glm::dmat3 rotation = dpr::rotation_from_vector(r);
+      const glm::dvec3 left = central_differences(
+          [&](const glm::dvec3& d) { return linear_function(a, dpr::rotation_from_vector(d) * rotation); });
+      const glm::dvec3 wanted = central_differences(
+          [&](const glm::dvec3& d) { return linear_function(a, dpr::rotation_from_vector(r + d)); });
+      const glm::dvec3 found = dpr::bench::rotation_vector_gradient(r, left);
+      CHECK(glm::length(found - wanted) < 1e-7);
+      if (angle >= 0.5) CHECK(glm::length(left - wanted) > 1e-2);  // they are not the same thing
+    }
+  }
+}
+
+TEST_SUITE("unit") {
+  TEST_CASE("pose problems: the angle is what was asked for, and a file replays them to the bit") {
+    PoseProblemSet set;
+    set.initial_degrees = 50;
+    set.translation_error = 0.1;
+    set.seed = 7;
+    const auto problems = dpr::bench::make_pose_problems(set, 5);
+    REQUIRE(problems.size() == 5);
+    for (const PoseProblem& problem : problems) {
+      CHECK(dpr::angle_degrees(problem.initial.rotation, problem.truth.rotation) ==
+            doctest::Approx(50).epsilon(1e-9));
+      CHECK(glm::length(problem.initial.translation - problem.truth.translation) ==
+            doctest::Approx(0.1 * dpr::bench::k_pose_camera_distance));
+    }
+    const dpr::test::TempDir folder;
+    dpr::bench::write_pose_problems(folder / "problems.json", set, problems);
+    PoseProblemSet read_set;
+    const auto read = dpr::bench::read_pose_problems(folder / "problems.json", read_set);
+    CHECK(read_set.seed == 7);
+    REQUIRE(read.size() == problems.size());
+    for (std::size_t i = 0; i < read.size(); ++i) {
+      CHECK(read[i].truth.rotation == problems[i].truth.rotation);
+      CHECK(read[i].initial.rotation == problems[i].initial.rotation);
+      CHECK(read[i].initial.translation == problems[i].initial.translation);
+      CHECK(read[i].seed == problems[i].seed);
+    }
+    folder.write("broken.json", "{\"set\": {}}");
+    CHECK_THROWS_AS(dpr::bench::read_pose_problems(folder / "broken.json", read_set), dpr::IoError);
+  }
+
+  TEST_CASE("solved parts: counted strictly below the threshold") {
+    const std::vector<double> angles{0.5, 1, 9.99, 10, 90};
+    CHECK(dpr::bench::solved_part(angles, 1) == doctest::Approx(0.2));
+    CHECK(dpr::bench::solved_part(angles, 10) == doctest::Approx(0.6));
+    CHECK(dpr::bench::solved_part({}, 10) == 0);
+  }
+
+  TEST_CASE("figures: every run of a figure has a file of its own, unless it is the same run") {
+    const dpr::bench::PoseRun common;
+    for (const dpr::bench::Figure& figure : dpr::bench::figures()) {
+      CAPTURE(figure.name);
+      const auto panels = figure.panels(common, 1);
+      CHECK(!panels.empty());
+      std::vector<std::string> stems;
+      for (const auto& panel : panels) {
+        for (const auto& curve : panel.curves) {
+          CHECK((curve.x.empty() ? std::size_t{1} : curve.x.size()) == curve.runs.size());
+          for (const auto& run : curve.runs) stems.push_back(dpr::bench::file_stem(run));
+        }
+      }
+      std::ranges::sort(stems);
+      CHECK(std::ranges::adjacent_find(stems) == stems.end());
+    }
+  }
+}
