@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/aov.hpp"
@@ -27,7 +28,8 @@ struct Renderer::Impl {
   void set_views(std::span<const View> views, std::size_t first_view);
   void set_smoothing(const Smoothing& smoothing);
   void forward();
-  SceneGradient backward(const Buffer<cl_float4>& grad_images);
+  /// `mesh_loss`, where there is one, adds its gradient to that of the positions.
+  SceneGradient backward(const Buffer<cl_float4>& grad_images, MeshLoss::Impl* mesh_loss = nullptr);
   /// Fills `aov` for the last frame, if it does not hold that already.
   void render_aov();
 
@@ -73,7 +75,7 @@ struct Renderer::Impl {
   void render(const Band& band);
   void differentiate(const Buffer<cl_float4>& grad_images);
 
-  void read_mesh_gradients(SceneGradient& gradient);
+  void read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl* mesh_loss);
   void read_summed_gradients(SceneGradient& gradient);
 };
 
