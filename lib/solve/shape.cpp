@@ -33,21 +33,6 @@ void add(std::vector<double>& values, std::span<const double> steps) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] += steps[i];
 }
 
-/// What does not change in a run, in the units of the scene.
-struct Plan {
-  Plan(const ShapeViews& views, const ShapeOptions& options) : common(common_view(views)) {
-    const double blur = static_cast<double>(options.blur_end);
-    const double ndc = blur * 2.0 / std::min(views.width, views.height);
-    smoothing = smoothing_preset("joint_gaussian");
-    smoothing.sigma = static_cast<float>(ndc * ndc);
-    smoothing.gamma = static_cast<float>(blur * common.pixel / common.depth_range);
-    if (views.smoothing) smoothing = *views.smoothing;
-  }
-
-  CommonView common;
-  Smoothing smoothing;  ///< at the finest level's end
-};
-
 /// Pixels of a level, of one of the finest.
 double pixel_scale(const ShapeOptions& options, unsigned level) {
   return std::ldexp(1.0, static_cast<int>(options.levels - 1 - level));
@@ -121,9 +106,10 @@ class Run {
       : device_(device),
         views_(views),
         options_(options),
-        plan_(views, options),
+        common_(common_view(views)),
+        finest_(finest_smoothing(views, options)),
         renderer_(device),
-        position_optimizer_(position_optimizer(options, plan_.common.radius)),
+        position_optimizer_(position_optimizer(options, common_.radius)),
         color_optimizer_({.learning_rate = options.color_learning_rate}),
         state_(std::move(state)) {
     position_optimizer_.set_state(state_.position_steps);
@@ -136,9 +122,13 @@ class Run {
     const unsigned in_level = state_.iteration % options_.iterations;
     const bool is_new_level = !batches_ || in_level == 0;
     if (is_new_level) batches_.emplace(device_, views_, options_, level);
-    const bool remeshes = options_.remesh_interval > 0 && in_level % options_.remesh_interval == 0;
+    const bool remeshes = options_.remesh_interval > 0 && in_level % options_.remesh_interval == 0 &&
+                          2 * in_level < options_.iterations;
     if (remeshes) make_mesh_anew(level);
     if (is_new_level || remeshes) prepare();
+    const double rate = std::pow(options_.learning_rate_end, progress(in_level));
+    position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
+    color_optimizer_.set_learning_rate(rate * options_.color_learning_rate);
     descend(evaluate(level, in_level));
     ++state_.iteration;
   }
@@ -153,7 +143,7 @@ class Run {
  private:
   void make_mesh_anew(unsigned level) {
     const double edge =
-        static_cast<double>(options_.edge_pixels) * plan_.common.pixel * pixel_scale(options_, level);
+        static_cast<double>(options_.edge_pixels) * common_.pixel * pixel_scale(options_, level);
     const std::optional<Mesh> mesh = remesh(state_.mesh(), static_cast<float>(edge));
     if (!mesh || mesh->faces.empty()) return;  // soup keeps its faces
     state_.faces = mesh->faces;
@@ -165,7 +155,7 @@ class Run {
 
   MeshLossWeights scaled_regularizers() const {
     MeshLossWeights weights = options_.regularizers;
-    const auto radius = static_cast<float>(plan_.common.radius);
+    const auto radius = static_cast<float>(common_.radius);
     weights.laplacian /= radius * radius;
     weights.edge_length /= radius * radius;
     weights.edge_target *= radius;
@@ -182,15 +172,20 @@ class Run {
     scene.background = views_.background;
     scene.camera = batches_->cameras(0).front().camera;
     scene.meshes.push_back({mesh});
-    scene.smoothing = plan_.smoothing;
+    scene.smoothing = finest_;
     scene.gradients = {true, true, false, false, false, false, false};
     renderer_.set_scene(scene);
   }
 
+  /// Through a level, from 0 to 1.
+  double progress(unsigned in_level) const {
+    return static_cast<double>(in_level) / std::max(options_.iterations - 1, 1U);
+  }
+
   Smoothing smoothing_at(unsigned level, unsigned in_level) const {
     const double begin = static_cast<double>(options_.blur) / static_cast<double>(options_.blur_end);
-    const double left = 1 - static_cast<double>(in_level) / std::max(options_.iterations - 1, 1U);
-    Smoothing smoothing = widened(plan_.smoothing, pixel_scale(options_, level) * std::pow(begin, left));
+    Smoothing smoothing =
+        widened(finest_, pixel_scale(options_, level) * std::pow(begin, 1 - progress(in_level)));
     smoothing.seed += state_.iteration;  // fresh noise: its errors average out along the descent
     return smoothing;
   }
@@ -236,7 +231,8 @@ class Run {
   const Device& device_;
   const ShapeViews& views_;
   const ShapeOptions& options_;
-  Plan plan_;
+  CommonView common_;
+  Smoothing finest_;
   Renderer renderer_;
   Optimizer position_optimizer_, color_optimizer_;
   std::optional<Batches> batches_;
@@ -275,6 +271,8 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
   require(o.lambda >= 0 && std::isfinite(o.lambda), "lambda (shape)", o.lambda,
           "a finite number, at least 0");
   require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");
+  require(positive(o.learning_rate_end), "learning_rate_end (shape)", o.learning_rate_end,
+          "a finite number above 0");
   require(positive(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
           "a finite number above 0");
 }
@@ -298,6 +296,17 @@ Mesh make_start(const ShapeViews& views) {
 }
 
 }  // namespace
+
+Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options) {
+  if (views.smoothing) return *views.smoothing;
+  const CommonView common = common_view(views);
+  const double blur = static_cast<double>(options.blur_end);
+  const double ndc = blur * 2.0 / std::min(views.width, views.height);
+  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  smoothing.sigma = static_cast<float>(ndc * ndc);
+  smoothing.gamma = static_cast<float>(blur * common.pixel / common.depth_range);
+  return smoothing;
+}
 
 ShapeSolver::ShapeSolver(Device device, ShapeViews views, ShapeOptions options)
     : device_(std::move(device)), views_(std::move(views)), options_(options) {

@@ -83,6 +83,7 @@ void add(Hash& hash, const ShapeOptions& o) {
     hash.add(value);
   }
   hash.add(o.learning_rate);
+  hash.add(o.learning_rate_end);
   hash.add(o.color_learning_rate);
 }
 
