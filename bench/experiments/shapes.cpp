@@ -48,7 +48,7 @@ void centre(Mesh& mesh) {
 /// Smoothly by position, with patches of one colour whose edges are sharp (to a triangle).
 void paint(Mesh& mesh) {
   constexpr std::size_t k_patches = 6;
-  constexpr float k_radius = 0.22F;
+  constexpr float k_radius = 0.25F;
   const glm::vec3 palette[] = {{0.95F, 0.9F, 0.2F}, {0.1F, 0.1F, 0.15F}, {0.9F, 0.95F, 1}};
   std::mt19937_64 generator(k_seed);
   std::vector<glm::vec3> centres;
@@ -69,7 +69,7 @@ std::vector<Shape> make_shapes(bool smoke) {
   const std::filesystem::path folder = DPR_MESH_FOLDER;
   std::vector<Shape> shapes;
   if (!smoke && std::filesystem::is_directory(folder)) {
-    shapes.push_back({"spot", read_mesh(folder / "spot.obj")});
+    shapes.push_back({"spot", read_mesh(folder / "spot_low.obj")});
     shapes.push_back({"fish", read_mesh(folder / "fish_low.obj")});
   } else {
     shapes.push_back({"blob", make_blob()});
@@ -107,16 +107,20 @@ struct Method {
 
 std::vector<Method> make_methods(bool smoke) {
   ShapeOptions options;
-  if (smoke) options = {.levels = 2, .iterations = 30, .remesh_interval = 15};
-  ShapeOptions paper = options;  // its regulariser and its weights, Adam on the positions
+  if (smoke) {
+    options.iterations = 40;
+    options.remesh_interval = 10;
+    options.learning_rate = 0.1;
+  }
+  ShapeOptions paper = options;  // its weights (74) and regulariser (77), Adam on the positions
   paper.steps = ShapeSteps::direct;
+  paper.loss = {.l1 = 1, .silhouette = 1};
   paper.regularizers.laplacian = 3e-3F;
   paper.learning_rate = 0.01;
   return {{"joint", options, ""},
-          {"joint, laplacian", paper, ""},
-          {"softras", options, "softras"},
           {"barrier", options, "barrier"},
-          {"softras, laplacian", paper, "softras"}};
+          {"softras", options, "softras"},
+          {"joint, direct steps, Laplacian", paper, ""}};
 }
 
 Smoothing smoothing_of(const std::string& preset, const Smoothing& like) {
@@ -216,20 +220,23 @@ void run_shapes(const Settings& settings) {
   const std::vector<Method> methods = make_methods(settings.smoke);
   Json rows = Json::array();
   std::vector<Image> pictures;
+  std::vector<Trial> trials;
   std::vector<Shape> shapes = make_shapes(settings.smoke);
+  const auto run = [&](Trial& trial, const Method& method) {
+    rows.push_back(trial.run(method));
+    // After each: what has been measured is not lost with what is still to come.
+    write_data(settings, "shapes",
+               {{"views", k_views}, {"held_out", k_held_out}, {"voxels", k_voxels}, {"rows", rows}});
+  };
   for (Shape& shape : shapes) {
-    const bool is_first = pictures.empty();
-    Trial trial(settings, std::move(shape));
-    rows.push_back(trial.run(methods.front()));
+    Trial& trial = trials.emplace_back(settings, std::move(shape));
+    run(trial, methods.front());
     pictures.push_back(trial.picture());
     write_mesh(settings.folder / (trial.name() + ".ply"), trial.result());
-    announce(settings, trial.name() + ".ply");
-    for (std::size_t i = 1; is_first && i < methods.size(); ++i) rows.push_back(trial.run(methods[i]));
   }
   write_image(settings.folder / "shapes.png", cli::vstack(pictures, 8));
   announce(settings, "shapes.png");
-  write_data(settings, "shapes",
-             {{"views", k_views}, {"held_out", k_held_out}, {"voxels", k_voxels}, {"rows", rows}});
+  for (std::size_t i = 1; i < methods.size(); ++i) run(trials.front(), methods[i]);
 }
 
 }  // namespace dpr::experiments

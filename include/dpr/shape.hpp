@@ -42,21 +42,21 @@ ShapeViews read_views(const std::filesystem::path& file);
 enum class ShapeSteps { large_steps, direct };
 
 struct ShapeOptions {
-  unsigned levels = 3;        ///< > 0: of resolution; each has half the pixels of the next on a side
-  unsigned iterations = 100;  ///< > 0: of a level
+  unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
+  unsigned iterations = 400;  ///< > 0: of a level
   unsigned batch = 8;         ///< > 0: views that an iteration renders, in turn
-  float edge_pixels = 3.0F;   ///< > 0: length of edges to which a level begins to remesh, in its pixels
+  float edge_pixels = 2.0F;   ///< > 0: length of edges to which a level begins to remesh, in its pixels
   /// Iterations between two remeshings, in the first half of a level; 0: the mesh keeps its faces.
   unsigned remesh_interval = 50;
-  float blur = 0.5F;       ///< > 0: of the edges, in pixels of the level, at its beginning
-  float blur_end = 0.25F;  ///< > 0: at its end
+  float blur = 0.5F;      ///< > 0: of the edges, in pixels of the level, at its beginning
+  float blur_end = 0.1F;  ///< > 0: at its end
   ShapeSteps steps = ShapeSteps::large_steps;
   float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
-  double learning_rate = 0.02;  ///< > 0: of the positions, in radii of the initial shape
+  double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the initial shape
   double learning_rate_end =
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
-  double color_learning_rate = 0.02;  ///< > 0
-  LossWeights loss{.l1 = 1, .silhouette = 1};
+  double color_learning_rate = 0.05;  ///< > 0
+  LossWeights loss{.l1 = 4, .silhouette = 1};
   MeshLossWeights regularizers;       ///< for an object of radius 1; edge_target is ignored
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
 };

@@ -61,9 +61,10 @@ ShapeViews make_views(const dpr::Device& device, int count = reduced(6, 2), int 
 ShapeOptions small_options() {
   ShapeOptions options;
   options.levels = reduced(2, 1);
-  options.iterations = reduced(20, 2);
+  options.iterations = reduced(40, 2);
   options.batch = 3;
   options.remesh_interval = reduced(10, 2);
+  options.learning_rate = 0.1;
   return options;
 }
 
