@@ -4,7 +4,7 @@
 dpr_packages=(
   g++ cmake ninja-build pkg-config
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
-  libglm-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
+  libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
   doctest-dev gnuplot-nox clinfo oclgrind clang
 )
 

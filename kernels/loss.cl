@@ -19,11 +19,12 @@ kernel void loss_forward(const LossParams p, global const float4* restrict image
 }
 
 /// d loss / d image of the mean over the views. One work-item per pixel.
-/// in   sums        float[DPR_LOSS_SUMS][view]
-/// out  grad_image  float4[view][pixel]
+/// in   sums         float[DPR_LOSS_SUMS][view]
+/// in   silhouettes  float[view]  weight of the silhouette loss
+/// out  grad_image   float4[view][pixel]
 kernel void loss_backward(const LossParams p, global const float4* restrict image,
                           global const float4* restrict target, global const float* restrict sums,
-                          global float4* restrict grad_image) {
+                          global const float* restrict silhouettes, global float4* restrict grad_image) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.pixels_per_view) return;
   const uint view = i / p.pixels_per_view;
@@ -35,6 +36,6 @@ kernel void loss_backward(const LossParams p, global const float4* restrict imag
   // Where both images are empty they agree: no loss, no gradient.
   const float b = target[i].w;
   const float alpha =
-      united > 0.0f ? -p.silhouette * (b * united - intersection * (1.0f - b)) / (united * united) : 0.0f;
+      united > 0.0f ? -silhouettes[view] * (b * united - intersection * (1.0f - b)) / (united * united) : 0.0f;
   grad_image[i] = (float4)(color, alpha) / (float)p.views;
 }

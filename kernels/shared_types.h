@@ -79,6 +79,10 @@ using float4 = cl_float4;
 /// Sums of a loss over the pixels of a view: squared error, absolute error, intersection and union of the alphas.
 #define DPR_LOSS_SUMS 4
 
+/// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge lengths; and its
+/// hinges: 1 - cos, and that squared.
+#define DPR_MESH_LOSS_CHANNELS 2
+
 /// Sizes and settings of a frame that the geometry stages need.
 typedef struct FrameParams {
   DPR_SHARED_NAME(FrameParams)
@@ -172,10 +176,18 @@ typedef struct Slot {
 /// Weights of the losses, and the sizes to average over.
 typedef struct LossParams {
   DPR_SHARED_NAME(LossParams)
-  float mse, l1, silhouette;
+  float mse, l1;
   uint views, pixels_per_view;
-  uint unused0, unused1, unused2;
 } LossParams;
+
+/// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its sizes.
+typedef struct MeshLossParams {
+  DPR_SHARED_NAME(MeshLossParams)
+  float laplacian, edge_length, normal_consistency, flatness;
+  float edge_target; /* object space */
+  uint first_vertex; /* of the mesh, in the joined buffers */
+  uint vertices, hinges;
+} MeshLossParams;
 
 #ifndef __OPENCL_C_VERSION__
 #undef DPR_SHARED_NAME

@@ -208,7 +208,7 @@ void Renderer::Impl::shade_and_aggregate() {
   aggregate.forward(aggregate_inputs(), scene.background);
 }
 
-SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
+SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images, MeshLoss::Impl* mesh_loss) {
   const GradientRequest& wanted = scene.gradients;
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
@@ -225,7 +225,7 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images) {
   gradient.views.resize(views.size());
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
   read_summed_gradients(gradient);
-  read_mesh_gradients(gradient);
+  read_mesh_gradients(gradient, mesh_loss);
   return gradient;
 }
 

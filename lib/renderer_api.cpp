@@ -3,6 +3,7 @@
 
 #include "dpr/opencl.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "loss/mesh_loss_impl.hpp"
 #include "renderer_impl.hpp"
 #include "scene/checks.hpp"
 
@@ -130,13 +131,32 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
   return m.backward(m.host_grad_images);
 }
 
+namespace {
+
+/// Throws unless what was evaluated was the last frame.
+void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const char* what) {
+  if (evaluated == rendered) return;
+  throw InvalidArgument(std::string(what) + " (Renderer::backward)", "the gradient of other images",
+                        "a loss evaluated on this renderer's last forward()");
+}
+
+}  // namespace
+
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");
-  if (loss.impl().frame_number != impl_->frame_number) {
-    throw InvalidArgument("loss (Renderer::backward)", "the gradient of other images",
-                          "a loss evaluated on this renderer's last forward()");
-  }
+  require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
   return impl_->backward(loss.impl().grad_image);
+}
+
+SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_loss) {
+  impl_->require_forward("Renderer::backward");
+  require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
+  require_same_frame(mesh_loss.impl().frame_number, impl_->frame_number, "mesh_loss");
+  if (!impl_->scene.gradients.positions) {
+    throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
+                          "GradientRequest::positions");
+  }
+  return impl_->backward(loss.impl().grad_image, &mesh_loss.impl());
 }
 
 RenderStatistics Renderer::statistics() const {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/aov.hpp"
@@ -29,7 +30,8 @@ struct Renderer::Impl {
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
   /// blocks to read the sizes to allocate.
   void forward();
-  SceneGradient backward(const Buffer<cl_float4>& grad_images);
+  /// `mesh_loss`, where there is one, adds its gradient to that of the positions.
+  SceneGradient backward(const Buffer<cl_float4>& grad_images, MeshLoss::Impl* mesh_loss = nullptr);
   /// Fills `aov` for the last frame, if it does not hold that already.
   void render_aov();
 
@@ -85,7 +87,7 @@ struct Renderer::Impl {
   void shade_and_aggregate();
   void differentiate(const Buffer<cl_float4>& grad_images);
 
-  void read_mesh_gradients(SceneGradient& gradient);
+  void read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl* mesh_loss);
   void read_summed_gradients(SceneGradient& gradient);
 };
 

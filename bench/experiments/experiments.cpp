@@ -12,6 +12,7 @@ void run_gradient_noise(const Settings& settings);
 void run_gallery(const Settings& settings);
 void run_estimators(const Settings& settings);
 void run_devices(const Settings& settings);
+void run_shapes(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -21,7 +22,9 @@ std::span<const Experiment> experiments() {
        run_gradient_noise},
       {"gallery", "Renders for growing sigma and gamma, each composition (Figure 2)", run_gallery},
       {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators},
-      {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices}};
+      {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices},
+      {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
+       run_shapes}};
   return k_experiments;
 }
 

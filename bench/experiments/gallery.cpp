@@ -2,6 +2,7 @@
 #include <memory>
 #include <sstream>
 
+#include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -24,27 +25,6 @@ Smoothing make_smoothing(const std::string& preset, float sigma, float gamma) {
   return smoothing;
 }
 
-/// Colours as they are seen over the background.
-Image opaque(Image image) {
-  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
-  return image;
-}
-
-/// Rows below each other; all of one width.
-Image vstack(const std::vector<Image>& rows) {
-  Image sheet;
-  sheet.width = rows.front().width;
-  for (const Image& row : rows) {
-    if (sheet.height > 0) {
-      sheet.pixels.insert(sheet.pixels.end(), static_cast<std::size_t>(k_gap * sheet.width), glm::vec4(1));
-      sheet.height += k_gap;
-    }
-    sheet.pixels.insert(sheet.pixels.end(), row.pixels.begin(), row.pixels.end());
-    sheet.height += row.height;
-  }
-  return sheet;
-}
-
 Image contact_sheet(const Device& device, Scene scene, const std::string& preset) {
   Renderer renderer(device);
   renderer.set_scene(scene);
@@ -54,11 +34,11 @@ Image contact_sheet(const Device& device, Scene scene, const std::string& preset
     for (const float sigma : k_sigmas) {
       renderer.set_smoothing(make_smoothing(preset, sigma, gamma));
       renderer.forward();
-      row.push_back(opaque(renderer.image()));
+      row.push_back(cli::opaque(renderer.image()));
     }
     rows.push_back(hstack(row, k_gap));
   }
-  return vstack(rows);
+  return cli::vstack(rows, k_gap);
 }
 
 /// Labels in the middle of tiles.

@@ -29,9 +29,11 @@ struct LossWeights {
 /// Weighted sum of losses against fixed targets, mean over the views.
 class ImageLoss {
  public:
-  /// One target a view, all of the same size. Throws InvalidArgument for sizes that differ, values that are
-  /// not finite, negative weights or none above zero.
-  ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets);
+  /// One target a view, all of the same size. `has_alpha`, one value a target or empty for all: where it is
+  /// 0 a target has no silhouette, and its view no silhouette loss. Throws InvalidArgument for sizes that
+  /// differ, values that are not finite, negative weights or none above zero.
+  ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets,
+            std::span<const unsigned char> has_alpha = {});
   ~ImageLoss();
   ImageLoss(ImageLoss&&) noexcept;
   ImageLoss& operator=(ImageLoss&&) noexcept;

@@ -6,7 +6,9 @@
 
 namespace dpr {
 
-enum class OptimizerKind { adam, sgd };
+/// uniform_adam: Adam with one second moment for all parameters, the largest, so that steps keep the
+/// gradient's direction in the large (Nicolet, Jacobson & Jakob 2021, section 3.4).
+enum class OptimizerKind { adam, sgd, uniform_adam };
 
 struct OptimizerOptions {
   OptimizerKind kind = OptimizerKind::adam;
@@ -14,6 +16,12 @@ struct OptimizerOptions {
   double beta1 = 0.9;           ///< Adam's first moment, SGD's momentum; in [0, 1)
   double beta2 = 0.999;         ///< Adam's second moment; in [0, 1)
   double epsilon = 1e-8;        ///< > 0
+};
+
+/// What an optimizer remembers between steps; empty before the first.
+struct OptimizerState {
+  std::vector<double> first_moment, second_moment;
+  unsigned iteration = 0;
 };
 
 /// Adam (Kingma & Ba 2015) with bias correction, or SGD with momentum, v <- beta1 v + g.
@@ -30,10 +38,14 @@ class Optimizer {
   /// Forgets the moments.
   void restart();
 
+  const OptimizerState& state() const { return state_; }
+  /// Goes on where another optimizer was. Throws InvalidArgument if the moments differ in length.
+  void set_state(OptimizerState state);
+
  private:
   OptimizerOptions options_;
-  std::vector<double> first_moment_, second_moment_, step_;
-  unsigned iteration_ = 0;
+  OptimizerState state_;
+  std::vector<double> step_;
 };
 
 }  // namespace dpr

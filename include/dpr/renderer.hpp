@@ -69,6 +69,7 @@ struct RenderStatistics {
 };
 
 class ImageLoss;
+class MeshLoss;
 
 /// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
 class Renderer {
@@ -105,6 +106,9 @@ class Renderer {
   SceneGradient backward(std::span<const Image> grad_images);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   SceneGradient backward(const ImageLoss& loss);
+  /// The same, with the gradient of a mesh's own loss added to that of its positions, on the device. Both
+  /// evaluated on the last forward(). Throws InvalidArgument if the scene asks for no positions' gradient.
+  SceneGradient backward(const ImageLoss& loss, const MeshLoss& mesh_loss);
 
   RenderStatistics statistics() const;
   const Device& device() const;

@@ -11,6 +11,7 @@ void add_devices_command(CLI::App& application, CommonOptions& common);
 void add_render_command(CLI::App& application, CommonOptions& common);
 void add_gradient_command(CLI::App& application, CommonOptions& common);
 void add_pose_command(CLI::App& application, CommonOptions& common);
+void add_fit_command(CLI::App& application, CommonOptions& common);
 void add_bench_command(CLI::App& application, CommonOptions& common);
 void add_demo_command(CLI::App& application, CommonOptions& common);
 

@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   dpr::cli::add_render_command(application, common);
   dpr::cli::add_gradient_command(application, common);
   dpr::cli::add_pose_command(application, common);
+  dpr::cli::add_fit_command(application, common);
   dpr::cli::add_bench_command(application, common);
   dpr::cli::add_demo_command(application, common);
   try {

@@ -2,52 +2,17 @@
 #include "cli/pose_page.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <string>
 
+#include "cli/page.hpp"
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {
 
-constexpr const char* k_head = R"(<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>Pose</title>
-<style>
-body { font-family: sans-serif; max-width: 62em; margin: 2em auto; padding: 0 1em; color: #222; }
-figure { display: inline-block; margin: 0 1em 1em 0; }
-figure img { width: 14em; image-rendering: pixelated; border: 1px solid #bbb; }
-figcaption { font-size: 90%; color: #555; }
-img.wide { max-width: 100%; }
-table { border-collapse: collapse; margin-bottom: 1.5em; }
-td, th { padding: 0.2em 1em 0.2em 0; text-align: left; border-bottom: 1px solid #ddd; }
-</style>
-</head>
-<body>
-<h1>Pose</h1>
-)";
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
-
 std::string vector_text(const glm::dvec3& v) { return format("%.6g, %.6g, %.6g", v.x, v.y, v.z); }
-
-void write_row(std::ostream& out, const char* name, const std::string& value) {
-  out << "<tr><th>" << name << "</th><td>" << value << "</td></tr>\n";
-}
-
-void write_picture(std::ostream& out, const char* file, const char* caption) {
-  out << "<figure><img src=\"" << file << "\" alt=\"" << caption << "\"><figcaption>" << caption
-      << "</figcaption></figure>\n";
-}
 
 void write_numbers(std::ostream& out, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
   out << "<table>\n";
@@ -87,16 +52,17 @@ void write_pose_page(const std::filesystem::path& file, const PoseResult& result
                      const std::optional<glm::dmat3>& truth) {
   TemporaryFile temporary(file);
   std::ofstream out(temporary.path());
-  out << k_head;
+  write_page_head(out, "Pose");
   write_numbers(out, result, truth);
   write_picture(out, "target.png", "target");
   write_picture(out, "start.png", "start");
   write_picture(out, "end.png", "end");
   write_picture(out, "difference.png", "difference of end and target");
   write_equals(out, result);
-  out << "<h2>On the way</h2>\n<p><img class=\"wide\" src=\"iterations.png\" alt=\"iterations\"></p>\n";
-  if (has_plot) out << "<p><img class=\"wide\" src=\"plot.png\" alt=\"loss, angle and smoothing\"></p>\n";
-  out << "</body>\n</html>\n";
+  out << "<h2>On the way</h2>\n";
+  write_wide_picture(out, "iterations.png", "iterations");
+  if (has_plot) write_wide_picture(out, "plot.png", "loss, angle and smoothing");
+  write_page_end(out);
   out.close();
   if (!out) throw IoError(file, "cannot be written");
   temporary.commit();

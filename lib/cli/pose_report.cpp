@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 
+#include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"
@@ -51,12 +52,6 @@ class PoseCamera {
   Camera camera_;
   View view_;
 };
-
-/// On the background's colour: the silhouette in the alpha channel would make the picture transparent.
-Image opaque(Image image) {
-  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
-  return image;
-}
 
 Image difference(const Image& a, const Image& b) {
   Image result = a;

@@ -60,13 +60,15 @@ LossWeights LossWeights::only(LossKind kind) {
   return weights;
 }
 
-ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<const Image> targets)
+ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<const Image> targets,
+                      std::span<const unsigned char> has_alpha)
     : device(device_),
       weights(weights_),
       width(targets[0].width),
       height(targets[0].height),
       views(targets.size()),
       per_view(targets.size()),
+      silhouettes(targets.size(), weights_.silhouette),
       forward(device.impl(), "loss.cl", "loss_forward"),
       backward(device.impl(), "loss.cl", "loss_backward"),
       reduce(device.impl()) {
@@ -79,13 +81,22 @@ ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<con
   }
   target.upload(device.impl(), values);
   view_starts.upload(device.impl(), starts);
+  for (std::size_t view = 0; view < has_alpha.size(); ++view) {
+    if (has_alpha[view] == 0) silhouettes[view] = 0;
+  }
+  view_silhouettes.upload(device.impl(), silhouettes);
   channels.resize(device.impl(), DPR_LOSS_SUMS * pixels * views);
   grad_image.resize(device.impl(), pixels * views);
 }
 
-ImageLoss::ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets) {
+ImageLoss::ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets,
+                     std::span<const unsigned char> has_alpha) {
   check_loss(weights, targets);
-  impl_ = std::make_unique<Impl>(device, weights, targets);
+  if (!has_alpha.empty() && has_alpha.size() != targets.size()) {
+    throw InvalidArgument("has_alpha (loss)", std::to_string(has_alpha.size()) + " values",
+                          "one for each of the " + std::to_string(targets.size()) + " targets, or none");
+  }
+  impl_ = std::make_unique<Impl>(device, weights, targets, has_alpha);
 }
 
 ImageLoss::~ImageLoss() = default;
@@ -109,12 +120,11 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   shared::LossParams p{};
   p.mse = m.weights.mse;
   p.l1 = m.weights.l1;
-  p.silhouette = m.weights.silhouette;
   p.views = static_cast<cl_uint>(m.views);
   p.pixels_per_view = static_cast<cl_uint>(pixels_per_view);
   m.forward(pixels, p, r.aggregate.image, m.target, m.channels);
   m.reduce({pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
-  m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.grad_image);
+  m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.view_silhouettes, m.grad_image);
   m.frame_number = r.frame_number;
 
   const std::vector<float> sums = m.sums.download();
@@ -123,8 +133,8 @@ double ImageLoss::evaluate(const Renderer& renderer) {
     const auto sum = [&](std::size_t channel) { return static_cast<double>(sums[channel * m.views + view]); };
     const double count = 3.0 * static_cast<double>(pixels_per_view);
     const double iou = sum(3) > 0 ? sum(2) / sum(3) : 1.0;  // two empty images agree
-    m.per_view[view] =
-        m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count + m.weights.silhouette * (1 - iou);
+    m.per_view[view] = m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count +
+                       static_cast<double>(m.silhouettes[view]) * (1 - iou);
     total += m.per_view[view] / static_cast<double>(m.views);
   }
   return total;

@@ -2,7 +2,6 @@
 // what the scan counted, and polygons become triangle fans. Writing needs no library.
 #include <OpenMesh/Core/IO/IOManager.hh>
 #include <OpenMesh/Core/IO/reader/OFFReader.hh>
-#include <OpenMesh/Core/System/omstream.hh>
 #include <algorithm>
 #include <fstream>
 #include <locale>
@@ -13,6 +12,7 @@
 #include "scene/checks.hpp"
 #include "scene/mesh_scan.hpp"
 #include "scene/scan_text.hpp"
+#include "scene/silent_openmesh.hpp"
 #include "scene/soup_importer.hpp"
 #include "scene/temporary_file.hpp"
 
@@ -44,24 +44,6 @@ MeshScan scan_file(const std::filesystem::path& file, const std::string& extensi
   if (extension == ".stl") return scan_stl(file, read_text(file));
   throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj, .ply, .off or .stl");
 }
-
-// OpenMesh writes to std::cerr and std::clog what it finds strange; the scan has said it better.
-class SilentOpenMesh {
- public:
-  SilentOpenMesh() {
-    omerr().disable();
-    omlog().disable();
-  }
-  ~SilentOpenMesh() {
-    if (errors_were_on_) omerr().enable();
-    if (log_was_on_) omlog().enable();
-  }
-  SilentOpenMesh(const SilentOpenMesh&) = delete;
-  SilentOpenMesh& operator=(const SilentOpenMesh&) = delete;
-
- private:
-  bool errors_were_on_ = omerr().is_enabled(), log_was_on_ = omlog().is_enabled();
-};
 
 // OpenMesh's readers make streams of their own, which take the program's locale: with one that writes 0,5
 // they would read 0.5 as 0 or 5. A program in the classic locale, as most are, is left alone.
@@ -126,7 +108,7 @@ SoupImporter read_soup(const std::filesystem::path& file, const std::string& ext
                        const MeshScan& scan) {
   static std::mutex openmesh;
   const std::lock_guard lock(openmesh);
-  const SilentOpenMesh silence;
+  const SilentOpenMesh silence;  // the scan has said it better
   const ClassicLocale locale;
   SoupImporter soup;
   OpenMesh::IO::Options options = options_for(scan);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "solve/require.hpp"
 
@@ -25,30 +26,32 @@ Optimizer::Optimizer(const OptimizerOptions& options) : options_(options) {
 }
 
 std::span<const double> Optimizer::step(std::span<const double> gradient) {
-  if (iteration_ == 0) {
-    for (auto* state : {&first_moment_, &second_moment_, &step_}) state->assign(gradient.size(), 0.0);
+  auto& [first, second, iteration] = state_;
+  if (iteration == 0) {
+    for (auto* moment : {&first, &second}) moment->assign(gradient.size(), 0.0);
   }
+  step_.resize(first.size());
   require(gradient.size() == step_.size(), "length of the gradient (optimizer)", gradient.size(),
           "the same length in every step");
   const auto wrong = std::ranges::find_if(gradient, [](double g) { return !std::isfinite(g); });
   require(wrong == gradient.end(), "gradient (optimizer)", wrong == gradient.end() ? 0.0 : *wrong,
           "finite numbers");
 
-  ++iteration_;
-  // Kingma & Ba 2015, Algorithm 1; the corrections undo the bias of moments that start at zero.
-  const double correction1 = 1 - std::pow(options_.beta1, iteration_);
-  const double correction2 = 1 - std::pow(options_.beta2, iteration_);
+  ++iteration;
+  const bool is_sgd = options_.kind == OptimizerKind::sgd;
   for (std::size_t i = 0; i < gradient.size(); ++i) {
     const double g = gradient[i];
-    if (options_.kind == OptimizerKind::sgd) {
-      first_moment_[i] = options_.beta1 * first_moment_[i] + g;
-      step_[i] = -options_.learning_rate * first_moment_[i];
-    } else {
-      first_moment_[i] = options_.beta1 * first_moment_[i] + (1 - options_.beta1) * g;
-      second_moment_[i] = options_.beta2 * second_moment_[i] + (1 - options_.beta2) * g * g;
-      const double scale = std::sqrt(second_moment_[i] / correction2) + options_.epsilon;
-      step_[i] = -options_.learning_rate * (first_moment_[i] / correction1) / scale;
-    }
+    first[i] = options_.beta1 * first[i] + (is_sgd ? g : (1 - options_.beta1) * g);
+    second[i] = options_.beta2 * second[i] + (1 - options_.beta2) * g * g;
+  }
+  // Kingma & Ba 2015, Algorithm 1; the corrections undo the bias of moments that start at zero.
+  const double correction1 = 1 - std::pow(options_.beta1, iteration);
+  const double correction2 = 1 - std::pow(options_.beta2, iteration);
+  const double largest = second.empty() ? 0.0 : *std::ranges::max_element(second);
+  for (std::size_t i = 0; i < gradient.size(); ++i) {
+    const double moment = options_.kind == OptimizerKind::uniform_adam ? largest : second[i];
+    const double scale = std::sqrt(moment / correction2) + options_.epsilon;
+    step_[i] = -options_.learning_rate * (is_sgd ? first[i] : first[i] / correction1 / scale);
   }
   return step_;
 }
@@ -58,6 +61,12 @@ void Optimizer::set_learning_rate(double learning_rate) {
   options_.learning_rate = learning_rate;
 }
 
-void Optimizer::restart() { iteration_ = 0; }
+void Optimizer::restart() { state_ = {}; }
+
+void Optimizer::set_state(OptimizerState state) {
+  require(state.first_moment.size() == state.second_moment.size(), "length of the moments (optimizer)",
+          state.second_moment.size(), "that of the first moment");
+  state_ = std::move(state);
+}
 
 }  // namespace dpr

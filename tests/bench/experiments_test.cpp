@@ -118,4 +118,17 @@ TEST_SUITE("bench-smoke") {
       CHECK(data["rows"][i]["views_per_second"].get<double>() > 0);
     }
   }
+
+  TEST_CASE("shapes: every method comes nearer to the truth than the sphere it begins with") {
+    const TempDir folder;
+    const Json data = run(folder, "shapes");
+    if (data.is_null()) return;
+    CHECK(data["rows"].size() >= 4);
+    for (const Json& row : data["rows"]) {
+      CAPTURE(row["method"].get<std::string>());
+      CHECK(row["iou"].get<double>() > row["start_iou"].get<double>());
+      CHECK(row["held_out_psnr"].get<double>() > row["start_held_out_psnr"].get<double>());
+    }
+    CHECK(data["rows"][0]["iou"].get<double>() > 0.85);
+  }
 }

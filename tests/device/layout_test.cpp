@@ -104,9 +104,17 @@ std::vector<Entry> entries() {
           DPR_SIZE(LossParams),
           DPR_FIELD(LossParams, mse),
           DPR_FIELD(LossParams, l1),
-          DPR_FIELD(LossParams, silhouette),
           DPR_FIELD(LossParams, views),
-          DPR_FIELD(LossParams, pixels_per_view)};
+          DPR_FIELD(LossParams, pixels_per_view),
+          DPR_SIZE(MeshLossParams),
+          DPR_FIELD(MeshLossParams, laplacian),
+          DPR_FIELD(MeshLossParams, edge_length),
+          DPR_FIELD(MeshLossParams, normal_consistency),
+          DPR_FIELD(MeshLossParams, flatness),
+          DPR_FIELD(MeshLossParams, edge_target),
+          DPR_FIELD(MeshLossParams, first_vertex),
+          DPR_FIELD(MeshLossParams, vertices),
+          DPR_FIELD(MeshLossParams, hinges)};
 }
 
 /// What the device says of every entry.

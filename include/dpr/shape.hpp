@@ -1,0 +1,115 @@
+// An object's shape and colours from several images.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <glm/glm.hpp>
+#include <optional>
+#include <vector>
+
+#include "dpr/camera.hpp"
+#include "dpr/device.hpp"
+#include "dpr/image.hpp"
+#include "dpr/loss.hpp"
+#include "dpr/mesh.hpp"
+#include "dpr/mesh_loss.hpp"
+#include "dpr/smoothing.hpp"
+
+namespace dpr {
+
+/// An image of the object and the camera that took it.
+struct ShapeView {
+  Image image;
+  Camera camera;
+  bool has_alpha = true;  ///< false: the image has no silhouette and is compared in colour alone
+};
+
+/// What a shape is found from.
+struct ShapeViews {
+  int width = 0, height = 0;  ///< of every image
+  glm::vec3 background{0.0F};
+  std::vector<ShapeView> views;
+  std::optional<Mesh> initial;         ///< none: an icosphere in the cameras' common view
+  std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
+};
+
+/// Reads the views format of the README; images and the initial mesh are relative to the file. Throws IoError
+/// where a file cannot be read, InvalidArgument for an unknown key, no views, or an image of another size.
+ShapeViews read_views(const std::filesystem::path& file);
+
+/// How the mesh moves. large_steps: in the variables u = (I + lambda L) v, L the Laplacian of the mesh's
+/// edges, by Adam with one step size for all (Nicolet, Jacobson & Jakob 2021). direct: Adam on the positions.
+enum class ShapeSteps { large_steps, direct };
+
+struct ShapeOptions {
+  unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
+  unsigned iterations = 400;  ///< > 0: of a level
+  unsigned batch = 8;         ///< > 0: views that an iteration renders, in turn
+  float edge_pixels = 2.0F;   ///< > 0: length of edges to which a level begins to remesh, in its pixels
+  /// Iterations between two remeshings, in the first half of a level; 0: the mesh keeps its faces.
+  unsigned remesh_interval = 50;
+  float blur = 0.5F;      ///< > 0: of the edges, in pixels of the level, at its beginning
+  float blur_end = 0.1F;  ///< > 0: at its end
+  ShapeSteps steps = ShapeSteps::large_steps;
+  float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
+  double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the initial shape
+  double learning_rate_end =
+      0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
+  double color_learning_rate = 0.05;  ///< > 0
+  LossWeights loss{.l1 = 4, .silhouette = 1};
+  MeshLossWeights regularizers;       ///< for an object of radius 1; edge_target is ignored
+  unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
+};
+
+/// The smoothing at the finest level's end: that of the views, or else the exact joint composition with edges
+/// blurred by `blur_end`, and depths by the same length in the world. A level with half the pixels has twice
+/// the blur. Throws InvalidArgument where cameras see no common point.
+Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options);
+
+/// One iteration: what it evaluated, and how.
+struct ShapeIteration {
+  unsigned iteration = 0;  ///< counted through all levels
+  unsigned level = 0;
+  double loss = 0;  ///< images and regularisers; comparable between iterations of one level
+  double image_loss = 0, mesh_loss = 0;
+  Smoothing smoothing;
+  int width = 0, height = 0;  ///< of the images compared
+  std::size_t vertices = 0, faces = 0;
+};
+
+struct ShapeResult {
+  Mesh start, mesh;                     ///< with vertex colours
+  bool finished = false;                ///< false: the callback stopped it
+  double seconds = 0;                   ///< of this run
+  std::vector<ShapeIteration> history;  ///< also of the runs that it goes on from
+};
+
+/// Finds a mesh with vertex colours that explains several images.
+class ShapeSolver {
+ public:
+  /// Called after every iteration with the mesh as it is then; false stops the solver.
+  using Callback = std::function<bool(const ShapeIteration&, const Mesh&)>;
+
+  /// Throws InvalidArgument if there are no views, sizes differ, cameras see no common point, or an option is
+  /// out of its range.
+  ShapeSolver(Device device, ShapeViews views, ShapeOptions options = {});
+
+  /// The mesh that solve() begins with: the initial one with vertex colours, or the icosphere.
+  const Mesh& start() const { return start_; }
+  /// How often the callback is called at most.
+  unsigned most_iterations() const;
+
+  /// From the start, or from the checkpoint if there is one in the file; leaves checkpoints there, the last
+  /// when it ends. An interrupted run gives the same bits as one that was not, on one device. An empty path:
+  /// no checkpoints. Throws IoError where the file cannot be read or written, InvalidArgument where it
+  /// belongs to other views or options.
+  ShapeResult solve(const Callback& callback = {}, const std::filesystem::path& checkpoint = {}) const;
+
+ private:
+  Device device_;
+  ShapeViews views_;
+  ShapeOptions options_;
+  Mesh start_;
+};
+
+}  // namespace dpr

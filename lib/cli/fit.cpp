@@ -1,0 +1,156 @@
+// dpr fit: a mesh with vertex colours from several images with known cameras.
+#include <cstdio>
+#include <memory>
+
+#include "cli/commands.hpp"
+#include "cli/fit_report.hpp"
+#include "cli/pose_report.hpp"
+#include "cli/text.hpp"
+#include "dpr/error.hpp"
+#include "scene/temporary_file.hpp"
+#include "solve/resample.hpp"
+
+namespace dpr::cli {
+namespace {
+
+const char* const k_solver_group = "Solver";
+const char* const k_loss_group = "Loss (weights)";
+
+struct FitCommandOptions {
+  std::string views, output, report, checkpoint, steps = "large";
+  ShapeOptions solver;
+};
+
+ShapeSteps parse_steps(const std::string& word) {
+  if (word == "large") return ShapeSteps::large_steps;
+  if (word == "direct") return ShapeSteps::direct;
+  throw InvalidArgument("--steps (command line)", "\"" + word + "\"", "large or direct");
+}
+
+void resize(ShapeViews& views, glm::ivec2 size) {
+  for (ShapeView& view : views.views) {
+    view.camera = resample(view.camera, views.width, views.height, size.x, size.y);
+    view.image = resample(view.image, size.x, size.y);
+  }
+  views.width = size.x;
+  views.height = size.y;
+}
+
+/// Puts --size, --seed and the smoothing flags into the views.
+void apply(const CLI::App& command, const CommonOptions& common, const ShapeOptions& options,
+           ShapeViews& views) {
+  if (common.size) resize(views, parse_size(*common.size));
+  if (!common.seed && !gives_any(command, k_smoothing_group)) return;
+  CommonOptions smoothing = common;
+  smoothing.size.reset();
+  Scene scene;
+  scene.width = views.width;
+  scene.height = views.height;
+  scene.smoothing = finest_smoothing(views, options);
+  cli::apply(smoothing, scene);
+  views.smoothing = scene.smoothing;
+}
+
+/// What can be wrong about the output is found out before the work, not after it.
+void check_outputs(const FitCommandOptions& options) {
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  if (extension != ".obj" && extension != ".ply") {
+    throw InvalidArgument("--output (command line)", "\"" + options.output + "\"", "a file .obj or .ply");
+  }
+  { const TemporaryFile writable(options.output); }
+  if (!options.checkpoint.empty()) {
+    const TemporaryFile writable(options.checkpoint);
+  }
+  if (!options.report.empty()) make_folder(options.report);
+}
+
+void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
+  check_outputs(options);
+  options.solver.steps = parse_steps(options.steps);
+  ShapeViews views = read_views(options.views);
+  apply(command, common, options.solver, views);
+  const Device device = open_device(common);
+  const ShapeSolver solver(device, views, options.solver);
+  FitObserver observer(solver.most_iterations(), common.quiet, !options.report.empty());
+  const ShapeResult result = solver.solve(observer.callback(), options.checkpoint);
+  write_mesh(options.output, result.mesh);
+  if (!options.report.empty())
+    write_fit_report(options.report, device, views, result, observer.kept(), common.quiet);
+  if (!common.quiet) {
+    std::printf("%s: %zu vertices, %zu triangles, loss %.4g after %zu iterations, %.1f s\n",
+                options.output.c_str(), result.mesh.positions.size(), result.mesh.faces.size(),
+                result.history.back().loss, result.history.size(), result.seconds);
+  }
+}
+
+void add_solver_options(CLI::App& command, FitCommandOptions& options) {
+  ShapeOptions& solver = options.solver;
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    command.add_option(name, value, description)
+        ->group(k_solver_group)
+        ->type_name(type)
+        ->capture_default_str();
+  };
+  add("--levels", solver.levels, "Levels of resolution, each with half the pixels of the next on a side",
+      "N");
+  add("--iterations", solver.iterations, "How many steps a level", "N");
+  add("--batch", solver.batch, "Views that a step looks at, in turn", "N");
+  add("--edge", solver.edge_pixels, "Length of the mesh's edges, in pixels of the level", "FLOAT");
+  add("--remesh-interval", solver.remesh_interval,
+      "Steps between two remeshings, in the first half of a level; 0: the faces stay", "N");
+  add("--blur", solver.blur, "Of the edges, in pixels of the level, at its beginning", "FLOAT");
+  add("--blur-end", solver.blur_end, "The same at its end", "FLOAT");
+  add("--steps", options.steps, "How vertices move: with their neighbours, or each on its own",
+      "large|direct");
+  add("--lambda", solver.lambda, "How far large steps take neighbours along", "FLOAT");
+  add("--learning-rate", solver.learning_rate, "Size of the steps of vertices, in radii of the first sphere",
+      "FLOAT");
+  add("--learning-rate-end", solver.learning_rate_end,
+      "Of all steps, at a level's end, of those at its beginning", "FLOAT");
+  add("--color-learning-rate", solver.color_learning_rate, "Size of the steps of colours", "FLOAT");
+  add("--checkpoint-interval", solver.checkpoint_interval, "Steps between two checkpoints", "N");
+}
+
+void add_loss_options(CLI::App& command, ShapeOptions& solver) {
+  const auto add = [&](const char* name, auto& value, const char* description) {
+    command.add_option(name, value, description)
+        ->group(k_loss_group)
+        ->type_name("FLOAT")
+        ->capture_default_str();
+  };
+  add("--silhouette", solver.loss.silhouette, "1 - IoU of the silhouettes");
+  add("--l1", solver.loss.l1, "Mean absolute difference of colours");
+  add("--mse", solver.loss.mse, "Mean squared difference of colours");
+  add("--laplacian", solver.regularizers.laplacian,
+      "Sum of squared distances of vertices from their neighbours' mean");
+  add("--edge-length", solver.regularizers.edge_length, "Mean squared length of edges");
+  add("--normal-consistency", solver.regularizers.normal_consistency,
+      "Mean of 1 - cos between neighbours' normals");
+  add("--flatness", solver.regularizers.flatness, "Mean of its square");
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command =
+      application.add_subcommand("fit", "Finds a mesh with colours from several images with known cameras");
+  const auto options = std::make_shared<FitCommandOptions>();
+  command->add_option("--views", options->views, "Images and their cameras")->required()->type_name("V.json");
+  command->add_option("-o,--output", options->output, "Mesh to write, OBJ or PLY")
+      ->required()
+      ->type_name("MESH.obj");
+  command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")
+      ->type_name("DIR");
+  command
+      ->add_option("--checkpoint", options->checkpoint,
+                   "Where to go on from if it is there, and to leave checkpoints")
+      ->type_name("FILE");
+  add_solver_options(*command, *options);
+  add_loss_options(*command, options->solver);
+  add_common_options(*command, common);
+  command->footer(
+      "Example: dpr fit --views views.json -o mesh.obj --report report --checkpoint fit.checkpoint");
+  command->callback([command, options, &common] { run(*command, *options, common); });
+}
+
+}  // namespace dpr::cli

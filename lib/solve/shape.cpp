@@ -1,0 +1,347 @@
+// The shape solver: levels of resolution, each with smoothing that shrinks and a mesh that is made anew.
+#include "dpr/shape.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "dpr/renderer.hpp"
+#include "scene/remesh.hpp"
+#include "solve/large_steps.hpp"
+#include "solve/require.hpp"
+#include "solve/resample.hpp"
+#include "solve/shape_space.hpp"
+#include "solve/shape_state.hpp"
+
+namespace dpr {
+namespace {
+
+std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
+
+std::vector<double> flat(const std::vector<glm::vec3>& list) {
+  std::vector<double> values;
+  values.reserve(3 * list.size());
+  for (const glm::vec3& v : list) {
+    for (int i = 0; i < 3; ++i) values.push_back(v[i]);
+  }
+  return values;
+}
+
+void add(std::vector<double>& values, std::span<const double> steps) {
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] += steps[i];
+}
+
+/// Pixels of a level, of one of the finest.
+double pixel_scale(const ShapeOptions& options, unsigned level) {
+  return std::ldexp(1.0, static_cast<int>(options.levels - 1 - level));
+}
+
+/// The smoothing with a blur that many times as wide, in the image as in depth.
+Smoothing widened(Smoothing smoothing, double factor) {
+  const double power = smoothing.distance == DistanceMetric::squared ? 2 : 1;
+  const auto scale = static_cast<float>(std::pow(factor, power));
+  smoothing.sigma *= scale;
+  if (smoothing.blur_radius && smoothing.occupancy_width == OccupancyWidth::fixed)
+    *smoothing.blur_radius *= scale;
+  smoothing.gamma *= static_cast<float>(factor);
+  return smoothing;
+}
+
+/// The views of a level, dealt into batches: batch b has the views b, b + batches, ...
+class Batches {
+ public:
+  Batches(const Device& device, const ShapeViews& views, const ShapeOptions& options, unsigned level)
+      : width(side(views.width, options, level)), height(side(views.height, options, level)) {
+    const std::size_t count = (views.views.size() + options.batch - 1) / options.batch;
+    for (std::size_t first = 0; first < count; ++first) {
+      std::vector<Image> images;
+      std::vector<unsigned char> has_alpha;
+      std::vector<View>& cameras = cameras_.emplace_back();
+      for (std::size_t i = first; i < views.views.size(); i += count) {
+        const ShapeView& view = views.views[i];
+        images.push_back(resample(view.image, width, height));
+        has_alpha.push_back(view.has_alpha ? 1 : 0);
+        cameras.push_back(
+            {resample(view.camera, views.width, views.height, width, height), {glm::mat4(1.0F)}});
+      }
+      losses_.emplace_back(device, options.loss, images, has_alpha);
+    }
+  }
+
+  std::span<const View> cameras(unsigned iteration) const { return cameras_[iteration % cameras_.size()]; }
+  ImageLoss& loss(unsigned iteration) { return losses_[iteration % losses_.size()]; }
+
+  const int width, height;
+
+ private:
+  static int side(int pixels, const ShapeOptions& options, unsigned level) {
+    return std::max(static_cast<int>(std::lround(pixels / pixel_scale(options, level))), 1);
+  }
+
+  std::vector<std::vector<View>> cameras_;
+  std::vector<ImageLoss> losses_;
+};
+
+/// What a mesh needs as long as its faces stay.
+struct Topology {
+  Topology(const Device& device, const Mesh& mesh, const MeshLossWeights& weights, double lambda)
+      : mesh_loss(device, weights, mesh), steps(mesh, lambda) {}
+
+  MeshLoss mesh_loss;
+  LargeSteps steps;
+};
+
+OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) {
+  const bool large = options.steps == ShapeSteps::large_steps;
+  return {.kind = large ? OptimizerKind::uniform_adam : OptimizerKind::adam,
+          .learning_rate = options.learning_rate * radius};
+}
+
+/// One run of the solver.
+class Run {
+ public:
+  Run(const Device& device, const ShapeViews& views, const ShapeOptions& options, ShapeState state)
+      : device_(device),
+        views_(views),
+        options_(options),
+        common_(common_view(views)),
+        finest_(finest_smoothing(views, options)),
+        renderer_(device),
+        position_optimizer_(position_optimizer(options, common_.radius)),
+        color_optimizer_({.learning_rate = options.color_learning_rate}),
+        state_(std::move(state)) {
+    position_optimizer_.set_state(state_.position_steps);
+    color_optimizer_.set_state(state_.color_steps);
+  }
+
+  /// One iteration; what it evaluated is the history's last.
+  void iterate() {
+    const unsigned level = state_.iteration / options_.iterations;
+    const unsigned in_level = state_.iteration % options_.iterations;
+    const bool is_new_level = !batches_ || in_level == 0;
+    if (is_new_level) batches_.emplace(device_, views_, options_, level);
+    const bool remeshes = options_.remesh_interval > 0 && in_level % options_.remesh_interval == 0 &&
+                          2 * in_level < options_.iterations;
+    if (remeshes) make_mesh_anew(level);
+    if (is_new_level || remeshes) prepare();
+    const double rate = std::pow(options_.learning_rate_end, progress(in_level));
+    position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
+    color_optimizer_.set_learning_rate(rate * options_.color_learning_rate);
+    descend(evaluate(level, in_level));
+    ++state_.iteration;
+  }
+
+  /// With the optimizers' memories.
+  const ShapeState& state() {
+    state_.position_steps = position_optimizer_.state();
+    state_.color_steps = color_optimizer_.state();
+    return state_;
+  }
+
+ private:
+  void make_mesh_anew(unsigned level) {
+    const double edge =
+        static_cast<double>(options_.edge_pixels) * common_.pixel * pixel_scale(options_, level);
+    const std::optional<Mesh> mesh = remesh(state_.mesh(), static_cast<float>(edge));
+    if (!mesh || mesh->faces.empty()) return;  // soup keeps its faces
+    state_.faces = mesh->faces;
+    state_.positions = flat(mesh->positions);
+    state_.colors = flat(mesh->vertex_colors);
+    position_optimizer_.restart();
+    color_optimizer_.restart();
+  }
+
+  MeshLossWeights scaled_regularizers() const {
+    MeshLossWeights weights = options_.regularizers;
+    const auto radius = static_cast<float>(common_.radius);
+    weights.laplacian /= radius * radius;
+    weights.edge_length /= radius * radius;
+    weights.edge_target *= radius;
+    return weights;
+  }
+
+  /// Puts the current mesh on the device.
+  void prepare() {
+    const Mesh mesh = state_.mesh();
+    topology_.emplace(device_, mesh, scaled_regularizers(), options_.lambda);
+    Scene scene;
+    scene.width = batches_->width;
+    scene.height = batches_->height;
+    scene.background = views_.background;
+    scene.camera = batches_->cameras(0).front().camera;
+    scene.meshes.push_back({mesh});
+    scene.smoothing = finest_;
+    scene.gradients = {true, true, false, false, false, false, false};
+    renderer_.set_scene(scene);
+  }
+
+  /// Through a level, from 0 to 1.
+  double progress(unsigned in_level) const {
+    return static_cast<double>(in_level) / std::max(options_.iterations - 1, 1U);
+  }
+
+  Smoothing smoothing_at(unsigned level, unsigned in_level) const {
+    const double begin = static_cast<double>(options_.blur) / static_cast<double>(options_.blur_end);
+    Smoothing smoothing =
+        widened(finest_, pixel_scale(options_, level) * std::pow(begin, 1 - progress(in_level)));
+    smoothing.seed += state_.iteration;  // fresh noise: its errors average out along the descent
+    return smoothing;
+  }
+
+  SceneGradient evaluate(unsigned level, unsigned in_level) {
+    const Mesh mesh = state_.mesh();
+    ImageLoss& loss = batches_->loss(in_level);
+    ShapeIteration step;
+    step.iteration = state_.iteration;
+    step.level = level;
+    step.smoothing = smoothing_at(level, in_level);
+    renderer_.set_positions(0, mesh.positions);
+    renderer_.set_colors(0, mesh.vertex_colors);
+    renderer_.set_smoothing(step.smoothing);
+    renderer_.set_views(batches_->cameras(in_level));
+    renderer_.forward();
+    step.image_loss = loss.evaluate(renderer_);
+    step.mesh_loss = topology_->mesh_loss.evaluate(renderer_);
+    step.loss = step.image_loss + step.mesh_loss;
+    const std::string where = "loss (shape, iteration " + std::to_string(step.iteration) + ")";
+    require(std::isfinite(step.loss), where.c_str(), step.loss, "a finite number");
+    step.width = batches_->width;
+    step.height = batches_->height;
+    step.vertices = mesh.positions.size();
+    step.faces = mesh.faces.size();
+    state_.history.push_back(step);
+    return renderer_.backward(loss, topology_->mesh_loss);
+  }
+
+  void descend(const SceneGradient& gradient) {
+    const MeshGradient& grad = gradient.meshes.front();
+    const std::vector<double> grad_positions = flat(grad.positions);
+    if (options_.steps == ShapeSteps::large_steps) {
+      // v = (I + lambda L)^-1 u: the gradient for u, and what a step of u does to v.
+      const auto step = position_optimizer_.step(topology_->steps.solve(grad_positions));
+      add(state_.positions, topology_->steps.solve(step));
+    } else {
+      add(state_.positions, position_optimizer_.step(grad_positions));
+    }
+    add(state_.colors, color_optimizer_.step(flat(grad.colors)));
+  }
+
+  const Device& device_;
+  const ShapeViews& views_;
+  const ShapeOptions& options_;
+  CommonView common_;
+  Smoothing finest_;
+  Renderer renderer_;
+  Optimizer position_optimizer_, color_optimizer_;
+  std::optional<Batches> batches_;
+  std::optional<Topology> topology_;
+  ShapeState state_;
+};
+
+void check(const ShapeViews& views) {
+  if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
+  for (std::size_t i = 0; i < views.views.size(); ++i) {
+    const auto& [image, camera, has_alpha] = views.views[i];
+    const std::string name = checks::element("views", i);
+    if (image.width != views.width || image.height != views.height) {
+      throw InvalidArgument(checks::in("size of " + name, "shape"), size_text(image.width, image.height),
+                            size_text(views.width, views.height));
+    }
+    checks::require_pixels(image, checks::in(name, "shape"));
+    validate(camera);
+  }
+  checks::require_finite(views.background, "background (shape)");
+  if (views.initial) validate(*views.initial, "initial (shape)");
+  if (views.smoothing) validate(*views.smoothing);
+}
+
+void check(const ShapeOptions& o, const ShapeViews& views) {
+  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+  const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
+  require(o.levels > 0 && o.levels <= most, "levels (shape)", o.levels,
+          "at least 1, and a pixel a side at the coarsest");
+  require(o.iterations > 0, "iterations (shape)", o.iterations, "at least 1");
+  require(o.batch > 0, "batch (shape)", o.batch, "at least 1");
+  require(o.checkpoint_interval > 0, "checkpoint_interval (shape)", o.checkpoint_interval, "at least 1");
+  require(positive(o.edge_pixels), "edge_pixels (shape)", o.edge_pixels, "a finite number above 0");
+  require(positive(o.blur), "blur (shape)", o.blur, "a finite number above 0");
+  require(positive(o.blur_end), "blur_end (shape)", o.blur_end, "a finite number above 0");
+  require(o.lambda >= 0 && std::isfinite(o.lambda), "lambda (shape)", o.lambda,
+          "a finite number, at least 0");
+  require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");
+  require(positive(o.learning_rate_end), "learning_rate_end (shape)", o.learning_rate_end,
+          "a finite number above 0");
+  require(positive(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
+          "a finite number above 0");
+}
+
+/// The mesh to begin with; colours that are not known are grey.
+Mesh make_start(const ShapeViews& views) {
+  constexpr unsigned k_subdivisions = 3;
+  const CommonView common = common_view(views);
+  if (views.initial) {
+    Mesh mesh = *views.initial;
+    if (mesh.vertex_colors.empty()) mesh.vertex_colors.assign(mesh.positions.size(), glm::vec3(0.5F));
+    mesh.face_colors.clear();
+    mesh.texcoords.clear();
+    mesh.face_texcoords.clear();
+    return mesh;
+  }
+  Mesh sphere = make_icosphere(k_subdivisions, static_cast<float>(common.radius));
+  for (glm::vec3& p : sphere.positions) p += glm::vec3(common.centre);
+  sphere.vertex_colors.assign(sphere.positions.size(), glm::vec3(0.5F));
+  return sphere;
+}
+
+}  // namespace
+
+Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options) {
+  if (views.smoothing) return *views.smoothing;
+  const CommonView common = common_view(views);
+  const double blur = static_cast<double>(options.blur_end);
+  const double ndc = blur * 2.0 / std::min(views.width, views.height);
+  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  smoothing.sigma = static_cast<float>(ndc * ndc);
+  smoothing.gamma = static_cast<float>(blur * common.pixel / common.depth_range);
+  return smoothing;
+}
+
+ShapeSolver::ShapeSolver(Device device, ShapeViews views, ShapeOptions options)
+    : device_(std::move(device)), views_(std::move(views)), options_(options) {
+  check(views_);
+  check(options_, views_);
+  start_ = make_start(views_);
+  // Each throws what is wrong with its options.
+  [[maybe_unused]] const MeshLoss mesh_loss(device_, options_.regularizers, start_);
+  [[maybe_unused]] const Batches batches(device_, views_, options_, 0);
+}
+
+unsigned ShapeSolver::most_iterations() const { return options_.levels * options_.iterations; }
+
+ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::path& checkpoint) const {
+  const auto start = std::chrono::steady_clock::now();
+  ShapeState state;
+  state.faces = start_.faces;
+  state.positions = flat(start_.positions);
+  state.colors = flat(start_.vertex_colors);
+  const std::uint64_t mark = checkpoint.empty() ? 0 : fingerprint(views_, start_, options_);
+  if (!checkpoint.empty() && std::filesystem::exists(checkpoint)) state = read_checkpoint(checkpoint, mark);
+
+  Run run(device_, views_, options_, std::move(state));
+  bool goes_on = true;
+  while (goes_on && run.state().iteration < most_iterations()) {
+    run.iterate();
+    const ShapeState& now = run.state();
+    goes_on = !callback || callback(now.history.back(), now.mesh());
+    const bool is_due = now.iteration % options_.checkpoint_interval == 0 || !goes_on;
+    if (!checkpoint.empty() && (is_due || now.iteration == most_iterations()))
+      write_checkpoint(checkpoint, now, mark);
+  }
+  const ShapeState& end = run.state();
+  return {start_, end.mesh(), end.iteration == most_iterations(),
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), end.history};
+}
+
+}  // namespace dpr

@@ -1,0 +1,56 @@
+#include "solve/shape_space.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "scene/checks.hpp"
+
+namespace dpr {
+namespace {
+
+/// The point with the least sum of squared distances to the cameras' axes. Axes that are parallel, or one
+/// alone, leave it open; then it is the nearest to the origin.
+glm::dvec3 meeting_point(const ShapeViews& views) {
+  constexpr double k_towards_origin = 1e-9;
+  glm::dmat3 sum(k_towards_origin);
+  glm::dvec3 right(0.0);
+  for (const ShapeView& view : views.views) {
+    const Projection p = projection(view.camera, views.width, views.height);
+    const glm::dmat4 to_world = glm::inverse(glm::dmat4(view.camera.view));
+    const glm::dvec3 eye(to_world[3]);
+    const glm::dvec3 axis = glm::normalize(
+        glm::dmat3(to_world) * glm::dvec3(-p.offset.x / p.scale.x, -p.offset.y / p.scale.y, -1.0));
+    const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
+    sum += across;
+    right += across * eye;
+  }
+  return glm::inverse(sum) * right;
+}
+
+}  // namespace
+
+CommonView common_view(const ShapeViews& views) {
+  constexpr double k_part_of_view = 0.5;
+  CommonView common;
+  common.centre = meeting_point(views);
+  common.radius = std::numeric_limits<double>::max();
+  const auto count = static_cast<double>(views.views.size());
+  for (std::size_t i = 0; i < views.views.size(); ++i) {
+    const Camera& camera = views.views[i].camera;
+    const Projection p = projection(camera, views.width, views.height);
+    const double depth = -(glm::dmat4(camera.view) * glm::dvec4(common.centre, 1.0)).z;
+    if (!(depth > camera.znear)) {
+      throw InvalidArgument(checks::element("views", i) + ".camera (shape)",
+                            "a depth of " + checks::text(depth) + " of the point that the cameras look at",
+                            "more than znear, " + checks::text(camera.znear));
+    }
+    const double world_per_ndc = depth / static_cast<double>(std::max(p.scale.x, p.scale.y));
+    common.radius = std::min(common.radius, k_part_of_view * world_per_ndc);
+    common.pixel += 2.0 / std::min(views.width, views.height) * world_per_ndc / count;
+    common.depth_range += static_cast<double>(camera.zfar - camera.znear) / count;
+  }
+  return common;
+}
+
+}  // namespace dpr

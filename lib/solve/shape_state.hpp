@@ -1,0 +1,34 @@
+// Where a shape solver is between two iterations, in memory and on disk.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "dpr/optimizer.hpp"
+#include "dpr/shape.hpp"
+
+namespace dpr {
+
+struct ShapeState {
+  unsigned iteration = 0;  ///< the next one
+  std::vector<glm::uvec3> faces;
+  std::vector<double> positions, colors;  ///< [vertex][3]
+  OptimizerState position_steps, color_steps;
+  std::vector<ShapeIteration> history;
+
+  /// In single precision, as it is rendered.
+  Mesh mesh() const;
+};
+
+/// A number that differs, with all likelihood, where views or options do.
+std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const ShapeOptions& options);
+
+/// All or nothing, as CBOR. Throws IoError.
+void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint);
+
+/// Throws IoError where the file is no checkpoint or damaged, InvalidArgument where its fingerprint is
+/// another.
+ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint);
+
+}  // namespace dpr

@@ -1,0 +1,58 @@
+// The views format: images with their cameras.
+#include <string>
+
+#include "dpr/error.hpp"
+#include "dpr/shape.hpp"
+#include "scene/checks.hpp"
+#include "scene/scene_json.hpp"
+
+namespace dpr {
+namespace {
+
+int parse_side(const JsonNode& node) {
+  constexpr std::uint64_t k_most = 16384;
+  const auto side = static_cast<int>(node.whole_number(k_most));
+  if (side < 1) node.fail("0", "at least 1");
+  return side;
+}
+
+ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views) {
+  node.require_keys({"image", "camera"});
+  ShapeView view;
+  const std::filesystem::path file = folder / node.at("image").string();
+  view.image = read_image(file, &view.has_alpha);
+  if (view.image.width != views.width || view.image.height != views.height) {
+    const auto text = [](int width, int height) {
+      return std::to_string(width) + "x" + std::to_string(height);
+    };
+    throw InvalidArgument("size (" + file.string() + ")", text(view.image.width, view.image.height),
+                          text(views.width, views.height) + ", the views'");
+  }
+  view.camera = parse_camera(node.at("camera"));
+  validate(view.camera);
+  return view;
+}
+
+}  // namespace
+
+ShapeViews read_views(const std::filesystem::path& file) {
+  const nlohmann::json document = read_json(file);
+  const JsonNode node(document, file);
+  node.require_keys({"width", "height", "background", "views", "initial", "smoothing"});
+  ShapeViews views;
+  views.width = parse_side(node.at("width"));
+  views.height = parse_side(node.at("height"));
+  if (const auto background = node.find("background")) views.background = background->vec3();
+  const std::filesystem::path folder = file.parent_path();
+  for (const JsonNode& view : node.at("views").elements())
+    views.views.push_back(parse_view(view, folder, views));
+  if (views.views.empty()) node.at("views").fail("none", "at least one");
+  if (const auto initial = node.find("initial")) views.initial = read_mesh(folder / initial->string());
+  if (const auto smoothing = node.find("smoothing")) {
+    views.smoothing = parse_smoothing(*smoothing, views.width, views.height);
+    validate(*views.smoothing);
+  }
+  return views;
+}
+
+}  // namespace dpr

@@ -1,0 +1,149 @@
+// dpr fit as a user runs it: mesh, report and checkpoint; and one line for whatever is wrong.
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "dpr/image.hpp"
+#include "dpr/mesh.hpp"
+#include "support/command.hpp"
+#include "support/messages.hpp"
+
+namespace {
+
+using dpr::test::contains;
+using dpr::test::TempDir;
+using nlohmann::json;
+
+std::string program() {
+  const std::string path = dpr::test::program_path("DPR_CLI");
+  if (path.empty()) MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
+  return path;
+}
+
+json camera(const char* view) {
+  return {{"view", json::parse(view)}, {"fov_y_degrees", 50}, {"znear", 1}, {"zfar", 8}};
+}
+
+/// views.json and its images: the cube from three sides.
+json write_inputs(const std::string& dpr, const TempDir& folder) {
+  const char* const sides[] = {"[[1,0,0,0],[0,0.8,-0.6,0],[0,0.6,0.8,-5],[0,0,0,1]]",
+                               "[[0,0,1,0],[0,1,0,0],[-1,0,0,-5],[0,0,0,1]]",
+                               "[[-0.8,0,-0.6,0],[0,1,0,0],[0.6,0,-0.8,-5],[0,0,0,1]]"};
+  dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+  json views = {{"width", 24}, {"height", 24}, {"views", json::array()}};
+  for (int i = 0; i < 3; ++i) {
+    const std::string image = "view" + std::to_string(i) + ".exr";
+    const json scene = {
+        {"width", 24}, {"height", 24}, {"camera", camera(sides[i])}, {"meshes", {{{"file", "cube.ply"}}}}};
+    folder.write("scene.json", scene.dump());
+    REQUIRE(dpr::test::run_program(dpr, folder,
+                                   {"render", "--scene", "scene.json", "--preset", "rigid", "-o", image})
+                .status == 0);
+    views["views"].push_back({{"image", image}, {"camera", camera(sides[i])}});
+  }
+  folder.write("views.json", views.dump());
+  return views;
+}
+
+const std::vector<std::string> k_short{"fit",      "--views", "views.json",   "-o", "mesh.obj",
+                                       "--levels", "1",       "--iterations", "6"};
+
+std::vector<std::string> with(std::vector<std::string> arguments, const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("dpr fit leaves a coloured mesh, a report that opens without a network, and a checkpoint") {
+    const std::string dpr = program();
+    if (dpr.empty()) return;
+    const TempDir folder;
+    write_inputs(dpr, folder);
+    const auto outcome = dpr::test::run_program(
+        dpr, folder, with(k_short, {"--report", "report", "--checkpoint", "state", "--laplacian", "3e-3"}));
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    const dpr::Mesh mesh = dpr::read_mesh(folder / "mesh.obj");
+    CHECK(mesh.vertex_colors.size() == mesh.positions.size());
+    const std::string page = folder.read("report/index.html");
+    for (const char* picture : {"targets.png", "results.png", "turntable.png", "iterations.png"}) {
+      CHECK(std::filesystem::is_regular_file(folder / ("report/" + std::string(picture))));
+      CHECK(contains(page, "src=\"" + std::string(picture) + "\""));
+    }
+    CHECK_FALSE(contains(page, "http"));
+    const json data = json::parse(folder.read("report/fit.json"));
+    CHECK(data["history"].size() == 6);
+    CHECK(data["history"][0]["mesh_loss"].get<double>() > 0);
+    CHECK(data["vertices"] == mesh.positions.size());
+    // Nothing is left to do, so the same mesh comes out.
+    const std::string before = folder.read("mesh.obj");
+    REQUIRE(
+        dpr::test::run_program(dpr, folder, with(k_short, {"--checkpoint", "state", "--laplacian", "3e-3"}))
+            .status == 0);
+    CHECK(folder.read("mesh.obj") == before);
+  }
+
+  TEST_CASE("dpr fit: an initial mesh, images without alpha, a smoothing, another size, PLY") {
+    const std::string dpr = program();
+    if (dpr.empty()) return;
+    const TempDir folder;
+    json views = write_inputs(dpr, folder);
+    dpr::write_image(folder / "view1.ppm", dpr::read_image(folder / "view1.exr"));
+    dpr::write_mesh(folder / "start.obj", dpr::make_icosphere(1));
+    views["views"][1]["image"] = "view1.ppm";
+    views["initial"] = "start.obj";
+    views["background"] = {0, 0, 0};
+    views["smoothing"] = {{"preset", "softras"}, {"sigma", 1e-4}, {"gamma", 1e-3}};
+    folder.write("views.json", views.dump());
+    const auto outcome = dpr::test::run_program(
+        dpr, folder,
+        {"fit", "--views", "views.json", "-o", "mesh.ply", "--levels", "1", "--iterations", "3",
+         "--remesh-interval", "0", "--steps", "direct", "--size", "16x16", "--sigma", "3e-4"});
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    CHECK(dpr::read_mesh(folder / "mesh.ply").faces == dpr::make_icosphere(1).faces);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("dpr fit: what is wrong is one line, and nothing is left behind") {
+    const std::string dpr = program();
+    if (dpr.empty()) return;
+    const TempDir folder;
+    const json good = write_inputs(dpr, folder);
+    dpr::write_image(folder / "small.exr", dpr::Image(8, 8, glm::vec4(1)));
+    folder.write("garbage", "no checkpoint");
+    const auto fails = [&](const json& views, const std::vector<std::string>& arguments, const char* word) {
+      folder.write("views.json", views.dump());
+      const auto outcome = dpr::test::run_program(dpr, folder, arguments);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, word));
+      CHECK_FALSE(std::filesystem::exists(folder / "mesh.obj"));
+    };
+    const auto changed = [&](auto change) {
+      json views = good;
+      change(views);
+      return views;
+    };
+    fails(changed([](json& v) { v["views"][1]["image"] = "missing.exr"; }), k_short, "missing.exr");
+    fails(changed([](json& v) { v["views"][1]["image"] = "small.exr"; }), k_short, "8x8");
+    fails(changed([](json& v) { v["views"] = json::array(); }), k_short, "views");
+    fails(changed([](json& v) { v["focus"] = 1; }), k_short, "focus");
+    fails(changed([](json& v) { v["views"][0]["images"] = 1; }), k_short, "images");
+    fails(changed([](json& v) { v["initial"] = "missing.obj"; }), k_short, "missing.obj");
+    fails(changed([](json& v) { v.erase("width"); }), k_short, "width");
+    fails(good, with(k_short, {"--checkpoint", "garbage"}), "garbage");
+    fails(good, with(k_short, {"--steps", "small"}), "small");
+    fails(good, with(k_short, {"--blur", "0"}), "blur");
+    fails(good, with(k_short, {"--laplacian", "-1"}), "weight");
+    fails(good, {"fit", "--views", "views.json", "-o", "mesh.stl"}, "mesh.stl");
+    fails(good, {"fit", "--views", "views.json", "-o", "nowhere/mesh.obj"}, "nowhere");
+    fails(good, {"fit", "--views", "none.json", "-o", "mesh.obj"}, "none.json");
+    CHECK(folder.read("garbage") == "no checkpoint");
+  }
+}
