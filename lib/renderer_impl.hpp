@@ -25,6 +25,8 @@ struct Renderer::Impl {
   explicit Impl(Device device);
 
   void set_views(std::span<const View> views, std::size_t first_view);
+  /// Checked already.
+  void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_smoothing(const Smoothing& smoothing);
   void forward();
   SceneGradient backward(const Buffer<cl_float4>& grad_images);
