@@ -19,3 +19,4 @@
 #include "dpr/sampling_error.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/smoothing.hpp"
+#include "dpr/voxels.hpp"
