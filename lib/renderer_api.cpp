@@ -83,6 +83,13 @@ void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const 
   m.set_shapes(positions, colors);
 }
 
+void Renderer::set_background(const glm::vec3& background) {
+  impl_->require_scene("Renderer::set_background");
+  checks::require_finite(background, "background");
+  impl_->scene.background = background;
+  impl_->rendered = false;
+}
+
 void Renderer::set_gradients(const GradientRequest& gradients) {
   impl_->require_scene("Renderer::set_gradients");
   impl_->scene.gradients = gradients;

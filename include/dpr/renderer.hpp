@@ -102,6 +102,8 @@ class Renderer {
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other. Empty: the scene's own for all views, to which set_views() returns as well.
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
+  /// A new background colour, linear RGB.
+  void set_background(const glm::vec3& background);
   /// Replaces what the next backward() computes.
   void set_gradients(const GradientRequest& gradients);
 

@@ -1,6 +1,7 @@
 // A shape of its own for every view: one batch of many meshes gives what each gives alone.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -175,7 +176,9 @@ TEST_SUITE("pipeline") {
     Renderer renderer(open_device());
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_shapes(batch.positions, {}), "set_scene");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_gradients({}), "set_scene");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_background({}), "set_scene");
     renderer.set_scene(batch.scene);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_background(glm::vec3(NAN)), "background");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_shapes(batch.positions, {}), "positions");
     renderer.set_views(batch.views);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_shapes({}, std::span(batch.colors).first(4)),
