@@ -5,6 +5,7 @@ dpr_packages=(
   g++ cmake ninja-build pkg-config
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
   libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
+  libzip-dev libtorch-dev libopenblas0-pthread python3-torch
   doctest-dev gnuplot-nox clinfo oclgrind clang
 )
 

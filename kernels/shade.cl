@@ -4,7 +4,7 @@
 
 /// One work-item per pair, up to `last_pair`.
 /// in   face_colors  uint4[face]         indices into colors, by corner
-/// in   colors       float4[color]       linear RGB; w unused
+/// in   colors       float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
 /// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
 kernel void shade_forward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
@@ -14,7 +14,8 @@ kernel void shade_forward(const FrameParams p, const uint last_pair, global cons
                           global float* restrict green, global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const uint4 corners = face_colors[pair_face[pair] % p.faces];
+  const uint view = pair_face[pair] / p.faces;
+  const uint4 corners = face_colors[pair_face[pair] - view * p.faces] + view * p.color_stride;
   const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; i += DPR_WIDTH) {
     const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
@@ -37,7 +38,8 @@ kernel void shade_backward(const FrameParams p, const uint last_pair, global con
                            global float* restrict grad_bary2, global float* restrict grad_colors) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const uint4 corners = face_colors[pair_face[pair] % p.faces];
+  const uint view = pair_face[pair] / p.faces;
+  const uint4 corners = face_colors[pair_face[pair] - view * p.faces] + view * p.color_stride;
   const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
   const uint first = fragment_starts[pair];
   const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);

@@ -38,7 +38,7 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
   s.eye = views[view].eye;
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    s.color[k] = splat3(colors[color[k]]);
+    s.color[k] = splat3(colors[view * p.color_stride + color[k]]);
     s.position[k] = splat3(corner[vertex[k]]);
     if (DPR_SHADING == DPR_FLAT) {
       s.normal[k] = splat3(flat_normal(corner[f.x], corner[f.y], corner[f.z]));

@@ -87,6 +87,8 @@ using float4 = cl_float4;
 typedef struct FrameParams {
   DPR_SHARED_NAME(FrameParams)
   uint views, meshes, vertices, faces;
+  uint position_stride;  /* from one view's positions to the next: vertices where every view has a shape of its own, else 0 */
+  uint color_stride;     /* the same for colours */
   uint first_view;       /* of a larger batch, which names the noise; 0 otherwise */
   uint width, height;    /* pixels */
   uint tiles_x, tiles_y; /* tiles of one view */

@@ -12,7 +12,7 @@ static inline float3 apply_transposed(float4 row0, float4 row1, float4 row2, flo
 
 /// Projects vertices. One work-item per (view, vertex).
 /// in   models       float4[view][mesh][3]  rows of object to world
-/// in   positions    float4[vertex]         object space; w unused
+/// in   positions    float4[vertex] or, with a stride, float4[view][vertex]  object space; w unused
 /// in   vertex_mesh  uint[vertex]
 /// out  world        float4[view][vertex]   world space; w = 1
 /// out  ndc          float4[view][vertex]   x, y in NDC, z = view depth, positive in front; w = 0
@@ -26,7 +26,7 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
   global const ViewParams* camera = views + view;
 
-  const float3 w = apply_affine(model[0], model[1], model[2], positions[vertex].xyz);
+  const float3 w = apply_affine(model[0], model[1], model[2], positions[view * p.position_stride + vertex].xyz);
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float depth = -c.z;
   world[i] = (float4)(w, 1.0f);
@@ -77,19 +77,22 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   for (int k = 0; k < DPR_POSE_CHANNELS; ++k) channels[(uint)k * count + i] = values[k];
 }
 
-/// Gradients of the object-space positions: the views' contributions in order. One work-item per vertex.
+/// Gradients of the object-space positions: the views' contributions in order, or, where every view has a shape of its
+/// own, its contribution alone. One work-item per vertex, or per (view, vertex).
 /// in   grad_world      float4[view][vertex]
-/// out  grad_positions  float4[vertex]
+/// out  grad_positions  float4[vertex] or, with a stride, float4[view][vertex]
 kernel void transform_backward_positions(const FrameParams p, global const float4* restrict models,
                                          global const uint* restrict vertex_mesh,
                                          global const float4* restrict grad_world,
                                          global float4* restrict grad_positions) {
-  const uint vertex = (uint)get_global_id(0);
-  if (vertex >= p.vertices) return;
+  const uint i = (uint)get_global_id(0);
+  if (i >= (p.position_stride ? p.views * p.vertices : p.vertices)) return;
+  const uint vertex = i % p.vertices;
+  const uint first_view = i / p.vertices, last_view = p.position_stride ? first_view + 1 : p.views;
   float3 sum = (float3)(0.0f);
-  for (uint view = 0; view < p.views; ++view) {
+  for (uint view = first_view; view < last_view; ++view) {
     global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
     sum += apply_transposed(model[0], model[1], model[2], grad_world[view * p.vertices + vertex].xyz);
   }
-  grad_positions[vertex] = (float4)(sum, 0.0f);
+  grad_positions[i] = (float4)(sum, 0.0f);
 }

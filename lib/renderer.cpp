@@ -35,6 +35,8 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.meshes = static_cast<cl_uint>(scene.meshes.size());
   p.vertices = static_cast<cl_uint>(geometry.vertices);
   p.faces = static_cast<cl_uint>(geometry.faces);
+  p.position_stride = geometry.view_positions.size() != 0 ? p.vertices : 0;
+  p.color_stride = geometry.view_colors.size() != 0 ? static_cast<cl_uint>(geometry.colors) : 0;
   p.width = static_cast<cl_uint>(scene.width);
   p.height = static_cast<cl_uint>(scene.height);
   p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
@@ -120,9 +122,11 @@ void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t firs
       starts.push_back(starts.back() + static_cast<cl_uint>(geometry->meshes[m].vertices));
     }
   }
-  const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size(), first_view);
-  check_frame_size(wanted);
+  check_frame_size(frame_params(scene, *geometry, new_views.size(), first_view));
 
+  geometry->view_positions.resize(device.impl(), 0);
+  geometry->view_colors.resize(device.impl(), 0);
+  const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size(), first_view);
   if (wanted.views != frame.views) last_counts.reset();
   frame = wanted;
   views.assign(new_views.begin(), new_views.end());
@@ -131,6 +135,15 @@ void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t firs
   view_vertex_starts.upload(device.impl(), starts);
   const std::array<cl_uint, 2> pixels{0, frame.views * frame.width * frame.height};
   all_pixels.upload(device.impl(), pixels);
+  rendered = false;
+}
+
+void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
+  geometry->view_positions.resize(device.impl(), positions.size());
+  geometry->view_colors.resize(device.impl(), colors.size());
+  write_range(device.impl(), geometry->view_positions, 0, positions);
+  write_range(device.impl(), geometry->view_colors, 0, colors);
+  frame = frame_params(scene, *geometry, views.size(), frame.first_view);
   rendered = false;
 }
 

@@ -42,18 +42,6 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
 
 namespace {
 
-/// Replaces a mesh's part of a joined buffer.
-void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
-                 std::span<const glm::vec3> values) {
-  if (values.empty()) return;
-  std::vector<cl_float4> rows;
-  rows.reserve(values.size());
-  for (const glm::vec3& v : values) rows.push_back(to_cl(v));
-  check_cl(device.queue.enqueueWriteBuffer(buffer.cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
-                                           rows.size() * sizeof(cl_float4), rows.data()),
-           "clEnqueueWriteBuffer");
-}
-
 void check_values(const std::string& name, std::span<const glm::vec3> values, std::size_t expected) {
   if (values.size() != expected) {
     throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
@@ -89,11 +77,41 @@ void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
   m.rendered = false;
 }
 
+void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_shapes");
+  if (!positions.empty()) check_values("positions", positions, m.views.size() * m.geometry->vertices);
+  if (!colors.empty()) check_values("colors", colors, m.views.size() * m.geometry->colors);
+  m.set_shapes(positions, colors);
+}
+
+void Renderer::set_background(const glm::vec3& background) {
+  impl_->require_scene("Renderer::set_background");
+  checks::require_finite(background, "background");
+  impl_->scene.background = background;
+  impl_->rendered = false;
+}
+
+void Renderer::set_gradients(const GradientRequest& gradients) {
+  impl_->require_scene("Renderer::set_gradients");
+  impl_->scene.gradients = gradients;
+}
+
 const Scene& Renderer::scene() const { return impl_->scene; }
 std::span<const View> Renderer::views() const { return impl_->views; }
 const Device& Renderer::device() const { return impl_->device; }
 
 void Renderer::forward() { impl_->forward(); }
+
+namespace {
+
+void require_pixel_count(std::size_t found, std::size_t expected) {
+  if (found == expected) return;
+  throw InvalidArgument("pixels", std::to_string(found),
+                        std::to_string(expected) + ", views x height x width");
+}
+
+}  // namespace
 
 Image Renderer::image(std::size_t view) const {
   Impl& m = *impl_;
@@ -108,6 +126,27 @@ Image Renderer::image(std::size_t view) const {
     image.pixels[i] = glm::vec4(values[i].s[0], values[i].s[1], values[i].s[2], values[i].s[3]);
   }
   return image;
+}
+
+void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
+  const Impl& m = *impl_;
+  m.require_forward("Renderer::read_pixels");
+  require_pixel_count(pixels.size(), m.aggregate.image.size());
+  check_cl(m.device.impl().queue.enqueueReadBuffer(m.aggregate.image.cl_buffer(), CL_TRUE, 0,
+                                                   pixels.size_bytes(), pixels.data()),
+           "clEnqueueReadBuffer");
+}
+
+SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::backward_pixels");
+  require_pixel_count(grad_pixels.size(), m.aggregate.image.size());
+  checks::require_finite(grad_pixels, "grad_pixels");
+  m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
+  check_cl(m.device.impl().queue.enqueueWriteBuffer(m.host_grad_images.cl_buffer(), CL_TRUE, 0,
+                                                    grad_pixels.size_bytes(), grad_pixels.data()),
+           "clEnqueueWriteBuffer");
+  return m.backward(m.host_grad_images);
 }
 
 SceneGradient Renderer::backward(std::span<const Image> grad_images) {

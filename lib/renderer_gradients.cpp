@@ -32,17 +32,25 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl
   if (mesh_loss != nullptr) mesh_loss->add_gradient(geometry->positions, transform.grad_positions);
   const bool colors = scene.gradients.colors &&
                       std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
-  if (colors) {
+  if (colors && frame.color_stride != 0) {
+    gather.per_view(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+                    grad_colors);
+  } else if (colors) {
     gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
                       grad_colors);
   }
+  const bool own_positions = frame.position_stride != 0, own_colors = frame.color_stride != 0;
+  if (scene.gradients.positions && own_positions) {
+    gradient.shapes.positions = read_range(transform.grad_positions, 0, transform.grad_positions.size());
+  }
+  if (colors && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const MeshRange& range = geometry->meshes[m];
     const Mesh& mesh = scene.meshes[m].mesh;
-    if (scene.gradients.positions) {
+    if (scene.gradients.positions && !own_positions) {
       gradient.meshes[m].positions = read_range(transform.grad_positions, range.first_vertex, range.vertices);
     }
-    if (scene.gradients.colors && has_colors(mesh)) {
+    if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
       gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
     }
   }

@@ -26,6 +26,8 @@ struct Renderer::Impl {
   explicit Impl(Device device);
 
   void set_views(std::span<const View> views, std::size_t first_view);
+  /// Checked already.
+  void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_smoothing(const Smoothing& smoothing);
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
   /// blocks to read the sizes to allocate.

@@ -48,9 +48,17 @@ struct PointLightGradient {
   glm::dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
 };
 
+/// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the
+/// scene's or none is requested.
+struct ShapesGradient {
+  std::vector<glm::vec3> positions;  ///< [view][vertex]
+  std::vector<glm::vec3> colors;     ///< [view][color]
+};
+
 /// What GradientRequest asked for; the rest is zero or empty. Bitwise the same from run to run on one device.
 struct SceneGradient {
-  std::vector<MeshGradient> meshes;  ///< summed over the views
+  std::vector<MeshGradient> meshes;  ///< summed over the views; empty arrays where these have their own
+  ShapesGradient shapes;
   std::vector<ViewGradient> views;
   glm::dvec3 ambient{0.0};
   std::vector<PointLightGradient> lights;  ///< summed over the views
@@ -91,6 +99,15 @@ class Renderer {
   /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
 
+  /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
+  /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
+  /// the other. Empty: the scene's own for all views, to which set_views() returns as well.
+  void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
+  /// A new background colour, linear RGB.
+  void set_background(const glm::vec3& background);
+  /// Replaces what the next backward() computes.
+  void set_gradients(const GradientRequest& gradients);
+
   const Scene& scene() const;
   std::span<const View> views() const;
 
@@ -99,11 +116,15 @@ class Renderer {
   void forward();
   /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
   Image image(std::size_t view = 0) const;
+  /// All images at once, [view][height][width], RGBA. Blocks.
+  void read_pixels(std::span<glm::vec4> pixels) const;
 
   /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the
   /// background). One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise
   /// again.
   SceneGradient backward(std::span<const Image> grad_images);
+  /// The same from [view][height][width], RGBA.
+  SceneGradient backward_pixels(std::span<const glm::vec4> grad_pixels);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   SceneGradient backward(const ImageLoss& loss);
   /// The same, with the gradient of a mesh's own loss added to that of its positions, on the device. Both

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/glm.hpp>
+#include <span>
 #include <string>
 
 #include "dpr/error.hpp"
@@ -79,6 +80,13 @@ inline void require_affine(const glm::mat4& matrix, const std::string& argument)
   }
 }
 
+inline void require_finite(std::span<const glm::vec4> pixels, const std::string& argument) {
+  for (const glm::vec4& p : pixels) {
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.w)) continue;
+    throw InvalidArgument(argument, "a pixel that is not finite", "finite values");
+  }
+}
+
 /// Throws unless the image has the pixels its size asks for, all finite.
 inline void require_pixels(const Image& image, const std::string& argument) {
   const std::size_t expected = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
@@ -86,10 +94,7 @@ inline void require_pixels(const Image& image, const std::string& argument) {
     throw InvalidArgument(argument, std::to_string(image.pixels.size()) + " pixels",
                           std::to_string(expected) + ", width x height");
   }
-  for (const glm::vec4& p : image.pixels) {
-    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.w)) continue;
-    throw InvalidArgument(argument, "a pixel that is not finite", "finite values");
-  }
+  require_finite(image.pixels, argument);
 }
 
 }  // namespace dpr::checks

@@ -46,6 +46,17 @@ cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_col
 
 cl_float4 to_cl(const glm::vec3& v) { return {{v.x, v.y, v.z, 0.0F}}; }
 
+void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
+                 std::span<const glm::vec3> values) {
+  if (values.empty()) return;
+  std::vector<cl_float4> rows;
+  rows.reserve(values.size());
+  for (const glm::vec3& v : values) rows.push_back(to_cl(v));
+  check_cl(device.queue.enqueueWriteBuffer(buffer.cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
+                                           rows.size() * sizeof(cl_float4), rows.data()),
+           "clEnqueueWriteBuffer");
+}
+
 Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> all_positions, all_colors;
   std::vector<cl_uint> all_mesh;
@@ -82,7 +93,8 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
 std::size_t Geometry::bytes() const {
   std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() +
                       face_vertices.capacity_bytes() + face_colors.capacity_bytes() +
-                      color_values.capacity_bytes();
+                      color_values.capacity_bytes() + view_positions.capacity_bytes() +
+                      view_colors.capacity_bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

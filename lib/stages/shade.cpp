@@ -46,8 +46,8 @@ void Shade::forward(const ShadeInputs& in) {
   for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragments);
   if (!lit_) {
     forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
-             in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2, red,
-             green, blue);
+             in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
+             red, green, blue);
     return;
   }
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
@@ -57,7 +57,7 @@ void Shade::forward(const ShadeInputs& in) {
                           in.geometry.vertex_corners.corners, in.transform.world, normals_);
   }
   lit_->forward(pairs, in.p, lighting_, pairs.last(), in.views.cameras, lights_, in.geometry.face_vertices,
-                in.geometry.face_colors, in.geometry.color_values, in.transform.world, normals_,
+                in.geometry.face_colors, in.geometry.colors_of(in.p), in.transform.world, normals_,
                 in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red,
                 green, blue);
 }
@@ -68,7 +68,7 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
   if (!lit_) {
     backward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
-              in.geometry.face_colors, in.geometry.color_values, in.rasterize.bary1, in.rasterize.bary2,
+              in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
     return;
   }
@@ -76,7 +76,7 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
   lit_->backward(pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(), in.views.cameras,
-                 lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
+                 lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
                  in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
                  in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green,
                  grad.blue, grad_bary1, grad_bary2, grad_corner_colors, grad_corner_positions_,
@@ -98,11 +98,12 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
 void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light) {
   const Range pairs = in.rasterize.pairs(in.bin);
   light_channels.resize(device_, light_sets() * k_light_channels * in.bin.pairs);
-  lit_->backward_lights(
-      pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
-      in.views.cameras, lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.color_values,
-      in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
-      in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green, grad.blue, light_channels);
+  lit_->backward_lights(pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
+                        static_cast<cl_uint>(light), in.views.cameras, lights_, in.geometry.face_vertices,
+                        in.geometry.face_colors, in.geometry.colors_of(in.p), in.transform.world, normals_,
+                        in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
+                        in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green, grad.blue,
+                        light_channels);
 }
 
 std::size_t Shade::bytes() const {

@@ -27,7 +27,7 @@ class Transform {
   Buffer<cl_float4> world;           ///< [view][vertex]
   Buffer<cl_float4> ndc;             ///< [view][vertex] x, y, view depth
   Buffer<float> channels;            ///< [DPR_POSE_CHANNELS][view][vertex]
-  Buffer<cl_float4> grad_positions;  ///< [vertex] object space
+  Buffer<cl_float4> grad_positions;  ///< [vertex], of views' own shapes [view][vertex]; object space
 
   std::size_t bytes() const {
     return world.capacity_bytes() + ndc.capacity_bytes() + channels.capacity_bytes() +

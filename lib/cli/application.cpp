@@ -1,0 +1,62 @@
+#include "cli/application.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+// Exit statuses other than 0.
+constexpr int k_wrong_input = 1;
+constexpr int k_device_failed = 2;
+
+int fail(std::string message, int status) {
+  std::ranges::replace(message, '\n', ' ');
+  std::fflush(stdout);
+  std::fprintf(stderr, "dpr: error: %s\n", message.c_str());
+  return status;
+}
+
+/// The command as it was typed, as far as it was understood: "dpr render".
+std::string command_name(const CLI::App& application) {
+  const auto chosen = application.get_subcommands();
+  const std::string& name = application.get_name();
+  return chosen.empty() ? name : name + " " + chosen.front()->get_name();
+}
+
+int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
+  // --help and --version arrive as errors too.
+  if (error.get_exit_code() == 0) return application.exit(error);
+  const std::string name = command_name(application);
+  const auto unknown = application.remaining();
+  const std::string problem = name == application.get_name() && !unknown.empty()
+                                  ? "no such command: " + unknown.front()
+                                  : std::string(error.what());
+  return fail(
+      "arguments (" + name + "): got \"" + problem + "\", expected what \"" + name + " --help\" describes",
+      k_wrong_input);
+}
+
+}  // namespace
+
+int run_application(CLI::App& application, const CommonOptions& common, int argc, char** argv) {
+  try {
+    application.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return fail_to_parse(application, error);
+  } catch (const BuildError& error) {
+    const int status = fail(error.what(), k_device_failed);
+    if (common.verbose) std::fprintf(stderr, "%s\n", error.log().c_str());
+    return status;
+  } catch (const DeviceError& error) {
+    return fail(error.what(), k_device_failed);
+  } catch (const std::exception& error) {
+    return fail(error.what(), k_wrong_input);
+  }
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,79 @@
+// Training and evaluation of single-image reconstruction. No header of torch is needed to use this.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dpr/device.hpp"
+#include "dpr/smoothing.hpp"
+#include "learn/dataset.hpp"
+
+namespace dpr::learn {
+
+/// Weights of (74).
+struct LearningWeights {
+  double silhouette = 1, color = 1, laplacian = 3e-3;
+};
+
+struct TrainingOptions {
+  std::string method = "joint_gaussian";  ///< a preset of the smoothing, with the scales below
+  std::optional<float> sigma, gamma;      ///< 1e-4 each unless given, as published for SoftRas
+  std::uint64_t seed = 1;                 ///< of the first weights, the batches, and sampled noise
+  std::int64_t palette = 16;              ///< colours of a palette
+  int batch = 16;               ///< images a step; each mesh is compared with two views of its object
+  double learning_rate = 1e-4;  ///< of Adam (0.9, 0.999)
+  LearningWeights weights;
+  std::size_t steps = 20000;           ///< in all, with those before a resumption
+  double minutes = 0;                  ///< of this run; 0: no limit
+  std::size_t checkpoint_every = 250;  ///< steps; validated each time
+};
+
+/// What is said of a run as it goes.
+struct TrainingProgress {
+  std::size_t step = 0;
+  double loss = 0;
+  double validation_iou = 0;  ///< of the last checkpoint; 0 before the first
+  double seconds = 0;         ///< of this run, without validation
+  double render_share = 0;    ///< of these seconds, in the renderer
+};
+
+struct TrainingResult {
+  TrainingProgress last;
+  std::vector<double> losses;  ///< [step] from the first one on
+  std::vector<double> validation_steps, validation_iou;
+};
+
+/// The smoothing of a method, as training uses it. Throws InvalidArgument.
+Smoothing training_smoothing(const TrainingOptions& options);
+
+/// Trains, or goes on where `folder`/checkpoint.pt stands, until the steps or the minutes are over, and
+/// leaves there checkpoint.pt and losses.csv. Step n depends on the options, the data and n only: interrupted
+/// and resumed training gives the same losses, bit by bit on one device with the same number of threads.
+/// Throws InvalidArgument, IoError; and Error if a loss is not finite.
+TrainingResult train(const Device& device, const Dataset& training, const Dataset& validation,
+                     const TrainingOptions& options, const std::filesystem::path& folder,
+                     const std::function<void(const TrainingProgress&)>& progress);
+
+/// 3D IoU of a class at 32^3.
+struct ClassIou {
+  std::size_t object_class = 0;
+  std::size_t images = 0;
+  double iou = 0;     ///< mean over the images
+  double sphere = 0;  ///< what the sphere that the network starts from has
+};
+
+/// Evaluates a checkpoint on `views` views, evenly spread, of every object. The mean over the classes is that
+/// of theirs.
+std::vector<ClassIou> evaluate(const std::filesystem::path& checkpoint, const Dataset& dataset,
+                               std::size_t views,
+                               const std::function<void(std::size_t, std::size_t)>& progress);
+
+/// One row a class: the input, and the reconstruction of it rendered from four sides.
+Image show(const Device& device, const std::filesystem::path& checkpoint, const Dataset& dataset,
+           std::size_t number);
+
+}  // namespace dpr::learn

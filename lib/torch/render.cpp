@@ -1,0 +1,396 @@
+// The operator: tensors in, the renderer's launches, tensors out; and its registration.
+#include "torch/render.hpp"
+
+#include <torch/csrc/autograd/custom_function.h>
+#include <torch/library.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "dpr/error.hpp"
+
+namespace dpr::torch_op {
+namespace {
+
+using torch::autograd::AutogradContext;
+using torch::autograd::variable_list;
+
+/// Runs the action; the library's errors become torch's.
+template <typename Action>
+auto with_torch_errors(Action action) {
+  try {
+    return action();
+  } catch (const Error& error) {
+    TORCH_CHECK(false, "dpr: error: ", error.what());
+  }
+}
+
+std::string shape_text(const at::Tensor& tensor) {
+  std::string text = "[";
+  for (const std::int64_t size : tensor.sizes()) text += (text.size() > 1 ? ", " : "") + std::to_string(size);
+  return text + "]";
+}
+
+/// The tensor itself, if it is contiguous. -1 stands for any size.
+at::Tensor checked(const at::Tensor& tensor, const std::string& name,
+                   std::initializer_list<std::int64_t> shape, const char* expected) {
+  if (tensor.scalar_type() != at::kFloat || !tensor.device().is_cpu()) {
+    throw InvalidArgument(name + " (dpr::render)", tensor.toString(), "a float32 tensor on the CPU");
+  }
+  bool fits = tensor.dim() == static_cast<std::int64_t>(shape.size());
+  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
+    const std::int64_t wanted = shape.begin()[i];
+    fits = wanted < 0 || tensor.size(static_cast<std::int64_t>(i)) == wanted;
+  }
+  if (!fits) throw InvalidArgument(name + " (dpr::render)", shape_text(tensor), expected);
+  return tensor.contiguous();
+}
+
+/// The memory of a contiguous tensor whose rows are vectors.
+template <typename Vector>
+std::span<const Vector> rows(const at::Tensor& tensor) {
+  static_assert(sizeof(Vector) == Vector::length() * sizeof(float));
+  return {reinterpret_cast<const Vector*>(tensor.data_ptr<float>()),
+          static_cast<std::size_t>(tensor.numel() / Vector::length())};
+}
+
+/// The gradients of the views' own vectors, [view, n, 3], or, if there are none, of those they share, [1, n,
+/// 3]: a tensor that owns them, no copy.
+at::Tensor adopt(std::vector<glm::vec3>& own, std::vector<glm::vec3>& shared, std::int64_t views) {
+  const std::int64_t batch = own.empty() ? 1 : views;
+  auto* vectors = new std::vector<glm::vec3>(std::move(own.empty() ? shared : own));
+  const auto count = static_cast<std::int64_t>(vectors->size());
+  return at::from_blob(
+      vectors->data(), {batch, count / batch, 3}, [vectors](void*) { delete vectors; },
+      at::TensorOptions(at::kFloat));
+}
+
+struct Inputs {
+  at::Tensor vertices, colors, views, intrinsics, background;
+};
+
+void require_batch(const at::Tensor& tensor, const char* name, std::int64_t views) {
+  if (tensor.size(0) == 1 || tensor.size(0) == views) return;
+  throw InvalidArgument(std::string(name) + " (dpr::render)", shape_text(tensor),
+                        "1 or " + std::to_string(views) + ", one a view, in the first dimension");
+}
+
+Inputs check(const Inputs& in, std::int64_t faces) {
+  Inputs out;
+  out.views = checked(in.views, "views", {-1, 4, 4}, "[view, 4, 4]");
+  const std::int64_t count = out.views.size(0);
+  if (count == 0) throw InvalidArgument("views (dpr::render)", shape_text(out.views), "at least one view");
+  out.vertices = checked(in.vertices, "vertices", {-1, -1, 3}, "[view or 1, vertex, 3]");
+  out.colors = checked(in.colors, "colors", {-1, -1, 3}, "[view or 1, vertex or face, 3]");
+  out.intrinsics = checked(in.intrinsics, "intrinsics", {count, 4}, "[view, 4]");
+  out.background = checked(in.background, "background", {3}, "[3]");
+  require_batch(out.vertices, "vertices", count);
+  require_batch(out.colors, "colors", count);
+  const std::int64_t colors = out.colors.size(1), vertices = out.vertices.size(1);
+  if (colors != vertices && colors != faces) {
+    throw InvalidArgument("colors (dpr::render)", shape_text(out.colors),
+                          std::to_string(vertices) + ", one a vertex, or " + std::to_string(faces) +
+                              ", one a face, in the second dimension");
+  }
+  return out;
+}
+
+std::vector<View> make_views(const Inputs& in, float znear, float zfar) {
+  const auto matrices = rows<glm::vec4>(in.views), intrinsics = rows<glm::vec4>(in.intrinsics);
+  std::vector<View> views;
+  for (std::size_t v = 0; v < intrinsics.size(); ++v) {
+    View view{{}, {glm::mat4(1.0F)}};
+    for (int row = 0; row < 4; ++row) {
+      const glm::vec4& values = matrices[4 * v + static_cast<std::size_t>(row)];
+      for (int column = 0; column < 4; ++column) view.camera.view[column][row] = values[column];
+    }
+    const glm::vec4& k = intrinsics[v];
+    view.camera.intrinsics = Intrinsics{k.x, k.y, k.z, k.w};
+    view.camera.znear = znear;
+    view.camera.zfar = zfar;
+    views.push_back(view);
+  }
+  return views;
+}
+
+/// d loss / d M of x_camera = A x_world + t, M = [A t; 0 1]: the sum over the vertices of g_camera x_world^T,
+/// where g_camera = A^-T g_world.
+at::Tensor view_gradients(const at::Tensor& views, const at::Tensor& vertices,
+                          const at::Tensor& grad_vertices) {
+  const at::Tensor linear = views.slice(1, 0, 3).slice(2, 0, 3).to(at::kDouble);
+  const at::Tensor grad_world = grad_vertices.to(at::kDouble).transpose(1, 2);  // [view, 3, vertex]
+  const at::Tensor world = at::constant_pad_nd(vertices.to(at::kDouble), {0, 1}, 1.0);
+  const at::Tensor grad = linear.transpose(1, 2).inverse().matmul(grad_world.matmul(world));  // [view, 3, 4]
+  return at::constant_pad_nd(grad, {0, 0, 0, 1}).to(at::kFloat);
+}
+
+using Clock = std::chrono::steady_clock;
+
+/// Adds the time of its life to a sum.
+class Timer {
+ public:
+  explicit Timer(double& seconds) : seconds_(seconds) {}
+  ~Timer() { seconds_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
+  Timer(const Timer&) = delete;
+  Timer& operator=(const Timer&) = delete;
+
+ private:
+  double& seconds_;
+  Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace
+
+/// A renderer for the life of a graph: its buffers hold the frame that the backward pass differentiates.
+class Lease : public torch::CustomClassHolder {
+ public:
+  Lease(c10::intrusive_ptr<BatchRenderer> owner, const BatchRenderer::Topology& topology)
+      : renderer(owner->take(topology)), owner_(std::move(owner)), topology_(topology) {}
+  ~Lease() override { owner_->put_back(std::move(renderer), topology_); }
+
+  Renderer renderer;
+
+ private:
+  c10::intrusive_ptr<BatchRenderer> owner_;
+  BatchRenderer::Topology topology_;
+};
+
+BatchRenderer::BatchRenderer(std::vector<glm::uvec3> faces, int width, int height, const Smoothing& smoothing,
+                             const Device& device)
+    : faces_(std::move(faces)), width_(width), height_(height), device_(device) {
+  set_smoothing(smoothing);
+}
+
+namespace {
+
+std::vector<glm::uvec3> read_faces(const at::Tensor& faces) {
+  if (faces.scalar_type() != at::kLong || faces.dim() != 2 || faces.size(1) != 3 ||
+      !faces.device().is_cpu()) {
+    throw InvalidArgument("faces (dpr::Renderer)", faces.toString() + " " + shape_text(faces),
+                          "an int64 tensor [face, 3] on the CPU");
+  }
+  const at::Tensor values = faces.contiguous();
+  const auto* index = values.data_ptr<std::int64_t>();
+  std::vector<glm::uvec3> result(static_cast<std::size_t>(faces.size(0)));
+  for (glm::uvec3& face : result) {
+    for (int corner = 0; corner < 3; ++corner, ++index) {
+      if (*index < 0 || *index > std::numeric_limits<std::uint32_t>::max()) {
+        throw InvalidArgument("faces (dpr::Renderer)", std::to_string(*index), "indices of vertices");
+      }
+      face[corner] = static_cast<std::uint32_t>(*index);
+    }
+  }
+  return result;
+}
+
+int image_side(std::int64_t value, const char* name) {
+  constexpr std::int64_t k_largest = 16384;
+  if (value >= 1 && value <= k_largest) return static_cast<int>(value);
+  throw InvalidArgument(std::string(name) + " (dpr::Renderer)", std::to_string(value),
+                        "1 to " + std::to_string(k_largest));
+}
+
+/// A count or a seed that came as a double.
+std::uint32_t whole_number(const std::string& name, double value) {
+  if (value >= 0 && value <= std::numeric_limits<std::uint32_t>::max() && value == std::floor(value)) {
+    return static_cast<std::uint32_t>(value);
+  }
+  throw InvalidArgument(name + " (dpr::Renderer)", std::to_string(value), "a whole number");
+}
+
+}  // namespace
+
+BatchRenderer::BatchRenderer(const at::Tensor& faces, std::int64_t width, std::int64_t height,
+                             const std::string& preset, const std::string& device)
+    : faces_(with_torch_errors([&] { return read_faces(faces); })),
+      width_(with_torch_errors([&] { return image_side(width, "width"); })),
+      height_(with_torch_errors([&] { return image_side(height, "height"); })),
+      smoothing_(with_torch_errors([&] { return smoothing_preset(preset, width_, height_); })),
+      device_(with_torch_errors([&] { return open_device(device); })) {}
+
+void BatchRenderer::set_smoothing(const Smoothing& smoothing) {
+  validate(smoothing);
+  smoothing_ = smoothing;
+}
+
+void BatchRenderer::set(const std::string& name, double value) {
+  with_torch_errors([&] {
+    Smoothing s = smoothing_;
+    Camera clipping;
+    clipping.znear = znear_;
+    clipping.zfar = zfar_;
+    const auto number = static_cast<float>(value);
+    if (name == "sigma") {
+      s.sigma = number;
+    } else if (name == "gamma") {
+      s.gamma = number;
+    } else if (name == "alpha") {
+      s.alpha = number;
+    } else if (name == "occupancy_threshold") {
+      s.occupancy_threshold = number;
+    } else if (name == "blur_radius") {
+      s.blur_radius = number;
+    } else if (name == "samples") {
+      s.samples = whole_number(name, value);
+    } else if (name == "seed") {
+      s.seed = whole_number(name, value);
+    } else if (name == "znear") {
+      clipping.znear = number;
+    } else if (name == "zfar") {
+      clipping.zfar = number;
+    } else {
+      throw InvalidArgument(
+          "name (dpr::Renderer.set)", "\"" + name + "\"",
+          "sigma, gamma, alpha, occupancy_threshold, blur_radius, samples, seed, znear or zfar");
+    }
+    validate(clipping);
+    set_smoothing(s);
+    znear_ = clipping.znear;
+    zfar_ = clipping.zfar;
+  });
+}
+
+Renderer BatchRenderer::take(const Topology& topology) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (topology == topology_ && !free_.empty()) {
+      Renderer renderer = std::move(free_.back());
+      free_.pop_back();
+      return renderer;
+    }
+  }
+  Scene scene;
+  scene.width = width_;
+  scene.height = height_;
+  Mesh mesh{std::vector<glm::vec3>(topology.vertices), faces_, {}, {}, {}, {}};
+  if (topology.face_colors) {
+    mesh.face_colors.resize(faces_.size());
+  } else {
+    mesh.vertex_colors.resize(topology.vertices);
+  }
+  scene.meshes.push_back({std::move(mesh)});
+  Renderer renderer(device_);
+  renderer.set_scene(scene);
+  return renderer;
+}
+
+void BatchRenderer::put_back(Renderer renderer, const Topology& topology) {
+  const std::lock_guard lock(mutex_);
+  if (topology != topology_) free_.clear();
+  topology_ = topology;
+  free_.push_back(std::move(renderer));
+}
+
+struct RenderFunction : public torch::autograd::Function<RenderFunction> {
+  static at::Tensor forward(AutogradContext* ctx, const c10::intrusive_ptr<BatchRenderer>& batch,
+                            const at::Tensor& vertices, const at::Tensor& colors, const at::Tensor& views,
+                            const at::Tensor& intrinsics, const at::Tensor& background) {
+    const Timer timer(batch->seconds_);
+    return with_torch_errors([&] {
+      const Inputs in = check({vertices, colors, views, intrinsics, background},
+                              static_cast<std::int64_t>(batch->faces_.size()));
+      const bool of_faces = in.colors.size(1) != in.vertices.size(1);
+      auto lease = c10::make_intrusive<Lease>(
+          batch, BatchRenderer::Topology{static_cast<std::size_t>(in.vertices.size(1)), of_faces});
+      GradientRequest wanted{};
+      wanted.positions = vertices.requires_grad() || views.requires_grad();
+      wanted.colors = colors.requires_grad();
+      wanted.camera = intrinsics.requires_grad();
+      wanted.background = background.requires_grad();
+      wanted.transform = wanted.lights = wanted.smoothing = false;
+      lease->renderer.set_gradients(wanted);
+      upload(*batch, lease->renderer, in, views.requires_grad());
+
+      lease->renderer.forward();
+      at::Tensor image = at::empty({in.views.size(0), batch->height_, batch->width_, 4}, at::kFloat);
+      lease->renderer.read_pixels({reinterpret_cast<glm::vec4*>(image.data_ptr<float>()),
+                                   static_cast<std::size_t>(image.numel() / 4)});
+      ctx->saved_data["batch"] = batch;
+      ctx->saved_data["lease"] = c10::IValue::make_capsule(std::move(lease));
+      ctx->saved_data["wants_views"] = views.requires_grad();
+      ctx->save_for_backward({in.vertices, in.views});
+      return image;
+    });
+  }
+
+  static variable_list backward(AutogradContext* ctx, const variable_list& grad_outputs) {
+    const auto batch = ctx->saved_data["batch"].toCustomClass<BatchRenderer>();
+    const Timer timer(batch->seconds_);
+    return with_torch_errors([&] {
+      auto& lease = static_cast<Lease&>(*ctx->saved_data["lease"].toCapsule());
+      const at::Tensor grad_image = grad_outputs[0].contiguous();
+      SceneGradient gradient = lease.renderer.backward_pixels(rows<glm::vec4>(grad_image));
+      return collect(*ctx, lease.renderer.scene().gradients, gradient);
+    });
+  }
+
+ private:
+  /// One shape for all views stays one; but the gradients of the views' matrices need those of every view's
+  /// vertices.
+  static void upload(const BatchRenderer& batch, Renderer& renderer, const Inputs& in, bool separate) {
+    const std::int64_t count = in.views.size(0);
+    renderer.set_smoothing(batch.smoothing_);
+    renderer.set_background(rows<glm::vec3>(in.background)[0]);
+    renderer.set_views(make_views(in, batch.znear_, batch.zfar_));
+    const bool own_shapes = count > 1 && (separate || in.vertices.size(0) > 1);
+    const bool own_colors = count > 1 && in.colors.size(0) > 1;
+    if (!own_shapes) renderer.set_positions(0, rows<glm::vec3>(in.vertices));
+    if (!own_colors) renderer.set_colors(0, rows<glm::vec3>(in.colors));
+    const at::Tensor shapes =
+        own_shapes ? in.vertices.expand({count, -1, -1}).contiguous() : at::empty({0, 3}, at::kFloat);
+    const at::Tensor colors = own_colors ? in.colors : at::empty({0, 3}, at::kFloat);
+    renderer.set_shapes(rows<glm::vec3>(shapes), rows<glm::vec3>(colors));
+  }
+
+  static variable_list collect(AutogradContext& ctx, const GradientRequest& wanted, SceneGradient& gradient) {
+    const variable_list saved = ctx.get_saved_variables();
+    const at::Tensor &vertices = saved[0], &views = saved[1];
+    const std::int64_t count = views.size(0);
+    variable_list grad(6);  // of the renderer, which has none, and the five tensors
+    if (wanted.positions) {
+      at::Tensor each = adopt(gradient.shapes.positions, gradient.meshes[0].positions, count);
+      if (ctx.saved_data["wants_views"].toBool()) grad[3] = view_gradients(views, vertices, each);
+      grad[1] = each.size(0) == vertices.size(0) ? each : each.sum(0, /*keepdim=*/true);
+    }
+    if (wanted.colors) grad[2] = adopt(gradient.shapes.colors, gradient.meshes[0].colors, count);
+    if (wanted.camera) {
+      grad[4] = at::empty({count, 4}, at::kFloat);
+      float* out = grad[4].data_ptr<float>();
+      for (const ViewGradient& view : gradient.views) {
+        for (const double k : view.camera.intrinsics) *out++ = static_cast<float>(k);
+      }
+    }
+    if (wanted.background) {
+      const glm::dvec3& g = gradient.background;
+      grad[5] = at::tensor({g.x, g.y, g.z}, at::kFloat);
+    }
+    return grad;
+  }
+};
+
+at::Tensor render(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
+                  const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
+                  const at::Tensor& background) {
+  return RenderFunction::apply(renderer, vertices, colors, views, intrinsics, background);
+}
+
+TORCH_LIBRARY(dpr, m) {
+  m.class_<BatchRenderer>("Renderer")
+      .def(torch::init<const at::Tensor&, std::int64_t, std::int64_t, const std::string&,
+                       const std::string&>(),
+           "Faces, image size, smoothing and device of a batch",
+           {torch::arg("faces"), torch::arg("width"), torch::arg("height"),
+            torch::arg("preset") = std::string("joint_gaussian"), torch::arg("device") = std::string()})
+      .def("set", &BatchRenderer::set, "Sets a number of the smoothing or the camera",
+           {torch::arg("name"), torch::arg("value")})
+      .def("seconds", &BatchRenderer::seconds);
+  m.def(
+      "render(__torch__.torch.classes.dpr.Renderer renderer, Tensor vertices, Tensor colors, Tensor views, "
+      "Tensor intrinsics, Tensor background) -> Tensor",
+      &render);
+}
+
+}  // namespace dpr::torch_op

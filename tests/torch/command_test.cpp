@@ -1,0 +1,57 @@
+// dpr learn as a user runs it.
+#include <doctest/doctest.h>
+
+#include "support/command.hpp"
+#include "support/messages.hpp"
+
+namespace dpr::test {
+namespace {
+
+Outcome learn(const TempDir& folder, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "learn");
+  return run_program(program_path("DPR_CLI"), folder, arguments);
+}
+
+void check_refused(const Outcome& outcome, const std::string& part) {
+  CHECK(outcome.status == 1);
+  CHECK_MESSAGE(is_error_line(outcome.err), outcome.err);
+  CHECK_MESSAGE(contains(outcome.err, part), outcome.err);
+}
+
+}  // namespace
+
+TEST_SUITE("robustness") {
+  TEST_CASE("learn: data, train, eval and show, and one line for what is wrong") {
+    if (program_path("DPR_CLI").empty()) return;
+    const TempDir folder;
+    Outcome outcome = learn(
+        folder, {"data", "-o", "data", "--classes", "sofa", "--train", "4", "--val", "1", "--test", "1"});
+    REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
+    CHECK(contains(outcome.out, "contact_sheet.png"));
+    const std::vector<std::string> data{"--data", "data", "--classes", "sofa"};
+    const auto with_data = [&](std::vector<std::string> words) {
+      words.insert(words.end(), data.begin(), data.end());
+      return learn(folder, words);
+    };
+    outcome = with_data({"train", "-o", "run", "--steps", "2", "--batch", "2"});
+    REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
+    CHECK(contains(outcome.out, "in the renderer"));
+    outcome = with_data({"eval", "--checkpoint", "run/checkpoint.pt", "--views", "2", "-o", "iou.json"});
+    REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
+    CHECK(contains(folder.read("iou.json"), "\"mean_iou\""));
+    outcome = with_data({"show", "--checkpoint", "run/checkpoint.pt", "-o", "figure.png"});
+    REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
+    CHECK(folder.read("figure.png").size() > 1000);
+
+    check_refused(learn(folder, {"eval", "--checkpoint", "run/checkpoint.pt", "--data", "data"}),
+                  "02691156_test_images.npz");
+    check_refused(with_data({"eval", "--checkpoint", "none.pt"}), "none.pt");
+    check_refused(with_data({"train", "-o", "run", "--palette", "3"}), "palette colours");
+    check_refused(with_data({"train", "-o", "other", "--method", "hard"}), "hard");
+    check_refused(learn(folder, {"train", "-o", "run", "--data", "data", "--classes", "horse"}), "horse");
+    check_refused(learn(folder, {"fly"}), "no such command: fly");
+    CHECK(learn(folder, {"--help"}).status == 0);
+  }
+}
+
+}  // namespace dpr::test

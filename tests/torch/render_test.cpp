@@ -1,0 +1,292 @@
+// The operator against the double-precision reference renderer, and what it does with graphs and wrong input.
+#include "torch/render.hpp"
+
+#include <doctest/doctest.h>
+#include <torch/torch.h>
+
+#include <functional>
+
+#include "pipeline/comparison.hpp"
+#include "pipeline/scenes.hpp"
+#include "reference/finite_difference.hpp"
+#include "reference/renderer.hpp"
+
+namespace dpr::test {
+namespace {
+
+using pipeline::Random;
+
+/// The operator's tensors, two shapes seen in two views.
+struct Inputs {
+  at::Tensor vertices, colors, views, intrinsics, background;
+
+  std::vector<at::Tensor*> all() { return {&vertices, &colors, &views, &intrinsics, &background}; }
+};
+
+constexpr int k_width = 14, k_height = 11;
+constexpr std::int64_t k_views = 2;
+
+at::Tensor to_tensor(const std::vector<glm::vec3>& values) {
+  at::Tensor tensor = torch::empty({1, static_cast<std::int64_t>(values.size()), 3});
+  std::memcpy(tensor.data_ptr<float>(), values.data(), values.size() * sizeof(glm::vec3));
+  return tensor;
+}
+
+at::Tensor random_like(const at::Tensor& tensor, float low, float high, unsigned seed) {
+  Random random(seed);
+  at::Tensor result = torch::empty_like(tensor);
+  float* values = result.data_ptr<float>();
+  for (std::int64_t i = 0; i < result.numel(); ++i) values[i] = random(low, high);
+  return result;
+}
+
+Inputs make_inputs(bool face_colors = false) {
+  const Mesh mesh = make_icosphere(0, 0.8F);
+  Inputs in;
+  in.vertices = to_tensor(mesh.positions).repeat({k_views, 1, 1});
+  in.vertices += random_like(in.vertices, -0.1F, 0.1F, 1);
+  const auto colors = static_cast<std::int64_t>(face_colors ? mesh.faces.size() : mesh.positions.size());
+  in.colors = random_like(torch::empty({k_views, colors, 3}), 0.1F, 0.9F, 2);
+  in.views = torch::empty({k_views, 4, 4});
+  for (int v = 0; v < k_views; ++v) {
+    const glm::mat4 view = orbit_camera(4.3F, 24.0F, 37.0F + 80.0F * static_cast<float>(v)).view;
+    for (int row = 0; row < 4; ++row) {
+      for (int column = 0; column < 4; ++column) in.views[v][row][column] = view[column][row];
+    }
+  }
+  in.intrinsics = torch::tensor({19.0F, 20.0F, 7.2F, 5.4F}).repeat({k_views, 1});
+  in.background = torch::tensor({0.2F, 0.5F, 0.3F});
+  return in;
+}
+
+Smoothing smoothing_for_tests(const char* preset) {
+  Smoothing smoothing = smoothing_preset(preset);
+  smoothing.sigma = 2e-3F;
+  smoothing.gamma = 3e-2F;
+  smoothing.background_depth = 0.6F;
+  return smoothing;
+}
+
+c10::intrusive_ptr<torch_op::BatchRenderer> make_renderer(const Smoothing& smoothing) {
+  auto renderer = c10::make_intrusive<torch_op::BatchRenderer>(make_icosphere(0).faces, k_width, k_height,
+                                                               smoothing, open_device());
+  renderer->set("zfar", 20);
+  return renderer;
+}
+
+at::Tensor render(const c10::intrusive_ptr<torch_op::BatchRenderer>& renderer, const Inputs& in) {
+  return torch_op::render(renderer, in.vertices, in.colors, in.views, in.intrinsics, in.background);
+}
+
+/// The scene of a view, in double precision.
+reference::Scene reference_scene(const std::vector<std::vector<double>>& values, const Smoothing& smoothing,
+                                 std::size_t view, bool face_colors) {
+  const auto vector = [&](std::size_t tensor, std::size_t index) {
+    const double* v = values[tensor].data() + 3 * index;
+    return reference::Vec3d{v[0], v[1], v[2]};
+  };
+  reference::Scene scene;
+  scene.width = k_width;
+  scene.height = k_height;
+  scene.smoothing = pipeline::to_reference(smoothing);
+  reference::Mesh mesh;
+  const std::size_t vertices = values[0].size() / 3 / k_views, colors = values[1].size() / 3 / k_views;
+  for (std::size_t i = 0; i < vertices; ++i) mesh.positions.push_back(vector(0, view * vertices + i));
+  for (std::size_t i = 0; i < colors; ++i) {
+    (face_colors ? mesh.face_colors : mesh.vertex_colors).push_back(vector(1, view * colors + i));
+  }
+  for (const glm::uvec3& face : make_icosphere(0).faces) mesh.faces.push_back({face.x, face.y, face.z});
+  scene.meshes.push_back(mesh);
+  for (std::size_t i = 0; i < 16; ++i) scene.camera.view[i / 4][i % 4] = values[2][16 * view + i];
+  const double* k = values[3].data() + 4 * view;
+  scene.camera.intrinsics = {k[0], k[1], k[2], k[3]};
+  scene.camera.znear = 1;
+  scene.camera.zfar = 20;
+  scene.background = vector(4, 0);
+  return scene;
+}
+
+std::vector<double> to_doubles(const at::Tensor& tensor) {
+  const at::Tensor values = tensor.to(torch::kDouble).contiguous();
+  return {values.data_ptr<double>(), values.data_ptr<double>() + values.numel()};
+}
+
+/// Sum over the pixels of weight times value, of all views.
+double reference_loss(const std::vector<std::vector<double>>& values, const std::vector<double>& weights,
+                      const Smoothing& smoothing, bool face_colors) {
+  double loss = 0;
+  auto weight = weights.begin();
+  for (std::size_t view = 0; view < k_views; ++view) {
+    for (const double value : reference::render(reference_scene(values, smoothing, view, face_colors)).rgba) {
+      loss += *weight++ * value;
+    }
+  }
+  return loss;
+}
+
+void check_against_finite_differences(const char* preset, bool face_colors) {
+  constexpr double k_step = 1e-5, k_tolerance = 1e-3;
+  const Smoothing smoothing = smoothing_for_tests(preset);
+  Inputs in = make_inputs(face_colors);
+  std::vector<std::vector<double>> values;
+  for (at::Tensor* tensor : in.all()) {
+    values.push_back(to_doubles(*tensor));
+    tensor->requires_grad_();
+  }
+  const at::Tensor image = render(make_renderer(smoothing), in);
+  REQUIRE(image.sizes() == at::IntArrayRef({k_views, k_height, k_width, 4}));
+  const at::Tensor weights = random_like(image.detach(), -1.0F, 1.0F, 3);
+  const double loss = reference_loss(values, to_doubles(weights), smoothing, face_colors);
+  CHECK((image * weights).sum().item<float>() == doctest::Approx(loss).epsilon(1e-4));
+  (image * weights).sum().backward();
+  for (std::size_t t = 0; t < values.size(); ++t) {
+    std::vector<double> at = values[t], found = to_doubles(in.all()[t]->grad());
+    if (t == 2) {  // the last rows are no parameters
+      for (const std::size_t i : {12, 13, 14, 15, 28, 29, 30, 31}) CHECK(found[i] == 0.0);
+    }
+    const auto f = [&](const std::vector<double>& x) {
+      std::vector<std::vector<double>> moved = values;
+      moved[t] = x;
+      return reference_loss(moved, to_doubles(weights), smoothing, face_colors);
+    };
+    const reference::GradientCheck check = reference::check_gradient(f, at, found, k_step, k_tolerance);
+    CHECK_MESSAGE(check.passed, preset << ", tensor " << t << ", element " << check.worst << ": "
+                                       << check.found << ", not " << check.expected);
+    // The check can fail.
+    found[check.worst] +=
+        2 * k_tolerance *
+        std::abs(*std::ranges::max_element(found, {}, [](double v) { return std::abs(v); }));
+    CHECK_FALSE(reference::check_gradient(f, at, found, k_step, k_tolerance / 4).passed);
+  }
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const c10::Error& error) {
+    return error.what_without_backtrace();
+  }
+  return "no c10::Error";
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+TEST_SUITE("gradient") {
+  TEST_CASE("operator: all five gradients agree with differences in double precision") {
+    check_against_finite_differences("joint_gaussian", /*face_colors*/ false);
+    check_against_finite_differences("softras", /*face_colors*/ true);
+  }
+}
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("operator: one shape in several views gives the sum of what separate shapes give") {
+    const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
+    Inputs one = make_inputs();
+    one.vertices = one.vertices.slice(0, 0, 1).clone();
+    one.colors = one.colors.slice(0, 0, 1).clone();
+    Inputs several = one;
+    several.vertices = one.vertices.repeat({k_views, 1, 1});
+    several.colors = one.colors.repeat({k_views, 1, 1});
+    at::Tensor images[2];
+    for (Inputs* in : {&one, &several}) {
+      in->vertices.requires_grad_();
+      in->colors.requires_grad_();
+      at::Tensor& image = images[in == &several];
+      image = render(renderer, *in);
+      (image * random_like(image.detach(), -1, 1, 4)).sum().backward();
+    }
+    CHECK(images[0].equal(images[1]));
+    CHECK(one.vertices.grad().allclose(several.vertices.grad().sum(0, true), 1e-4, 1e-4));
+    CHECK(one.colors.grad().allclose(several.colors.grad().sum(0, true), 1e-4, 1e-4));
+    // The views' matrices need every view's vertices by themselves; the rest does not change.
+    const at::Tensor grad = one.vertices.grad().clone();
+    one.vertices.mutable_grad() = at::Tensor();
+    one.views.requires_grad_();
+    const at::Tensor image = render(renderer, one);
+    (image * random_like(image.detach(), -1, 1, 4)).sum().backward();
+    CHECK(one.vertices.grad().allclose(grad, 1e-4, 1e-4));
+  }
+
+  TEST_CASE("operator: graphs in flight do not disturb each other") {
+    const auto renderer = make_renderer(smoothing_for_tests("softras"));
+    Inputs in = make_inputs(), other = make_inputs();
+    other.vertices *= 0.5;
+    in.vertices.requires_grad_();
+    other.vertices.requires_grad_();
+    render(renderer, in).square().sum().backward();
+    const at::Tensor alone = in.vertices.grad().clone();
+    in.vertices.mutable_grad() = at::Tensor();
+    const at::Tensor first = render(renderer, in), second = render(renderer, other);
+    second.square().sum().backward();
+    first.square().sum().backward({}, /*keep_graph=*/true);
+    CHECK(in.vertices.grad().equal(alone));
+    first.square().sum().backward();
+    CHECK(in.vertices.grad().equal(alone + alone));
+    // Another topology with the same renderer is a matter of colours.
+    CHECK(render(renderer, make_inputs(/*face_colors=*/true)).isfinite().all().item<bool>());
+    CHECK(renderer->seconds() > 0);
+  }
+
+  TEST_CASE("operator: what is not contiguous, and what needs no gradient") {
+    const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
+    const Inputs in = make_inputs();
+    const at::Tensor image = render(renderer, in);
+    CHECK_FALSE(image.requires_grad());
+    Inputs strided = in;
+    strided.vertices = in.vertices.transpose(0, 2).contiguous().transpose(0, 2);
+    strided.views = in.views.transpose(1, 2).contiguous().transpose(1, 2);
+    REQUIRE_FALSE(strided.vertices.is_contiguous());
+    CHECK(render(renderer, strided).equal(image));
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("operator: wrong tensors are torch errors with our words, and the renderer goes on") {
+    const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
+    const Inputs good = make_inputs();
+    const at::Tensor expected = render(renderer, good);
+    const auto message = [&](const std::function<void(Inputs&)>& spoil) {
+      return message_of([&] {
+        Inputs in = good;
+        spoil(in);
+        render(renderer, in);
+      });
+    };
+    CHECK(has(message([](Inputs& in) { in.vertices = in.vertices.to(torch::kDouble); }),
+              "vertices (dpr::render)"));
+    CHECK(has(message([](Inputs& in) { in.vertices = in.vertices.squeeze(0)[0]; }), "[12, 3]"));
+    CHECK(has(message([](Inputs& in) {
+                in.vertices = in.vertices.repeat({2, 1, 1});
+              }),
+              "1 or 2, one a view"));
+    CHECK(has(message([](Inputs& in) { in.vertices = in.vertices.slice(1, 0, 5); }), "colors (dpr::render)"));
+    CHECK(has(message([](Inputs& in) {
+                in.vertices = in.vertices.slice(1, 0, 5);
+                in.colors = in.colors.slice(1, 0, 5);
+              }),
+              "faces"));
+    CHECK(has(message([](Inputs& in) { in.vertices = in.vertices * NAN; }), "finite"));
+    CHECK(has(message([](Inputs& in) { in.colors = in.colors.slice(1, 0, 7); }),
+              "one a vertex, or 20, one a face"));
+    CHECK(has(message([](Inputs& in) { in.views = in.views * 0.0; }), "view"));
+    CHECK(has(message([](Inputs& in) { in.views = in.views.slice(0, 0, 0); }), "at least one view"));
+    CHECK(has(message([](Inputs& in) { in.intrinsics = in.intrinsics * -1.0; }), "fx"));
+    CHECK(has(message([](Inputs& in) { in.background = in.background.to(torch::kInt); }), "CPUIntType"));
+    CHECK(has(message_of([&] { renderer->set("sigma", -1); }), "sigma"));
+    CHECK(has(message_of([&] { renderer->set("samples", 2.5); }), "a whole number"));
+    CHECK(has(message_of([&] { renderer->set("nothing", 1); }), "name (dpr::Renderer.set)"));
+    const at::Tensor faces = torch::tensor({{0, 1, 2}});
+    const auto make = [&](const at::Tensor& f, std::int64_t size, const char* preset) {
+      return message_of([&] { torch_op::BatchRenderer(f, size, size, preset, ""); });
+    };
+    CHECK(has(make(faces.to(torch::kFloat), 8, "softras"), "faces (dpr::Renderer)"));
+    CHECK(has(make(-faces, 8, "softras"), "indices of vertices"));
+    CHECK(has(make(faces, 0, "softras"), "width (dpr::Renderer)"));
+    CHECK(has(make(faces, 8, "hard"), "preset"));
+    CHECK(render(renderer, good).equal(expected));
+  }
+}
+
+}  // namespace dpr::test

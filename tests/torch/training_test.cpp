@@ -1,0 +1,162 @@
+// Training learns, goes on where it stopped, and says what is wrong with what it is given.
+#include <doctest/doctest.h>
+#include <torch/torch.h>
+
+#include <cmath>
+
+#include "dpr/error.hpp"
+#include "learn/generate.hpp"
+#include "support/messages.hpp"
+#include "support/temp_dir.hpp"
+#include "torch/checkpoint.hpp"
+#include "torch/evaluation.hpp"
+#include "torch/learning.hpp"
+
+namespace dpr::test {
+namespace {
+
+using namespace learn;
+
+std::vector<std::size_t> two_classes() { return {find_class("table"), find_class("car")}; }
+
+/// A data set of a few objects, made once.
+const std::filesystem::path& data_folder() {
+  static const TempDir folder;
+  static const bool made = [] {
+    generate(open_device(), {two_classes(), {8, 2, 2}, 3}, folder.path(),
+             [](std::size_t, std::size_t, const std::string&) {});
+    return true;
+  }();
+  static_cast<void>(made);
+  return folder.path();
+}
+
+Dataset read(Split split) { return {data_folder(), split, two_classes()}; }
+
+TrainingOptions small_options(const std::string& method) {
+  TrainingOptions options;
+  options.method = method;
+  options.batch = 4;
+  options.steps = 6;
+  options.checkpoint_every = 2;
+  options.palette = 5;
+  return options;
+}
+
+TrainingResult run(const TrainingOptions& options, const TempDir& folder) {
+  return train(open_device(), read(Split::train), read(Split::val), options, folder.path(),
+               [](const TrainingProgress&) {});
+}
+
+std::string message(const TrainingOptions& options, const TempDir& folder) {
+  return message_of<Error>([&] { run(options, folder); });
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("network: shapes, ranges, and a start at the sphere") {
+    LoadedCheckpoint fresh = start({7}, "softras", 3, 1e-4);
+    torch::manual_seed(1);
+    const at::Tensor images = torch::rand({3, 4, 64, 64});
+    const Reconstruction found = fresh.network->forward(images);
+    CHECK(found.vertices.sizes() == at::IntArrayRef({3, 642, 3}));
+    CHECK(found.colors.sizes() == at::IntArrayRef({3, 642, 3}));
+    CHECK(found.colors.min().item<float>() >= 0);
+    CHECK(found.colors.max().item<float>() <= 1);
+    const at::Tensor radius = found.vertices.norm(2, {2});
+    CHECK(radius.min().item<float>() > 0.15F);
+    CHECK(radius.max().item<float>() < 0.35F);
+    // A palette's colours are those of the object: of a red object on nothing, red.
+    at::Tensor red = torch::zeros({2, 4, 64, 64});
+    red.slice(2, 20, 40).select(1, 0) = 0.8;
+    red.slice(2, 20, 40).select(1, 3) = 1.0;
+    const at::Tensor color = fresh.network->forward(red).colors.flatten(0, 1).mean(0);
+    CHECK(color[0].item<float>() == doctest::Approx(0.8).epsilon(0.02));
+    CHECK(color[1].item<float>() < 0.02F);
+  }
+}
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("training: interrupted and resumed gives the same losses, bit by bit") {
+    for (const char* method : {"joint_gaussian", "paper_gaussian"}) {
+      CAPTURE(std::string(method));
+      TrainingOptions options = small_options(method);
+      const TempDir whole, parts;
+      const std::vector<double> expected = run(options, whole).losses;
+      REQUIRE(expected.size() == 6);
+      options.steps = 3;
+      CHECK(run(options, parts).losses.size() == 3);
+      options.steps = 6;
+      CHECK(run(options, parts).losses == expected);
+      CHECK(whole.read("losses.csv") == parts.read("losses.csv"));
+      CHECK(parts.entries() == 2);  // checkpoint and losses
+      options.seed = 2;
+      const TempDir other;
+      CHECK(run(options, other).losses != expected);
+    }
+  }
+
+  TEST_CASE("training: in a minute it learns shapes far better than the sphere's") {
+    TrainingOptions options;
+    options.batch = 8;
+    options.steps = 120;
+    options.learning_rate = 3e-4;
+    options.checkpoint_every = 1000;
+    const TempDir folder;
+    const TrainingResult result = run(options, folder);
+    CHECK(result.losses.back() < 0.75 * result.losses.front());
+    double found = 0, sphere = 0;
+    for (const ClassIou& row :
+         evaluate(folder / "checkpoint.pt", read(Split::test), 4, [](std::size_t, std::size_t) {})) {
+      CHECK(row.images == 8);
+      found += row.iou / 2;
+      sphere += row.sphere / 2;
+    }
+    MESSAGE("IoU " << found << ", of the sphere " << sphere << ", loss " << result.losses.front() << " to "
+                   << result.losses.back());
+    CHECK(found > sphere + 0.1);
+    const Image figure = show(open_device(), folder / "checkpoint.pt", read(Split::test), 0);
+    CHECK(figure.height == 2 * 128);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("training: checkpoints that do not fit, and options out of range") {
+    const TempDir folder;
+    const TrainingOptions options = small_options("softras");
+    run(options, folder);
+    TrainingOptions other = options;
+    other.palette = 9;
+    CHECK(contains(message(other, folder), "5 palette colours"));
+    other = options;
+    other.method = "joint_gaussian";
+    CHECK(contains(message(other, folder), "softras with seed 1"));
+    other.method = "rigid";
+    CHECK(contains(message(other, TempDir()), "one that has gradients"));
+    other.method = "hard";
+    CHECK(contains(message(other, TempDir()), "preset"));
+    other = options;
+    other.batch = 1;
+    CHECK(contains(message(other, folder), "batch (dpr learn)"));
+    other = options;
+    other.sigma = -1.0F;
+    CHECK(contains(message(other, folder), "sigma"));
+
+    const auto read_message = [](const std::filesystem::path& file) {
+      return message_of<IoError>([&] { load_checkpoint(file, 1e-4); });
+    };
+    CHECK(contains(read_message(folder / "missing.pt"), "does not exist"));
+    CHECK(contains(read_message(folder.write("text.pt", "no checkpoint")), "no checkpoint of dpr learn"));
+    const std::string good = folder.read("checkpoint.pt");
+    CHECK(contains(read_message(folder.write("cut.pt", good.substr(0, good.size() / 2))), "damaged"));
+    torch::serialize::OutputArchive foreign;
+    foreign.write("description", c10::IValue(std::string(R"({"architecture": "another one"})")));
+    foreign.save_to((folder / "foreign.pt").string());
+    CHECK(contains(read_message(folder / "foreign.pt"), "another architecture: \"another one\""));
+    torch::save(torch::ones({2}), (folder / "tensor.pt").string());
+    CHECK(contains(read_message(folder / "tensor.pt"), "no checkpoint of dpr learn"));
+  }
+}
+
+}  // namespace dpr::test
