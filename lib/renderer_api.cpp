@@ -129,7 +129,7 @@ Image Renderer::image(std::size_t view) const {
 }
 
 void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
-  const Impl& m = *impl_;
+  Impl& m = *impl_;
   m.require_forward("Renderer::read_pixels");
   require_pixel_count(pixels.size(), m.aggregate.image.size());
   check_cl(m.device.impl().queue.enqueueReadBuffer(m.aggregate.image.cl_buffer(), CL_TRUE, 0,

@@ -28,13 +28,12 @@ std::string command_name(const CLI::App& application) {
 }
 
 int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
-  // --help and --version arrive as errors too.
-  if (error.get_exit_code() == 0) return application.exit(error);
   const std::string name = command_name(application);
   const auto unknown = application.remaining();
-  const std::string problem = name == application.get_name() && !unknown.empty()
-                                  ? "no such command: " + unknown.front()
-                                  : std::string(error.what());
+  const bool is_unknown = name == application.get_name() && !unknown.empty();
+  // --help and --version arrive as errors too.
+  if (error.get_exit_code() == 0 && !is_unknown) return application.exit(error);
+  const std::string problem = is_unknown ? "no such command: " + unknown.front() : std::string(error.what());
   return fail(
       "arguments (" + name + "): got \"" + problem + "\", expected what \"" + name + " --help\" describes",
       k_wrong_input);

@@ -1,11 +1,7 @@
+// Pictures put together for reports.
 #include "cli/pictures.hpp"
 
 namespace dpr::cli {
-
-Image opaque(Image image) {
-  for (glm::vec4& pixel : image.pixels) pixel.a = 1;
-  return image;
-}
 
 Image vstack(const std::vector<Image>& rows, int gap) {
   Image sheet;

@@ -7,10 +7,6 @@
 
 namespace dpr::cli {
 
-/// Colours as they are seen over the background: the silhouette in the alpha channel would make the picture
-/// transparent.
-Image opaque(Image image);
-
 /// Rows below each other, with a gap between them. All must have the same width; at least one.
 Image vstack(const std::vector<Image>& rows, int gap = 2);
 

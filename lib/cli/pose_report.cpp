@@ -7,7 +7,6 @@
 #include <iterator>
 #include <memory>
 
-#include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"

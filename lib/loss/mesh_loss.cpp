@@ -110,7 +110,7 @@ MeshLoss& MeshLoss::operator=(MeshLoss&&) noexcept = default;
 
 double MeshLoss::evaluate(const Renderer& renderer, std::size_t mesh) {
   Impl& m = *impl_;
-  const Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = renderer.impl();
   r.require_forward("MeshLoss::evaluate");
   if (mesh >= r.geometry->meshes.size()) {
     throw InvalidArgument("mesh (mesh loss)", std::to_string(mesh),
