@@ -111,8 +111,11 @@ class Renderer {
   const Scene& scene() const;
   std::span<const View> views() const;
 
-  /// Renders every view. Blocks only to read the sizes it needs to allocate: of the pairs, and of the
-  /// fragments. Throws InvalidArgument where they do not fit the device's memory budget.
+  /// Renders every view. The first frame of a scene, and one in several bands, blocks to read the sizes to
+  /// allocate: of the pairs, and of the fragments. Later frames are enqueued without a wait, for the buffers
+  /// that are there; where they turn out too small, the first call that needs the frame (image(), backward(),
+  /// a loss, ...) renders it again. Throws InvalidArgument where a frame does not fit the device's memory
+  /// budget; then that call may be the one to throw.
   void forward();
   /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
   Image image(std::size_t view = 0) const;
