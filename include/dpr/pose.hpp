@@ -32,7 +32,8 @@ double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with Jacobians from differences of images rendered in the same
 /// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
-/// composition with a blur that follows the pixels; the scene's is not used.
+/// composition with a blur that follows the pixels; the scene's is not used. Levels whose pixels are much
+/// larger than the mesh's triangles work on a coarser mesh.
 struct LeastSquares {
   /// Rotations tried at the coarsest level, spread evenly over all; 0: only the poses that solve() is given.
   unsigned rotations = 1152;

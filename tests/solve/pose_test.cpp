@@ -207,6 +207,17 @@ TEST_SUITE("pipeline") {
     CHECK(errors[2] < 3);
   }
 
+  TEST_CASE("least squares: triangles much smaller than the coarse pixels are no hindrance") {
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(reduced(64, 8));
+    dpr::Mesh& mesh = scene.meshes.front().mesh;
+    mesh = dpr::make_icosphere(static_cast<unsigned>(reduced(5, 1)));
+    for (glm::vec3& p : mesh.positions) p *= glm::vec3(1.6F, 1.0F, 0.6F);
+    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = least_squares()});
+    const dpr::PoseResult result = solver.solve(turned(70));
+    if (!is_reduced()) CHECK(error_degrees(result) < 1);
+  }
+
   TEST_CASE("least squares: several initial poses and no others") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(reduced(64, 8));
