@@ -111,6 +111,7 @@ std::vector<Method> make_methods(bool smoke) {
     options.iterations = 40;
     options.remesh_interval = 10;
     options.learning_rate = 0.1;
+    options.lambda = 2;  // a mesh this small is stiff
   }
   ShapeOptions paper = options;  // its weights (74) and regulariser (77), Adam on the positions
   paper.steps = ShapeSteps::direct;
