@@ -268,6 +268,11 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
   require(positive(o.edge_pixels), "edge_pixels (shape)", o.edge_pixels, "a finite number above 0");
   require(positive(o.blur), "blur (shape)", o.blur, "a finite number above 0");
   require(positive(o.blur_end), "blur_end (shape)", o.blur_end, "a finite number above 0");
+  const bool all_have_alpha = std::ranges::all_of(views.views, &ShapeView::has_alpha);
+  if (!all_have_alpha && !(o.loss.mse + o.loss.l1 > 0)) {
+    throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
+                          "one of colours too");
+  }
   require(o.lambda >= 0 && std::isfinite(o.lambda), "lambda (shape)", o.lambda,
           "a finite number, at least 0");
   require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");

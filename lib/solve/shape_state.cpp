@@ -1,7 +1,6 @@
 // Checkpoints: CBOR by nlohmann's library, which keeps every bit of a double, and a checksum of the content.
 #include "solve/shape_state.hpp"
 
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>

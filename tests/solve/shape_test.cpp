@@ -210,6 +210,8 @@ TEST_SUITE("robustness") {
     refuses(nothing, [](ShapeOptions& o) { o.lambda = -1; });
     refuses(nothing, [](ShapeOptions& o) { o.learning_rate = 0; });
     refuses(nothing, [](ShapeOptions& o) { o.loss = {}; });
+    refuses([](ShapeViews& v) { v.views[0].has_alpha = false; },
+            [](ShapeOptions& o) { o.loss = {.silhouette = 1}; });
     refuses(nothing, [](ShapeOptions& o) { o.regularizers.laplacian = -1; });
   }
 
