@@ -71,7 +71,7 @@ TEST_SUITE("unit") {
         }
         CHECK(make_object(c, seed).positions == mesh.positions);
         CHECK(make_object(c, seed + 100).positions != mesh.positions);
-        CHECK(voxelize(mesh, k_voxel_resolution, voxel_bounds()).count() > 200);
+        CHECK(voxelize(mesh, k_voxel_resolution, voxel_bounds()).count() > 100);
       }
     }
     CHECK(find_class("02691156") == find_class("airplane"));

@@ -42,11 +42,14 @@ struct Outcome {
 inline Outcome run_program(const std::string& program, const TempDir& folder,
                            const std::vector<std::string>& arguments, const std::string& environment = "") {
   const TempDir streams;
-  std::string line = "cd " + quoted(folder.path().string()) + " && env " +
-                     (environment.empty() ? "" : quoted(environment) + " ") + quoted(program);
-  for (const std::string& argument : arguments) line += " " + quoted(argument);
-  line +=
-      " >" + quoted((streams / "out").string()) + " 2>" + quoted((streams / "err").string()) + " </dev/null";
+  // Appended piece by piece: at sums of strings GCC 12 gives a false alarm (its bug 105651).
+  std::string line = "cd ";
+  line.append(quoted(folder.path().string())).append(" && env ");
+  if (!environment.empty()) line.append(quoted(environment)).append(" ");
+  line.append(quoted(program));
+  for (const std::string& argument : arguments) line.append(" ").append(quoted(argument));
+  line.append(" >").append(quoted((streams / "out").string()));
+  line.append(" 2>").append(quoted((streams / "err").string())).append(" </dev/null");
   const int result = std::system(line.c_str());
   Outcome outcome;
   if (WIFEXITED(result)) outcome.status = WEXITSTATUS(result);

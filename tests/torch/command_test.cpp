@@ -7,9 +7,10 @@
 namespace dpr::test {
 namespace {
 
-Outcome learn(const TempDir& folder, std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "learn");
-  return run_program(program_path("DPR_CLI"), folder, arguments);
+Outcome learn(const TempDir& folder, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words{"learn"};
+  for (const std::string& argument : arguments) words.push_back(argument);
+  return run_program(program_path("DPR_CLI"), folder, words);
 }
 
 void check_refused(const Outcome& outcome, const std::string& part) {
@@ -30,7 +31,7 @@ TEST_SUITE("robustness") {
     CHECK(contains(outcome.out, "contact_sheet.png"));
     const std::vector<std::string> data{"--data", "data", "--classes", "sofa"};
     const auto with_data = [&](std::vector<std::string> words) {
-      words.insert(words.end(), data.begin(), data.end());
+      for (const std::string& word : data) words.push_back(word);
       return learn(folder, words);
     };
     outcome = with_data({"train", "-o", "run", "--steps", "2", "--batch", "2"});
