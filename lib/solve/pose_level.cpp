@@ -82,7 +82,7 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.width = scaled(scene.width, full, short_side);
   result.height = scaled(scene.height, full, short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
-  simplify(result, space);
+  if (short_side < full) simplify(result, space);  // the answer comes from the mesh itself
   result.smoothing = level_smoothing(result, space, options, blur);
   result.gradients = {false, false, false, false, false, false, false};
   return result;
