@@ -34,7 +34,7 @@ Image contact_sheet(const Device& device, Scene scene, const std::string& preset
     for (const float sigma : k_sigmas) {
       renderer.set_smoothing(make_smoothing(preset, sigma, gamma));
       renderer.forward();
-      row.push_back(cli::opaque(renderer.image()));
+      row.push_back(opaque(renderer.image()));
     }
     rows.push_back(hstack(row, k_gap));
   }

@@ -147,7 +147,7 @@ double psnr(const std::vector<Image>& images, const std::vector<Image>& targets)
 
 Image row_of(const std::vector<Image>& images) {
   std::vector<Image> shown(images.begin(), images.begin() + k_shown);
-  for (Image& image : shown) image = cli::opaque(std::move(image));
+  for (Image& image : shown) image = opaque(std::move(image));
   return hstack(shown);
 }
 

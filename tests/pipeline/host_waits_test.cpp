@@ -78,7 +78,7 @@ TEST_SUITE("pipeline") {
         CHECK(waits_of_forward(renderer) == 0);
         CHECK(equals_fresh_render(renderer));
       }
-      // As many pairs, more fragments; and out of nothing.
+      // A wider blur, with more fragments; and out of nothing.
       Smoothing wide = scene.smoothing;
       wide.sigma *= 4;
       renderer.set_smoothing(wide);
