@@ -233,7 +233,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::antithetic, 2)),
                           "samples (smoothing): got 2 with leave_one_out, expected at least 4");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::stratified, 8)),
-                          "variance_reduction (smoothing): got leave_one_out with stratified draws");
+                          "variance_reduction (smoothing): got leave_one_out (the default) with stratified draws");
     Smoothing gumbel = sampled(none, Draws::antithetic, 8);
     gumbel.depth_prior = Prior::gumbel;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(gumbel),
