@@ -7,6 +7,7 @@
 
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
+#include "cli/text.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 
@@ -54,6 +55,16 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   return camera;
 }
 
+/// The expected rigid image with edges blurred by a quarter of a pixel: what a picture of a mesh is to look
+/// like.
+Smoothing picture_smoothing(int width, int height) {
+  constexpr float k_blur_pixels = 0.25F;
+  const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(width, height));  // NDC
+  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  smoothing.sigma = blur * blur;
+  return smoothing;
+}
+
 /// A soft light from above the camera's left shoulder.
 Lights fit_lights(const Camera& camera, const Sphere& sphere) {
   const glm::mat4 to_world = glm::inverse(camera.view);
@@ -72,8 +83,9 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   constexpr int k_size = 256;
   Scene scene;
   scene.width = scene.height = k_size;
-  scene.smoothing = smoothing_preset("joint_gaussian");
   scene.meshes.push_back({read_mesh(options.mesh), glm::mat4(1.0F)});
+  const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
+  scene.smoothing = picture_smoothing(size.x, size.y);
   apply(common, scene);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
   scene.camera = fit_camera(sphere, options, scene.width, scene.height);
@@ -114,8 +126,10 @@ void run(const RenderOptions& options, CommonOptions& common) {
 void add_render_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand("render", "Renders a mesh or a scene");
   const auto options = std::make_shared<RenderOptions>();
-  auto* mesh = command->add_option("MESH", options->mesh,
-                                   "Mesh file (OBJ, PLY, OFF, STL); camera and light are fitted to it");
+  auto* mesh = command->add_option(
+      "MESH", options->mesh,
+      "Mesh file (OBJ, PLY, OFF, STL); camera, light and a blur of a quarter of a pixel are fitted to "
+      "it");
   mesh->type_name("");
   command->add_option("--scene", options->scene, "Scene file, instead of MESH")
       ->type_name("S.json")
