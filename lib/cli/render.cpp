@@ -55,13 +55,14 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   return camera;
 }
 
-/// The expected rigid image with edges blurred by a quarter of a pixel: what a picture of a mesh is to look
-/// like.
+/// For a picture: edges blurred by a quarter of a pixel, and little depth noise. In the joint composition the
+/// seams of triangles as small as pixels would show.
 Smoothing picture_smoothing(int width, int height) {
-  constexpr float k_blur_pixels = 0.25F;
+  constexpr float k_blur_pixels = 0.25F, k_gamma = 1e-3F;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(width, height));  // NDC
-  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  Smoothing smoothing;
   smoothing.sigma = blur * blur;
+  smoothing.gamma = k_gamma;
   return smoothing;
 }
 
