@@ -21,7 +21,7 @@ std::vector<std::uint8_t> numbers(std::size_t count) {
   return values;
 }
 
-void put(std::string& bytes, std::uint32_t value, int count) {
+void put(std::string& bytes, std::uint64_t value, int count) {
   for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
 }
 
