@@ -21,8 +21,9 @@ std::vector<std::uint8_t> numbers(std::size_t count) {
   return values;
 }
 
-void put(std::string& bytes, std::uint64_t value, int count) {
-  for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
+/// Little-endian, with zeros after the value's own bytes.
+void put(std::string& bytes, std::uint32_t value, int count) {
+  for (int i = 0; i < count; ++i, value >>= 8U) bytes += static_cast<char>(value & 0xff);
 }
 
 std::uint32_t crc32(const std::string& bytes) {
