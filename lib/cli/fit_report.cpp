@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 
 #include "cli/folder.hpp"
@@ -12,7 +11,6 @@
 #include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
-#include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "scene/temporary_file.hpp"
 
@@ -98,27 +96,24 @@ Json to_json(const ShapeResult& result) {
 
 void write_page(const std::filesystem::path& file, const ShapeResult& result, bool has_iterations,
                 bool has_plot) {
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path());
-  write_page_head(out, "Shape");
-  out << "<table>\n";
-  write_row(out, "vertices", std::to_string(result.mesh.positions.size()));
-  write_row(out, "triangles", std::to_string(result.mesh.faces.size()));
-  if (!result.history.empty()) write_row(out, "loss", format("%.4g", result.history.back().loss));
-  write_row(out, "iterations", std::to_string(result.history.size()));
-  write_row(out, "seconds", format("%.1f", result.seconds));
-  out << "</table>\n<h2>Images, and the shape from there</h2>\n";
-  write_wide_picture(out, "targets.png", "images");
-  write_wide_picture(out, "results.png", "the shape as the same cameras see it");
-  out << "<h2>Turntable</h2>\n";
-  write_wide_picture(out, "turntable.png", "turntable");
-  if (has_iterations || has_plot) out << "<h2>On the way</h2>\n";
-  if (has_iterations) write_wide_picture(out, "iterations.png", "iterations");
-  if (has_plot) write_wide_picture(out, "plot.png", "loss, smoothing and vertices");
-  write_page_end(out);
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) {
+    write_page_head(out, "Shape");
+    out << "<table>\n";
+    write_row(out, "vertices", std::to_string(result.mesh.positions.size()));
+    write_row(out, "triangles", std::to_string(result.mesh.faces.size()));
+    if (!result.history.empty()) write_row(out, "loss", format("%.4g", result.history.back().loss));
+    write_row(out, "iterations", std::to_string(result.history.size()));
+    write_row(out, "seconds", format("%.1f", result.seconds));
+    out << "</table>\n<h2>Images, and the shape from there</h2>\n";
+    write_wide_picture(out, "targets.png", "images");
+    write_wide_picture(out, "results.png", "the shape as the same cameras see it");
+    out << "<h2>Turntable</h2>\n";
+    write_wide_picture(out, "turntable.png", "turntable");
+    if (has_iterations || has_plot) out << "<h2>On the way</h2>\n";
+    if (has_iterations) write_wide_picture(out, "iterations.png", "iterations");
+    if (has_plot) write_wide_picture(out, "plot.png", "loss, smoothing and vertices");
+    write_page_end(out);
+  });
 }
 
 }  // namespace

@@ -2,9 +2,8 @@
 #include "cli/json.hpp"
 
 #include <charconv>
-#include <fstream>
+#include <ostream>
 
-#include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
@@ -75,12 +74,7 @@ std::string to_text(const Json& json) {
 }
 
 void write_json(const std::filesystem::path& file, const Json& json) {
-  TemporaryFile temporary(file);
-  std::ofstream stream(temporary.path(), std::ios::binary);
-  stream << to_text(json);
-  stream.close();
-  if (!stream) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) { out << to_text(json); });
 }
 
 }  // namespace dpr::cli

@@ -2,11 +2,9 @@
 #include "cli/pose_page.hpp"
 
 #include <cmath>
-#include <fstream>
 #include <string>
 
 #include "cli/page.hpp"
-#include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
@@ -50,22 +48,19 @@ void write_equals(std::ostream& out, const PoseResult& result) {
 
 void write_pose_page(const std::filesystem::path& file, const PoseResult& result, bool has_plot,
                      const std::optional<glm::dmat3>& truth) {
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path());
-  write_page_head(out, "Pose");
-  write_numbers(out, result, truth);
-  write_picture(out, "target.png", "target");
-  write_picture(out, "start.png", "start");
-  write_picture(out, "end.png", "end");
-  write_picture(out, "difference.png", "difference of end and target");
-  write_equals(out, result);
-  out << "<h2>On the way</h2>\n";
-  write_wide_picture(out, "iterations.png", "iterations");
-  if (has_plot) write_wide_picture(out, "plot.png", "loss, angle and smoothing");
-  write_page_end(out);
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) {
+    write_page_head(out, "Pose");
+    write_numbers(out, result, truth);
+    write_picture(out, "target.png", "target");
+    write_picture(out, "start.png", "start");
+    write_picture(out, "end.png", "end");
+    write_picture(out, "difference.png", "difference of end and target");
+    write_equals(out, result);
+    out << "<h2>On the way</h2>\n";
+    write_wide_picture(out, "iterations.png", "iterations");
+    if (has_plot) write_wide_picture(out, "plot.png", "loss, angle and smoothing");
+    write_page_end(out);
+  });
 }
 
 }  // namespace dpr::cli

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <ostream>
 
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"
@@ -56,15 +56,12 @@ void append_planes(const Image& image, std::vector<std::uint8_t>& planes) {
 
 void write_ids(const std::filesystem::path& file, std::size_t object_class, std::uint64_t seed, Split split,
                std::size_t objects) {
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path());
-  for (std::size_t i = 0; i < objects; ++i) {
-    out << object_classes()[object_class].synset << '/' << std::hex
-        << object_seed(seed, object_class, split, i) << '\n';
-  }
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) {
+    for (std::size_t i = 0; i < objects; ++i) {
+      out << object_classes()[object_class].synset << '/' << std::hex
+          << object_seed(seed, object_class, split, i) << '\n';
+    }
+  });
 }
 
 }  // namespace

@@ -297,12 +297,7 @@ void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
   }
   validate(mesh, "mesh for " + file.string());
   const std::string text = extension == ".obj" ? obj_text(file, mesh) : ply_text(mesh);
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path(), std::ios::binary);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) { out << text; });
 }
 
 }  // namespace dpr

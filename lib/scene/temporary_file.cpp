@@ -1,6 +1,7 @@
 // Temporary files in the folder of their target, so that the rename at the end stays on one file system.
 #include "scene/temporary_file.hpp"
 
+#include <fstream>
 #include <random>
 #include <string>
 #include <system_error>
@@ -39,6 +40,15 @@ void TemporaryFile::commit() {
   std::filesystem::rename(path_, target_, error);
   if (error) throw IoError(target_, "cannot be written: " + error.message());
   committed_ = true;
+}
+
+void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write) {
+  TemporaryFile temporary(file);
+  std::ofstream out(temporary.path(), std::ios::binary);
+  write(out);
+  out.close();
+  if (!out) throw IoError(file, "cannot be written");
+  temporary.commit();
 }
 
 }  // namespace dpr

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <iosfwd>
 
 namespace dpr {
 
@@ -24,5 +26,9 @@ class TemporaryFile {
   std::filesystem::path target_, path_;
   bool committed_ = false;
 };
+
+/// Writes what `write` puts into the stream (binary) to a temporary file, which then becomes `file`. Throws
+/// IoError; what `write` throws passes through, and leaves nothing behind.
+void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write);
 
 }  // namespace dpr

@@ -183,12 +183,9 @@ void write_checkpoint(const std::filesystem::path& file, const ShapeState& state
                                                          {"fingerprint", fingerprint},
                                                          {"checksum", hash_of(content)},
                                                          {"content", json::binary(content)}});
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path(), std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) {
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  });
 }
 
 ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint) {

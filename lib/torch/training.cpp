@@ -3,8 +3,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <numeric>
+#include <ostream>
 #include <random>
 
 #include "dpr/error.hpp"
@@ -169,19 +169,16 @@ class Trainer {
 };
 
 void write_losses(const std::filesystem::path& file, const std::vector<StepRecord>& steps) {
-  TemporaryFile temporary(file);
-  std::ofstream out(temporary.path());
-  out << "step,loss,silhouette,color,laplacian\n";
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    out << i + 1;
-    for (const double value : {steps[i].loss, steps[i].silhouette, steps[i].color, steps[i].laplacian}) {
-      out << ',' << checks::text(value);
+  write_whole_file(file, [&](std::ostream& out) {
+    out << "step,loss,silhouette,color,laplacian\n";
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      out << i + 1;
+      for (const double value : {steps[i].loss, steps[i].silhouette, steps[i].color, steps[i].laplacian}) {
+        out << ',' << checks::text(value);
+      }
+      out << '\n';
     }
-    out << '\n';
-  }
-  out.close();
-  if (!out) throw IoError(file, "cannot be written");
-  temporary.commit();
+  });
 }
 
 void check(const TrainingOptions& options) {
