@@ -2,7 +2,6 @@
 #include <memory>
 #include <sstream>
 
-#include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -38,7 +37,7 @@ Image contact_sheet(const Device& device, Scene scene, const std::string& preset
     }
     rows.push_back(hstack(row, k_gap));
   }
-  return cli::vstack(rows, k_gap);
+  return vstack(rows, k_gap);
 }
 
 /// Labels in the middle of tiles.

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cli/fit_report.hpp"
-#include "cli/pictures.hpp"
 #include "dpr/shape.hpp"
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
@@ -197,7 +196,7 @@ class Trial {
   }
 
   /// Truth above the last result, from views held out.
-  Image picture() const { return cli::vstack({row_of(targets_), row_of(render(result_, held_out_))}); }
+  Image picture() const { return vstack({row_of(targets_), row_of(render(result_, held_out_))}); }
   const std::string& name() const { return shape_.name; }
   const Mesh& result() const { return result_; }
 
@@ -235,7 +234,7 @@ void run_shapes(const Settings& settings) {
     pictures.push_back(trial.picture());
     write_mesh(settings.folder / (trial.name() + ".ply"), trial.result());
   }
-  write_image(settings.folder / "shapes.png", cli::vstack(pictures, 8));
+  write_image(settings.folder / "shapes.png", vstack(pictures, 8));
   announce(settings, "shapes.png");
   for (std::size_t i = 1; i < methods.size(); ++i) run(trials.front(), methods[i]);
 }

@@ -44,8 +44,12 @@ void write_image(const std::filesystem::path& file, const Image& image);
 /// The same with alpha 1: for viewers, which would blend colours by the silhouette that were blended already.
 Image opaque(Image image);
 
-/// Images side by side, with a gap between them, for strips. All must have the same height. Empty in, empty
-/// out.
+/// Images side by side, with a gap between them (pixels, filled), for strips. Empty in, empty out. Throws
+/// InvalidArgument unless all have the same height and the gap is >= 0.
 Image hstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));
+
+/// Images below each other, the first on top, with a gap between them (pixels, filled), for sheets. Empty in,
+/// empty out. Throws InvalidArgument unless all have the same width and the gap is >= 0.
+Image vstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));
 
 }  // namespace dpr

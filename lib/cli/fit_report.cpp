@@ -8,7 +8,6 @@
 
 #include "cli/folder.hpp"
 #include "cli/page.hpp"
-#include "cli/pictures.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "dpr/renderer.hpp"

@@ -72,12 +72,6 @@ Image enlarged_input(const Image& input) {
   return image;
 }
 
-void paste(const Image& part, Image& whole, int top) {
-  for (int y = 0; y < part.height; ++y) {
-    for (int x = 0; x < part.width; ++x) whole.at(x, top + y) = part.at(x, y);
-  }
-}
-
 }  // namespace
 
 at::Tensor load_images(const Dataset& dataset, const std::vector<ViewOfObject>& which) {
@@ -154,7 +148,7 @@ Image show(const Device& device, const std::filesystem::path& checkpoint, const 
   LoadedCheckpoint loaded = load_checkpoint(checkpoint, TrainingOptions{}.learning_rate);
   const EvaluationMode mode(loaded.network);
   Renderer renderer(device);
-  Image figure;
+  std::vector<Image> rows;
   for (std::size_t c = 0; c < dataset.classes().size(); ++c) {
     const std::size_t first = dataset.first_object(c), count = dataset.first_object(c + 1) - first;
     const ViewOfObject which{first + number % count,
@@ -163,12 +157,9 @@ Image show(const Device& device, const std::filesystem::path& checkpoint, const 
     std::vector<Image> row{enlarged_input(to_image(dataset.image(which.first, which.second)))};
     const Mesh mesh = to_mesh(loaded.network->forward(images), 0);
     std::ranges::move(portraits(renderer, mesh, which.second), std::back_inserter(row));
-    const Image strip = hstack(row);
-    if (c == 0)
-      figure = Image(strip.width, strip.height * static_cast<int>(dataset.classes().size()), glm::vec4(1));
-    paste(strip, figure, static_cast<int>(c) * strip.height);
+    rows.push_back(hstack(row));
   }
-  return figure;
+  return vstack(rows, /*gap=*/0);
 }
 
 }  // namespace dpr::learn

@@ -114,6 +114,20 @@ TEST_SUITE("unit") {
       CHECK(strip.at(3, row) == glm::vec4(0.5F));
     }
   }
+
+  TEST_CASE("below each other") {
+    CHECK(vstack({}).pixels.empty());
+    const Image sheet =
+        vstack({Image(3, 1, glm::vec4(0)), sample(), Image(3, 1, glm::vec4(0.5F))}, 2, glm::vec4(1));
+    CHECK(sheet.width == 3);
+    CHECK(sheet.height == 8);
+    for (int column = 0; column < 3; ++column) {
+      CHECK(sheet.at(column, 0) == glm::vec4(0));
+      for (const int row : {1, 2, 5, 6}) CHECK(sheet.at(column, row) == glm::vec4(1));
+      for (const int row : {0, 1}) CHECK(sheet.at(column, 3 + row) == sample().at(column, row));
+      CHECK(sheet.at(column, 7) == glm::vec4(0.5F));
+    }
+  }
 }
 
 TEST_SUITE("robustness") {
@@ -167,5 +181,11 @@ TEST_SUITE("robustness") {
   TEST_CASE("strips of different heights") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, hstack({Image(1, 2), Image(1, 3)}), "images[1] (hstack)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, hstack({Image(1, 2)}, -1), "gap (hstack)");
+  }
+
+  TEST_CASE("sheets of different widths") {
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, vstack({Image(2, 1), Image(2, 1), Image(3, 1)}),
+                          "images[2] (vstack): got a width of 3");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, vstack({Image(1, 2)}, -1), "gap (vstack)");
   }
 }
