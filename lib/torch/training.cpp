@@ -8,6 +8,7 @@
 #include <random>
 
 #include "dpr/error.hpp"
+#include "scene/adjacency.hpp"
 #include "scene/checks.hpp"
 #include "scene/temporary_file.hpp"
 #include "torch/checkpoint.hpp"
@@ -70,16 +71,16 @@ at::Tensor intrinsics() {
 
 /// L of L v = v - mean of its one-ring, [642, 642].
 at::Tensor umbrella_operator(const Mesh& mesh) {
+  const Adjacency adjacency = make_adjacency(mesh);
   const auto count = static_cast<std::int64_t>(mesh.positions.size());
-  at::Tensor ring = torch::zeros({count, count});
-  auto values = ring.accessor<float, 2>();
-  for (const glm::uvec3& face : mesh.faces) {
-    for (int k = 0; k < 3; ++k) {
-      values[face[k]][face[(k + 1) % 3]] = 1;
-      values[face[(k + 1) % 3]][face[k]] = 1;
-    }
+  at::Tensor matrix = torch::eye(count);
+  auto values = matrix.accessor<float, 2>();
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    const std::uint32_t first = adjacency.ring_starts[v], last = adjacency.ring_starts[v + 1];
+    for (std::uint32_t i = first; i < last; ++i)
+      values[v][adjacency.ring[i]] = -1.0F / static_cast<float>(last - first);
   }
-  return torch::eye(count) - ring / ring.sum(1, /*keepdim=*/true);
+  return matrix;
 }
 
 /// The three terms of (74), unweighted, each a mean over the batch.
