@@ -45,6 +45,14 @@ void add_data(CLI::App& command, DataOptions& options) {
   add_classes(command, options.classes);
 }
 
+void add_checkpoint(CLI::App& command, std::string& file) {
+  command.add_option("--checkpoint", file, "The trained network")->required()->type_name("FILE.pt");
+}
+
+void add_split(CLI::App& command, std::string& split) {
+  command.add_option("--split", split, "Which objects")->capture_default_str()->type_name("train|val|test");
+}
+
 std::vector<std::size_t> class_indices(const std::vector<std::string>& words) {
   std::vector<std::size_t> indices;
   for (const std::string& word : words) indices.push_back(learn::find_class(word));
@@ -257,13 +265,9 @@ void run_eval(const EvalCommand& command, const CommonOptions& common) {
 void add_eval_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand("eval", "3D IoU at 32^3, by class");
   const auto options = std::make_shared<EvalCommand>();
-  command->add_option("--checkpoint", options->checkpoint, "The trained network")
-      ->required()
-      ->type_name("FILE.pt");
+  add_checkpoint(*command, options->checkpoint);
   add_data(*command, options->data);
-  command->add_option("--split", options->split, "Which objects")
-      ->capture_default_str()
-      ->type_name("train|val|test");
+  add_split(*command, options->split);
   command->add_option("--views", options->views, "Views of each object")
       ->check(CLI::Range(std::size_t{1}, learn::k_views))
       ->capture_default_str()
@@ -285,13 +289,9 @@ struct ShowCommand {
 void add_show_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand("show", "A picture of inputs and their reconstructions");
   const auto options = std::make_shared<ShowCommand>();
-  command->add_option("--checkpoint", options->checkpoint, "The trained network")
-      ->required()
-      ->type_name("FILE.pt");
+  add_checkpoint(*command, options->checkpoint);
   add_data(*command, options->data);
-  command->add_option("--split", options->split, "Which objects")
-      ->capture_default_str()
-      ->type_name("train|val|test");
+  add_split(*command, options->split);
   command->add_option("--object", options->object, "Which object of every class")
       ->capture_default_str()
       ->type_name("N");
