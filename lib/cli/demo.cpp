@@ -1,5 +1,4 @@
 // dpr demo: the pose of the coloured cube, found from 50 degrees away.
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <random>
@@ -8,6 +7,7 @@
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "dpr/renderer.hpp"
+#include "scene/uniform_number.hpp"
 #include "solve/polar.hpp"
 
 namespace dpr::cli {
@@ -49,11 +49,10 @@ Image render_rigidly(const Device& device, Scene scene) {
   return renderer.image();
 }
 
-/// Uniform on the sphere, by rejection; the distributions of the standard library differ from one to the
-/// other.
+/// Uniform on the sphere, by rejection.
 glm::dvec3 random_axis(std::uint64_t seed) {
   std::mt19937_64 generator(seed);
-  const auto uniform = [&] { return std::ldexp(static_cast<double>(generator() >> 11), -52) - 1; };
+  const auto uniform = [&] { return 2 * uniform_number(generator) - 1; };
   for (;;) {
     const glm::dvec3 v(uniform(), uniform(), uniform());
     const double length = glm::length(v);

@@ -1,47 +1,16 @@
 // The families. Lengths are relative: the finished object is scaled. No part is much thinner than a voxel.
 #include "learn/families.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cmath>
-#include <random>
 #include <string>
 
 #include "dpr/error.hpp"
+#include "learn/draw.hpp"
 #include "learn/solids.hpp"
 
 namespace dpr::learn {
 namespace {
-
-/// Random numbers that are the same with every standard library.
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : engine_(seed) {}
-
-  float between(float low, float high) {
-    constexpr double k_unit = 1.0 / 9007199254740992.0;  // 2^-53
-    return low + (high - low) * static_cast<float>(static_cast<double>(engine_() >> 11U) * k_unit);
-  }
-  bool chance(float probability) { return between(0, 1) < probability; }
-  int integer(int low, int high) {
-    return std::min(high, low + static_cast<int>(between(0, 1) * static_cast<float>(high - low + 1)));
-  }
-  /// Of any hue, neither black nor white.
-  glm::vec3 color() {
-    const float hue = between(0, 6), strength = between(0.25F, 0.85F), value = between(0.45F, 0.95F);
-    const auto channel = [&](float shift) {
-      const float k = std::fmod(hue + shift, 6.0F);
-      return value * (1 - strength * glm::clamp(std::min(k, 4 - k), 0.0F, 1.0F));
-    };
-    return {channel(5), channel(3), channel(1)};
-  }
-  glm::vec3 wood() {
-    return glm::mix(glm::vec3(0.35F, 0.2F, 0.1F), glm::vec3(0.8F, 0.6F, 0.35F), between(0, 1));
-  }
-  glm::vec3 grey(float low, float high) { return glm::vec3(between(low, high)); }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 /// Four legs under a rectangle of half extents x, z, from the floor at 0 to `height`.
 void add_legs(Solids& solids, float x, float z, float height, float thickness, bool is_round,

@@ -11,11 +11,12 @@
 
 #include "cli/json.hpp"
 #include "dpr/error.hpp"
+#include "scene/uniform_number.hpp"
 
 namespace dpr::bench {
 namespace {
 
-/// The distributions of the standard library differ from one to the other; its generators do not.
+/// What problems are drawn from: a stream of random numbers of its own for each.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t stream) {
@@ -24,9 +25,7 @@ class Random {
   }
 
   /// In [low, high).
-  double uniform(double low = 0, double high = 1) {
-    return low + (high - low) * std::ldexp(static_cast<double>(generator_() >> 11), -53);
-  }
+  double uniform(double low = 0, double high = 1) { return low + (high - low) * uniform_number(generator_); }
 
   glm::dvec3 direction() {
     const double z = uniform(-1, 1), angle = uniform(0, glm::two_pi<double>()), radius = std::sqrt(1 - z * z);
