@@ -13,6 +13,7 @@
 #include "dpr/shape.hpp"
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
+#include "scene/bounding_box.hpp"
 
 namespace dpr::experiments {
 namespace {
@@ -37,11 +38,10 @@ Mesh make_blob() {
 }
 
 void centre(Mesh& mesh) {
-  glm::vec3 low = mesh.positions.front(), high = low;
-  for (const glm::vec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
-  const glm::vec3 size = high - low;
+  const Bounds box = bounding_box(mesh.positions);
+  const glm::vec3 size = box.high - box.low, middle = center(box);
   const float scale = 2 / std::max({size.x, size.y, size.z});
-  for (glm::vec3& p : mesh.positions) p = scale * (p - 0.5F * (low + high));
+  for (glm::vec3& p : mesh.positions) p = scale * (p - middle);
 }
 
 /// Smoothly by position, with patches of one colour whose edges are sharp (to a triangle).

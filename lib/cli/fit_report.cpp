@@ -11,6 +11,7 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "dpr/renderer.hpp"
+#include "scene/bounding_box.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
@@ -34,14 +35,13 @@ std::vector<const ShapeView*> some_of(const std::vector<ShapeView>& views) {
 /// Cameras around the mesh, which fills most of their pictures.
 std::vector<Camera> turntable(const Mesh& mesh, std::size_t count) {
   constexpr float k_elevation_degrees = 20, k_fov_degrees = 40, k_margin = 1.15F;
-  glm::vec3 low = mesh.positions.front(), high = low;
-  for (const glm::vec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
-  const float radius = 0.5F * glm::length(high - low);
+  const Bounds box = bounding_box(mesh.positions);
+  const float radius = 0.5F * glm::length(box.high - box.low);
   const float distance = k_margin * radius / std::sin(glm::radians(0.5F * k_fov_degrees));
   std::vector<Camera> cameras;
   for (std::size_t i = 0; i < count; ++i) {
     const float azimuth = 360.0F * static_cast<float>(i) / static_cast<float>(count);
-    Camera camera = orbit_camera(distance, k_elevation_degrees, azimuth, 0.5F * (low + high));
+    Camera camera = orbit_camera(distance, k_elevation_degrees, azimuth, center(box));
     camera.fov_y_degrees = k_fov_degrees;
     camera.znear = distance - 1.1F * radius;
     camera.zfar = distance + 1.1F * radius;

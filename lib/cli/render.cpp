@@ -10,6 +10,7 @@
 #include "cli/text.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
+#include "scene/bounding_box.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -28,12 +29,7 @@ struct Sphere {
 
 /// About the centre of the bounding box: not the smallest sphere, but never much larger.
 Sphere bounding_sphere(const Mesh& mesh) {
-  glm::vec3 lowest = mesh.positions.front(), highest = lowest;
-  for (const glm::vec3& p : mesh.positions) {
-    lowest = glm::min(lowest, p);
-    highest = glm::max(highest, p);
-  }
-  Sphere sphere{0.5F * (lowest + highest), 0};
+  Sphere sphere{center(bounding_box(mesh.positions)), 0};
   for (const glm::vec3& p : mesh.positions) {
     sphere.radius = std::max(sphere.radius, glm::distance(p, sphere.center));
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "scene/bounding_box.hpp"
+
 namespace dpr::learn {
 namespace {
 
@@ -99,15 +101,11 @@ void Solids::loft(Axis axis, std::span<const Section> sections, unsigned sides, 
 }
 
 Mesh Solids::fitted(float side, float diagonal) const {
-  glm::vec3 low(INFINITY), high(-INFINITY);
-  for (const glm::vec3& p : mesh_.positions) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  const glm::vec3 size = high - low;
+  const Bounds box = bounding_box(mesh_.positions);
+  const glm::vec3 size = box.high - box.low, middle = center(box);
   const float scale = std::min(side / std::max({size.x, size.y, size.z}), diagonal / glm::length(size));
   Mesh mesh = mesh_;
-  for (glm::vec3& p : mesh.positions) p = (p - 0.5F * (low + high)) * scale;
+  for (glm::vec3& p : mesh.positions) p = (p - middle) * scale;
   return mesh;
 }
 

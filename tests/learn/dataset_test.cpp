@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "learn/generate.hpp"
+#include "scene/bounding_box.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
@@ -57,11 +58,7 @@ TEST_SUITE("unit") {
         validate(mesh);
         CHECK(is_closed(mesh));
         CHECK(signed_volume(mesh) > 0);
-        glm::vec3 low(1), high(-1);
-        for (const glm::vec3& p : mesh.positions) {
-          low = glm::min(low, p);
-          high = glm::max(high, p);
-        }
+        const auto [low, high] = bounding_box(mesh.positions);
         CHECK(std::max({high.x, high.y, high.z}) <= 0.5001F);
         CHECK(glm::length(low + high) < 1e-5F);
         CHECK(glm::length(high - low) <= 1.2001F);

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "dpr/mesh.hpp"
+#include "scene/bounding_box.hpp"
 #include "support/messages.hpp"
 
 using namespace dpr;
@@ -88,11 +89,7 @@ void check_parts(const Mesh& mesh, std::size_t count, int characteristic) {
 }
 
 void check_fits_unit_box(const Mesh& mesh) {
-  glm::vec3 low(2), high(-2);
-  for (const glm::vec3& p : mesh.positions) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
+  const auto [low, high] = bounding_box(mesh.positions);
   CHECK(glm::all(glm::greaterThanEqual(low, glm::vec3(-1))));
   CHECK(glm::all(glm::lessThanEqual(high, glm::vec3(1))));
   CHECK(high.y - low.y == doctest::Approx(2));

@@ -11,6 +11,7 @@
 
 #include "cli/json.hpp"
 #include "dpr/error.hpp"
+#include "scene/bounding_box.hpp"
 #include "scene/uniform_number.hpp"
 
 namespace dpr::bench {
@@ -54,10 +55,9 @@ void color_by_position(Mesh& mesh) {
 
 /// Moves the bounding box's centre to the origin and makes the rim as far away as the cube's corners.
 void fit_to_cube(Mesh& mesh) {
-  glm::vec3 low = mesh.positions.front(), high = low;
-  for (const glm::vec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
+  const glm::vec3 middle = center(bounding_box(mesh.positions));
   float radius = 0;
-  for (glm::vec3& p : mesh.positions) p -= 0.5F * (low + high), radius = std::max(radius, glm::length(p));
+  for (glm::vec3& p : mesh.positions) p -= middle, radius = std::max(radius, glm::length(p));
   for (glm::vec3& p : mesh.positions) p *= glm::root_three<float>() / radius;
 }
 
