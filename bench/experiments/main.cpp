@@ -2,7 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "cli/pose_report.hpp"
+#include "cli/folder.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
 

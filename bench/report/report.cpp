@@ -5,8 +5,8 @@
 #include <set>
 #include <sstream>
 
+#include "cli/folder.hpp"
 #include "cli/plot.hpp"
-#include "cli/pose_report.hpp"
 #include "dpr/error.hpp"
 #include "stages.hpp"
 

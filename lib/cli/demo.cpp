@@ -5,6 +5,7 @@
 #include <random>
 
 #include "cli/commands.hpp"
+#include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"

@@ -4,7 +4,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
-#include "cli/pose_report.hpp"
+#include "cli/folder.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <memory>
 
+#include "cli/folder.hpp"
 #include "cli/page.hpp"
 #include "cli/pictures.hpp"
 #include "cli/plot.hpp"
-#include "cli/pose_report.hpp"
 #include "cli/progress.hpp"
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "cli/commands.hpp"
+#include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/target.hpp"
 #include "cli/text.hpp"

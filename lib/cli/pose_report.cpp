@@ -7,10 +7,10 @@
 #include <iterator>
 #include <memory>
 
+#include "cli/folder.hpp"
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"
-#include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
@@ -173,14 +173,6 @@ void write_pose_report(const std::filesystem::path& folder, const Device& device
   const bool is_plotted = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   write_pose_page(folder / "index.html", result, is_plotted, truth);
-}
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error || !std::filesystem::is_directory(folder)) {
-    throw IoError(folder, "the folder cannot be made: " + (error ? error.message() : "a file has its name"));
-  }
 }
 
 }  // namespace dpr::cli

@@ -24,7 +24,4 @@ void write_pose_report(const std::filesystem::path& folder, const Device& device
                        const Image& target, const PoseResult& result, bool quiet,
                        const std::optional<glm::dmat3>& truth = {});
 
-/// Makes the folder where it is missing. Throws IoError.
-void make_folder(const std::filesystem::path& folder);
-
 }  // namespace dpr::cli

@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <memory>
 
+#include "cli/folder.hpp"
 #include "cli/json.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
-#include "dpr/error.hpp"
 #include "learn/generate.hpp"
 #include "torch/learning.hpp"
 
@@ -58,12 +58,6 @@ Dataset read(const DataOptions& options, Split split) {
   return {options.folder, split, class_indices(options.classes)};
 }
 
-void create_folder(const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (!std::filesystem::is_directory(folder)) throw IoError(folder, "cannot be made a folder");
-}
-
 // data
 
 struct DataCommand {
@@ -74,7 +68,7 @@ struct DataCommand {
 
 void run_data(DataCommand& command, const CommonOptions& common) {
   command.generate.classes = class_indices(command.classes);
-  create_folder(command.output);
+  make_folder(command.output);
   {
     std::unique_ptr<Progress> bar;
     learn::generate(open_device(common), command.generate, command.output,
@@ -134,7 +128,7 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
 
 void run_train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
-  create_folder(command.output);
+  make_folder(command.output);
   constexpr unsigned k_parts = 1000;
   learn::TrainingResult result;
   {

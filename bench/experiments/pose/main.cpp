@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 
+#include "cli/folder.hpp"
 #include "cli/plot.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
@@ -71,7 +72,7 @@ std::vector<PoseRun> runs_of(const Options& options) {
 }
 
 void run(const Options& options) {
-  std::filesystem::create_directories(options.folder);
+  cli::make_folder(options.folder);
   const Device device = open_device(options.device);
   std::vector<cli::Curve> curves;
   for (const PoseRun& wanted : runs_of(options)) {
@@ -83,7 +84,7 @@ void run(const Options& options) {
 }
 
 void run_figure(const Options& options, const Figure& figure) {
-  std::filesystem::create_directories(options.folder);
+  cli::make_folder(options.folder);
   make_figure(open_device(options.device), figure, common_of(options), count_of(options), options.folder);
 }
 
