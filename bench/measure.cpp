@@ -189,6 +189,14 @@ Json quartiles(std::vector<double> values) {
           {"n", n}};
 }
 
+double first_image_ms(const Device& device) {
+  const Workload workload = make_workloads("cube128").front();
+  const auto start = Clock::now();
+  Row row(device, workload, workload.variants.front());
+  row.forward();
+  return rounded(milliseconds_since(start));
+}
+
 Json measure(const Device& device, const Peaks& peaks, const Workload& workload, const Variant& variant,
              const MeasureOptions& options) {
   const Json row = describe_row(workload, variant);

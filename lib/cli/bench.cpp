@@ -1,9 +1,10 @@
 // dpr bench: measures the workloads, compares files of results, draws them.
+#include "cli/bench.hpp"
+
 #include <cstdio>
 #include <memory>
 
 #include "cli/bench_measure.hpp"
-#include "cli/commands.hpp"
 #include "compare.hpp"
 #include "dpr/error.hpp"
 #include "report/report.hpp"
@@ -82,23 +83,21 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
 
 }  // namespace
 
-void add_bench_command(CLI::App& application, CommonOptions& common) {
-  CLI::App* command = application.add_subcommand(
-      "bench", "Measures forward and backward passes, compares results, draws them");
+void add_bench_options(CLI::App& application, CommonOptions& common) {
   const auto options = std::make_shared<BenchOptions>();
-  add_measure_options(*command, options->measure);
+  add_measure_options(application, options->measure);
   auto* compare =
-      command->add_option("--compare", options->compared, "Two files of results, the earlier first")
+      application.add_option("--compare", options->compared, "Two files of results, the earlier first")
           ->expected(2)
           ->type_name("A.json B.json");
-  command->add_option("--report", options->report, "Folder for plots of the files of results that follow")
+  application.add_option("--report", options->report, "Folder for plots of the files of results that follow")
       ->type_name("DIR")
       ->excludes(compare);
-  command->add_option("files", options->files, "Files of results, for --report")->type_name("R.json");
-  add_device_options(*command, common);
-  add_output_options(*command, common);
-  command->footer(footer());
-  command->callback([options, &common] { run(*options, common); });
+  application.add_option("files", options->files, "Files of results, for --report")->type_name("R.json");
+  add_device_options(application, common);
+  add_output_options(application, common);
+  application.footer(footer());
+  application.callback([options, &common] { run(*options, common); });
 }
 
 }  // namespace dpr::cli

@@ -88,12 +88,14 @@ void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
     const TemporaryFile writable(options.output);
   }
   const Device device = open_device(common);
+  const double first_image_ms = bench::first_image_ms(device);
   const bench::Peaks peaks = bench::measure_peaks(device);
   if (!common.quiet) {
-    std::printf("%s: %.1f GFLOP/s and %.1f GB/s at most\n", device.info().name.c_str(), peaks.gflops,
-                peaks.gbytes_per_s);
+    std::printf("%s: %.1f GFLOP/s and %.1f GB/s at most; first image after %.0f ms\n",
+                device.info().name.c_str(), peaks.gflops, peaks.gbytes_per_s, first_image_ms);
   }
   Json file = results_head(device, peaks, options.each);
+  file["first_image_ms"] = first_image_ms;
   for (const std::string& name : names) {
     for (const bench::Workload& workload : bench::make_workloads(name)) {
       for (const bench::Variant& variant : workload.variants) {

@@ -12,9 +12,9 @@ void add_render_command(CLI::App& application, CommonOptions& common);
 void add_gradient_command(CLI::App& application, CommonOptions& common);
 void add_pose_command(CLI::App& application, CommonOptions& common);
 void add_fit_command(CLI::App& application, CommonOptions& common);
-/// Hands over to the program dpr-learn beside this one.
+/// These hand over to the programs dpr-learn and dpr-bench beside this one.
 void add_learn_command(CLI::App& application);
-void add_bench_command(CLI::App& application, CommonOptions& common);
+void add_bench_command(CLI::App& application);
 void add_demo_command(CLI::App& application, CommonOptions& common);
 
 }  // namespace dpr::cli

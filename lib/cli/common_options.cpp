@@ -148,14 +148,4 @@ Scene read_scene(const std::string& file, const CommonOptions& options) {
   return scene;
 }
 
-Image read_target(const std::string& file, const LossWeights& weights) {
-  Image target = read_image(file);
-  const bool shows_silhouette = std::ranges::any_of(target.pixels, [](const auto& p) { return p.a < 1; });
-  if (weights.silhouette > 0 && !shows_silhouette) {
-    throw InvalidArgument("--target " + file + " (command line)", "no alpha, or 1 everywhere",
-                          "an image whose alpha is the silhouette, such as an .exr of dpr render");
-  }
-  return target;
-}
-
 }  // namespace dpr::cli

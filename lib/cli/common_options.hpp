@@ -7,8 +7,6 @@
 #include <string>
 
 #include "dpr/device.hpp"
-#include "dpr/image.hpp"
-#include "dpr/loss.hpp"
 #include "dpr/scene.hpp"
 
 namespace dpr::cli {
@@ -48,8 +46,5 @@ Device open_device(const CommonOptions& options);
 void apply(const CommonOptions& options, Scene& scene);
 /// read_scene() and apply().
 Scene read_scene(const std::string& file, const CommonOptions& options);
-/// The image to compare a render with. Throws IoError, and InvalidArgument where silhouettes are to be
-/// compared and the file shows none: it has no alpha, or 1 everywhere.
-Image read_target(const std::string& file, const LossWeights& weights);
 
 }  // namespace dpr::cli

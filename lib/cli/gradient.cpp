@@ -4,6 +4,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
+#include "cli/target.hpp"
 #include "dpr/image.hpp"
 #include "dpr/loss.hpp"
 #include "dpr/renderer.hpp"

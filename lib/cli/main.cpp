@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   dpr::cli::add_pose_command(application, common);
   dpr::cli::add_fit_command(application, common);
   dpr::cli::add_learn_command(application);
-  dpr::cli::add_bench_command(application, common);
+  dpr::cli::add_bench_command(application);
   dpr::cli::add_demo_command(application, common);
   return dpr::cli::run_application(application, common, argc, argv);
 }

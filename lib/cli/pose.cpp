@@ -6,6 +6,7 @@
 #include "cli/commands.hpp"
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
+#include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "scene/temporary_file.hpp"

@@ -61,6 +61,7 @@ TEST_SUITE("bench-smoke") {
     CHECK(contains(measured.out, "% of peak"));
     const dpr::bench::Json results = dpr::bench::read_results(folder / "a.json");
     CHECK(results["device"]["peak_gflops"].get<double>() > 0);
+    CHECK(results["first_image_ms"].get<double>() > 0);
     CHECK(contains(results["build_options"].get<std::string>(), "-cl-std=CL1.2"));
     for (const auto& row : results["results"]) {
       CHECK(row["status"] == "ok");

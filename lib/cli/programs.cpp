@@ -1,0 +1,56 @@
+// Commands that are programs of their own beside this one, for what they load: dpr learn loads libtorch, and
+// dpr bench, which tells how much memory the library takes, does without the libraries for image files.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/commands.hpp"
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+struct Program {
+  std::string command, description;
+  std::string missing, remedy;  // what an installation without it is, and what to do
+};
+
+[[noreturn]] void run(const Program& program, const std::vector<std::string>& arguments) {
+  const std::filesystem::path file =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("dpr-" + program.command);
+  if (!std::filesystem::exists(file)) {
+    throw InvalidArgument(program.command + " (dpr)", program.missing, program.remedy);
+  }
+  std::string name = file.string();
+  std::vector<std::string> words = arguments;
+  std::vector<char*> argv{name.data()};
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(name.c_str(), argv.data());
+  throw IoError(file, std::string("cannot be run: ") + std::strerror(errno));
+}
+
+void add(CLI::App& application, const Program& program) {
+  CLI::App* command = application.add_subcommand(program.command, program.description);
+  command->prefix_command();
+  command->set_help_flag();  // the other program's
+  command->callback([command, program] { run(program, command->remaining()); });
+}
+
+}  // namespace
+
+void add_learn_command(CLI::App& application) {
+  add(application, {"learn", "Trains and evaluates single-image reconstruction (needs libtorch)",
+                    "a build without libtorch", "one with it: libtorch-dev, then cmake again"});
+}
+
+void add_bench_command(CLI::App& application) {
+  add(application, {"bench", "Measures forward and backward passes, compares results, draws them",
+                    "an installation without the program dpr-bench", "one with dpr-bench beside dpr"});
+}
+
+}  // namespace dpr::cli
