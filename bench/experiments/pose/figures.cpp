@@ -70,11 +70,11 @@ std::vector<FigurePanel> figure5(const PoseRun& common, std::size_t count) {
   const auto run = [&](double degrees, const PoseMethod& method) {
     return make_run(common, count, "published_cube", degrees, method);
   };
-  FigurePanel variance{"20 degrees, M samples throughout", {}, "samples M", 5};
+  FigurePanel variance{"20 degrees, M samples to begin with", {}, "samples M", 5};
   for (const bool adapts : {true, false}) {
     for (const auto reduction : {VarianceReduction::rigid, VarianceReduction::none}) {
-      FigureCurve curve{std::string(adapts ? "adaptive" : "fixed") + " smoothing, variance reduction " +
-                            (reduction == VarianceReduction::rigid ? "on" : "off"),
+      FigureCurve curve{std::string(adapts ? "adaptive smoothing, M doubles" : "fixed smoothing and M") +
+                            ", variance reduction " + (reduction == VarianceReduction::rigid ? "on" : "off"),
                         {},
                         {}};
       for (unsigned m = 1; m <= (common.smoke ? 2U : 64U); m *= 2) {

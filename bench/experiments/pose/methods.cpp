@@ -60,7 +60,6 @@ Protocol protocol_of(const PoseMethod& method, const PoseProblemSet& set, bool s
   }
   Protocol protocol{.smoothing = member(method.name)};
   if (!method.adaptive) protocol.schedule.reset();
-  if (protocol.schedule && method.samples) protocol.schedule->max_samples = *method.samples;
   Smoothing& smoothing = protocol.smoothing;
   smoothing.seed = set.seed;
   smoothing.variance_reduction = method.variance_reduction;

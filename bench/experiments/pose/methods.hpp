@@ -15,10 +15,10 @@ namespace dpr::bench {
 /// A method by name, and where a figure varies the published protocol, how.
 struct PoseMethod {
   std::string name = "default";
-  std::optional<std::uint32_t> samples = {};  ///< throughout; left out: 8, and more as the smoothing shrinks
+  std::optional<std::uint32_t> samples = {};  ///< to begin with; left out: 8
   std::optional<float> sigma = {}, gamma = {};  ///< to begin with
   VarianceReduction variance_reduction = VarianceReduction::rigid;
-  bool adaptive = true;  ///< the smoothing shrinks
+  bool adaptive = true;  ///< the smoothing shrinks, and the samples double
 };
 
 struct MethodName {

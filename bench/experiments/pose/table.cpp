@@ -119,6 +119,13 @@ Json earlier_rows(const std::filesystem::path& file, const Json& wanted) {
   }
 }
 
+/// For others to replay. A longer file of the same set, from a run of more, stays.
+void keep_problems(const std::filesystem::path& file, const PoseRun& run) {
+  PoseProblemSet set;
+  if (std::filesystem::exists(file) && read_pose_problems(file, set).size() > run.problems.size()) return;
+  write_pose_problems(file, run.set, run.problems);
+}
+
 void print(const std::string& name, const Json& s) {
   const auto percent = [&](const char* key) { return 100 * s[key].get<double>(); };
   std::printf(
@@ -147,7 +154,7 @@ Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::
   const std::string stem = file_stem(run);
   const std::filesystem::path file = folder / (stem + ".json");
   const std::string set_stem = stem.substr(0, stem.size() - label(run.method).size());
-  write_pose_problems(folder / (set_stem + "problems.json"), run.set, run.problems);
+  keep_problems(folder / (set_stem + "problems.json"), run);
   Scene scene = pose_scene(run.set.object);
   scene.width = scene.height = run.size;
   RigidCamera camera(device, scene);
