@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <memory>
 #include <string>
 
 #include "dpr/error.hpp"
+#include "scene/input_file.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr {
@@ -39,9 +39,7 @@ constexpr std::array<Format, 9> k_formats{{{".exr", 4, OIIO::TypeDesc::FLOAT},
                                            {".ppm", 3, OIIO::TypeDesc::UINT8}}};
 
 const Format& format_of(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case_extension(file);
   std::string known;
   for (const Format& format : k_formats) {
     if (format.extension == extension) return format;
@@ -75,9 +73,7 @@ std::string one_line(std::string reason) {
 }
 
 std::unique_ptr<OIIO::ImageInput> open(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) throw IoError(file, "the file does not exist");
-  if (std::filesystem::is_directory(file, error)) throw IoError(file, "is a folder, expected a file");
+  require_file(file);
   OIIO::ImageSpec configuration;
   configuration.attribute(k_unassociated_alpha, 1);
   auto input = OIIO::ImageInput::open(file.string(), &configuration);

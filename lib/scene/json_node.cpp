@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "dpr/error.hpp"
+#include "scene/input_file.hpp"
 
 namespace dpr {
 namespace {
@@ -67,12 +66,7 @@ std::string reason_of(const nlohmann::json::exception& error) {
 }  // namespace
 
 nlohmann::json read_json(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) throw IoError(file, "the file does not exist");
-  if (std::filesystem::is_directory(file, error)) throw IoError(file, "is a folder, expected a file");
-  std::ifstream in(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (!in.is_open() || in.bad()) throw IoError(file, "the file cannot be read");
+  const std::string text = read_file(file);
   DuplicateKeys duplicates(file);
   try {
     return nlohmann::json::parse(text, [&](int, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {

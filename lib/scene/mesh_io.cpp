@@ -3,13 +3,13 @@
 #include <OpenMesh/Core/IO/IOManager.hh>
 #include <OpenMesh/Core/IO/reader/OFFReader.hh>
 #include <algorithm>
-#include <fstream>
 #include <locale>
 #include <mutex>
 #include <sstream>
 
 #include "dpr/mesh.hpp"
 #include "scene/checks.hpp"
+#include "scene/input_file.hpp"
 #include "scene/mesh_scan.hpp"
 #include "scene/scan_text.hpp"
 #include "scene/silent_openmesh.hpp"
@@ -19,29 +19,11 @@
 namespace dpr {
 namespace {
 
-std::string lower_case_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
-
-std::string read_text(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) throw IoError(file, "the file does not exist");
-  if (std::filesystem::is_directory(file, error)) throw IoError(file, "is a folder, expected a file");
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (!in.is_open() || in.bad() || text.fail()) throw IoError(file, "the file cannot be read");
-  return std::move(text).str();
-}
-
 MeshScan scan_file(const std::filesystem::path& file, const std::string& extension) {
-  if (extension == ".obj") return scan_obj(file, read_text(file));
-  if (extension == ".ply") return scan_ply(file, read_text(file));
-  if (extension == ".off") return scan_off(file, read_text(file));
-  if (extension == ".stl") return scan_stl(file, read_text(file));
+  if (extension == ".obj") return scan_obj(file, read_file(file));
+  if (extension == ".ply") return scan_ply(file, read_file(file));
+  if (extension == ".off") return scan_off(file, read_file(file));
+  if (extension == ".stl") return scan_stl(file, read_file(file));
   throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj, .ply, .off or .stl");
 }
 

@@ -8,22 +8,15 @@
 #include "support/messages.hpp"
 
 using dpr::test::contains;
+using dpr::test::is_skipped;
 using dpr::test::Outcome;
 using dpr::test::TempDir;
 
 namespace {
 
-std::string command_path() { return dpr::test::program_path("DPR_CLI"); }
-
-bool is_skipped() {
-  if (!command_path().empty()) return false;
-  MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
-  return true;
-}
-
 Outcome bench(const TempDir& folder, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "bench");
-  return dpr::test::run_program(command_path(), folder, arguments);
+  return dpr::test::run_command(folder, arguments);
 }
 
 void check_fails(const TempDir& folder, const std::vector<std::string>& arguments, const std::string& part) {

@@ -16,12 +16,10 @@ namespace {
 
 /// Runs one; its numbers, or null where it cannot be run.
 Json run(const TempDir& folder, const std::string& name) {
-  const std::string program = dpr::test::program_path("DPR_EXPERIMENTS");
-  if (program.empty()) {
-    MESSAGE("skipped: DPR_EXPERIMENTS is not set, or DPR_TEST_REDUCED is");
-    return {};
-  }
-  const auto outcome = dpr::test::run_program(program, folder, {name, "--smoke", "-o", "out"});
+  constexpr const char* k_program = "DPR_EXPERIMENTS";
+  if (dpr::test::is_skipped(k_program)) return {};
+  const auto outcome =
+      dpr::test::run_program(dpr::test::program_path(k_program), folder, {name, "--smoke", "-o", "out"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.status == 0);
   CHECK(std::filesystem::file_size(folder / ("out/" + name + ".png")) > 1000);

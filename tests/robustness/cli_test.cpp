@@ -13,21 +13,14 @@
 #include "support/messages.hpp"
 
 using dpr::test::is_error_line;
+using dpr::test::is_skipped;
 using dpr::test::Outcome;
+using dpr::test::run_command;
 using dpr::test::TempDir;
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The command's path, or empty where it cannot be run.
-std::string command_path() { return dpr::test::program_path("DPR_CLI"); }
-
-/// Runs the command in the folder. `environment` is NAME=VALUE or empty.
-Outcome run(const TempDir& folder, const std::vector<std::string>& arguments,
-            const std::string& environment = "") {
-  return dpr::test::run_program(command_path(), folder, arguments, environment);
-}
 
 /// A mesh, a scene that shows it, and an image of another size than the scene's.
 void write_inputs(const TempDir& folder) {
@@ -54,18 +47,12 @@ void check_fails(const TempDir& folder, int status, const std::string& part,
   for (const std::string& argument : arguments) line += " " + argument;
   CAPTURE(line);
   const std::vector<std::string> before = files(folder);
-  const Outcome outcome = run(folder, arguments, environment);
+  const Outcome outcome = run_command(folder, arguments, environment);
   CAPTURE(outcome.err);
   CHECK(outcome.status == status);
   CHECK(is_error_line(outcome.err));
   CHECK(dpr::test::contains(outcome.err, part));
   CHECK(files(folder) == before);
-}
-
-bool is_skipped() {
-  if (!command_path().empty()) return false;
-  MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
-  return true;
 }
 
 }  // namespace
@@ -82,7 +69,7 @@ TEST_SUITE("robustness") {
         {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "c.json"},
         {"render", "--scene", "scene.json", "-o", "d.exr", "--device", "cpu", "--sigma", "1e-4", "--quiet"}};
     for (const std::vector<std::string>& command : commands) {
-      const Outcome outcome = run(folder, command);
+      const Outcome outcome = run_command(folder, command);
       CAPTURE(outcome.err);
       CHECK(outcome.status == 0);
       CHECK(outcome.err.empty());
@@ -90,11 +77,11 @@ TEST_SUITE("robustness") {
     CHECK(files(folder).size() == before + commands.size());
     CHECK(dpr::read_image(folder / "a.png").width == 16);
     CHECK(dpr::read_image(folder / "b.exr").height == 12);
-    CHECK(run(folder, {"--help"}).status == 0);
-    CHECK(run(folder, {"render", "--help"}).status == 0);
-    CHECK(run(folder, {"devices"}).status == 0);
+    CHECK(run_command(folder, {"--help"}).status == 0);
+    CHECK(run_command(folder, {"render", "--help"}).status == 0);
+    CHECK(run_command(folder, {"devices"}).status == 0);
     // An existing output is replaced.
-    CHECK(run(folder, {"render", "cube.ply", "-o", "a.png", "--size", "20x10"}).status == 0);
+    CHECK(run_command(folder, {"render", "cube.ply", "-o", "a.png", "--size", "20x10"}).status == 0);
     CHECK(dpr::read_image(folder / "a.png").width == 20);
   }
 
@@ -105,7 +92,7 @@ TEST_SUITE("robustness") {
     const std::vector<std::string> render{"render", "cube.ply", "--size", "256x256", "-o"};
     const auto with = [&](std::vector<std::string> more) {
       more.insert(more.begin(), render.begin(), render.end());
-      return run(folder, more);
+      return run_command(folder, more);
     };
     CHECK(dpr::test::contains(with({"whole.exr", "--verbose"}).out, "in 1 bands"));
     const Outcome banded = with({"banded.exr", "--verbose", "--memory-budget", "1"});
@@ -122,8 +109,9 @@ TEST_SUITE("robustness") {
         "square.obj",
         "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n");
     const std::size_t before = files(folder).size();
-    const Outcome all = run(folder, {"render", "square.obj", "-o", "a.png", "--size", "16x12", "--aov",
-                                     "depth,normal,face_id,barycentrics,uv,effective_faces"});
+    const Outcome all =
+        run_command(folder, {"render", "square.obj", "-o", "a.png", "--size", "16x12", "--aov",
+                             "depth,normal,face_id,barycentrics,uv,effective_faces"});
     CAPTURE(all.err);
     CHECK(all.status == 0);
     CHECK(files(folder).size() == before + 7);
@@ -131,11 +119,11 @@ TEST_SUITE("robustness") {
       CHECK(dpr::read_image(folder / (std::string("a.") + name + ".exr")).height == 12);
     }
     CHECK(dpr::read_image(folder / "a.face_id.exr").at(8, 6).a == 1);
-    CHECK(run(folder, {"render", "--aov", "depth", "square.obj", "-o", "a.png", "--size", "16x12"}).status ==
-          0);
+    CHECK(run_command(folder, {"render", "--aov", "depth", "square.obj", "-o", "a.png", "--size", "16x12"})
+              .status == 0);
     const Outcome sampled =
-        run(folder, {"render", "--scene", "scene.json", "-o", "b.exr", "--preset", "paper_gaussian",
-                     "--verbose", "--aov", "standard_error,gradient_standard_error"});
+        run_command(folder, {"render", "--scene", "scene.json", "-o", "b.exr", "--preset", "paper_gaussian",
+                             "--verbose", "--aov", "standard_error,gradient_standard_error"});
     CHECK(sampled.status == 0);
     CHECK(dpr::test::contains(sampled.out, "standard error of the colours: "));
     CHECK(dpr::read_image(folder / "b.standard_error.exr").width == 16);
@@ -152,7 +140,7 @@ TEST_SUITE("robustness") {
     const auto render = [&](const std::string& output, const std::vector<std::string>& more) {
       std::vector<std::string> words{"render", "--scene", "scene.json", "--size", "40x20", "-o", output};
       words.insert(words.end(), more.begin(), more.end());
-      CHECK(run(folder, words).status == 0);
+      CHECK(run_command(folder, words).status == 0);
       return dpr::read_image(folder / output).pixels;
     };
     const auto preset = render("a.exr", {"--preset", "opendr"});
@@ -246,7 +234,7 @@ TEST_SUITE("robustness") {
                 {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "g.json"}, environment);
     // Wrong input is found out before the device is looked for.
     check_fails(folder, 1, "missing.obj", {"render", "missing.obj", "-o", "o.png"}, environment);
-    CHECK(run(folder, {"devices"}, environment).status == 0);
+    CHECK(run_command(folder, {"devices"}, environment).status == 0);
   }
 
   TEST_CASE("cli: what is no error line is told apart") {

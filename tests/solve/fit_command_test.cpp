@@ -12,21 +12,17 @@
 namespace {
 
 using dpr::test::contains;
+using dpr::test::is_skipped;
+using dpr::test::run_command;
 using dpr::test::TempDir;
 using nlohmann::json;
-
-std::string program() {
-  const std::string path = dpr::test::program_path("DPR_CLI");
-  if (path.empty()) MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
-  return path;
-}
 
 json camera(const char* view) {
   return {{"view", json::parse(view)}, {"fov_y_degrees", 50}, {"znear", 1}, {"zfar", 8}};
 }
 
 /// views.json and its images: the cube from three sides.
-json write_inputs(const std::string& dpr, const TempDir& folder) {
+json write_inputs(const TempDir& folder) {
   const char* const sides[] = {"[[1,0,0,0],[0,0.8,-0.6,0],[0,0.6,0.8,-5],[0,0,0,1]]",
                                "[[0,0,1,0],[0,1,0,0],[-1,0,0,-5],[0,0,0,1]]",
                                "[[-0.8,0,-0.6,0],[0,1,0,0],[0.6,0,-0.8,-5],[0,0,0,1]]"};
@@ -37,9 +33,9 @@ json write_inputs(const std::string& dpr, const TempDir& folder) {
     const json scene = {
         {"width", 24}, {"height", 24}, {"camera", camera(sides[i])}, {"meshes", {{{"file", "cube.ply"}}}}};
     folder.write("scene.json", scene.dump());
-    REQUIRE(dpr::test::run_program(dpr, folder,
-                                   {"render", "--scene", "scene.json", "--preset", "rigid", "-o", image})
-                .status == 0);
+    REQUIRE(
+        run_command(folder, {"render", "--scene", "scene.json", "--preset", "rigid", "-o", image}).status ==
+        0);
     views["views"].push_back({{"image", image}, {"camera", camera(sides[i])}});
   }
   folder.write("views.json", views.dump());
@@ -58,12 +54,11 @@ std::vector<std::string> with(std::vector<std::string> arguments, const std::vec
 
 TEST_SUITE("pipeline") {
   TEST_CASE("dpr fit leaves a coloured mesh, a report that opens without a network, and a checkpoint") {
-    const std::string dpr = program();
-    if (dpr.empty()) return;
+    if (is_skipped()) return;
     const TempDir folder;
-    write_inputs(dpr, folder);
-    const auto outcome = dpr::test::run_program(
-        dpr, folder, with(k_short, {"--report", "report", "--checkpoint", "state", "--laplacian", "3e-3"}));
+    write_inputs(folder);
+    const auto outcome = run_command(
+        folder, with(k_short, {"--report", "report", "--checkpoint", "state", "--laplacian", "3e-3"}));
     CAPTURE(outcome.err);
     REQUIRE(outcome.status == 0);
     const dpr::Mesh mesh = dpr::read_mesh(folder / "mesh.obj");
@@ -80,17 +75,14 @@ TEST_SUITE("pipeline") {
     CHECK(data["vertices"] == mesh.positions.size());
     // Nothing is left to do, so the same mesh comes out.
     const std::string before = folder.read("mesh.obj");
-    REQUIRE(
-        dpr::test::run_program(dpr, folder, with(k_short, {"--checkpoint", "state", "--laplacian", "3e-3"}))
-            .status == 0);
+    REQUIRE(run_command(folder, with(k_short, {"--checkpoint", "state", "--laplacian", "3e-3"})).status == 0);
     CHECK(folder.read("mesh.obj") == before);
   }
 
   TEST_CASE("dpr fit: an initial mesh, images without alpha, a smoothing, another size, PLY") {
-    const std::string dpr = program();
-    if (dpr.empty()) return;
+    if (is_skipped()) return;
     const TempDir folder;
-    json views = write_inputs(dpr, folder);
+    json views = write_inputs(folder);
     dpr::write_image(folder / "view1.ppm", dpr::read_image(folder / "view1.exr"));
     dpr::write_mesh(folder / "start.obj", dpr::make_icosphere(1));
     views["views"][1]["image"] = "view1.ppm";
@@ -98,10 +90,9 @@ TEST_SUITE("pipeline") {
     views["background"] = {0, 0, 0};
     views["smoothing"] = {{"preset", "softras"}, {"sigma", 1e-4}, {"gamma", 1e-3}};
     folder.write("views.json", views.dump());
-    const auto outcome = dpr::test::run_program(
-        dpr, folder,
-        {"fit", "--views", "views.json", "-o", "mesh.ply", "--levels", "1", "--iterations", "3",
-         "--remesh-interval", "0", "--steps", "direct", "--size", "16x16", "--sigma", "3e-4"});
+    const auto outcome = run_command(
+        folder, {"fit", "--views", "views.json", "-o", "mesh.ply", "--levels", "1", "--iterations", "3",
+                 "--remesh-interval", "0", "--steps", "direct", "--size", "16x16", "--sigma", "3e-4"});
     CAPTURE(outcome.err);
     REQUIRE(outcome.status == 0);
     CHECK(dpr::read_mesh(folder / "mesh.ply").faces == dpr::make_icosphere(1).faces);
@@ -110,15 +101,14 @@ TEST_SUITE("pipeline") {
 
 TEST_SUITE("robustness") {
   TEST_CASE("dpr fit: what is wrong is one line, and nothing is left behind") {
-    const std::string dpr = program();
-    if (dpr.empty()) return;
+    if (is_skipped()) return;
     const TempDir folder;
-    const json good = write_inputs(dpr, folder);
+    const json good = write_inputs(folder);
     dpr::write_image(folder / "small.exr", dpr::Image(8, 8, glm::vec4(1)));
     folder.write("garbage", "no checkpoint");
     const auto fails = [&](const json& views, const std::vector<std::string>& arguments, const char* word) {
       folder.write("views.json", views.dump());
-      const auto outcome = dpr::test::run_program(dpr, folder, arguments);
+      const auto outcome = run_command(folder, arguments);
       CAPTURE(outcome.err);
       CHECK(outcome.status == 1);
       CHECK(dpr::test::is_error_line(outcome.err));

@@ -1,39 +1,30 @@
 // dpr pose: what its flags do, what its files hold, and which flags do not go together. Runs where the
 // environment variable DPR_CLI names the command.
 #include <doctest/doctest.h>
-#include <sys/wait.h>
 
-#include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
+#include "support/command.hpp"
 #include "support/messages.hpp"
-#include "support/reduced.hpp"
-#include "support/temp_dir.hpp"
 
 namespace {
 
 using dpr::test::contains;
+using dpr::test::is_skipped;
+using dpr::test::Outcome;
 using dpr::test::TempDir;
 using nlohmann::json;
 
-const char* command_path() { return dpr::test::is_reduced() ? nullptr : std::getenv("DPR_CLI"); }
-
-bool is_skipped() {
-  if (command_path() != nullptr) return false;
-  MESSAGE("skipped: DPR_CLI is not set, or DPR_TEST_REDUCED is");
-  return true;
-}
-
-/// Runs `dpr ARGUMENTS` in the folder; what it prints is in the files out and err there.
-int run(const TempDir& folder, const std::string& arguments) {
-  const std::string line = "cd '" + folder.path().string() + "' && '" + command_path() + "' " + arguments +
-                           " >out 2>err </dev/null";
-  const int result = std::system(line.c_str());
-  return WIFEXITED(result) ? WEXITSTATUS(result) : -1;
+/// Runs `dpr ARGUMENTS` in the folder; spaces part the arguments.
+Outcome run(const TempDir& folder, const std::string& arguments) {
+  std::istringstream words(arguments);
+  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
 }
 
 /// scene.json, and target.exr: the cube turned by 0.8 radians about y.
@@ -47,7 +38,7 @@ void write_inputs(const TempDir& folder) {
   };
   folder.write("scene.json", scene("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"));
   folder.write("truth.json", scene("[[0.696707,0,0.717356,0],[0,1,0,0],[-0.717356,0,0.696707,0],[0,0,0,1]]"));
-  REQUIRE(run(folder, "render --scene truth.json --preset rigid -o target.exr --quiet") == 0);
+  REQUIRE(run(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
 }
 
 /// R[0][0] and R[0][2] of the truth are cos 0.8 and sin 0.8.
@@ -65,7 +56,8 @@ TEST_SUITE("pipeline") {
     write_inputs(folder);
     REQUIRE(run(folder,
                 "pose --scene scene.json --target target.exr --search --translation -o pose.json "
-                "--report report") == 0);
+                "--report report")
+                .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
     CHECK(pose["translation"].size() == 3);
@@ -100,7 +92,8 @@ TEST_SUITE("pipeline") {
     REQUIRE(run(folder,
                 "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --mask mask.png "
                 "--robust 0.2 --focal --rotations 0 --coarsest 24 --level-iterations 12 --blur 0.3 "
-                "--blur-end 0.15 -o pose.json --quiet") == 0);
+                "--blur-end 0.15 -o pose.json --quiet")
+                .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
     CHECK(pose["focal_scale"].get<double>() == doctest::Approx(1).epsilon(0.03));
@@ -116,7 +109,8 @@ TEST_SUITE("pipeline") {
     for (const char* option : {"--method descent", "--schedule anneal", "--sigma 1e-3"}) {
       REQUIRE(run(folder, std::string("pose --scene scene.json --target target.exr --composition joint "
                                       "--iterations 4 --restarts 0 -o pose.json --quiet ") +
-                              option) == 0);
+                              option)
+                  .status == 0);
       const json pose = json::parse(folder.read("pose.json"));
       CHECK(pose["iterations"] == 4);
       CHECK(pose["history"][0]["width"] == 64);
@@ -135,11 +129,11 @@ TEST_SUITE("robustness") {
           "--search --schedule anneal", "--mask target.exr --iterations 4", "--mask missing.png", "--blur 0",
           "--search --rotations 0", "--robust -1"}) {
       CAPTURE(options);
-      CHECK(run(folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options) ==
-            1);
-      const std::string error = folder.read("err");
-      CAPTURE(error);
-      CHECK(error.starts_with("dpr: error: "));
+      const Outcome outcome =
+          run(folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
       CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));
     }
   }

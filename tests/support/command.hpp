@@ -1,6 +1,7 @@
 // Runs a program of this project as a user would: in a folder, with arguments, and looks at what it printed.
 #pragma once
 
+#include <doctest/doctest.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -18,6 +19,13 @@ inline std::string program_path(const char* variable) {
   const char* path = std::getenv(variable);
   if (path == nullptr || is_reduced()) return {};
   return path;
+}
+
+/// Whether a test has no program to run, and says so.
+inline bool is_skipped(const char* variable = "DPR_CLI") {
+  if (!program_path(variable).empty()) return false;
+  MESSAGE("skipped: " << variable << " is not set, or DPR_TEST_REDUCED is");
+  return true;
 }
 
 /// A word of a shell's command line.
@@ -56,6 +64,12 @@ inline Outcome run_program(const std::string& program, const TempDir& folder,
   outcome.out = streams.read("out");
   outcome.err = streams.read("err");
   return outcome;
+}
+
+/// Runs `dpr ARGUMENTS` in the folder. `environment` is NAME=VALUE or empty.
+inline Outcome run_command(const TempDir& folder, const std::vector<std::string>& arguments,
+                           const std::string& environment = "") {
+  return run_program(program_path("DPR_CLI"), folder, arguments, environment);
 }
 
 /// "dpr: error: WHAT (WHERE): got ..., expected ...": one line and nothing else.

@@ -10,7 +10,7 @@ namespace {
 Outcome learn(const TempDir& folder, const std::vector<std::string>& arguments) {
   std::vector<std::string> words{"learn"};
   for (const std::string& argument : arguments) words.push_back(argument);
-  return run_program(program_path("DPR_CLI"), folder, words);
+  return run_command(folder, words);
 }
 
 void check_refused(const Outcome& outcome, const std::string& part) {
@@ -23,7 +23,7 @@ void check_refused(const Outcome& outcome, const std::string& part) {
 
 TEST_SUITE("robustness") {
   TEST_CASE("learn: data, train, eval and show, and one line for what is wrong") {
-    if (program_path("DPR_CLI").empty()) return;
+    if (is_skipped()) return;
     const TempDir folder;
     Outcome outcome = learn(
         folder, {"data", "-o", "data", "--classes", "sofa", "--train", "4", "--val", "1", "--test", "1"});
