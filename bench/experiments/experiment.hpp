@@ -9,6 +9,7 @@
 #include <string>
 
 #include "cli/progress.hpp"
+#include "dpr/smoothing.hpp"
 #include "provenance.hpp"
 
 namespace dpr::experiments {
@@ -37,6 +38,10 @@ void write_data(const Settings& settings, const std::string& name, const Json& d
 /// Draws `name`.png by gnuplot (cli/plot.hpp). Throws IoError where gnuplot is not installed.
 void draw_figure(const Settings& settings, const std::string& name, int width, int height,
                  const std::string& script);
+
+/// A preset, or "barrier" for the library's default, with these scales; a preset's blur radius stays the same
+/// number of sigmas.
+Smoothing scaled_smoothing(const std::string& preset, float sigma, float gamma);
 
 /// Prints a file's path, unless quiet.
 void announce(const Settings& settings, const std::string& file);

@@ -4,6 +4,7 @@
 #include "cli/plot.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
+#include "scene/set_sigma.hpp"
 
 namespace dpr::experiments {
 
@@ -26,6 +27,13 @@ std::span<const Experiment> experiments() {
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
        run_shapes}};
   return k_experiments;
+}
+
+Smoothing scaled_smoothing(const std::string& preset, float sigma, float gamma) {
+  Smoothing smoothing = preset == "barrier" ? Smoothing{} : smoothing_preset(preset);
+  set_sigma(smoothing, sigma);
+  smoothing.gamma = gamma;
+  return smoothing;
 }
 
 void announce(const Settings& settings, const std::string& file) {

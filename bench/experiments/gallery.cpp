@@ -16,14 +16,6 @@ constexpr float k_gammas[] = {1e-4F, 1e-3F, 1e-2F, 1e-1F};  // rows, from the to
 constexpr const char* k_presets[] = {"softras", "barrier", "joint_gaussian"};
 constexpr int k_gap = 2;
 
-Smoothing make_smoothing(const std::string& preset, float sigma, float gamma) {
-  Smoothing smoothing = preset == "barrier" ? Smoothing{} : smoothing_preset(preset);
-  if (smoothing.blur_radius) *smoothing.blur_radius *= sigma / smoothing.sigma;
-  smoothing.sigma = sigma;
-  smoothing.gamma = gamma;
-  return smoothing;
-}
-
 Image contact_sheet(const Device& device, Scene scene, const std::string& preset) {
   Renderer renderer(device);
   renderer.set_scene(scene);
@@ -31,7 +23,7 @@ Image contact_sheet(const Device& device, Scene scene, const std::string& preset
   for (const float gamma : k_gammas) {
     std::vector<Image> row;
     for (const float sigma : k_sigmas) {
-      renderer.set_smoothing(make_smoothing(preset, sigma, gamma));
+      renderer.set_smoothing(scaled_smoothing(preset, sigma, gamma));
       renderer.forward();
       row.push_back(opaque(renderer.image()));
     }

@@ -123,14 +123,6 @@ std::vector<Method> make_methods(bool smoke) {
           {"joint, direct steps, Laplacian", paper, ""}};
 }
 
-Smoothing smoothing_of(const std::string& preset, const Smoothing& like) {
-  Smoothing smoothing = preset == "barrier" ? Smoothing{} : smoothing_preset(preset);
-  if (smoothing.blur_radius) *smoothing.blur_radius *= like.sigma / smoothing.sigma;
-  smoothing.sigma = like.sigma;
-  smoothing.gamma = like.gamma;
-  return smoothing;
-}
-
 /// Peak signal-to-noise ratio over all pixels and colours, decibels, of a signal of 1.
 double psnr(const std::vector<Image>& images, const std::vector<Image>& targets) {
   double sum = 0, count = 0;
@@ -167,8 +159,10 @@ class Trial {
 
   Json run(const Method& method) {
     ShapeViews views = views_;
-    if (!method.preset.empty())
-      views.smoothing = smoothing_of(method.preset, finest_smoothing(views, method.options));
+    if (!method.preset.empty()) {
+      const Smoothing finest = finest_smoothing(views, method.options);
+      views.smoothing = scaled_smoothing(method.preset, finest.sigma, finest.gamma);
+    }
     const ShapeSolver solver(settings_.device, views, method.options);
     const std::clock_t start = std::clock();
     cli::FitObserver observer(solver.most_iterations(), settings_.quiet, false);

@@ -8,6 +8,7 @@
 
 #include "dpr/scene.hpp"
 #include "scene/checks.hpp"
+#include "scene/set_sigma.hpp"
 
 namespace dpr {
 namespace {
@@ -157,10 +158,13 @@ void take_estimators(const JsonNode& node, Smoothing& smoothing) {
 // A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius; but not
 // where sigma is no width.
 void take_reach(const JsonNode& node, Smoothing& smoothing) {
-  const float preset_sigma = smoothing.sigma;
-  take_number(node, "sigma", smoothing.sigma);
-  const bool is_width = smoothing.occupancy_width == OccupancyWidth::fixed;
-  if (smoothing.blur_radius && is_width) *smoothing.blur_radius *= smoothing.sigma / preset_sigma;
+  float sigma = smoothing.sigma;
+  take_number(node, "sigma", sigma);
+  if (smoothing.occupancy_width == OccupancyWidth::fixed) {
+    set_sigma(smoothing, sigma);
+  } else {
+    smoothing.sigma = sigma;
+  }
   take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/set_sigma.hpp"
 #include "solve/is_sampled.hpp"
 #include "solve/require.hpp"
 
@@ -58,8 +59,7 @@ bool AdaptiveSmoothing::update(unsigned iteration, double grad_gamma, Smoothing&
   if (is_sampled(smoothing) && samples < most) samples = std::min(2 * samples, most);
   if (sigma == smoothing.sigma && gamma == smoothing.gamma && samples == smoothing.samples) return false;
 
-  if (smoothing.blur_radius) *smoothing.blur_radius *= sigma / smoothing.sigma;
-  smoothing.sigma = sigma;
+  set_sigma(smoothing, sigma);
   smoothing.gamma = gamma;
   smoothing.samples = samples;
   learning_rate = shrink(learning_rate, schedule_.learning_rate_divisor, schedule_.learning_rate_floor);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/set_sigma.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {
@@ -39,10 +40,8 @@ bool AnnealedSmoothing::update(unsigned iteration, Smoothing& smoothing, double&
   if (level == level_of(iteration)) return false;
 
   const double fraction = static_cast<double>(level) / std::max(schedule_.levels - 1, 1U);
-  const Smoothing before = smoothing;
-  smoothing.sigma = static_cast<float>(fall(start_.sigma, schedule_.sigma_end, fraction));
+  set_sigma(smoothing, static_cast<float>(fall(start_.sigma, schedule_.sigma_end, fraction)));
   smoothing.gamma = static_cast<float>(fall(start_.gamma, schedule_.gamma_end, fraction));
-  if (smoothing.blur_radius) *smoothing.blur_radius *= smoothing.sigma / before.sigma;
   learning_rate = fall(learning_rate_, schedule_.learning_rate_end, fraction);
   return true;
 }

@@ -10,6 +10,7 @@
 #include "dpr/error.hpp"
 #include "scene/adjacency.hpp"
 #include "scene/checks.hpp"
+#include "scene/set_sigma.hpp"
 #include "scene/temporary_file.hpp"
 #include "torch/checkpoint.hpp"
 #include "torch/evaluation.hpp"
@@ -239,10 +240,13 @@ Smoothing training_smoothing(const TrainingOptions& options) {
   Smoothing smoothing = smoothing_preset(options.method, k_image_size, k_image_size);
   const bool has_scales =
       smoothing.occupancy_prior != Prior::uniform;  // else pixels and rigid depths are the scales
-  const float preset_sigma = smoothing.sigma;
-  smoothing.sigma = options.sigma.value_or(has_scales ? k_published_scale : smoothing.sigma);
+  const float sigma = options.sigma.value_or(has_scales ? k_published_scale : smoothing.sigma);
+  if (has_scales) {
+    set_sigma(smoothing, sigma);
+  } else {
+    smoothing.sigma = sigma;
+  }
   smoothing.gamma = options.gamma.value_or(has_scales ? k_published_scale : smoothing.gamma);
-  if (has_scales && smoothing.blur_radius) *smoothing.blur_radius *= smoothing.sigma / preset_sigma;
   validate(smoothing);
   return smoothing;
 }

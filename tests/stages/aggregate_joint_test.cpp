@@ -64,6 +64,15 @@ AggregateErrors crowd_errors(Prior prior) {
   return errors;
 }
 
+void check_within(const AggregateErrors& errors, const PriorCase& c) {
+  DPR_CHECK_WORST(errors.weight, c.weight);
+  DPR_CHECK_WORST(errors.color, c.color);
+  DPR_CHECK_WORST(errors.alpha, k_alpha);
+  DPR_CHECK_WORST(errors.grad_depth, c.depth);
+  DPR_CHECK_WORST(errors.grad_log_occupancy, c.log_occupancy);
+  DPR_CHECK_WORST(errors.grad_gamma, c.gamma);
+}
+
 }  // namespace
 
 TEST_SUITE("gradient") {
@@ -71,12 +80,7 @@ TEST_SUITE("gradient") {
     for (const PriorCase& c : k_cases) {
       CAPTURE(std::string(c.name));
       const AggregateErrors errors = all_errors(c.prior);
-      DPR_CHECK_WORST(errors.weight, c.weight);
-      DPR_CHECK_WORST(errors.color, c.color);
-      DPR_CHECK_WORST(errors.alpha, k_alpha);
-      DPR_CHECK_WORST(errors.grad_depth, c.depth);
-      DPR_CHECK_WORST(errors.grad_log_occupancy, c.log_occupancy);
-      DPR_CHECK_WORST(errors.grad_gamma, c.gamma);
+      check_within(errors, c);
       CHECK(errors.grad_alpha.error == 0.0);
     }
   }
@@ -85,12 +89,7 @@ TEST_SUITE("gradient") {
     for (const PriorCase& c : k_cases) {
       CAPTURE(std::string(c.name));
       const AggregateErrors errors = crowd_errors(c.prior);
-      DPR_CHECK_WORST(errors.weight, c.weight);
-      DPR_CHECK_WORST(errors.color, c.color);
-      DPR_CHECK_WORST(errors.alpha, k_alpha);
-      DPR_CHECK_WORST(errors.grad_depth, c.depth);
-      DPR_CHECK_WORST(errors.grad_log_occupancy, c.log_occupancy);
-      DPR_CHECK_WORST(errors.grad_gamma, c.gamma);
+      check_within(errors, c);
     }
   }
 

@@ -7,6 +7,7 @@
 
 #include "dpr/error.hpp"
 #include "experiments/pose/protocol.hpp"
+#include "scene/set_sigma.hpp"
 
 namespace dpr::bench {
 namespace {
@@ -64,10 +65,7 @@ Protocol protocol_of(const PoseMethod& method, const PoseProblemSet& set, bool s
   smoothing.seed = set.seed;
   smoothing.variance_reduction = method.variance_reduction;
   smoothing.samples = method.samples.value_or(smoothing.samples);
-  if (method.sigma) {
-    if (smoothing.blur_radius) *smoothing.blur_radius *= *method.sigma / smoothing.sigma;
-    smoothing.sigma = *method.sigma;
-  }
+  if (method.sigma) set_sigma(smoothing, *method.sigma);
   if (method.gamma) smoothing.gamma = *method.gamma;
   if (method.name == "paper_gaussian_minus_one") protocol.sensitivity = SensitivityConstant::one;
   if (smoke) protocol.iterations = k_smoke_iterations;
