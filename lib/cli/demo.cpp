@@ -54,7 +54,7 @@ glm::dvec3 random_axis(std::uint64_t seed) {
   std::mt19937_64 generator(seed);
   const auto uniform = [&] { return 2 * uniform_number(generator) - 1; };
   for (;;) {
-    const glm::dvec3 v(uniform(), uniform(), uniform());
+    const glm::dvec3 v{uniform(), uniform(), uniform()};  // braces: drawn in this order
     const double length = glm::length(v);
     if (length > 0.1 && length <= 1) return v / length;
   }
