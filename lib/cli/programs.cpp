@@ -3,9 +3,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/commands.hpp"
@@ -17,6 +19,7 @@ namespace {
 struct Program {
   std::string command, description;
   std::string missing, remedy;  // what an installation without it is, and what to do
+  std::vector<std::pair<std::string, std::string>> environment = {};  // where the user's says nothing else
 };
 
 [[noreturn]] void run(const Program& program, const std::vector<std::string>& arguments) {
@@ -25,6 +28,7 @@ struct Program {
   if (!std::filesystem::exists(file)) {
     throw InvalidArgument(program.command + " (dpr)", program.missing, program.remedy);
   }
+  for (const auto& [variable, value] : program.environment) setenv(variable.c_str(), value.c_str(), 0);
   std::string name = file.string();
   std::vector<std::string> words = arguments;
   std::vector<char*> argv{name.data()};
@@ -44,8 +48,15 @@ void add(CLI::App& application, const Program& program) {
 }  // namespace
 
 void add_learn_command(CLI::App& application) {
-  add(application, {"learn", "Trains and evaluates single-image reconstruction (needs libtorch)",
-                    "a build without libtorch", "one with it: libtorch-dev, then cmake again"});
+  add(application, {"learn",
+                    "Trains and evaluates single-image reconstruction (needs libtorch)",
+                    "a build without libtorch",
+                    "one with it: libtorch-dev, then cmake again",
+                    // OpenBLAS' threads sleep at once instead of waiting busily while the renderer works, and
+                    // freed memory is kept: a step's tensors take the pages of the last one's.
+                    {{"OPENBLAS_THREAD_TIMEOUT", "4"},
+                     {"MALLOC_MMAP_THRESHOLD_", "8589934592"},
+                     {"MALLOC_TRIM_THRESHOLD_", "8589934592"}}});
 }
 
 void add_bench_command(CLI::App& application) {
