@@ -155,16 +155,11 @@ void take_estimators(const JsonNode& node, Smoothing& smoothing) {
   take_word(node, "aggregation_estimator", smoothing.aggregation_estimator, parse_estimator);
 }
 
-// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius; but not
-// where sigma is no width.
+// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius.
 void take_reach(const JsonNode& node, Smoothing& smoothing) {
   float sigma = smoothing.sigma;
   take_number(node, "sigma", sigma);
-  if (smoothing.occupancy_width == OccupancyWidth::fixed) {
-    set_sigma(smoothing, sigma);
-  } else {
-    smoothing.sigma = sigma;
-  }
+  set_sigma(smoothing, sigma);
   take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
 }
 

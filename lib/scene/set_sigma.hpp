@@ -5,9 +5,11 @@
 
 namespace dpr {
 
-/// Sets sigma; a blur radius, where one is given, stays the same number of sigmas.
+/// Sets sigma; a blur radius, where one is given, stays the same number of sigmas. With a variable width it
+/// stays as it is: there sigma is no width, but what keeps the derivative at an edge finite.
 inline void set_sigma(Smoothing& smoothing, float sigma) {
-  if (smoothing.blur_radius) *smoothing.blur_radius *= sigma / smoothing.sigma;
+  const bool is_width = smoothing.occupancy_width == OccupancyWidth::fixed;
+  if (smoothing.blur_radius && is_width) *smoothing.blur_radius *= sigma / smoothing.sigma;
   smoothing.sigma = sigma;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dpr/error.hpp"
+#include "scene/set_sigma.hpp"
 
 namespace dpr::torch_op {
 namespace {
@@ -224,7 +225,7 @@ void BatchRenderer::set(const std::string& name, double value) {
     clipping.zfar = zfar_;
     const auto number = static_cast<float>(value);
     if (name == "sigma") {
-      s.sigma = number;
+      set_sigma(s, number);
     } else if (name == "gamma") {
       s.gamma = number;
     } else if (name == "alpha") {

@@ -241,11 +241,7 @@ Smoothing training_smoothing(const TrainingOptions& options) {
   const bool has_scales =
       smoothing.occupancy_prior != Prior::uniform;  // else pixels and rigid depths are the scales
   const float sigma = options.sigma.value_or(has_scales ? k_published_scale : smoothing.sigma);
-  if (has_scales) {
-    set_sigma(smoothing, sigma);
-  } else {
-    smoothing.sigma = sigma;
-  }
+  set_sigma(smoothing, sigma);
   smoothing.gamma = options.gamma.value_or(has_scales ? k_published_scale : smoothing.gamma);
   validate(smoothing);
   return smoothing;

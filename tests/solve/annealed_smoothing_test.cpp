@@ -51,6 +51,15 @@ TEST_SUITE("unit") {
     CHECK(learning_rate == 1e-5);
     CHECK(smoothing.gamma == doctest::Approx(1e-3));
   }
+
+  TEST_CASE("a reach that is no number of sigmas stays") {
+    dpr::Smoothing smoothing = dpr::smoothing_preset("nmr");
+    double learning_rate = 1;
+    const dpr::AnnealedSmoothing annealed({.levels = 2, .sigma_end = 1e-4F}, 2, smoothing, learning_rate);
+    CHECK(annealed.update(0, smoothing, learning_rate));
+    CHECK(smoothing.sigma == doctest::Approx(1e-4));
+    CHECK(smoothing.blur_radius == 0.5F);
+  }
 }
 
 TEST_SUITE("robustness") {

@@ -229,6 +229,17 @@ TEST_SUITE("pipeline") {
     CHECK(renderer->seconds() > 0);
   }
 
+  TEST_CASE("operator: a preset's blur radius follows sigma, as in a scene") {
+    Smoothing wide = smoothing_preset("softras");
+    *wide.blur_radius *= 5;
+    wide.sigma *= 5;
+    const auto renderer = make_renderer(smoothing_preset("softras"));
+    const Inputs in = make_inputs();
+    CHECK_FALSE(render(renderer, in).equal(render(make_renderer(wide), in)));
+    renderer->set("sigma", wide.sigma);
+    CHECK(render(renderer, in).allclose(render(make_renderer(wide), in), 1e-5, 1e-6));
+  }
+
   TEST_CASE("operator: what is not contiguous, and what needs no gradient") {
     const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
     const Inputs in = make_inputs();
