@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dpr/renderer.hpp"
+#include "solve/resample.hpp"
 #include "torch/checkpoint.hpp"
 
 namespace dpr::learn {
@@ -40,13 +41,12 @@ Mesh start_mesh() {
 /// A reconstruction from some sides, at the size of the input and twice that.
 std::vector<Image> portraits(Renderer& renderer, const Mesh& mesh, std::size_t input_view) {
   constexpr std::size_t k_portraits = 4;
+  constexpr int k_side = 2 * k_image_size, k_supersampling = 4;
   Scene scene;
-  scene.width = scene.height = 2 * k_image_size;
+  scene.width = scene.height = k_supersampling * k_side;
   scene.camera = dataset_camera(0);
   scene.background = glm::vec3(1);
-  scene.smoothing = smoothing_preset("joint_gaussian");
-  scene.smoothing.sigma = 1e-5F;
-  scene.smoothing.gamma = 1e-5F;
+  scene.smoothing = rigid_smoothing();
   scene.meshes.push_back({mesh});
   renderer.set_scene(scene);
   std::vector<View> views;
@@ -56,7 +56,7 @@ std::vector<Image> portraits(Renderer& renderer, const Mesh& mesh, std::size_t i
   renderer.set_views(views);
   renderer.forward();
   std::vector<Image> images;
-  for (std::size_t i = 0; i < k_portraits; ++i) images.push_back(renderer.image(i));
+  for (std::size_t i = 0; i < k_portraits; ++i) images.push_back(resample(renderer.image(i), k_side, k_side));
   return images;
 }
 
