@@ -112,6 +112,8 @@ std::vector<Method> make_methods(bool smoke) {
     options.learning_rate = 0.1;
     options.lambda = 2;  // a mesh this small is stiff
   }
+  ShapeOptions adaptive = options;
+  adaptive.schedule = ShapeSchedule::adaptive;
   ShapeOptions paper = options;  // its weights (74) and regulariser (77), Adam on the positions
   paper.steps = ShapeSteps::direct;
   paper.loss = {.l1 = 1, .silhouette = 1};
@@ -120,6 +122,7 @@ std::vector<Method> make_methods(bool smoke) {
   return {{"joint", options, ""},
           {"barrier", options, "barrier"},
           {"softras", options, "softras"},
+          {"joint, adaptive smoothing", adaptive, ""},
           {"joint, direct steps, Laplacian", paper, ""}};
 }
 

@@ -24,8 +24,8 @@ struct AdaptiveSchedule {
 /// member of the family. A blur radius given explicitly shrinks with sigma.
 class AdaptiveSmoothing {
  public:
-  /// Throws InvalidArgument for a schedule out of range.
-  explicit AdaptiveSmoothing(const AdaptiveSchedule& schedule = {});
+  /// `average` is that of the run it goes on from. Throws InvalidArgument for a schedule out of range.
+  explicit AdaptiveSmoothing(const AdaptiveSchedule& schedule = {}, double average = 0);
 
   /// To be called once an iteration. Returns true if it changed `smoothing`; then the optimizer should be
   /// restarted with `learning_rate`, which it divides too. Until the first check only the average is formed.
@@ -35,7 +35,7 @@ class AdaptiveSmoothing {
 
  private:
   AdaptiveSchedule schedule_;
-  double average_ = 0;
+  double average_;
 };
 
 }  // namespace dpr

@@ -41,6 +41,11 @@ ShapeViews read_views(const std::filesystem::path& file);
 /// edges, by Adam with one step size for all (Nicolet, Jacobson & Jakob 2021). direct: Adam on the positions.
 enum class ShapeSteps { large_steps, direct };
 
+/// How the smoothing shrinks in a level, from `blur` to `blur_end`. annealed: geometrically. adaptive: while
+/// less of it means less loss, by the sign of d loss / d gamma (AdaptiveSmoothing, which doubles samples
+/// too); it need not come to the end.
+enum class ShapeSchedule { annealed, adaptive };
+
 struct ShapeOptions {
   unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
   unsigned iterations = 400;  ///< > 0: of a level
@@ -50,6 +55,7 @@ struct ShapeOptions {
   unsigned remesh_interval = 50;
   float blur = 0.5F;      ///< > 0: of the edges, in pixels of the level, at its beginning
   float blur_end = 0.1F;  ///< > 0: at its end
+  ShapeSchedule schedule = ShapeSchedule::annealed;
   ShapeSteps steps = ShapeSteps::large_steps;
   float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
   double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the initial shape

@@ -17,7 +17,7 @@ const char* const k_solver_group = "Solver";
 const char* const k_loss_group = "Loss (weights)";
 
 struct FitCommandOptions {
-  std::string views, output, report, checkpoint, steps = "large";
+  std::string views, output, report, checkpoint, steps = "large", schedule = "anneal";
   ShapeOptions solver;
 };
 
@@ -25,6 +25,12 @@ ShapeSteps parse_steps(const std::string& word) {
   if (word == "large") return ShapeSteps::large_steps;
   if (word == "direct") return ShapeSteps::direct;
   throw InvalidArgument("--steps (command line)", "\"" + word + "\"", "large or direct");
+}
+
+ShapeSchedule parse_schedule(const std::string& word) {
+  if (word == "anneal") return ShapeSchedule::annealed;
+  if (word == "adaptive") return ShapeSchedule::adaptive;
+  throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
 }
 
 void resize(ShapeViews& views, glm::ivec2 size) {
@@ -67,6 +73,7 @@ void check_outputs(const FitCommandOptions& options) {
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
+  options.solver.schedule = parse_schedule(options.schedule);
   ShapeViews views = read_views(options.views);
   apply(command, common, options.solver, views);
   const Device device = open_device(common);
@@ -100,6 +107,8 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
       "Steps between two remeshings, in the first half of a level; 0: the faces stay", "N");
   add("--blur", solver.blur, "Of the edges, in pixels of the level, at its beginning", "FLOAT");
   add("--blur-end", solver.blur_end, "The same at its end", "FLOAT");
+  add("--schedule", options.schedule, "How the blur shrinks: steadily, or while less of it means less loss",
+      "anneal|adaptive");
   add("--steps", options.steps, "How vertices move: with their neighbours, or each on its own",
       "large|direct");
   add("--lambda", solver.lambda, "How far large steps take neighbours along", "FLOAT");

@@ -21,7 +21,8 @@ Number shrink(Number value, float divisor, float floor) {
 
 }  // namespace
 
-AdaptiveSmoothing::AdaptiveSmoothing(const AdaptiveSchedule& schedule) : schedule_(schedule) {
+AdaptiveSmoothing::AdaptiveSmoothing(const AdaptiveSchedule& schedule, double average)
+    : schedule_(schedule), average_(average) {
   const auto positive = [](float x) { return x > 0 && std::isfinite(x); };
   require(schedule.interval > 0, "interval (adaptive smoothing)", schedule.interval, "at least 1");
   require(schedule.rate > 1 && std::isfinite(schedule.rate), "rate (adaptive smoothing)", schedule.rate,

@@ -7,8 +7,10 @@
 #include <string>
 #include <utility>
 
+#include "dpr/adaptive_smoothing.hpp"
 #include "dpr/renderer.hpp"
 #include "scene/remesh.hpp"
+#include "scene/set_sigma.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/require.hpp"
 #include "solve/resample.hpp"
@@ -42,9 +44,7 @@ double pixel_scale(const ShapeOptions& options, unsigned level) {
 Smoothing widened(Smoothing smoothing, double factor) {
   const double power = smoothing.distance == DistanceMetric::squared ? 2 : 1;
   const auto scale = static_cast<float>(std::pow(factor, power));
-  smoothing.sigma *= scale;
-  if (smoothing.blur_radius && smoothing.occupancy_width == OccupancyWidth::fixed)
-    *smoothing.blur_radius *= scale;
+  set_sigma(smoothing, scale * smoothing.sigma);
   smoothing.gamma *= static_cast<float>(factor);
   return smoothing;
 }
@@ -129,7 +129,9 @@ class Run {
     const double rate = std::pow(options_.learning_rate_end, progress(in_level));
     position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
     color_optimizer_.set_learning_rate(rate * options_.color_learning_rate);
-    descend(evaluate(level, in_level));
+    const SceneGradient gradient = evaluate(level, in_level);
+    descend(gradient);
+    if (is_adaptive()) adapt(level, in_level, gradient.gamma);
     ++state_.iteration;
   }
 
@@ -173,7 +175,13 @@ class Run {
     scene.camera = batches_->cameras(0).front().camera;
     scene.meshes.push_back({mesh});
     scene.smoothing = finest_;
-    scene.gradients = {true, true, false, false, false, false, false};
+    scene.gradients = {.positions = true,
+                       .colors = true,
+                       .transform = false,
+                       .camera = false,
+                       .lights = false,
+                       .smoothing = is_adaptive(),
+                       .background = false};
     renderer_.set_scene(scene);
   }
 
@@ -182,12 +190,42 @@ class Run {
     return static_cast<double>(in_level) / std::max(options_.iterations - 1, 1U);
   }
 
-  Smoothing smoothing_at(unsigned level, unsigned in_level) const {
+  bool is_adaptive() const { return options_.schedule == ShapeSchedule::adaptive; }
+
+  /// A level's, somewhere between its beginning (0) and its end (1).
+  Smoothing annealed(unsigned level, double fraction) const {
     const double begin = static_cast<double>(options_.blur) / static_cast<double>(options_.blur_end);
-    Smoothing smoothing =
-        widened(finest_, pixel_scale(options_, level) * std::pow(begin, 1 - progress(in_level)));
+    return widened(finest_, pixel_scale(options_, level) * std::pow(begin, 1 - fraction));
+  }
+
+  Smoothing smoothing_at(unsigned level, unsigned in_level) {
+    Smoothing smoothing = annealed(level, progress(in_level));
+    if (is_adaptive()) {
+      ShapeState::Adaptive& now = state_.adaptive;
+      if (in_level == 0) now = {smoothing.sigma, smoothing.gamma, smoothing.samples, now.average};
+      smoothing = finest_;
+      set_sigma(smoothing, now.sigma);
+      smoothing.gamma = now.gamma;
+      smoothing.samples = now.samples;
+    }
     smoothing.seed += state_.iteration;  // fresh noise: its errors average out along the descent
     return smoothing;
+  }
+
+  /// The published rate, at moments enough to come to the level's end. Learning rates fall by themselves.
+  void adapt(unsigned level, unsigned in_level, double grad_gamma) {
+    constexpr unsigned k_settling = 10, k_moments = 40;  // parts of a level
+    const Smoothing end = annealed(level, 1);
+    AdaptiveSmoothing schedule({.start = options_.iterations / k_settling,
+                                .interval = std::max(options_.iterations / k_moments, 1U),
+                                .sigma_floor = end.sigma,
+                                .gamma_floor = end.gamma,
+                                .learning_rate_divisor = 1},
+                               state_.adaptive.average);
+    Smoothing smoothing = state_.history.back().smoothing;
+    double learning_rate = options_.learning_rate;
+    schedule.update(in_level, grad_gamma, smoothing, learning_rate);
+    state_.adaptive = {smoothing.sigma, smoothing.gamma, smoothing.samples, schedule.average()};
   }
 
   SceneGradient evaluate(unsigned level, unsigned in_level) {

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* k_format = "dpr shape checkpoint 1";
+constexpr const char* k_format = "dpr shape checkpoint 2";
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo 1991).
 class Hash {
@@ -72,8 +72,8 @@ void add(Hash& hash, const Smoothing& s) {
 }
 
 void add(Hash& hash, const ShapeOptions& o) {
-  for (const unsigned value :
-       {o.levels, o.iterations, o.batch, o.remesh_interval, static_cast<unsigned>(o.steps)})
+  for (const unsigned value : {o.levels, o.iterations, o.batch, o.remesh_interval,
+                               static_cast<unsigned>(o.steps), static_cast<unsigned>(o.schedule)})
     hash.add(value);
   for (const float value :
        {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette,
@@ -126,6 +126,8 @@ json to_json(const ShapeState& state) {
           {"colors", state.colors},
           {"position_steps", to_json(state.position_steps)},
           {"color_steps", to_json(state.color_steps)},
+          {"adaptive",
+           {state.adaptive.sigma, state.adaptive.gamma, state.adaptive.samples, state.adaptive.average}},
           {"history", history}};
 }
 
@@ -137,6 +139,8 @@ ShapeState state_of(const json& node) {
   state.colors = node.at("colors").get<std::vector<double>>();
   state.position_steps = optimizer_state(node.at("position_steps"));
   state.color_steps = optimizer_state(node.at("color_steps"));
+  const json& adaptive = node.at("adaptive");
+  state.adaptive = {adaptive.at(0), adaptive.at(1), adaptive.at(2), adaptive.at(3)};
   for (const json& step : node.at("history")) state.history.push_back(iteration(step));
   return state;
 }

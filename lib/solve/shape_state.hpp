@@ -11,10 +11,18 @@
 namespace dpr {
 
 struct ShapeState {
+  /// Of a smoothing that adapts: its scales now, and the average sensitivity.
+  struct Adaptive {
+    float sigma = 0, gamma = 0;
+    std::uint32_t samples = 0;
+    double average = 0;
+  };
+
   unsigned iteration = 0;  ///< the next one
   std::vector<glm::uvec3> faces;
   std::vector<double> positions, colors;  ///< [vertex][3]
   OptimizerState position_steps, color_steps;
+  Adaptive adaptive;
   std::vector<ShapeIteration> history;
 
   /// In single precision, as it is rendered.

@@ -129,6 +129,24 @@ TEST_SUITE("pipeline") {
     CHECK(result.history.back().smoothing.sigma < result.history.front().smoothing.sigma);
   }
 
+  TEST_CASE("adaptive smoothing finds it too, and stays between a level's beginning and end") {
+    const dpr::Device device = dpr::open_device();
+    ShapeOptions options = small_options();
+    options.schedule = dpr::ShapeSchedule::adaptive;
+    const ShapeViews views = make_views(device);
+    const ShapeResult result = ShapeSolver(device, views, options).solve();
+    const float finest = dpr::finest_smoothing(views, options).sigma;
+    const float ratio = (options.blur / options.blur_end) * (options.blur / options.blur_end);
+    for (const dpr::ShapeIteration& i : result.history) {
+      const float end = i.level + 1 == options.levels ? finest : 4 * finest;
+      CHECK(i.smoothing.sigma >= end * 0.999F);
+      CHECK(i.smoothing.sigma <= end * ratio * 1.001F);
+    }
+    if (dpr::test::is_reduced()) return;
+    CHECK(error_of(result.mesh) < 0.3);
+    CHECK(result.history.back().smoothing.sigma < 0.5F * finest * ratio);  // it has adapted
+  }
+
   TEST_CASE("stopped by the callback and gone on from its checkpoint, a run ends with the same bits") {
     const dpr::Device device = dpr::open_device();
     const ShapeViews views = make_views(device, 2, reduced(16, 8));
@@ -137,6 +155,8 @@ TEST_SUITE("pipeline") {
     options.iterations = reduced(8, 2);
     options.remesh_interval = 3;
     options.batch = 1;
+    SUBCASE("annealed") {}
+    SUBCASE("adaptive") { options.schedule = dpr::ShapeSchedule::adaptive; }
     const ShapeSolver solver(device, views, options);
     const ShapeResult whole = solver.solve();
     const TempDir folder;
@@ -151,8 +171,10 @@ TEST_SUITE("pipeline") {
       CHECK(rest.finished);
       CHECK(same(rest.mesh, whole.mesh));
       REQUIRE(rest.history.size() == whole.history.size());
-      for (std::size_t i = 0; i < whole.history.size(); ++i)
+      for (std::size_t i = 0; i < whole.history.size(); ++i) {
         CHECK(rest.history[i].loss == whole.history[i].loss);
+        CHECK(rest.history[i].smoothing.sigma == whole.history[i].smoothing.sigma);
+      }
       CHECK(same(solver.solve({}, file).mesh, whole.mesh));  // nothing is left to do
     }
     CHECK(folder.entries() == 2);
