@@ -223,9 +223,9 @@ struct EvalCommand {
   std::size_t views = learn::k_views;
 };
 
-Json to_json(const std::vector<learn::ClassIou>& rows, double mean, double sphere) {
+Json to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
   Json classes = Json::array();
-  for (const learn::ClassIou& row : rows) {
+  for (const learn::ClassIou& row : evaluation.classes) {
     const learn::ObjectClass& c = learn::object_classes()[row.object_class];
     classes.push_back({{"class", c.name},
                        {"synset", c.synset},
@@ -233,33 +233,36 @@ Json to_json(const std::vector<learn::ClassIou>& rows, double mean, double spher
                        {"iou", row.iou},
                        {"sphere", row.sphere}});
   }
-  return {{"mean_iou", mean}, {"sphere_mean_iou", sphere}, {"classes", classes}};
+  return {{"method", evaluation.method},
+          {"seed", evaluation.seed},
+          {"steps", evaluation.steps},
+          {"split", command.split},
+          {"views", command.views},
+          {"mean_iou", evaluation.iou},
+          {"sphere_mean_iou", evaluation.sphere},
+          {"classes", classes}};
 }
 
 void run_eval(const EvalCommand& command, const CommonOptions& common) {
   const Dataset dataset = read(command.data, learn::parse_split(command.split));
-  std::vector<learn::ClassIou> rows;
+  learn::Evaluation evaluation;
   {
     std::unique_ptr<Progress> bar;
-    rows =
+    evaluation =
         learn::evaluate(command.checkpoint, dataset, command.views, [&](std::size_t done, std::size_t all) {
           if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet);
           bar->update(static_cast<unsigned>(done), "images");
         });
   }
-  double mean = 0, sphere = 0;
-  for (const learn::ClassIou& row : rows) {
-    mean += row.iou / static_cast<double>(rows.size());
-    sphere += row.sphere / static_cast<double>(rows.size());
-  }
-  if (!command.output.empty()) write_json(command.output, to_json(rows, mean, sphere));
+  if (!command.output.empty()) write_json(command.output, to_json(evaluation, command));
   if (common.quiet) return;
-  for (const learn::ClassIou& row : rows) {
-    std::printf("%-10s %5.1f%%  (the sphere %4.1f%%)\n",
-                std::string(learn::object_classes()[row.object_class].name).c_str(), 100 * row.iou,
-                100 * row.sphere);
+  const auto print = [](std::string_view name, double iou, double sphere) {
+    std::printf("%-10s %5.1f%%  (the sphere %4.1f%%)\n", std::string(name).c_str(), 100 * iou, 100 * sphere);
+  };
+  for (const learn::ClassIou& row : evaluation.classes) {
+    print(learn::object_classes()[row.object_class].name, row.iou, row.sphere);
   }
-  std::printf("%-10s %5.1f%%  (the sphere %4.1f%%)\n", "mean", 100 * mean, 100 * sphere);
+  print("mean", evaluation.iou, evaluation.sphere);
 }
 
 void add_eval_command(CLI::App& application, CommonOptions& common) {

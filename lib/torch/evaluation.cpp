@@ -120,15 +120,16 @@ std::vector<ViewOfObject> spread_views(const Dataset& dataset, std::size_t views
   return which;
 }
 
-std::vector<ClassIou> evaluate(const std::filesystem::path& checkpoint, const Dataset& dataset,
-                               std::size_t views,
-                               const std::function<void(std::size_t, std::size_t)>& progress) {
+Evaluation evaluate(const std::filesystem::path& checkpoint, const Dataset& dataset, std::size_t views,
+                    const std::function<void(std::size_t, std::size_t)>& progress) {
   LoadedCheckpoint loaded = load_checkpoint(checkpoint, TrainingOptions{}.learning_rate);
   const std::vector<ViewOfObject> which = spread_views(dataset, views);
   const std::vector<double> found = reconstruction_iou(
       loaded.network, dataset, which, [&](std::size_t done) { progress(done, which.size()); });
   const Mesh sphere = start_mesh();
-  std::vector<ClassIou> result;
+  const Checkpoint& trained = loaded.checkpoint;
+  Evaluation result{trained.method, trained.seed, trained.steps.size(), 0, 0, {}};
+  const auto classes = static_cast<double>(dataset.classes().size());
   for (std::size_t c = 0; c < dataset.classes().size(); ++c) {
     ClassIou row{dataset.classes()[c], 0, 0, 0};
     const std::size_t first = dataset.first_object(c), last = dataset.first_object(c + 1);
@@ -138,7 +139,9 @@ std::vector<ClassIou> evaluate(const std::filesystem::path& checkpoint, const Da
     row.images = (last - first) * views;
     row.iou /= static_cast<double>(row.images);
     row.sphere /= static_cast<double>(last - first);
-    result.push_back(row);
+    result.iou += row.iou / classes;
+    result.sphere += row.sphere / classes;
+    result.classes.push_back(row);
   }
   return result;
 }

@@ -26,8 +26,8 @@ class BatchRenderer : public torch::CustomClassHolder {
                 const std::string& device);
 
   /// From the next render() on: "sigma", "gamma", "alpha", "occupancy_threshold", "blur_radius", "samples" or
-  /// "seed" of the smoothing; "znear" or "zfar", which are 1 and 100 unless set. A preset's blur radius follows
-  /// sigma, so the radius is set after it. Errors are torch's.
+  /// "seed" of the smoothing; "znear" or "zfar", which are 1 and 100 unless set. A preset's blur radius
+  /// follows sigma, so the radius is set after it. Errors are torch's.
   void set(const std::string& name, double value);
   void set_smoothing(const Smoothing& smoothing);
 
