@@ -124,7 +124,7 @@ std::vector<FigurePanel> figure10(const PoseRun& common, std::size_t count) {
 
 std::vector<FigurePanel> figure11(const PoseRun& common, std::size_t count) {
   constexpr double k_one[] = {50};
-  constexpr const char* k_methods[] = {"softras", "paper_cauchy", "paper_gaussian", "default"};
+  constexpr const char* k_methods[] = {"softras", "paper_cauchy", "paper_gaussian", "joint", "default"};
   std::vector<FigurePanel> panels = threshold_panels(common, count, "mailbox", k_one, k_methods);
   panels.push_back(threshold_panels(common, count, "bag", k_one, k_methods).front());
   return panels;
