@@ -27,12 +27,6 @@ ShapeSteps parse_steps(const std::string& word) {
   throw InvalidArgument("--steps (command line)", "\"" + word + "\"", "large or direct");
 }
 
-ShapeSchedule parse_schedule(const std::string& word) {
-  if (word == "anneal") return ShapeSchedule::annealed;
-  if (word == "adaptive") return ShapeSchedule::adaptive;
-  throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
-}
-
 void resize(ShapeViews& views, glm::ivec2 size) {
   for (ShapeView& view : views.views) {
     view.camera = resample(view.camera, views.width, views.height, size.x, size.y);
@@ -73,7 +67,7 @@ void check_outputs(const FitCommandOptions& options) {
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
-  options.solver.schedule = parse_schedule(options.schedule);
+  if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   ShapeViews views = read_views(options.views);
   apply(command, common, options.solver, views);
   const Device device = open_device(common);

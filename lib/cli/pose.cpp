@@ -37,12 +37,6 @@ OptimizerKind parse_optimizer(const std::string& word) {
   throw InvalidArgument("--optimizer (command line)", "\"" + word + "\"", "adam or sgd");
 }
 
-std::variant<AnnealSchedule, AdaptiveSchedule> parse_schedule(const std::string& word) {
-  if (word == "anneal") return AnnealSchedule{};
-  if (word == "adaptive") return AdaptiveSchedule{};
-  throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
-}
-
 /// The method that is asked for, by name or by an option that only one of them has.
 bool wants_descent(const CLI::App& command, const std::optional<std::string>& method) {
   const bool descends = gives_any(command, k_descent_group) || gives_any(command, k_smoothing_group);
@@ -71,10 +65,9 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   }
   options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
   options.descent.optimizer.kind = parse_optimizer(options.optimizer);
-  options.descent.schedule = parse_schedule(options.schedule);
-  if (std::holds_alternative<AdaptiveSchedule>(options.descent.schedule) &&
-      command.count("--iterations") == 0) {
-    options.descent.iterations = k_adaptive_iterations;
+  if (is_adaptive_schedule(options.schedule)) {
+    options.descent.schedule = AdaptiveSchedule{};
+    if (command.count("--iterations") == 0) options.descent.iterations = k_adaptive_iterations;
   }
   options.solver.method = options.descent;
 }

@@ -38,4 +38,10 @@ glm::dvec3 parse_vector(const std::string& text, const std::string& argument) {
                         "three finite numbers separated by commas, e.g. 0.1,0,-0.5");
 }
 
+bool is_adaptive_schedule(const std::string& word) {
+  if (word == "adaptive") return true;
+  if (word == "anneal") return false;
+  throw InvalidArgument("--schedule (command line)", "\"" + word + "\"", "anneal or adaptive");
+}
+
 }  // namespace dpr::cli

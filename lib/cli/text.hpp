@@ -12,4 +12,7 @@ glm::ivec2 parse_size(const std::string& text);
 /// Three numbers separated by commas. Throws InvalidArgument; `argument` says which one in the message.
 glm::dvec3 parse_vector(const std::string& text, const std::string& argument);
 
+/// The value of --schedule: true for "adaptive", false for "anneal". Throws InvalidArgument for another word.
+bool is_adaptive_schedule(const std::string& word);
+
 }  // namespace dpr::cli

@@ -129,6 +129,7 @@ TEST_SUITE("robustness") {
     fails(changed([](json& v) { v.erase("width"); }), k_short, "width");
     fails(good, with(k_short, {"--checkpoint", "garbage"}), "garbage");
     fails(good, with(k_short, {"--steps", "small"}), "small");
+    fails(good, with(k_short, {"--schedule", "sometimes"}), "sometimes");
     fails(good, with(k_short, {"--blur", "0"}), "blur");
     fails(good, with(k_short, {"--laplacian", "-1"}), "weight");
     fails(good, {"fit", "--views", "views.json", "-o", "mesh.stl"}, "mesh.stl");
