@@ -4,6 +4,7 @@
 #include <random>
 
 #include "cli/commands.hpp"
+#include "cli/fit_report.hpp"
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "dpr/renderer.hpp"
@@ -41,7 +42,7 @@ Scene cube_scene() {
   return scene;
 }
 
-Image render_rigidly(const Device& device, Scene scene) {
+Image rigid_image(const Device& device, Scene scene) {
   scene.smoothing = rigid_smoothing();
   Renderer renderer(device);
   renderer.set_scene(scene);
@@ -60,6 +61,13 @@ glm::dvec3 random_axis(std::uint64_t seed) {
   }
 }
 
+Json camera_to_json(const Camera& camera) {
+  return {{"view", rows_to_json(glm::dmat4(camera.view))},
+          {"fov_y_degrees", number(camera.fov_y_degrees)},
+          {"znear", number(camera.znear)},
+          {"zfar", number(camera.zfar)}};
+}
+
 /// A scene file of the demo's scene, with the cube in a pose.
 Json scene_to_json(const Scene& scene, const Pose& pose) {
   const PointLight& light = scene.lights->point.front();
@@ -67,9 +75,7 @@ Json scene_to_json(const Scene& scene, const Pose& pose) {
   const glm::dmat4 transform(affine(pose.rotation, pose.translation));
   return {{"width", scene.width},
           {"height", scene.height},
-          {"camera",
-           {{"view", rows_to_json(glm::dmat4(scene.camera.view))},
-            {"fov_y_degrees", number(scene.camera.fov_y_degrees)}}},
+          {"camera", camera_to_json(scene.camera)},
           {"meshes", Json::array({{{"file", "cube.obj"}, {"transform", rows_to_json(transform)}}})},
           {"lights",
            {{"point", Json::array({{{"position", vector(light.position)},
@@ -78,13 +84,43 @@ Json scene_to_json(const Scene& scene, const Pose& pose) {
           {"smoothing", {{"preset", "joint_gaussian"}}}};
 }
 
+/// Two rings of cameras about the cube, one above it and one below.
+std::vector<Camera> cameras_around() {
+  std::vector<Camera> cameras;
+  for (const float elevation : {35.0F, -35.0F}) {
+    for (int i = 0; i < 6; ++i) {
+      Camera camera = orbit_camera(5, elevation, 60.0F * static_cast<float>(i));
+      camera.fov_y_degrees = 45;
+      camera.zfar = 10;
+      cameras.push_back(camera);
+    }
+  }
+  return cameras;
+}
+
+/// Images of the cube's colours, without its light, and the views file for `dpr fit`.
+void write_views(const std::filesystem::path& folder, const Device& device, const Mesh& cube) {
+  constexpr int k_size = 64;
+  const std::vector<Camera> cameras = cameras_around();
+  const std::vector<Image> images = render_rigidly(device, cube, cameras, k_size, k_size);
+  make_folder(folder / "views");
+  Json views = Json::array();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string file = "views/" + std::to_string(i) + ".exr";
+    write_image(folder / file, images[i]);
+    views.push_back({{"image", file}, {"camera", camera_to_json(cameras[i])}});
+  }
+  write_json(folder / "views.json", {{"width", k_size}, {"height", k_size}, {"views", views}});
+}
+
 /// What the other commands take, so that they can be tried on it.
-void write_inputs(const std::filesystem::path& folder, const Scene& scene, const Pose& truth,
-                  const Pose& start, const Image& target) {
+void write_inputs(const std::filesystem::path& folder, const Device& device, const Scene& scene,
+                  const Pose& truth, const Pose& start, const Image& target) {
   write_mesh(folder / "cube.obj", scene.meshes.front().mesh);
   write_json(folder / "truth.json", scene_to_json(scene, truth));
   write_json(folder / "scene.json", scene_to_json(scene, start));
   write_image(folder / "target.exr", target);
+  write_views(folder, device, scene.meshes.front().mesh);
 }
 
 void run(const CLI::App& command, const std::string& folder, const CommonOptions& common) {
@@ -92,7 +128,7 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   Scene scene = cube_scene();
   apply(common, scene);
   const Device device = open_device(common);
-  const Image target = render_rigidly(device, scene);
+  const Image target = rigid_image(device, scene);
   PoseOptions options;
   if (gives_any(command, k_smoothing_group)) options.method = Descent{};  // least squares brings its own
   const PoseSolver solver(device, scene, target, options);
@@ -101,7 +137,7 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   const glm::dvec3 turn = glm::radians(k_start_degrees) * random_axis(common.seed.value_or(k_axis_seed));
   const Pose start{rotation_from_vector(turn) * truth.rotation, truth.translation};
   const PoseResult result = solver.solve(start, progress_callback(solver.most_iterations(), common.quiet));
-  write_inputs(folder, scene, truth, start, target);
+  write_inputs(folder, device, scene, truth, start, target);
   write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(scene, result, truth.rotation));
   write_pose_report(folder, device, scene, target, result, common.quiet, truth.rotation);
   if (!common.quiet) {
