@@ -233,7 +233,9 @@ void run_shapes(const Settings& settings) {
   }
   write_image(settings.folder / "shapes.png", vstack(pictures, 8));
   announce(settings, "shapes.png");
-  for (std::size_t i = 1; i < methods.size(); ++i) run(trials.front(), methods[i]);
+  for (Trial& trial : trials) {
+    for (std::size_t i = 1; i < methods.size(); ++i) run(trial, methods[i]);
+  }
 }
 
 }  // namespace dpr::experiments
