@@ -4,9 +4,11 @@
 
 namespace dpr::bench {
 
+const char* commit() { return DPR_COMMIT; }
+
 Json provenance(const Device& device) {
   const DeviceInfo& info = device.info();
-  return {{"commit", DPR_COMMIT},
+  return {{"commit", commit()},
           {"device",
            {{"platform", info.platform},
             {"name", info.name},

@@ -8,6 +8,9 @@ namespace dpr::bench {
 
 using cli::Json;
 
+/// The commit that was built; "unknown" outside a checkout.
+const char* commit();
+
 /// {"commit", "device": {...}, "build_options"}.
 Json provenance(const Device& device);
 

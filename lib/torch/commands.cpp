@@ -11,6 +11,7 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "learn/generate.hpp"
+#include "provenance.hpp"
 #include "torch/learning.hpp"
 
 namespace dpr::cli {
@@ -233,13 +234,10 @@ Json to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
                        {"iou", row.iou},
                        {"sphere", row.sphere}});
   }
-  return {{"method", evaluation.method},
-          {"seed", evaluation.seed},
-          {"steps", evaluation.steps},
-          {"split", command.split},
-          {"views", command.views},
-          {"mean_iou", evaluation.iou},
-          {"sphere_mean_iou", evaluation.sphere},
+  return {{"commit", bench::commit()},  {"method", evaluation.method},
+          {"seed", evaluation.seed},    {"steps", evaluation.steps},
+          {"split", command.split},     {"views", command.views},
+          {"mean_iou", evaluation.iou}, {"sphere_mean_iou", evaluation.sphere},
           {"classes", classes}};
 }
 
