@@ -35,7 +35,7 @@ kernel void loss_backward(const LossParams p, global const float4* restrict imag
   const float intersection = sums[2 * p.views + view], united = sums[3 * p.views + view];
   // Where both images are empty they agree: no loss, no gradient.
   const float b = target[i].w;
-  const float alpha =
-      united > 0.0f ? -silhouettes[view] * (b * united - intersection * (1.0f - b)) / (united * united) : 0.0f;
+  const float iou = united > 0.0f ? intersection / united : 1.0f;
+  const float alpha = united > 0.0f ? -silhouettes[view] * (b - iou * (1.0f - b)) / united : 0.0f;
   grad_image[i] = (float4)(color, alpha) / (float)p.views;
 }

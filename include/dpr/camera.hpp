@@ -3,6 +3,7 @@
 
 #include <glm/glm.hpp>
 #include <optional>
+#include <string>
 
 namespace dpr {
 
@@ -30,8 +31,8 @@ struct Projection {
 Projection projection(const Camera& camera, int width, int height);
 
 /// Throws InvalidArgument if the view is singular, not affine or not finite, or a parameter is out of its
-/// range.
-void validate(const Camera& camera);
+/// range; `name` says which camera it is.
+void validate(const Camera& camera, const std::string& name = "camera");
 
 /// A camera on a sphere about `target`, looking at it, up is +y. At elevation 0 and azimuth 0 it stands on
 /// +z; azimuth turns it towards +x, elevation lifts it. Degrees; elevation strictly between -90 and 90.

@@ -28,8 +28,8 @@ struct MeshLossTerms {
 };
 
 /// Weighted sum of the terms for a mesh whose connectivity stays; its gradient joins that of the images in
-/// Renderer::backward. Everything is gathered in a fixed order: the
-/// same bits from run to run on a device. Faces without area have no normal, and their hinges no loss.
+/// Renderer::backward. Everything is gathered in a fixed order: the same bits from run to run on a device.
+/// Faces without area have no normal, and their hinges no loss.
 class MeshLoss {
  public:
   /// Throws InvalidArgument for a mesh that is not valid and for weights that are negative or not finite; all
@@ -40,8 +40,8 @@ class MeshLoss {
   MeshLoss& operator=(MeshLoss&&) noexcept;
 
   /// The loss of a mesh of the renderer's scene, at the positions of its last forward(); for
-  /// Renderer::backward(image_loss, mesh_loss). Blocks. Throws InvalidArgument if that mesh has another
-  /// number of vertices.
+  /// Renderer::backward(image_loss, mesh_loss). Blocks. Throws InvalidArgument if there is no such
+  /// mesh, if it has another number of vertices, or if every view has a shape of its own (set_shapes()).
   double evaluate(const Renderer& renderer, std::size_t mesh = 0);
   /// The terms of the last evaluate().
   const MeshLossTerms& terms() const;

@@ -29,7 +29,7 @@ struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
   glm::vec3 background{0.0F};
   std::vector<ShapeView> views;
-  std::optional<Mesh> initial;         ///< none: an icosphere in the cameras' common view
+  std::optional<Mesh> initial;         ///< grey without vertex colours; none: an icosphere in the common view
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
 };
 
@@ -53,17 +53,18 @@ struct ShapeOptions {
   float edge_pixels = 2.0F;   ///< > 0: length of edges to which a level begins to remesh, in its pixels
   /// Iterations between two remeshings, in the first half of a level; 0: the mesh keeps its faces.
   unsigned remesh_interval = 50;
-  float blur = 0.5F;      ///< > 0: of the edges, in pixels of the level, at its beginning
-  float blur_end = 0.1F;  ///< > 0: at its end
+  /// > 0: of the edges, in pixels of the level, at its beginning and at its end. Where the views have a
+  /// smoothing of their own, that is the end, and it begins blur / blur_end times as wide.
+  float blur = 0.5F, blur_end = 0.1F;
   ShapeSchedule schedule = ShapeSchedule::annealed;
   ShapeSteps steps = ShapeSteps::large_steps;
   float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
-  double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the initial shape
+  double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the sphere in the common view
   double learning_rate_end =
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
   double color_learning_rate = 0.05;  ///< > 0
   LossWeights loss{.l1 = 4, .silhouette = 1};
-  MeshLossWeights regularizers;       ///< for an object of radius 1; edge_target is ignored
+  MeshLossWeights regularizers;       ///< as if that sphere had a radius of 1; edge_target too
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
 };
 

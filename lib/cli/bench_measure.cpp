@@ -84,9 +84,7 @@ std::vector<std::string> chosen_workloads(const BenchMeasureOptions& options) {
 void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
   const std::vector<std::string> names = chosen_workloads(options);
   for (const std::string& stage : options.stages) require_stage(stage);
-  if (!options.output.empty()) {
-    const TemporaryFile writable(options.output);
-  }
+  if (!options.output.empty()) require_writable(options.output);
   const Device device = open_device(common);
   const double first_image_ms = bench::first_image_ms(device);
   const bench::Peaks peaks = bench::measure_peaks(device);

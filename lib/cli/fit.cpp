@@ -57,11 +57,8 @@ void check_outputs(const FitCommandOptions& options) {
   if (extension != ".obj" && extension != ".ply") {
     throw InvalidArgument("--output (command line)", "\"" + options.output + "\"", "a file .obj or .ply");
   }
-  { const TemporaryFile writable(options.output); }
-  if (!options.checkpoint.empty()) {
-    const TemporaryFile writable(options.checkpoint);
-  }
-  if (!options.report.empty()) make_folder(options.report);
+  require_writable(options.output);
+  if (!options.checkpoint.empty()) require_writable(options.checkpoint);
 }
 
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
@@ -72,6 +69,7 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   apply(command, common, options.solver, views);
   const Device device = open_device(common);
   const ShapeSolver solver(device, views, options.solver);
+  if (!options.report.empty()) make_folder(options.report);
   FitObserver observer(solver.most_iterations(), common.quiet, !options.report.empty());
   const ShapeResult result = solver.solve(observer.callback(), options.checkpoint);
   write_mesh(options.output, result.mesh);
@@ -99,7 +97,10 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   add("--edge", solver.edge_pixels, "Length of the mesh's edges, in pixels of the level", "FLOAT");
   add("--remesh-interval", solver.remesh_interval,
       "Steps between two remeshings, in the first half of a level; 0: the faces stay", "N");
-  add("--blur", solver.blur, "Of the edges, in pixels of the level, at its beginning", "FLOAT");
+  add("--blur", solver.blur,
+      "Of the edges, in pixels of the level, at its beginning; with a smoothing given, it begins blur / "
+      "blur-end times as wide",
+      "FLOAT");
   add("--blur-end", solver.blur_end, "The same at its end", "FLOAT");
   add("--schedule", options.schedule, "How the blur shrinks: steadily, or while less of it means less loss",
       "anneal|adaptive");

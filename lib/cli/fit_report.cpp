@@ -32,17 +32,19 @@ std::vector<const ShapeView*> some_of(const std::vector<ShapeView>& views) {
   return chosen;
 }
 
-/// Cameras around the mesh, which fills most of their pictures.
-std::vector<Camera> turntable(const Mesh& mesh, std::size_t count) {
+/// Cameras around the mesh, which fills most of the short side of their pictures.
+std::vector<Camera> turntable(const Mesh& mesh, std::size_t count, int width, int height) {
   constexpr float k_elevation_degrees = 20, k_fov_degrees = 40, k_margin = 1.15F;
   const Bounds box = bounding_box(mesh.positions);
   const float radius = 0.5F * glm::length(box.high - box.low);
-  const float distance = k_margin * radius / std::sin(glm::radians(0.5F * k_fov_degrees));
+  const float half_angle = glm::radians(0.5F * k_fov_degrees);
+  const float distance = k_margin * radius / std::sin(half_angle);
+  const float tall = static_cast<float>(height) / static_cast<float>(std::min(width, height));
   std::vector<Camera> cameras;
   for (std::size_t i = 0; i < count; ++i) {
     const float azimuth = 360.0F * static_cast<float>(i) / static_cast<float>(count);
     Camera camera = orbit_camera(distance, k_elevation_degrees, azimuth, center(box));
-    camera.fov_y_degrees = k_fov_degrees;
+    camera.fov_y_degrees = glm::degrees(2 * std::atan(tall * std::tan(half_angle)));
     camera.znear = distance - 1.1F * radius;
     camera.zfar = distance + 1.1F * radius;
     cameras.push_back(camera);
@@ -168,8 +170,9 @@ void write_fit_report(const std::filesystem::path& folder, const Device& device,
   for (const Mesh& mesh : kept) stages.push_back(render(mesh, {cameras.front()}).front());
   write_image(folder / "targets.png", strip_of(targets));
   write_image(folder / "results.png", strip_of(render(result.mesh, cameras)));
-  write_image(folder / "turntable.png",
-              strip_of(render(result.mesh, turntable(result.mesh, k_strip_length))));
+  write_image(
+      folder / "turntable.png",
+      strip_of(render(result.mesh, turntable(result.mesh, k_strip_length, views.width, views.height))));
   if (!stages.empty()) write_image(folder / "iterations.png", strip_of(stages));
   const bool is_plotted = !result.history.empty() && plot_history(folder / "plot.png", result.history);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");

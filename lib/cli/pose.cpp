@@ -96,8 +96,7 @@ void print(const std::string& file, const PoseResult& result) {
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // What can be wrong about the output is found out before the work, not after it.
-  { const TemporaryFile writable(options.output); }
-  if (!options.report.empty()) make_folder(options.report);
+  require_writable(options.output);
   std::optional<glm::dmat3> rotation;
   if (!options.initial_rotation.empty()) {
     rotation =
@@ -108,6 +107,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const Image target = read_target(options.target, options.descent.loss);
   const Device device = open_device(common);
   const PoseSolver solver(device, scene, target, options.solver);
+  if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   write_json(options.output, pose_to_json(scene, result));
   if (!options.report.empty()) write_pose_report(options.report, device, scene, target, result, common.quiet);

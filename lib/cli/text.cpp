@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dpr/error.hpp"
+#include "scene/checks.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -25,8 +26,12 @@ bool take(const char*& at, const char* end, Number& number, char follower) {
 glm::ivec2 parse_size(const std::string& text) {
   const char *at = text.data(), *end = at + text.size();
   glm::ivec2 size(0);
-  if (take(at, end, size.x, 'x') && take(at, end, size.y, 0) && size.x > 0 && size.y > 0) return size;
-  throw InvalidArgument("--size (command line)", "\"" + text + "\"", "WIDTHxHEIGHT, e.g. 640x480");
+  const auto is_side = [](int pixels) { return pixels >= 1 && pixels <= checks::k_largest_side; };
+  if (take(at, end, size.x, 'x') && take(at, end, size.y, 0) && is_side(size.x) && is_side(size.y))
+    return size;
+  throw InvalidArgument(
+      "--size (command line)", "\"" + text + "\"",
+      "WIDTHxHEIGHT, e.g. 640x480, at most " + std::to_string(checks::k_largest_side) + " on a side");
 }
 
 glm::dvec3 parse_vector(const std::string& text, const std::string& argument) {

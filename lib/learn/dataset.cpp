@@ -1,8 +1,11 @@
 #include "learn/dataset.hpp"
 
 #include <algorithm>
+#include <sstream>
+#include <system_error>
 
 #include "dpr/error.hpp"
+#include "scene/input_file.hpp"
 
 namespace dpr::learn {
 namespace {
@@ -28,6 +31,18 @@ ByteArray read_array(const std::filesystem::path& file, std::initializer_list<st
     throw IoError(file, "has the shape " + shape_text(array.shape) + ", not Nx" + shape_text(rest));
   }
   return array;
+}
+
+/// Throws IoError if there is a list of the objects, and of another number of them.
+void check_list(const std::filesystem::path& file, std::size_t objects) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return;
+  std::istringstream list(read_file(file));
+  std::size_t lines = 0;
+  for (std::string line; std::getline(list, line);) lines += line.empty() ? 0 : 1;
+  if (lines == objects) return;
+  throw IoError(file,
+                "lists " + std::to_string(lines) + " objects, the images are of " + std::to_string(objects));
 }
 
 }  // namespace
@@ -100,6 +115,7 @@ Dataset::Dataset(const std::filesystem::path& folder, Split split, std::span<con
       throw IoError(file, "has " + std::to_string(voxels_.back().shape[0]) + " objects, its images " +
                               std::to_string(objects));
     }
+    check_list(ids_file(folder, c, split), objects);
     first_.push_back(count_);
     count_ += objects;
   }

@@ -56,8 +56,8 @@ VoxelGrid from_file_order(std::span<const std::uint8_t> voxels);
 /// The objects of one split and some classes, all in memory: 426 kB each.
 class Dataset {
  public:
-  /// Throws IoError for a file that is missing, damaged or of another shape, InvalidArgument where no class
-  /// is asked for.
+  /// Throws IoError for a file that is missing, damaged, of another shape or of other objects than its
+  /// class' other files, InvalidArgument where no class is asked for.
   Dataset(const std::filesystem::path& folder, Split split, std::span<const std::size_t> classes);
 
   std::size_t size() const { return count_; }

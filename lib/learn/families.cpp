@@ -69,7 +69,9 @@ Solids bench(Draw& draw) {
   const float x = 0.5F, z = draw.between(0.12F, 0.2F), height = draw.between(0.2F, 0.3F), thickness = 0.03F;
   s.box({0, height, 0}, {x, thickness, z}, seat);
   if (draw.chance(0.5F)) {
-    add_legs(s, x * 0.95F, z, height, draw.between(0.025F, 0.04F), draw.chance(0.4F), frame);
+    const bool round_legs = draw.chance(0.4F);
+    const float width = draw.between(0.025F, 0.04F);
+    add_legs(s, x * 0.95F, z, height, width, round_legs, frame);
   } else {
     const float inset = draw.between(0.6F, 0.9F) * x;
     for (const float side : {-inset, inset})
@@ -148,7 +150,9 @@ Solids chair(Draw& draw) {
                           {height + thickness + back, {0, -z + 0.03F - lean}, {x * top, 0.028F}}};
   s.loft(Axis::y, rest, 4, draw.chance(0.5F) ? seat : frame);
   if (draw.chance(0.8F)) {
-    add_legs(s, x, z, height, draw.between(0.025F, 0.035F), draw.chance(0.5F), frame);
+    const bool round_legs = draw.chance(0.5F);
+    const float width = draw.between(0.025F, 0.035F);
+    add_legs(s, x, z, height, width, round_legs, frame);
   } else {
     s.cylinder(Axis::y, {0, height / 2, 0}, height / 2, 0.035F, frame);
     s.cylinder(Axis::y, {0, 0.03F, 0}, 0.03F, x * 0.9F, frame);
@@ -188,8 +192,9 @@ Solids lamp(Draw& draw) {
   const Section cone[] = {{height, {0, 0}, glm::vec2(low)}, {height + tall, {0, 0}, glm::vec2(high)}};
   s.loft(Axis::y, cone, draw.chance(0.75F) ? 16 : 4, shade);
   if (draw.chance(0.4F)) {
-    s.ellipsoid({0, height * 0.4F, 0},
-                {draw.between(0.08F, 0.13F), height * 0.4F, draw.between(0.08F, 0.13F)}, draw.color());
+    const glm::vec3 body = draw.color();
+    const float wide = draw.between(0.08F, 0.13F), deep = draw.between(0.08F, 0.13F);
+    s.ellipsoid({0, height * 0.4F, 0}, {wide, height * 0.4F, deep}, body);
   }
   s.cylinder(Axis::y, {0, height / 2, 0}, height / 2 + 0.02F, draw.between(0.025F, 0.035F), pole);
   s.cylinder(Axis::y, {0, 0.025F, 0}, 0.025F, draw.between(0.1F, 0.17F), pole);
@@ -276,8 +281,9 @@ Solids table(Draw& draw) {
     return s;
   }
   const float inset = is_round ? 0.65F : 0.95F;
-  add_legs(s, x * inset, (is_round ? x : z) * inset, height, draw.between(0.025F, 0.04F), draw.chance(0.4F),
-           legs);
+  const bool round_legs = draw.chance(0.4F);
+  const float width = draw.between(0.025F, 0.04F);
+  add_legs(s, x * inset, (is_round ? x : z) * inset, height, width, round_legs, legs);
   if (!is_round && draw.chance(0.3F)) s.box({0, height * 0.35F, 0}, {x * 0.9F, 0.025F, z * 0.9F}, legs);
   return s;
 }

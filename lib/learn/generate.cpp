@@ -105,6 +105,9 @@ void generate(const Device& device, const GenerateOptions& options, const std::f
       }
       constexpr std::size_t n = k_voxel_resolution, side = k_image_size;
       const std::size_t image_shape[] = {objects, k_views, 4, side, side}, voxel_shape[] = {objects, n, n, n};
+      // An earlier set's go first: cut off here, files are missing, and none belong to other images.
+      std::filesystem::remove(voxels_file(folder, c, split));
+      std::filesystem::remove(ids_file(folder, c, split));
       write_npz(images_file(folder, c, split), image_shape, images);
       write_npz(voxels_file(folder, c, split), voxel_shape, voxels, /*is_bool=*/true);
       write_ids(ids_file(folder, c, split), c, options.seed, split, objects);

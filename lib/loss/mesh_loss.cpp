@@ -112,6 +112,9 @@ double MeshLoss::evaluate(const Renderer& renderer, std::size_t mesh) {
   Impl& m = *impl_;
   Renderer::Impl& r = renderer.impl();
   r.require_forward("MeshLoss::evaluate");
+  if (r.frame.position_stride != 0) {
+    throw InvalidArgument("mesh (mesh loss)", "a shape of its own for every view", "one for all views");
+  }
   if (mesh >= r.geometry->meshes.size()) {
     throw InvalidArgument("mesh (mesh loss)", std::to_string(mesh),
                           "below " + std::to_string(r.geometry->meshes.size()));

@@ -34,20 +34,20 @@ Projection projection(const Camera& camera, int width, int height) {
           glm::vec2(ndc_per_pixel * (k.cx - 0.5 * width), ndc_per_pixel * (0.5 * height - k.cy))};
 }
 
-void validate(const Camera& camera) {
-  checks::require_affine(camera.view, "view (camera)");
+void validate(const Camera& camera, const std::string& name) {
+  checks::require_affine(camera.view, checks::in("view", name));
   if (camera.intrinsics) {
-    checks::require_positive(camera.intrinsics->fx, "fx (camera.intrinsics)");
-    checks::require_positive(camera.intrinsics->fy, "fy (camera.intrinsics)");
-    checks::require_finite(camera.intrinsics->cx, "cx (camera.intrinsics)");
-    checks::require_finite(camera.intrinsics->cy, "cy (camera.intrinsics)");
+    checks::require_positive(camera.intrinsics->fx, checks::in("fx", name + ".intrinsics"));
+    checks::require_positive(camera.intrinsics->fy, checks::in("fy", name + ".intrinsics"));
+    checks::require_finite(camera.intrinsics->cx, checks::in("cx", name + ".intrinsics"));
+    checks::require_finite(camera.intrinsics->cy, checks::in("cy", name + ".intrinsics"));
   } else if (!(camera.fov_y_degrees > 0 && camera.fov_y_degrees < 180)) {
-    throw InvalidArgument("fov_y_degrees (camera)", checks::text(camera.fov_y_degrees),
+    throw InvalidArgument(checks::in("fov_y_degrees", name), checks::text(camera.fov_y_degrees),
                           "an angle between 0 and 180, both excluded");
   }
-  checks::require_positive(camera.znear, "znear (camera)");
+  checks::require_positive(camera.znear, checks::in("znear", name));
   if (!(camera.zfar > camera.znear && std::isfinite(camera.zfar))) {
-    throw InvalidArgument("zfar (camera)", checks::text(camera.zfar),
+    throw InvalidArgument(checks::in("zfar", name), checks::text(camera.zfar),
                           "a finite number above znear, " + checks::text(camera.znear));
   }
 }

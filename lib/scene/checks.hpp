@@ -14,6 +14,9 @@
 
 namespace dpr::checks {
 
+/// Of an image, in pixels.
+inline constexpr int k_largest_side = 16384;
+
 /// The shortest text that reads back as the same number; independent of the locale.
 template <typename Number>
 std::string text(Number value) {

@@ -10,13 +10,12 @@
 #include <string>
 
 #include "dpr/error.hpp"
+#include "scene/checks.hpp"
 #include "scene/input_file.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr {
 namespace {
-
-constexpr int k_largest_side = 16384;
 
 // Alpha is the silhouette, not a factor of the colours. OpenImageIO multiplies it in while reading PNG and
 // the like, and takes it out again while writing, unless both sides are told that it is not there.
@@ -94,11 +93,12 @@ std::array<int, 4> channels_of(const OIIO::ImageSpec& spec) {
 Image read_image(const std::filesystem::path& file, bool* has_alpha) {
   const auto input = open(file);
   const OIIO::ImageSpec& spec = input->spec();
-  if (spec.width < 1 || spec.height < 1 || spec.width > k_largest_side || spec.height > k_largest_side ||
-      spec.depth > 1 || spec.nchannels < 1) {
+  if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
+      spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {
     throw IoError(file, "got " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
                             " pixels in " + std::to_string(spec.nchannels) + " channels, expected 1 to " +
-                            std::to_string(k_largest_side) + " pixels on a side in one channel or more");
+                            std::to_string(checks::k_largest_side) +
+                            " pixels on a side in one channel or more");
   }
   const auto channels = static_cast<std::size_t>(spec.nchannels);
   const std::array<int, 4> source = channels_of(spec);

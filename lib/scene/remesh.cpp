@@ -4,8 +4,11 @@
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
+#include "dpr/error.hpp"
+#include "scene/checks.hpp"
 #include "scene/silent_openmesh.hpp"
 
 namespace dpr {
@@ -37,6 +40,7 @@ std::optional<Halfedges> make_halfedges(const Mesh& mesh) {
     m.set_color(v, mesh.vertex_colors.empty() ? Vec3d(1.0) : to_openmesh(mesh.vertex_colors[i]));
   }
   for (const glm::uvec3& f : mesh.faces) {
+    if (f.x == f.y || f.y == f.z || f.z == f.x) return {};  // OpenMesh would link an edge to itself
     const auto corner = [&](int i) { return m.vertex_handle(f[i]); };
     if (!m.add_face(corner(0), corner(1), corner(2)).is_valid()) return {};
   }
@@ -55,6 +59,21 @@ Mesh to_mesh(const Halfedges& m, bool has_colors) {
     for (const VertexHandle v : m.fv_range(f)) face[corner++] = static_cast<unsigned>(v.idx());
   }
   return mesh;
+}
+
+/// Throws InvalidArgument where equilateral triangles of the surface's area would take all memory.
+void require_room(const Mesh& mesh, float edge_length) {
+  constexpr double k_most_faces = 1 << 22;
+  double area = 0;
+  for (const glm::uvec3& f : mesh.faces) {
+    const glm::dvec3 a = mesh.positions[f.x], b = mesh.positions[f.y], c = mesh.positions[f.z];
+    area += 0.5 * glm::length(glm::cross(b - a, c - a));
+  }
+  const double length = edge_length;
+  if (area <= k_most_faces * 0.25 * std::sqrt(3.0) * length * length) return;
+  throw InvalidArgument("edge length (remesh)",
+                        checks::text(edge_length) + " for an area of " + checks::text(area),
+                        "one that needs at most 2^22 triangles");
 }
 
 Vec3d normal_of(const Vec3d& a, const Vec3d& b, const Vec3d& c) { return OpenMesh::cross(b - a, c - a); }
@@ -166,6 +185,7 @@ void relax(Halfedges& m) {
 }  // namespace
 
 std::optional<Mesh> remesh(const Mesh& mesh, float edge_length, unsigned passes) {
+  require_room(mesh, edge_length);
   std::optional<Halfedges> halfedges = make_halfedges(mesh);
   if (!halfedges) return {};
   const double longest = 4.0 / 3.0 * static_cast<double>(edge_length);

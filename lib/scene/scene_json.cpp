@@ -13,8 +13,6 @@
 namespace dpr {
 namespace {
 
-constexpr int k_largest_side = 16384;
-
 template <typename Value, typename Parse>
 void take(const JsonNode& node, std::string_view key, Value& value, Parse parse) {
   if (const auto member = node.find(key)) value = parse(*member);
@@ -182,9 +180,9 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder) {
 }
 
 void validate_side(int value, const std::string& argument) {
-  if (value >= 1 && value <= k_largest_side) return;
+  if (value >= 1 && value <= checks::k_largest_side) return;
   throw InvalidArgument(argument, std::to_string(value),
-                        "1 to " + std::to_string(k_largest_side) + " pixels");
+                        "1 to " + std::to_string(checks::k_largest_side) + " pixels");
 }
 
 }  // namespace

@@ -42,6 +42,11 @@ void TemporaryFile::commit() {
   committed_ = true;
 }
 
+void require_writable(const std::filesystem::path& file) {
+  const TemporaryFile beside(file);
+  if (!std::ofstream(beside.path())) throw IoError(file, "cannot be written");
+}
+
 void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write) {
   TemporaryFile temporary(file);
   std::ofstream out(temporary.path(), std::ios::binary);

@@ -27,6 +27,9 @@ class TemporaryFile {
   bool committed_ = false;
 };
 
+/// Throws IoError where a file cannot be written; leaves what is there. For work that would be lost without.
+void require_writable(const std::filesystem::path& file);
+
 /// Writes what `write` puts into the stream (binary) to a temporary file, which then becomes `file`. Throws
 /// IoError; what `write` throws passes through, and leaves nothing behind.
 void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write);

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "dpr/adaptive_smoothing.hpp"
@@ -280,6 +282,9 @@ class Run {
 
 void check(const ShapeViews& views) {
   if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
+  if (views.width < 1 || views.height < 1) {
+    throw InvalidArgument("size (shape)", size_text(views.width, views.height), "at least 1x1");
+  }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
     const auto& [image, camera, has_alpha] = views.views[i];
     const std::string name = checks::element("views", i);
@@ -288,7 +293,7 @@ void check(const ShapeViews& views) {
                             size_text(views.width, views.height));
     }
     checks::require_pixels(image, checks::in(name, "shape"));
-    validate(camera);
+    validate(camera, name + ".camera");
   }
   checks::require_finite(views.background, "background (shape)");
   if (views.initial) validate(*views.initial, "initial (shape)");
@@ -300,7 +305,8 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
   const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
   require(o.levels > 0 && o.levels <= most, "levels (shape)", o.levels,
           "at least 1, and a pixel a side at the coarsest");
-  require(o.iterations > 0, "iterations (shape)", o.iterations, "at least 1");
+  require(o.iterations > 0 && o.iterations <= std::numeric_limits<unsigned>::max() / o.levels,
+          "iterations (shape)", o.iterations, "at least 1, and below 2^32 in all levels");
   require(o.batch > 0, "batch (shape)", o.batch, "at least 1");
   require(o.checkpoint_interval > 0, "checkpoint_interval (shape)", o.checkpoint_interval, "at least 1");
   require(positive(o.edge_pixels), "edge_pixels (shape)", o.edge_pixels, "a finite number above 0");
@@ -370,7 +376,9 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
   state.positions = flat(start_.positions);
   state.colors = flat(start_.vertex_colors);
   const std::uint64_t mark = checkpoint.empty() ? 0 : fingerprint(views_, start_, options_);
-  if (!checkpoint.empty() && std::filesystem::exists(checkpoint)) state = read_checkpoint(checkpoint, mark);
+  std::error_code unknown;  // then reading it says why
+  if (!checkpoint.empty() && (std::filesystem::exists(checkpoint, unknown) || unknown))
+    state = read_checkpoint(checkpoint, mark, finest_smoothing(views_, options_));
 
   Run run(device_, views_, options_, std::move(state));
   bool goes_on = true;

@@ -31,7 +31,7 @@ glm::dvec3 meeting_point(const ShapeViews& views) {
 }  // namespace
 
 CommonView common_view(const ShapeViews& views) {
-  constexpr double k_part_of_view = 0.5;
+  constexpr double k_part_of_view = 0.5, k_part_of_depth = 0.9;
   CommonView common;
   common.centre = meeting_point(views);
   common.radius = std::numeric_limits<double>::max();
@@ -40,13 +40,15 @@ CommonView common_view(const ShapeViews& views) {
     const Camera& camera = views.views[i].camera;
     const Projection p = projection(camera, views.width, views.height);
     const double depth = -(glm::dmat4(camera.view) * glm::dvec4(common.centre, 1.0)).z;
-    if (!(depth > camera.znear)) {
-      throw InvalidArgument(checks::element("views", i) + ".camera (shape)",
-                            "a depth of " + checks::text(depth) + " of the point that the cameras look at",
-                            "more than znear, " + checks::text(camera.znear));
+    if (!(depth > camera.znear && depth < camera.zfar)) {
+      throw InvalidArgument(
+          checks::element("views", i) + ".camera (shape)",
+          "a depth of " + checks::text(depth) + " of the point that the cameras look at",
+          "between znear, " + checks::text(camera.znear) + ", and zfar, " + checks::text(camera.zfar));
     }
     const double world_per_ndc = depth / static_cast<double>(std::max(p.scale.x, p.scale.y));
-    common.radius = std::min(common.radius, k_part_of_view * world_per_ndc);
+    const double to_planes = std::min(depth - camera.znear, camera.zfar - depth);
+    common.radius = std::min({common.radius, k_part_of_view * world_per_ndc, k_part_of_depth * to_planes});
     common.pixel += 2.0 / std::min(views.width, views.height) * world_per_ndc / count;
     common.depth_range += static_cast<double>(camera.zfar - camera.znear) / count;
   }

@@ -1,13 +1,16 @@
 // Checkpoints: CBOR by nlohmann's library, which keeps every bit of a double, and a checksum of the content.
 #include "solve/shape_state.hpp"
 
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
+#include <ostream>
 #include <span>
+#include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "dpr/error.hpp"
+#include "scene/input_file.hpp"
+#include "scene/set_sigma.hpp"
 #include "scene/temporary_file.hpp"
 
 namespace dpr {
@@ -15,7 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* k_format = "dpr shape checkpoint 2";
+/// What a file begins with.
+constexpr std::string_view k_magic = "dpr shape checkpoint 3\n";
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo 1991).
 class Hash {
@@ -96,23 +100,27 @@ OptimizerState optimizer_state(const json& node) {
 }
 
 json to_json(const ShapeIteration& i) {
-  return {i.iteration,       i.level, i.loss,   i.image_loss, i.mesh_loss, i.smoothing.sigma,
-          i.smoothing.gamma, i.width, i.height, i.vertices,   i.faces};
+  const Smoothing& s = i.smoothing;
+  return {i.iteration, i.level, i.loss,  i.image_loss, i.mesh_loss, s.sigma, s.gamma,
+          s.samples,   s.seed,  i.width, i.height,     i.vertices,  i.faces};
 }
 
-ShapeIteration iteration(const json& node) {
+ShapeIteration iteration(const json& node, const Smoothing& finest) {
   ShapeIteration i;
   i.iteration = node.at(0);
   i.level = node.at(1);
   i.loss = node.at(2);
   i.image_loss = node.at(3);
   i.mesh_loss = node.at(4);
-  i.smoothing.sigma = node.at(5);
+  i.smoothing = finest;
+  set_sigma(i.smoothing, node.at(5));
   i.smoothing.gamma = node.at(6);
-  i.width = node.at(7);
-  i.height = node.at(8);
-  i.vertices = node.at(9);
-  i.faces = node.at(10);
+  i.smoothing.samples = node.at(7);
+  i.smoothing.seed = node.at(8);
+  i.width = node.at(9);
+  i.height = node.at(10);
+  i.vertices = node.at(11);
+  i.faces = node.at(12);
   return i;
 }
 
@@ -131,7 +139,7 @@ json to_json(const ShapeState& state) {
           {"history", history}};
 }
 
-ShapeState state_of(const json& node) {
+ShapeState state_of(const json& node, const Smoothing& finest) {
   ShapeState state;
   state.iteration = node.at("iteration");
   for (const json& f : node.at("faces")) state.faces.emplace_back(f.at(0), f.at(1), f.at(2));
@@ -141,7 +149,7 @@ ShapeState state_of(const json& node) {
   state.color_steps = optimizer_state(node.at("color_steps"));
   const json& adaptive = node.at("adaptive");
   state.adaptive = {adaptive.at(0), adaptive.at(1), adaptive.at(2), adaptive.at(3)};
-  for (const json& step : node.at("history")) state.history.push_back(iteration(step));
+  for (const json& step : node.at("history")) state.history.push_back(iteration(step, finest));
   return state;
 }
 
@@ -183,31 +191,29 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
 
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint) {
   const std::vector<std::uint8_t> content = json::to_cbor(to_json(state));
-  const std::vector<std::uint8_t> bytes = json::to_cbor({{"format", k_format},
-                                                         {"fingerprint", fingerprint},
-                                                         {"checksum", hash_of(content)},
-                                                         {"content", json::binary(content)}});
+  const std::vector<std::uint8_t> bytes = json::to_cbor(
+      {{"fingerprint", fingerprint}, {"checksum", hash_of(content)}, {"content", json::binary(content)}});
   write_whole_file(file, [&](std::ostream& out) {
+    out << k_magic;
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   });
 }
 
-ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint) {
-  std::ifstream in(file, std::ios::binary);
-  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
-  if (!in.is_open() || in.bad()) throw IoError(file, "the file cannot be read");
+ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
+                           const Smoothing& finest) {
+  const std::string bytes = read_file(file);
+  if (!bytes.starts_with(k_magic)) throw IoError(file, "is no checkpoint of a shape, or of another version");
   try {
-    const json document = json::from_cbor(bytes);
-    if (document.at("format") != k_format) throw IoError(file, "is a checkpoint of another kind");
+    const json document = json::from_cbor(bytes.substr(k_magic.size()));
     const std::vector<std::uint8_t>& content = document.at("content").get_binary();
     if (document.at("checksum") != hash_of(content)) throw IoError(file, "the checkpoint is damaged");
     if (document.at("fingerprint") != fingerprint) {
       throw InvalidArgument("checkpoint (" + file.string() + ")", "one of other views or options",
                             "one of this run; remove it to begin anew");
     }
-    return state_of(json::from_cbor(content));
+    return state_of(json::from_cbor(content), finest);
   } catch (const json::exception&) {
-    throw IoError(file, "is no checkpoint of a shape, or damaged");
+    throw IoError(file, "the checkpoint is damaged");
   }
 }
 

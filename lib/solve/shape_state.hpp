@@ -35,8 +35,9 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
 /// All or nothing, as CBOR. Throws IoError.
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint);
 
-/// Throws IoError where the file is no checkpoint or damaged, InvalidArgument where its fingerprint is
-/// another.
-ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint);
+/// A file keeps of the history's smoothings what changes; `finest` is the rest. Throws IoError where the file
+/// is no checkpoint or damaged, InvalidArgument where its fingerprint is another.
+ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
+                           const Smoothing& finest);
 
 }  // namespace dpr

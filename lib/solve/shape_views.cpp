@@ -10,12 +10,12 @@ namespace dpr {
 namespace {
 
 int parse_side(const JsonNode& node) {
-  constexpr std::uint64_t k_most = 16384;
-  const auto side = static_cast<int>(node.whole_number(k_most));
+  const auto side = static_cast<int>(node.whole_number(checks::k_largest_side));
   if (side < 1) node.fail("0", "at least 1");
   return side;
 }
 
+/// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views) {
   node.require_keys({"image", "camera"});
   ShapeView view;
@@ -29,7 +29,7 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
                           text(views.width, views.height) + ", the views'");
   }
   view.camera = parse_camera(node.at("camera"));
-  validate(view.camera);
+  validate(view.camera, checks::element("views", views.views.size()) + ".camera");
   return view;
 }
 

@@ -23,6 +23,8 @@ at::Tensor to_tensor(const std::vector<Record>& records) {
 
 template <typename Record>
 std::vector<Record> to_records(const at::Tensor& tensor) {
+  constexpr std::int64_t k_columns = sizeof(Record) / sizeof(double);
+  TORCH_CHECK(tensor.scalar_type() == torch::kDouble && tensor.dim() == 2 && tensor.size(1) == k_columns);
   std::vector<Record> records(static_cast<std::size_t>(tensor.size(0)));
   const at::Tensor values = tensor.contiguous();
   if (!records.empty())
@@ -48,6 +50,23 @@ nlohmann::json read_description(torch::serialize::InputArchive& archive) {
   return nlohmann::json::parse(text.toStringRef());
 }
 
+/// Reads the network's weights. Throws c10::Error unless they are as many as it has, and finite.
+void read_network(torch::serialize::InputArchive& archive, Network& network) {
+  const auto tensors = [&] {
+    std::vector<at::Tensor> all = network->parameters();
+    for (const at::Tensor& buffer : network->buffers()) all.push_back(buffer);
+    return all;
+  };
+  std::vector<std::vector<std::int64_t>> shapes;
+  for (const at::Tensor& tensor : tensors()) shapes.push_back(tensor.sizes().vec());
+  torch::serialize::InputArchive part;
+  archive.read("network", part);
+  network->load(part);  // takes tensors of any shape
+  auto shape = shapes.begin();
+  for (const at::Tensor& tensor : tensors())
+    TORCH_CHECK(tensor.sizes().vec() == *shape++ && tensor.isfinite().all().item<bool>());
+}
+
 LoadedCheckpoint read_checkpoint(const std::filesystem::path& file, torch::serialize::InputArchive& archive,
                                  double learning_rate) {
   const nlohmann::json description = read_description(archive);
@@ -60,9 +79,8 @@ LoadedCheckpoint read_checkpoint(const std::filesystem::path& file, torch::seria
   LoadedCheckpoint loaded = start(options, description.at("method"), description.at("seed"), learning_rate);
   loaded.checkpoint.steps = to_records<StepRecord>(read_tensor(archive, "steps"));
   loaded.checkpoint.validations = to_records<ValidationRecord>(read_tensor(archive, "validations"));
-  torch::serialize::InputArchive part;
-  archive.read("network", part);
-  loaded.network->load(part);
+  loaded.checkpoint.settings = description.at("settings");
+  read_network(archive, loaded.network);
   torch::serialize::InputArchive moments;
   archive.read("optimizer", moments);
   loaded.optimizer->load(moments);
@@ -79,7 +97,8 @@ void save_checkpoint(const std::filesystem::path& file, const Checkpoint& checkp
   const nlohmann::json description = {{"architecture", k_architecture},
                                       {"palette", checkpoint.architecture.palette},
                                       {"method", checkpoint.method},
-                                      {"seed", checkpoint.seed}};
+                                      {"seed", checkpoint.seed},
+                                      {"settings", checkpoint.settings}};
   torch::serialize::OutputArchive archive, part, moments;
   archive.write("description", c10::IValue(description.dump()));
   archive.write("steps", to_tensor(checkpoint.steps));
@@ -88,13 +107,13 @@ void save_checkpoint(const std::filesystem::path& file, const Checkpoint& checkp
   archive.write("network", part);
   optimizer.save(moments);
   archive.write("optimizer", moments);
-  TemporaryFile temporary(file);
-  try {
-    archive.save_to(temporary.path().string());
-  } catch (const c10::Error& error) {
-    throw IoError(file, std::string("cannot be written: ") + error.what_without_backtrace());
-  }
-  temporary.commit();
+  write_whole_file(file, [&](std::ostream& out) {
+    // Torch's writer terminates the process where writing fails, so it is not told: the stream knows.
+    archive.save_to([&](const void* bytes, std::size_t count) {
+      out.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
+      return count;
+    });
+  });
 }
 
 LoadedCheckpoint start(const NetworkOptions& architecture, const std::string& method, std::uint64_t seed,

@@ -25,6 +25,7 @@ struct Checkpoint {
   NetworkOptions architecture;
   std::string method;
   std::uint64_t seed = 1;
+  std::string settings;  ///< whatever else a step depends on, as text
   std::vector<StepRecord> steps;
   std::vector<ValidationRecord> validations;
 };

@@ -26,13 +26,6 @@ struct DataOptions {
   std::vector<std::string> classes;
 };
 
-void add_device(CLI::App& command, CommonOptions& common) {
-  add_output_options(command, common);
-  command
-      .add_option("--device", common.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
-      ->type_name("cpu|gpu|INDEX|SUBSTRING");
-}
-
 void add_classes(CLI::App& command, std::vector<std::string>& classes) {
   command
       .add_option("--classes", classes,
@@ -56,7 +49,10 @@ void add_split(CLI::App& command, std::string& split) {
 
 std::vector<std::size_t> class_indices(const std::vector<std::string>& words) {
   std::vector<std::size_t> indices;
-  for (const std::string& word : words) indices.push_back(learn::find_class(word));
+  for (const std::string& word : words) {
+    const std::size_t c = learn::find_class(word);
+    if (std::ranges::find(indices, c) == indices.end()) indices.push_back(c);
+  }
   if (words.empty()) {
     for (std::size_t i = 0; i < learn::object_classes().size(); ++i) indices.push_back(i);
   }
@@ -106,9 +102,11 @@ void add_data_command(CLI::App& application, CommonOptions& common) {
   count("--val", Split::val, "Objects of a class to validate with");
   count("--test", Split::test, "Objects of a class to test with");
   command->add_option("--seed", options->generate.seed, "Seed of the shapes")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->type_name("N");
-  add_device(*command, common);
+  add_output_options(*command, common);
+  add_device_options(*command, common);
   command->footer("Example: dpr learn data -o data");
   command->callback([options, &common] { run_data(*options, common); });
 }
@@ -187,15 +185,18 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->capture_default_str()
       ->type_name("N");
   command->add_option("--seed", o.seed, "Seed of the weights, the batches and the noise")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->type_name("N");
   command->add_option("--batch", o.batch, "Images a step")->capture_default_str()->type_name("N");
   command->add_option("--learning-rate", o.learning_rate, "Of Adam")
       ->capture_default_str()
       ->type_name("FLOAT");
-  command->add_option("--sigma", o.sigma, "Scale of the distance noise, NDC^2 (default: 1e-4)")
+  command
+      ->add_option("--sigma", o.sigma,
+                   "Scale of the distance noise, NDC^2 (default: 1e-4; of opendr and nmr the preset's)")
       ->type_name("FLOAT");
-  command->add_option("--gamma", o.gamma, "Scale of the depth noise (default: 1e-4)")->type_name("FLOAT");
+  command->add_option("--gamma", o.gamma, "Scale of the depth noise (default: the same)")->type_name("FLOAT");
   command->add_option("--palette", o.palette, "Colours of a palette")->capture_default_str()->type_name("N");
   command->add_option("--silhouette-weight", o.weights.silhouette, "Of the silhouette's IoU")
       ->capture_default_str()
@@ -211,7 +212,8 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");
-  add_device(*command, common);
+  add_output_options(*command, common);
+  add_device_options(*command, common);
   command->footer("Example: dpr learn train --data data -o run --method joint_gaussian --minutes 30");
   command->callback([options, &common] { run_train(*options, common); });
 }
@@ -294,10 +296,12 @@ void add_show_command(CLI::App& application, CommonOptions& common) {
   add_data(*command, options->data);
   add_split(*command, options->split);
   command->add_option("--object", options->object, "Which object of every class")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->type_name("N");
   command->add_option("-o,--output", options->output, "Picture to write")->required()->type_name("OUT.png");
-  add_device(*command, common);
+  add_output_options(*command, common);
+  add_device_options(*command, common);
   command->footer("Example: dpr learn show --checkpoint run/checkpoint.pt --data data -o figure.png");
   command->callback([options, &common] {
     const Dataset dataset = read(options->data, learn::parse_split(options->split));

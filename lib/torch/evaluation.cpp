@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/resample.hpp"
 #include "torch/checkpoint.hpp"
@@ -38,7 +39,7 @@ Mesh start_mesh() {
   return mesh;
 }
 
-/// A reconstruction from some sides, at the size of the input and twice that.
+/// A reconstruction from some sides, at twice the size of the input.
 std::vector<Image> portraits(Renderer& renderer, const Mesh& mesh, std::size_t input_view) {
   constexpr std::size_t k_portraits = 4;
   constexpr int k_side = 2 * k_image_size, k_supersampling = 4;
@@ -122,6 +123,9 @@ std::vector<ViewOfObject> spread_views(const Dataset& dataset, std::size_t views
 
 Evaluation evaluate(const std::filesystem::path& checkpoint, const Dataset& dataset, std::size_t views,
                     const std::function<void(std::size_t, std::size_t)>& progress) {
+  if (views < 1 || views > k_views) {
+    throw InvalidArgument("views (dpr learn)", std::to_string(views), "1 to " + std::to_string(k_views));
+  }
   LoadedCheckpoint loaded = load_checkpoint(checkpoint, TrainingOptions{}.learning_rate);
   const std::vector<ViewOfObject> which = spread_views(dataset, views);
   const std::vector<double> found = reconstruction_iou(
@@ -154,8 +158,10 @@ Image show(const Device& device, const std::filesystem::path& checkpoint, const 
   std::vector<Image> rows;
   for (std::size_t c = 0; c < dataset.classes().size(); ++c) {
     const std::size_t first = dataset.first_object(c), count = dataset.first_object(c + 1) - first;
-    const ViewOfObject which{first + number % count,
-                             (2 + 5 * c) % k_views};  // from another side in every row
+    if (number >= count) {
+      throw InvalidArgument("object (dpr learn)", std::to_string(number), "below " + std::to_string(count));
+    }
+    const ViewOfObject which{first + number, (2 + 5 * c) % k_views};  // from another side in every row
     const at::Tensor images = load_images(dataset, {which});
     std::vector<Image> row{enlarged_input(to_image(dataset.image(which.first, which.second)))};
     const Mesh mesh = to_mesh(loaded.network->forward(images), 0);

@@ -22,9 +22,10 @@ struct LearningWeights {
 
 struct TrainingOptions {
   std::string method = "joint_gaussian";  ///< a preset of the smoothing, with the scales below
-  std::optional<float> sigma, gamma;      ///< 1e-4 each unless given, as published for SoftRas
-  std::uint64_t seed = 1;                 ///< of the first weights, the batches, and sampled noise
-  std::int64_t palette = 16;              ///< colours of a palette
+  /// Unless given 1e-4 each, as published for SoftRas; of opendr and nmr the preset's.
+  std::optional<float> sigma, gamma;
+  std::uint64_t seed = 1;       ///< of the first weights, the batches, and sampled noise
+  std::int64_t palette = 16;    ///< colours of a palette
   int batch = 16;               ///< images a step; each mesh is compared with two views of its object
   double learning_rate = 3e-4;  ///< of Adam (0.9, 0.999); the paper's is 1e-4
   LearningWeights weights;
@@ -52,9 +53,10 @@ struct TrainingResult {
 Smoothing training_smoothing(const TrainingOptions& options);
 
 /// Trains, or goes on where `folder`/checkpoint.pt stands, until the steps or the minutes are over, and
-/// leaves there checkpoint.pt and losses.csv. Step n depends on the options, the data and n only: interrupted
+/// leaves checkpoint.pt and losses.csv in that folder, which exists. Step n depends on the options, the data
+/// and n only, and all but the learning rate are those of the checkpoint: interrupted
 /// and resumed training gives the same losses, bit by bit on one device with the same number of threads.
-/// Throws InvalidArgument, IoError; and Error if a loss is not finite.
+/// Throws InvalidArgument, IoError, DeviceError; and Error if a loss is not finite.
 TrainingResult train(const Device& device, const Dataset& training, const Dataset& validation,
                      const TrainingOptions& options, const std::filesystem::path& folder,
                      const std::function<void(const TrainingProgress&)>& progress);
@@ -76,11 +78,13 @@ struct Evaluation {
   std::vector<ClassIou> classes;
 };
 
-/// Evaluates a checkpoint on `views` views, evenly spread, of every object.
+/// Evaluates a checkpoint on `views` views, 1 to 24, evenly spread, of every object. Throws InvalidArgument,
+/// IoError.
 Evaluation evaluate(const std::filesystem::path& checkpoint, const Dataset& dataset, std::size_t views,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 
-/// One row a class: the input, and the reconstruction of it rendered from four sides.
+/// One row a class: an image of its object `number`, and the reconstruction rendered from four sides. Throws
+/// InvalidArgument where a class has no such object, IoError, DeviceError.
 Image show(const Device& device, const std::filesystem::path& checkpoint, const Dataset& dataset,
            std::size_t number);
 

@@ -10,7 +10,7 @@
 #include <span>
 #include <utility>
 
-#include "dpr/error.hpp"
+#include "scene/checks.hpp"
 #include "scene/set_sigma.hpp"
 
 namespace dpr::torch_op {
@@ -25,7 +25,7 @@ auto with_torch_errors(Action action) {
   try {
     return action();
   } catch (const Error& error) {
-    TORCH_CHECK(false, "dpr: error: ", error.what());
+    throw RenderError(error);
   }
 }
 
@@ -145,6 +145,10 @@ class Timer {
 
 }  // namespace
 
+RenderError::RenderError(const dpr::Error& error)
+    : c10::Error(std::string("dpr: error: ") + error.what(), /*backtrace=*/""),
+      original_(std::current_exception()) {}
+
 /// A renderer for the life of a graph: its buffers hold the frame that the backward pass differentiates.
 class Lease : public torch::CustomClassHolder {
  public:
@@ -188,10 +192,9 @@ std::vector<glm::uvec3> read_faces(const at::Tensor& faces) {
 }
 
 int image_side(std::int64_t value, const char* name) {
-  constexpr std::int64_t k_largest = 16384;
-  if (value >= 1 && value <= k_largest) return static_cast<int>(value);
+  if (value >= 1 && value <= checks::k_largest_side) return static_cast<int>(value);
   throw InvalidArgument(std::string(name) + " (dpr::Renderer)", std::to_string(value),
-                        "1 to " + std::to_string(k_largest));
+                        "1 to " + std::to_string(checks::k_largest_side));
 }
 
 /// A count or a seed that came as a double.
@@ -318,6 +321,9 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
   }
 
   static variable_list backward(AutogradContext* ctx, const variable_list& grad_outputs) {
+    TORCH_CHECK(!at::GradMode::is_enabled(),
+                "dpr: error: create_graph (dpr::render): got true, expected false: there are no second "
+                "derivatives");
     const auto batch = ctx->saved_data["batch"].toCustomClass<BatchRenderer>();
     const Timer timer(batch->seconds_);
     return with_torch_errors([&] {

@@ -4,15 +4,28 @@
 
 #include <torch/custom_class.h>
 
+#include <exception>
 #include <glm/glm.hpp>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 
 namespace dpr::torch_op {
+
+/// Torch's error, with the library's that it was.
+class RenderError : public c10::Error {
+ public:
+  /// Of the exception that is being handled.
+  explicit RenderError(const dpr::Error& error);
+  std::exception_ptr original() const { return original_; }
+
+ private:
+  std::exception_ptr original_;
+};
 
 /// Faces, image size, smoothing and device of the batches that render() renders: torch.classes.dpr.Renderer.
 /// One thread at a time renders with it.
@@ -68,8 +81,9 @@ class BatchRenderer : public torch::CustomClassHolder {
 /// @param intrinsics  [view, 4] fx, fy, cx, cy in pixels; the origin is the corner of the top-left pixel
 /// @param background  [3] linear RGB
 /// @return [view, height, width, 4] RGBA over the background; alpha is the silhouette
-/// Differentiable with respect to all five, the matrices of the views as any affine matrices. A graph keeps
-/// the frame's buffers on the device until it is freed. Throws c10::Error.
+/// Differentiable once with respect to all five, the matrices of the views as any affine matrices. A graph
+/// keeps the frame's buffers on the device until it is freed. Throws RenderError; c10::Error where second
+/// derivatives are asked for.
 at::Tensor render(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
                   const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
                   const at::Tensor& background);

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <ostream>
 #include <random>
+#include <sstream>
 
 #include "dpr/error.hpp"
 #include "scene/adjacency.hpp"
@@ -106,6 +107,8 @@ class Trainer {
   StepRecord step(LoadedCheckpoint& run) {
     try {
       return try_step(run);
+    } catch (const torch_op::RenderError& error) {
+      std::rethrow_exception(error.original());
     } catch (const c10::Error& error) {
       throw Error(error.what_without_backtrace());
     }
@@ -200,11 +203,28 @@ void check(const TrainingOptions& options) {
   }
 }
 
+/// What a step depends on beside its number and the learning rate, which may change on the way.
+std::string settings_of(const TrainingOptions& options, const Dataset& training) {
+  const Smoothing smoothing = training_smoothing(options);
+  const LearningWeights& w = options.weights;
+  std::ostringstream text;
+  text << options.method << " with seed " << options.seed << ", batch " << options.batch << ", sigma "
+       << checks::text(smoothing.sigma) << ", gamma " << checks::text(smoothing.gamma) << ", weights "
+       << checks::text(w.silhouette) << " " << checks::text(w.color) << " " << checks::text(w.laplacian)
+       << ", " << training.size() << " objects of";
+  for (const std::size_t c : training.classes()) text << " " << object_classes()[c].name;
+  return text.str();
+}
+
 /// The checkpoint to go on from, or a fresh start. Throws InvalidArgument if it belongs to another training.
-LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions& options) {
+LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions& options,
+                        const std::string& settings) {
   const NetworkOptions wanted{options.palette};
-  if (!std::filesystem::exists(file))
-    return start(wanted, options.method, options.seed, options.learning_rate);
+  if (!std::filesystem::exists(file)) {
+    LoadedCheckpoint fresh = start(wanted, options.method, options.seed, options.learning_rate);
+    fresh.checkpoint.settings = settings;
+    return fresh;
+  }
   LoadedCheckpoint loaded = load_checkpoint(file, options.learning_rate);
   const Checkpoint& c = loaded.checkpoint;
   if (!(c.architecture == wanted)) {
@@ -212,10 +232,8 @@ LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions
                           "a network of " + std::to_string(c.architecture.palette) + " palette colours",
                           std::to_string(wanted.palette) + ", as asked for");
   }
-  if (c.method != options.method || c.seed != options.seed) {
-    throw InvalidArgument(
-        "checkpoint (" + file.string() + ")", c.method + " with seed " + std::to_string(c.seed),
-        options.method + " with seed " + std::to_string(options.seed) + ", or another folder");
+  if (c.settings != settings) {
+    throw InvalidArgument("checkpoint (" + file.string() + ")", c.settings, settings + ", or another folder");
   }
   return loaded;
 }
@@ -252,7 +270,7 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
                      const std::function<void(const TrainingProgress&)>& progress) {
   check(options);
   const std::filesystem::path file = folder / "checkpoint.pt";
-  LoadedCheckpoint run = resume(file, options);
+  LoadedCheckpoint run = resume(file, options, settings_of(options, training));
   Trainer trainer(device, training, options);
   constexpr std::size_t k_validation_views = 2;
   const std::vector<ViewOfObject> held_out = spread_views(validation, k_validation_views);

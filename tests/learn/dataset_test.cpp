@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "learn/generate.hpp"
 #include "scene/bounding_box.hpp"
@@ -140,6 +141,11 @@ TEST_SUITE("robustness") {
     };
     CHECK(contains(message(car), "02958343_train_images.npz"));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, Dataset(folder.path(), Split::train, {}), "classes");
+    const std::filesystem::path list = ids_file(folder.path(), chair, Split::train);
+    std::ofstream(list, std::ios::app) << "03001627/one-more\n";
+    CHECK(contains(message(chair), "lists 3 objects, the images are of 2"));
+    std::filesystem::remove(list);  // it may be missing
+    CHECK_NOTHROW(Dataset(folder.path(), Split::train, std::span(&chair, 1)));
     const std::filesystem::path voxels = voxels_file(folder.path(), chair, Split::train);
     const std::size_t one[] = {1, 32, 32, 32}, flat[] = {2, 32, 32};
     write_npz(voxels, one, std::vector<std::uint8_t>(32768));

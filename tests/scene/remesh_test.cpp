@@ -6,7 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <map>
+#include <utility>
+#include <vector>
 
+#include "dpr/error.hpp"
 #include "dpr/voxels.hpp"
 #include "scene/adjacency.hpp"
 
@@ -30,6 +34,19 @@ double odd_edges(const Mesh& mesh, float length) {
 bool is_closed(const Mesh& mesh) {
   const dpr::Adjacency adjacency = dpr::make_adjacency(mesh);
   return adjacency.hinges.size() == adjacency.edges() && 2 * adjacency.edges() == 3 * mesh.faces.size();
+}
+
+/// The ends of edges that one face has.
+std::vector<glm::vec3> border_of(const Mesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> faces;
+  for (const glm::uvec3& f : mesh.faces) {
+    for (int i = 0; i < 3; ++i) ++faces[std::minmax(f[i], f[(i + 1) % 3])];
+  }
+  std::vector<glm::vec3> ends;
+  for (const auto& [edge, count] : faces) {
+    if (count == 1) ends.insert(ends.end(), {mesh.positions[edge.first], mesh.positions[edge.second]});
+  }
+  return ends;
 }
 
 }  // namespace
@@ -73,6 +90,8 @@ TEST_SUITE("unit") {
     CHECK(first->positions == second->positions);
     CHECK(first->faces == second->faces);
     CHECK_FALSE(is_closed(*first));
+    for (const glm::vec3& p : border_of(open))
+      CHECK(std::ranges::find(first->positions, p) != first->positions.end());
   }
 
   TEST_CASE("remesh: what is not manifold is left alone") {
@@ -80,5 +99,13 @@ TEST_SUITE("unit") {
     fan.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}};
     fan.faces = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
     CHECK_FALSE(dpr::remesh(fan, 0.2F));
+    Mesh repeated;
+    repeated.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    repeated.faces = {{0, 0, 1}, {0, 1, 2}};  // a corner twice
+    CHECK_FALSE(dpr::remesh(repeated, 0.2F));
+  }
+
+  TEST_CASE("remesh: a length that would take all memory is refused") {
+    CHECK_THROWS_AS(dpr::remesh(dpr::make_icosphere(1), 1e-4F), dpr::InvalidArgument);
   }
 }

@@ -90,12 +90,20 @@ TEST_SUITE("pipeline") {
     views["background"] = {0, 0, 0};
     views["smoothing"] = {{"preset", "softras"}, {"sigma", 1e-4}, {"gamma", 1e-3}};
     folder.write("views.json", views.dump());
-    const auto outcome = run_command(
-        folder, {"fit", "--views", "views.json", "-o", "mesh.ply", "--levels", "1", "--iterations", "3",
-                 "--remesh-interval", "0", "--steps", "direct", "--size", "16x16", "--sigma", "3e-4"});
+    const auto outcome =
+        run_command(folder, {"fit",      "--views", "views.json",   "-o",       "mesh.ply",
+                             "--levels", "1",       "--iterations", "3",        "--remesh-interval",
+                             "0",        "--steps", "direct",       "--size",   "16x12",
+                             "--sigma",  "3e-4",    "--schedule",   "adaptive", "--report",
+                             "report"});
     CAPTURE(outcome.err);
     REQUIRE(outcome.status == 0);
     CHECK(dpr::read_mesh(folder / "mesh.ply").faces == dpr::make_icosphere(1).faces);
+    const json history = json::parse(folder.read("report/fit.json"))["history"];
+    CHECK(history[0]["width"] == 16);
+    CHECK(history[0]["height"] == 12);
+    CHECK(history[0]["sigma"].get<double>() == doctest::Approx(25 * 3e-4));  // --blur is 5 times --blur-end
+    CHECK(history[0]["gamma"].get<double>() == doctest::Approx(5 * 1e-3));   // the file's
   }
 }
 
@@ -106,6 +114,7 @@ TEST_SUITE("robustness") {
     const json good = write_inputs(folder);
     dpr::write_image(folder / "small.exr", dpr::Image(8, 8, glm::vec4(1)));
     folder.write("garbage", "no checkpoint");
+    const std::size_t entries = folder.entries();
     const auto fails = [&](const json& views, const std::vector<std::string>& arguments, const char* word) {
       folder.write("views.json", views.dump());
       const auto outcome = run_command(folder, arguments);
@@ -113,7 +122,7 @@ TEST_SUITE("robustness") {
       CHECK(outcome.status == 1);
       CHECK(dpr::test::is_error_line(outcome.err));
       CHECK(contains(outcome.err, word));
-      CHECK_FALSE(std::filesystem::exists(folder / "mesh.obj"));
+      CHECK(folder.entries() == entries);
     };
     const auto changed = [&](auto change) {
       json views = good;
@@ -134,7 +143,10 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--laplacian", "-1"}), "weight");
     fails(good, {"fit", "--views", "views.json", "-o", "mesh.stl"}, "mesh.stl");
     fails(good, {"fit", "--views", "views.json", "-o", "nowhere/mesh.obj"}, "nowhere");
-    fails(good, {"fit", "--views", "none.json", "-o", "mesh.obj"}, "none.json");
+    fails(good, {"fit", "--views", "none.json", "-o", "mesh.obj", "--report", "report"}, "none.json");
+    fails(good, {"fit", "--views", "views.json", "-o", "/proc/mesh.obj"}, "cannot be written");
+    fails(good, with(k_short, {"--size", "100000x100000"}), "16384");
+    fails(good, with(k_short, {"--edge", "1e-6"}), "edge length");
     CHECK(folder.read("garbage") == "no checkpoint");
   }
 }

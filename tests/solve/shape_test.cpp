@@ -93,6 +93,8 @@ TEST_SUITE("unit") {
     views.views.resize(1);
     views.views[0].camera = dpr::orbit_camera(5, 0, 0);
     CHECK(glm::length(dpr::common_view(views).centre) < 1e-5);
+    views.views[0].camera.znear = 4.5F;  // nearer to the centre than the sphere would reach
+    CHECK(dpr::common_view(views).radius == doctest::Approx(0.9 * 0.5));
   }
 
   TEST_CASE("large steps solve (I + lambda L) x = b") {
@@ -173,7 +175,12 @@ TEST_SUITE("pipeline") {
       REQUIRE(rest.history.size() == whole.history.size());
       for (std::size_t i = 0; i < whole.history.size(); ++i) {
         CHECK(rest.history[i].loss == whole.history[i].loss);
-        CHECK(rest.history[i].smoothing.sigma == whole.history[i].smoothing.sigma);
+        const dpr::Smoothing &a = rest.history[i].smoothing, &b = whole.history[i].smoothing;
+        CHECK(a.sigma == b.sigma);
+        CHECK(a.gamma == b.gamma);
+        CHECK(a.samples == b.samples);
+        CHECK(a.seed == b.seed);
+        CHECK(a.composition == b.composition);
       }
       CHECK(same(solver.solve({}, file).mesh, whole.mesh));  // nothing is left to do
     }
@@ -221,12 +228,15 @@ TEST_SUITE("robustness") {
     refuses([](ShapeViews& v) { v.views.clear(); }, nothing);
     refuses([](ShapeViews& v) { v.views[0].image = dpr::Image(4, 8); }, nothing);
     refuses([](ShapeViews& v) { v.views[0].camera.view[3][2] = 20; }, nothing);  // the point is behind it
+    refuses([](ShapeViews& v) { v.views[0].camera.zfar = 3; }, nothing);         // or beyond what it sees
+    refuses([](ShapeViews& v) { v.width = v.height = 0, v.views[0].image = {}; }, nothing);
     refuses([](ShapeViews& v) { v.views[0].image.pixels[3].x = std::numeric_limits<float>::infinity(); },
             nothing);
     refuses([](ShapeViews& v) { v.initial = Mesh{}; }, nothing);
     refuses(nothing, [](ShapeOptions& o) { o.levels = 0; });
     refuses(nothing, [](ShapeOptions& o) { o.levels = 5; });  // less than a pixel
     refuses(nothing, [](ShapeOptions& o) { o.iterations = 0; });
+    refuses(nothing, [](ShapeOptions& o) { o.iterations = 1U << 31U; });  // more than can be counted
     refuses(nothing, [](ShapeOptions& o) { o.batch = 0; });
     refuses(nothing, [](ShapeOptions& o) { o.blur = 0; });
     refuses(nothing, [](ShapeOptions& o) { o.lambda = -1; });
@@ -251,6 +261,7 @@ TEST_SUITE("robustness") {
       return ShapeSolver(device, views, with).solve({}, file);
     };
     CHECK_NOTHROW(solve(good, options));
+    CHECK_THROWS_AS(ShapeSolver(device, views, options).solve({}, folder.path()), dpr::IoError);
     CHECK_THROWS_AS(solve("", options), dpr::IoError);
     CHECK_THROWS_AS(solve("not a checkpoint", options), dpr::IoError);
     CHECK_THROWS_AS(solve(good.substr(0, good.size() / 2), options), dpr::IoError);

@@ -2,8 +2,10 @@
 // targets without a silhouette.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 
 #include "dpr/error.hpp"
 #include "dpr/loss.hpp"
@@ -88,6 +90,35 @@ TEST_SUITE("gradient") {
 }
 
 TEST_SUITE("robustness") {
+  TEST_CASE("silhouettes that are almost nothing leave finite gradients") {
+    dpr::Scene scene;
+    scene.width = scene.height = 4;
+    scene.camera = dpr::orbit_camera(5, 0, 0);
+    const float right =
+        5 * std::tan(glm::radians(30.0F)) + 2;  // its side is more than 0.2 NDC from the image's
+    scene.meshes.push_back({dpr::make_cube(), glm::translate(glm::mat4(1.0F), glm::vec3(right, 0, 0))});
+    scene.smoothing = dpr::smoothing_preset("joint_gaussian");
+    scene.smoothing.occupancy_prior = dpr::Prior::logistic;
+    scene.smoothing.blur_radius = 4.0F;
+    for (const float sigma : {1e-3F, 2e-3F, 5e-3F, 1e-2F}) {
+      CAPTURE(sigma);
+      scene.smoothing.sigma = sigma;
+      dpr::Renderer renderer(dpr::test::test_device());
+      renderer.set_scene(scene);
+      renderer.forward();
+      float most = 0;
+      for (const glm::vec4& pixel : renderer.image().pixels) most = std::max(most, pixel.a);
+      CAPTURE(most);
+      CHECK(most < 1e-3F);
+      if (sigma > 4e-3F) CHECK(most > 0);
+      const dpr::Image target(scene.width, scene.height, glm::vec4(0));
+      dpr::ImageLoss loss(renderer.device(), {.silhouette = 1}, {&target, 1});
+      CHECK(std::isfinite(loss.evaluate(renderer)));
+      for (const glm::vec3& g : renderer.backward(loss).meshes[0].positions)
+        CHECK((std::isfinite(g.x) && std::isfinite(g.y) && std::isfinite(g.z)));
+    }
+  }
+
   TEST_CASE("one value of has_alpha a target, or none") {
     const std::vector<dpr::Image> targets = make_targets(4, 4);
     const std::array<unsigned char, 2> too_few{1, 0};

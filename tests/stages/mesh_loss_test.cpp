@@ -157,6 +157,11 @@ TEST_SUITE("gradient") {
               doctest::Approx(own.gradient[3 * v + static_cast<std::size_t>(i)]).epsilon(1e-4));
       }
     }
+    std::vector<glm::vec3> shapes = scene.meshes[0].mesh.positions;
+    shapes.insert(shapes.end(), scene.meshes[1].mesh.positions.begin(), scene.meshes[1].mesh.positions.end());
+    renderer.set_shapes(shapes, {});
+    renderer.forward();
+    CHECK_THROWS_AS(mesh_loss.evaluate(renderer, 1), dpr::InvalidArgument);  // whose shape?
   }
 }
 

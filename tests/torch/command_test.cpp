@@ -48,6 +48,12 @@ TEST_SUITE("robustness") {
                   "02691156_test_images.npz");
     check_refused(with_data({"eval", "--checkpoint", "none.pt"}), "none.pt");
     check_refused(with_data({"train", "-o", "run", "--palette", "3"}), "palette colours");
+    check_refused(with_data({"train", "-o", "run", "--seed", "-1"}), "--seed");
+    check_refused(with_data({"show", "--checkpoint", "run/checkpoint.pt", "-o", "f.png", "--object", "9"}),
+                  "below 1");
+    outcome = with_data({"train", "-o", "wild", "--steps", "50", "--batch", "2", "--learning-rate", "1e30"});
+    check_refused(outcome, "got");
+    CHECK_FALSE(contains(outcome.err, "error: dpr"));
     check_refused(with_data({"train", "-o", "other", "--method", "hard"}), "hard");
     check_refused(learn(folder, {"train", "-o", "run", "--data", "data", "--classes", "horse"}), "horse");
     check_refused(learn(folder, {"fly"}), "no such command: fly");

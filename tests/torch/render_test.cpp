@@ -202,11 +202,32 @@ TEST_SUITE("pipeline") {
     CHECK(one.colors.grad().allclose(several.colors.grad().sum(0, true), 1e-4, 1e-4));
     // The views' matrices need every view's vertices by themselves; the rest does not change.
     const at::Tensor grad = one.vertices.grad().clone();
-    one.vertices.mutable_grad() = at::Tensor();
-    one.views.requires_grad_();
-    const at::Tensor image = render(renderer, one);
-    (image * random_like(image.detach(), -1, 1, 4)).sum().backward();
+    for (Inputs* in : {&one, &several}) {
+      in->vertices.mutable_grad() = at::Tensor();
+      in->views = in->views.detach().clone().requires_grad_();
+      const at::Tensor image = render(renderer, *in);
+      (image * random_like(image.detach(), -1, 1, 4)).sum().backward();
+    }
     CHECK(one.vertices.grad().allclose(grad, 1e-4, 1e-4));
+    CHECK(one.views.grad().allclose(several.views.grad(), 1e-4, 1e-4));
+  }
+
+  TEST_CASE("operator: a batch of one view has the gradients of that view in a batch of several") {
+    const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
+    Inputs several = make_inputs(), one = make_inputs();
+    for (at::Tensor* tensor : {&one.vertices, &one.colors, &one.views, &one.intrinsics})
+      *tensor = tensor->slice(0, 0, 1).clone();
+    for (Inputs* in : {&one, &several}) {
+      for (at::Tensor* tensor : in->all()) tensor->requires_grad_();
+      const at::Tensor image = render(renderer, *in).select(0, 0);
+      (image * random_like(image.detach(), -1, 1, 4)).sum().backward();
+    }
+    for (std::size_t t = 0; t < 4; ++t) {
+      CAPTURE(t);
+      CHECK(one.all()[t]->grad()[0].allclose(several.all()[t]->grad()[0], 1e-4, 1e-4));
+      CHECK(several.all()[t]->grad()[1].abs().max().item<float>() == 0);
+    }
+    CHECK(one.background.grad().allclose(several.background.grad(), 1e-4, 1e-4));
   }
 
   TEST_CASE("operator: graphs in flight do not disturb each other") {
@@ -297,6 +318,23 @@ TEST_SUITE("robustness") {
     CHECK(has(make(faces, 0, "softras"), "width (dpr::Renderer)"));
     CHECK(has(make(faces, 8, "hard"), "preset"));
     CHECK(render(renderer, good).equal(expected));
+    Inputs twice = good;
+    twice.vertices = good.vertices.clone().requires_grad_();
+    const at::Tensor loss = render(renderer, twice).square().sum();
+    CHECK(has(
+        message_of([&] { torch::autograd::grad({loss}, {twice.vertices}, {}, {}, /*create_graph=*/true); }),
+        "no second derivatives"));
+  }
+
+  TEST_CASE("operator: a torch error holds the library's own") {
+    Inputs in = make_inputs();
+    in.vertices = in.vertices * NAN;
+    try {
+      render(make_renderer(smoothing_for_tests("joint_gaussian")), in);
+      FAIL("no error");
+    } catch (const torch_op::RenderError& error) {
+      CHECK_THROWS_AS(std::rethrow_exception(error.original()), InvalidArgument);
+    }
   }
 }
 

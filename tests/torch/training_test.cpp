@@ -1,8 +1,10 @@
 // Training learns, goes on where it stopped, and says what is wrong with what it is given.
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 #include <torch/torch.h>
 
 #include <cmath>
+#include <csignal>
 
 #include "dpr/error.hpp"
 #include "learn/generate.hpp"
@@ -51,6 +53,27 @@ TrainingResult run(const TrainingOptions& options, const TempDir& folder) {
 std::string message(const TrainingOptions& options, const TempDir& folder) {
   return message_of<Error>([&] { run(options, folder); });
 }
+
+/// For its life no file grows beyond a megabyte: writing more fails, as on a full disk.
+class SmallFiles {
+ public:
+  SmallFiles() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit small = before_;
+    small.rlim_cur = 1 << 20;
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallFiles() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  SmallFiles(const SmallFiles&) = delete;
+  SmallFiles& operator=(const SmallFiles&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
 
 }  // namespace
 
@@ -138,6 +161,18 @@ TEST_SUITE("robustness") {
     other.method = "hard";
     CHECK(contains(message(other, TempDir()), "preset"));
     other = options;
+    other.batch = 6;
+    CHECK(contains(message(other, folder), "batch 4, sigma"));
+    other = options;
+    other.weights.laplacian = 3e-3;
+    CHECK(contains(message(other, folder), "weights 1 1 0.3"));
+    other = options;
+    other.learning_rate = 5e-5;  // may change on the way
+    CHECK_NOTHROW(run(other, folder));
+    CHECK_THROWS_AS(evaluate(folder / "checkpoint.pt", read(Split::test), 0, [](std::size_t, std::size_t) {}),
+                    InvalidArgument);
+    CHECK_THROWS_AS(show(open_device(), folder / "checkpoint.pt", read(Split::test), 2), InvalidArgument);
+    other = options;
     other.batch = 1;
     CHECK(contains(message(other, folder), "batch (dpr learn)"));
     other = options;
@@ -155,6 +190,19 @@ TEST_SUITE("robustness") {
     foreign.write("description", c10::IValue(std::string(R"({"architecture": "another one"})")));
     foreign.save_to((folder / "foreign.pt").string());
     CHECK(contains(read_message(folder / "foreign.pt"), "another architecture: \"another one\""));
+    LoadedCheckpoint bad = load_checkpoint(folder / "checkpoint.pt", 1e-4);
+    {
+      const torch::NoGradGuard guard;
+      bad.network->parameters()[0].view(-1)[0] = NAN;
+    }
+    save_checkpoint(folder / "nan.pt", bad.checkpoint, bad.network, *bad.optimizer);
+    CHECK(contains(read_message(folder / "nan.pt"), "damaged"));
+    {
+      const SmallFiles full_disk;
+      CHECK_THROWS_AS(save_checkpoint(folder / "full.pt", bad.checkpoint, bad.network, *bad.optimizer),
+                      IoError);
+    }
+    CHECK_FALSE(std::filesystem::exists(folder / "full.pt"));
     torch::save(torch::ones({2}), (folder / "tensor.pt").string());
     CHECK(contains(read_message(folder / "tensor.pt"), "no checkpoint of dpr learn"));
   }
