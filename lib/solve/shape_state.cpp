@@ -153,9 +153,10 @@ ShapeState state_of(const json& node, const Smoothing& finest) {
   return state;
 }
 
-std::uint64_t hash_of(const std::vector<std::uint8_t>& bytes) {
+std::uint64_t hash_of(const std::vector<std::uint8_t>& bytes, std::uint64_t fingerprint) {
   Hash hash;
   hash.add_bytes(std::as_bytes(std::span(bytes)));
+  hash.add(fingerprint);
   return hash.value();
 }
 
@@ -191,8 +192,9 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
 
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint) {
   const std::vector<std::uint8_t> content = json::to_cbor(to_json(state));
-  const std::vector<std::uint8_t> bytes = json::to_cbor(
-      {{"fingerprint", fingerprint}, {"checksum", hash_of(content)}, {"content", json::binary(content)}});
+  const std::vector<std::uint8_t> bytes = json::to_cbor({{"fingerprint", fingerprint},
+                                                         {"checksum", hash_of(content, fingerprint)},
+                                                         {"content", json::binary(content)}});
   write_whole_file(file, [&](std::ostream& out) {
     out << k_magic;
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -206,8 +208,9 @@ ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fing
   try {
     const json document = json::from_cbor(bytes.substr(k_magic.size()));
     const std::vector<std::uint8_t>& content = document.at("content").get_binary();
-    if (document.at("checksum") != hash_of(content)) throw IoError(file, "the checkpoint is damaged");
-    if (document.at("fingerprint") != fingerprint) {
+    const auto mark = document.at("fingerprint").get<std::uint64_t>();
+    if (document.at("checksum") != hash_of(content, mark)) throw IoError(file, "the checkpoint is damaged");
+    if (mark != fingerprint) {
       throw InvalidArgument("checkpoint (" + file.string() + ")", "one of other views or options",
                             "one of this run; remove it to begin anew");
     }
