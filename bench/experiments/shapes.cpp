@@ -119,11 +119,11 @@ std::vector<Method> make_methods(bool smoke) {
   paper.loss = {.l1 = 1, .silhouette = 1};
   paper.regularizers.laplacian = 3e-3F;
   paper.learning_rate = 0.01;
-  return {{"joint", options, ""},
-          {"barrier", options, "barrier"},
+  return {{"default", options, ""},
+          {"joint", options, "joint_gaussian"},
           {"softras", options, "softras"},
-          {"joint, adaptive smoothing", adaptive, ""},
-          {"joint, direct steps, Laplacian", paper, ""}};
+          {"adaptive smoothing", adaptive, ""},
+          {"direct steps, Laplacian", paper, ""}};
 }
 
 /// Peak signal-to-noise ratio over all pixels and colours, decibels, of a signal of 1.

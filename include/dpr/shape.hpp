@@ -68,7 +68,7 @@ struct ShapeOptions {
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
 };
 
-/// The smoothing at the finest level's end: that of the views, or else the exact joint composition with edges
+/// The smoothing at the finest level's end: that of the views, or else the exact Gaussian barrier with edges
 /// blurred by `blur_end`, and depths by the same length in the world. A level with half the pixels has twice
 /// the blur. Throws InvalidArgument where cameras see no common point.
 Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options);
