@@ -1,6 +1,8 @@
 // dpr fit: a mesh with vertex colours from several images with known cameras.
+#include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <string>
 
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
@@ -28,6 +30,11 @@ ShapeSteps parse_steps(const std::string& word) {
 }
 
 void resize(ShapeViews& views, glm::ivec2 size) {
+  if (std::int64_t{size.x} * views.height != std::int64_t{size.y} * views.width) {
+    throw InvalidArgument("--size (command line)", std::to_string(size.x) + "x" + std::to_string(size.y),
+                          "the proportions of the views, " + std::to_string(views.width) + "x" +
+                              std::to_string(views.height) + ", which are resampled");
+  }
   for (ShapeView& view : views.views) {
     view.camera = resample(view.camera, views.width, views.height, size.x, size.y);
     view.image = resample(view.image, size.x, size.y);

@@ -33,6 +33,14 @@ ByteArray read_array(const std::filesystem::path& file, std::initializer_list<st
   return array;
 }
 
+void require_class(const std::filesystem::path& folder, std::size_t object_class, Split split) {
+  const std::filesystem::path file = images_file(folder, object_class, split);
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) return;
+  throw IoError(file, "is missing: the folder has no " + std::string(object_classes()[object_class].name) +
+                          " in its split " + to_string(split) + "; --classes names the classes to read");
+}
+
 /// Throws IoError if there is a list of the objects, and of another number of them.
 void check_list(const std::filesystem::path& file, std::size_t objects) {
   std::error_code error;
@@ -108,6 +116,7 @@ Dataset::Dataset(const std::filesystem::path& folder, Split split, std::span<con
   for (const std::size_t c : classes_) {
     constexpr std::size_t n = k_voxel_resolution, side = k_image_size;
     const std::filesystem::path file = voxels_file(folder, c, split);
+    require_class(folder, c, split);
     images_.push_back(read_array(images_file(folder, c, split), {k_views, 4, side, side}));
     voxels_.push_back(read_array(file, {n, n, n}));
     const std::size_t objects = images_.back().shape[0];

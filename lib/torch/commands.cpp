@@ -12,6 +12,7 @@
 #include "cli/progress.hpp"
 #include "learn/generate.hpp"
 #include "provenance.hpp"
+#include "scene/temporary_file.hpp"
 #include "torch/learning.hpp"
 
 namespace dpr::cli {
@@ -135,6 +136,7 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
 
 void run_train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
+  learn::training_smoothing(command.training);  // a wrong method leaves no folder behind
   make_folder(command.output);
   constexpr unsigned k_parts = 1000;
   learn::TrainingResult result;
@@ -244,6 +246,7 @@ Json to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
 }
 
 void run_eval(const EvalCommand& command, const CommonOptions& common) {
+  if (!command.output.empty()) require_writable(command.output);  // before the work, not after it
   const Dataset dataset = read(command.data, learn::parse_split(command.split));
   learn::Evaluation evaluation;
   {
@@ -304,6 +307,7 @@ void add_show_command(CLI::App& application, CommonOptions& common) {
   add_device_options(*command, common);
   command->footer("Example: dpr learn show --checkpoint run/checkpoint.pt --data data -o figure.png");
   command->callback([options, &common] {
+    require_writable(options->output);
     const Dataset dataset = read(options->data, learn::parse_split(options->split));
     write_image(options->output,
                 learn::show(open_device(common), options->checkpoint, dataset, options->object));

@@ -93,7 +93,7 @@ TEST_SUITE("pipeline") {
     const auto outcome =
         run_command(folder, {"fit",      "--views", "views.json",   "-o",       "mesh.ply",
                              "--levels", "1",       "--iterations", "3",        "--remesh-interval",
-                             "0",        "--steps", "direct",       "--size",   "16x12",
+                             "0",        "--steps", "direct",       "--size",   "16x16",
                              "--sigma",  "3e-4",    "--schedule",   "adaptive", "--report",
                              "report"});
     CAPTURE(outcome.err);
@@ -101,7 +101,7 @@ TEST_SUITE("pipeline") {
     CHECK(dpr::read_mesh(folder / "mesh.ply").faces == dpr::make_icosphere(1).faces);
     const json history = json::parse(folder.read("report/fit.json"))["history"];
     CHECK(history[0]["width"] == 16);
-    CHECK(history[0]["height"] == 12);
+    CHECK(history[0]["height"] == 16);
     CHECK(history[0]["sigma"].get<double>() == doctest::Approx(25 * 3e-4));  // --blur is 5 times --blur-end
     CHECK(history[0]["gamma"].get<double>() == doctest::Approx(5 * 1e-3));   // the file's
   }
@@ -146,6 +146,7 @@ TEST_SUITE("robustness") {
     fails(good, {"fit", "--views", "none.json", "-o", "mesh.obj", "--report", "report"}, "none.json");
     fails(good, {"fit", "--views", "views.json", "-o", "/proc/mesh.obj"}, "cannot be written");
     fails(good, with(k_short, {"--size", "100000x100000"}), "16384");
+    fails(good, with(k_short, {"--size", "32x16"}), "proportions");
     fails(good, with(k_short, {"--edge", "1e-6"}), "edge length");
     CHECK(folder.read("garbage") == "no checkpoint");
   }

@@ -1,6 +1,8 @@
 // dpr learn as a user runs it.
 #include <doctest/doctest.h>
 
+#include <filesystem>
+
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
@@ -47,6 +49,10 @@ TEST_SUITE("robustness") {
     check_refused(learn(folder, {"eval", "--checkpoint", "run/checkpoint.pt", "--data", "data"}),
                   "02691156_test_images.npz");
     check_refused(with_data({"eval", "--checkpoint", "none.pt"}), "none.pt");
+    check_refused(with_data({"eval", "--checkpoint", "run/checkpoint.pt", "-o", "/proc/iou.json"}),
+                  "cannot be written");
+    check_refused(with_data({"train", "-o", "unwanted", "--method", "hard"}), "hard");
+    CHECK_FALSE(std::filesystem::exists(folder / "unwanted"));
     check_refused(with_data({"train", "-o", "run", "--palette", "3"}), "palette colours");
     check_refused(with_data({"train", "-o", "run", "--seed", "-1"}), "--seed");
     check_refused(with_data({"show", "--checkpoint", "run/checkpoint.pt", "-o", "f.png", "--object", "9"}),
@@ -54,7 +60,6 @@ TEST_SUITE("robustness") {
     outcome = with_data({"train", "-o", "wild", "--steps", "50", "--batch", "2", "--learning-rate", "1e30"});
     check_refused(outcome, "got");
     CHECK_FALSE(contains(outcome.err, "error: dpr"));
-    check_refused(with_data({"train", "-o", "other", "--method", "hard"}), "hard");
     check_refused(learn(folder, {"train", "-o", "run", "--data", "data", "--classes", "horse"}), "horse");
     check_refused(learn(folder, {"fly"}), "no such command: fly");
     CHECK(learn(folder, {"--help"}).status == 0);
