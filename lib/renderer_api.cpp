@@ -159,9 +159,8 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
   std::vector<cl_float4> values;
   for (const Image& image : grad_images) {
     if (image.width != m.scene.width || image.height != m.scene.height) {
-      throw InvalidArgument("size (grad_images)",
-                            std::to_string(image.width) + "x" + std::to_string(image.height),
-                            std::to_string(m.scene.width) + "x" + std::to_string(m.scene.height));
+      throw InvalidArgument("size (grad_images)", checks::size(image.width, image.height),
+                            checks::size(m.scene.width, m.scene.height));
     }
     checks::require_pixels(image, "grad_images");
     for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});

@@ -2,13 +2,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
-#include <string>
 
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/folder.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "scene/checks.hpp"
 #include "scene/temporary_file.hpp"
 #include "solve/resample.hpp"
 
@@ -31,9 +31,9 @@ ShapeSteps parse_steps(const std::string& word) {
 
 void resize(ShapeViews& views, glm::ivec2 size) {
   if (std::int64_t{size.x} * views.height != std::int64_t{size.y} * views.width) {
-    throw InvalidArgument("--size (command line)", std::to_string(size.x) + "x" + std::to_string(size.y),
-                          "the proportions of the views, " + std::to_string(views.width) + "x" +
-                              std::to_string(views.height) + ", which are resampled");
+    throw InvalidArgument(
+        "--size (command line)", checks::size(size.x, size.y),
+        "the proportions of the views, " + checks::size(views.width, views.height) + ", which are resampled");
   }
   for (ShapeView& view : views.views) {
     view.camera = resample(view.camera, views.width, views.height, size.x, size.y);

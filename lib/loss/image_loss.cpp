@@ -24,15 +24,13 @@ void check_weights(const LossWeights& weights) {
   }
 }
 
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
-
 void check_targets(std::span<const Image> targets) {
   if (targets.empty()) throw InvalidArgument("targets (loss)", "none", "one image a view");
   for (const Image& image : targets) {
     if (image.width < 1 || image.height < 1 || image.width != targets[0].width ||
         image.height != targets[0].height) {
-      throw InvalidArgument("target size (loss)", size_text(image.width, image.height),
-                            "images of one size, " + size_text(targets[0].width, targets[0].height));
+      throw InvalidArgument("target size (loss)", checks::size(image.width, image.height),
+                            "images of one size, " + checks::size(targets[0].width, targets[0].height));
     }
     checks::require_pixels(image, "target (loss)");
   }
@@ -112,8 +110,8 @@ double ImageLoss::evaluate(const Renderer& renderer) {
                           "one for each of the " + std::to_string(r.frame.views) + " views");
   }
   if (r.scene.width != m.width || r.scene.height != m.height) {
-    throw InvalidArgument("target size (loss)", size_text(m.width, m.height),
-                          "the size of the render, " + size_text(r.scene.width, r.scene.height));
+    throw InvalidArgument("target size (loss)", checks::size(m.width, m.height),
+                          "the size of the render, " + checks::size(r.scene.width, r.scene.height));
   }
   const std::size_t pixels_per_view = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
   const std::size_t pixels = pixels_per_view * m.views;

@@ -33,6 +33,13 @@ inline bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+/// "640x480"
+inline std::string size(int width, int height) {
+  // Appended piece by piece: at sums of strings GCC 12 gives a false alarm (its bug 105651).
+  std::string result = std::to_string(width);
+  return result.append("x").append(std::to_string(height));
+}
+
 /// "positions[7]"
 inline std::string element(const std::string& list, std::size_t index) {
   return list + "[" + std::to_string(index) + "]";

@@ -95,8 +95,8 @@ Image read_image(const std::filesystem::path& file, bool* has_alpha) {
   const OIIO::ImageSpec& spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
       spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {
-    throw IoError(file, "got " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
-                            " pixels in " + std::to_string(spec.nchannels) + " channels, expected 1 to " +
+    throw IoError(file, "got " + checks::size(spec.width, spec.height) + " pixels in " +
+                            std::to_string(spec.nchannels) + " channels, expected 1 to " +
                             std::to_string(checks::k_largest_side) +
                             " pixels on a side in one channel or more");
   }
@@ -123,10 +123,10 @@ void write_image(const std::filesystem::path& file, const Image& image) {
   const auto width = static_cast<std::size_t>(std::max(image.width, 0));
   if (image.width < 1 || image.height < 1 ||
       image.pixels.size() != width * static_cast<std::size_t>(image.height)) {
-    throw InvalidArgument("image (for " + file.string() + ")",
-                          std::to_string(image.width) + "x" + std::to_string(image.height) + " with " +
-                              std::to_string(image.pixels.size()) + " pixels",
-                          "at least 1x1, and width times height pixels");
+    throw InvalidArgument(
+        "image (for " + file.string() + ")",
+        checks::size(image.width, image.height) + " with " + std::to_string(image.pixels.size()) + " pixels",
+        "at least 1x1, and width times height pixels");
   }
   require_finite(file, image);
   std::vector<float> values;

@@ -126,9 +126,8 @@ PerturbedPose::PerturbedPose(Device device, const Scene& scene, const Image& tar
   validate_scale(flat(options.scale), scene.camera);
   require(options.mesh < scene.meshes.size(), "mesh (perturbed pose)", options.mesh, "one of the scene's");
   if (target.width != scene.width || target.height != scene.height) {
-    throw InvalidArgument("size of the target (perturbed pose)",
-                          std::to_string(target.width) + "x" + std::to_string(target.height),
-                          std::to_string(scene.width) + "x" + std::to_string(scene.height) + ", the scene's");
+    throw InvalidArgument("size of the target (perturbed pose)", checks::size(target.width, target.height),
+                          checks::size(scene.width, scene.height) + ", the scene's");
   }
   impl_ = std::make_unique<Impl>(device, scene, target, options);
 }

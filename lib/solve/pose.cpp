@@ -16,8 +16,6 @@
 namespace dpr {
 namespace {
 
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
-
 void require_rotation(const glm::dmat3& rotation) {
   constexpr double k_tolerance = 1e-3;  // what the rounding of a matrix written with a few digits leaves
   const glm::dmat3 excess = glm::transpose(rotation) * rotation - glm::dmat3(1.0);
@@ -49,8 +47,8 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
   require(scene_.meshes.size() == 1, "number of meshes (pose)", scene_.meshes.size(), "1");
   validate(scene_);
   if (target_.width != scene_.width || target_.height != scene_.height) {
-    throw InvalidArgument("size of the target (pose)", size_text(target_.width, target_.height),
-                          size_text(scene_.width, scene_.height) + ", the scene's");
+    throw InvalidArgument("size of the target (pose)", checks::size(target_.width, target_.height),
+                          checks::size(scene_.width, scene_.height) + ", the scene's");
   }
   checks::require_pixels(target_, "target (pose)");
   require(options_.explained > 0 && options_.explained < 1, "explained (pose)", options_.explained,

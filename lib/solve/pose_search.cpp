@@ -206,9 +206,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
   const Image& mask = options.mask;
   if (mask.pixels.empty()) return;
   if (mask.width != scene.width || mask.height != scene.height) {
-    throw InvalidArgument("size of the mask (pose)",
-                          std::to_string(mask.width) + "x" + std::to_string(mask.height),
-                          std::to_string(scene.width) + "x" + std::to_string(scene.height) + ", the scene's");
+    throw InvalidArgument("size of the mask (pose)", checks::size(mask.width, mask.height),
+                          checks::size(scene.width, scene.height) + ", the scene's");
   }
   double sum = 0;
   for (const glm::vec4& pixel : mask.pixels) {

@@ -22,8 +22,6 @@
 namespace dpr {
 namespace {
 
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
-
 std::vector<double> flat(const std::vector<glm::vec3>& list) {
   std::vector<double> values;
   values.reserve(3 * list.size());
@@ -283,14 +281,14 @@ class Run {
 void check(const ShapeViews& views) {
   if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
   if (views.width < 1 || views.height < 1) {
-    throw InvalidArgument("size (shape)", size_text(views.width, views.height), "at least 1x1");
+    throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
   }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
     const auto& [image, camera, has_alpha] = views.views[i];
     const std::string name = checks::element("views", i);
     if (image.width != views.width || image.height != views.height) {
-      throw InvalidArgument(checks::in("size of " + name, "shape"), size_text(image.width, image.height),
-                            size_text(views.width, views.height));
+      throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
+                            checks::size(views.width, views.height));
     }
     checks::require_pixels(image, checks::in(name, "shape"));
     validate(camera, name + ".camera");

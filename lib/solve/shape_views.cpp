@@ -22,11 +22,8 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
   const std::filesystem::path file = folder / node.at("image").string();
   view.image = read_image(file, &view.has_alpha);
   if (view.image.width != views.width || view.image.height != views.height) {
-    const auto text = [](int width, int height) {
-      return std::to_string(width) + "x" + std::to_string(height);
-    };
-    throw InvalidArgument("size (" + file.string() + ")", text(view.image.width, view.image.height),
-                          text(views.width, views.height) + ", the views'");
+    throw InvalidArgument("size (" + file.string() + ")", checks::size(view.image.width, view.image.height),
+                          checks::size(views.width, views.height) + ", the views'");
   }
   view.camera = parse_camera(node.at("camera"));
   validate(view.camera, checks::element("views", views.views.size()) + ".camera");

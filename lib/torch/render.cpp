@@ -5,35 +5,17 @@
 #include <torch/library.h>
 
 #include <chrono>
-#include <cmath>
-#include <limits>
 #include <span>
+#include <string>
 #include <utility>
 
-#include "scene/checks.hpp"
-#include "scene/set_sigma.hpp"
+#include "torch/errors.hpp"
 
 namespace dpr::torch_op {
 namespace {
 
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
-
-/// Runs the action; the library's errors become torch's.
-template <typename Action>
-auto with_torch_errors(Action action) {
-  try {
-    return action();
-  } catch (const Error& error) {
-    throw RenderError(error);
-  }
-}
-
-std::string shape_text(const at::Tensor& tensor) {
-  std::string text = "[";
-  for (const std::int64_t size : tensor.sizes()) text += (text.size() > 1 ? ", " : "") + std::to_string(size);
-  return text + "]";
-}
 
 /// The tensor itself, if it is contiguous. -1 stands for any size.
 at::Tensor checked(const at::Tensor& tensor, const std::string& name,
@@ -145,10 +127,6 @@ class Timer {
 
 }  // namespace
 
-RenderError::RenderError(const dpr::Error& error)
-    : c10::Error(std::string("dpr: error: ") + error.what(), /*backtrace=*/""),
-      original_(std::current_exception()) {}
-
 /// A renderer for the life of a graph: its buffers hold the frame that the backward pass differentiates.
 class Lease : public torch::CustomClassHolder {
  public:
@@ -162,131 +140,6 @@ class Lease : public torch::CustomClassHolder {
   c10::intrusive_ptr<BatchRenderer> owner_;
   BatchRenderer::Topology topology_;
 };
-
-BatchRenderer::BatchRenderer(std::vector<glm::uvec3> faces, int width, int height, const Smoothing& smoothing,
-                             const Device& device)
-    : faces_(std::move(faces)), width_(width), height_(height), device_(device) {
-  set_smoothing(smoothing);
-}
-
-namespace {
-
-std::vector<glm::uvec3> read_faces(const at::Tensor& faces) {
-  if (faces.scalar_type() != at::kLong || faces.dim() != 2 || faces.size(1) != 3 ||
-      !faces.device().is_cpu()) {
-    throw InvalidArgument("faces (dpr::Renderer)", faces.toString() + " " + shape_text(faces),
-                          "an int64 tensor [face, 3] on the CPU");
-  }
-  const at::Tensor values = faces.contiguous();
-  const auto* index = values.data_ptr<std::int64_t>();
-  std::vector<glm::uvec3> result(static_cast<std::size_t>(faces.size(0)));
-  for (glm::uvec3& face : result) {
-    for (int corner = 0; corner < 3; ++corner, ++index) {
-      if (*index < 0 || *index > std::numeric_limits<std::uint32_t>::max()) {
-        throw InvalidArgument("faces (dpr::Renderer)", std::to_string(*index), "indices of vertices");
-      }
-      face[corner] = static_cast<std::uint32_t>(*index);
-    }
-  }
-  return result;
-}
-
-int image_side(std::int64_t value, const char* name) {
-  if (value >= 1 && value <= checks::k_largest_side) return static_cast<int>(value);
-  throw InvalidArgument(std::string(name) + " (dpr::Renderer)", std::to_string(value),
-                        "1 to " + std::to_string(checks::k_largest_side));
-}
-
-/// A count or a seed that came as a double.
-std::uint32_t whole_number(const std::string& name, double value) {
-  if (value >= 0 && value <= std::numeric_limits<std::uint32_t>::max() && value == std::floor(value)) {
-    return static_cast<std::uint32_t>(value);
-  }
-  throw InvalidArgument(name + " (dpr::Renderer)", std::to_string(value), "a whole number");
-}
-
-}  // namespace
-
-BatchRenderer::BatchRenderer(const at::Tensor& faces, std::int64_t width, std::int64_t height,
-                             const std::string& preset, const std::string& device)
-    : faces_(with_torch_errors([&] { return read_faces(faces); })),
-      width_(with_torch_errors([&] { return image_side(width, "width"); })),
-      height_(with_torch_errors([&] { return image_side(height, "height"); })),
-      smoothing_(with_torch_errors([&] { return smoothing_preset(preset, width_, height_); })),
-      device_(with_torch_errors([&] { return open_device(device); })) {}
-
-void BatchRenderer::set_smoothing(const Smoothing& smoothing) {
-  validate(smoothing);
-  smoothing_ = smoothing;
-}
-
-void BatchRenderer::set(const std::string& name, double value) {
-  with_torch_errors([&] {
-    Smoothing s = smoothing_;
-    Camera clipping;
-    clipping.znear = znear_;
-    clipping.zfar = zfar_;
-    const auto number = static_cast<float>(value);
-    if (name == "sigma") {
-      set_sigma(s, number);
-    } else if (name == "gamma") {
-      s.gamma = number;
-    } else if (name == "alpha") {
-      s.alpha = number;
-    } else if (name == "occupancy_threshold") {
-      s.occupancy_threshold = number;
-    } else if (name == "blur_radius") {
-      s.blur_radius = number;
-    } else if (name == "samples") {
-      s.samples = whole_number(name, value);
-    } else if (name == "seed") {
-      s.seed = whole_number(name, value);
-    } else if (name == "znear") {
-      clipping.znear = number;
-    } else if (name == "zfar") {
-      clipping.zfar = number;
-    } else {
-      throw InvalidArgument(
-          "name (dpr::Renderer.set)", "\"" + name + "\"",
-          "sigma, gamma, alpha, occupancy_threshold, blur_radius, samples, seed, znear or zfar");
-    }
-    validate(clipping);
-    set_smoothing(s);
-    znear_ = clipping.znear;
-    zfar_ = clipping.zfar;
-  });
-}
-
-Renderer BatchRenderer::take(const Topology& topology) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (topology == topology_ && !free_.empty()) {
-      Renderer renderer = std::move(free_.back());
-      free_.pop_back();
-      return renderer;
-    }
-  }
-  Scene scene;
-  scene.width = width_;
-  scene.height = height_;
-  Mesh mesh{std::vector<glm::vec3>(topology.vertices), faces_, {}, {}, {}, {}};
-  if (topology.face_colors) {
-    mesh.face_colors.resize(faces_.size());
-  } else {
-    mesh.vertex_colors.resize(topology.vertices);
-  }
-  scene.meshes.push_back({std::move(mesh)});
-  Renderer renderer(device_);
-  renderer.set_scene(scene);
-  return renderer;
-}
-
-void BatchRenderer::put_back(Renderer renderer, const Topology& topology) {
-  const std::lock_guard lock(mutex_);
-  if (topology != topology_) free_.clear();
-  topology_ = topology;
-  free_.push_back(std::move(renderer));
-}
 
 struct RenderFunction : public torch::autograd::Function<RenderFunction> {
   static at::Tensor forward(AutogradContext* ctx, const c10::intrusive_ptr<BatchRenderer>& batch,

@@ -14,6 +14,7 @@
 #include "scene/set_sigma.hpp"
 #include "scene/temporary_file.hpp"
 #include "torch/checkpoint.hpp"
+#include "torch/errors.hpp"
 #include "torch/evaluation.hpp"
 #include "torch/render.hpp"
 

@@ -10,6 +10,7 @@
 #include "pipeline/scenes.hpp"
 #include "reference/finite_difference.hpp"
 #include "reference/renderer.hpp"
+#include "torch/errors.hpp"
 
 namespace dpr::test {
 namespace {
