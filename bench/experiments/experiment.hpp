@@ -39,8 +39,7 @@ void write_data(const Settings& settings, const std::string& name, const Json& d
 void draw_figure(const Settings& settings, const std::string& name, int width, int height,
                  const std::string& script);
 
-/// A preset, or "barrier" for the library's default, with these scales; a preset's blur radius stays the same
-/// number of sigmas.
+/// A preset with these scales; its blur radius stays the same number of sigmas.
 Smoothing scaled_smoothing(const std::string& preset, float sigma, float gamma);
 
 /// Prints a file's path, unless quiet.

@@ -30,7 +30,7 @@ std::span<const Experiment> experiments() {
 }
 
 Smoothing scaled_smoothing(const std::string& preset, float sigma, float gamma) {
-  Smoothing smoothing = preset == "barrier" ? Smoothing{} : smoothing_preset(preset);
+  Smoothing smoothing = smoothing_preset(preset);
   set_sigma(smoothing, sigma);
   smoothing.gamma = gamma;
   return smoothing;

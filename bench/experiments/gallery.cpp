@@ -13,7 +13,7 @@ namespace {
 
 constexpr float k_sigmas[] = {1e-5F, 1e-4F, 1e-3F, 1e-2F};
 constexpr float k_gammas[] = {1e-4F, 1e-3F, 1e-2F, 1e-1F};  // rows, from the top
-constexpr const char* k_presets[] = {"softras", "barrier", "joint_gaussian"};
+constexpr const char* k_presets[] = {"softras", "gaussian", "joint_gaussian"};
 constexpr int k_gap = 2;
 
 Image contact_sheet(const Device& device, Scene scene, const std::string& preset) {

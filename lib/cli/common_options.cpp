@@ -17,7 +17,7 @@ void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
   const char* const priors = "gaussian|cauchy|logistic|gumbel|uniform";
   const char* const estimators = "exact|monte_carlo";
   add("--preset", s.preset, "Take all values from a named member of the family",
-      "softras|opendr|nmr|paper_gaussian|paper_cauchy|joint_gaussian|rigid");
+      "softras|opendr|nmr|paper_gaussian|paper_cauchy|gaussian|joint_gaussian|rigid");
   add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
   add("--depth-prior", s.depth_prior, "Noise of the depth", priors);
   add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");

@@ -259,10 +259,12 @@ Smoothing smoothing_preset(std::string_view name, int width, int height) {
   if (name == "nmr") return nmr();
   if (name == "paper_gaussian") return published(Prior::gaussian);
   if (name == "paper_cauchy") return published(Prior::cauchy);
+  if (name == "gaussian") return Smoothing{};
   if (name == "joint_gaussian") return joint_gaussian();
   if (name == "rigid") return rigid_smoothing();
-  throw InvalidArgument("preset (smoothing)", "\"" + std::string(name) + "\"",
-                        "softras, opendr, nmr, paper_gaussian, paper_cauchy, joint_gaussian or rigid");
+  throw InvalidArgument(
+      "preset (smoothing)", "\"" + std::string(name) + "\"",
+      "softras, opendr, nmr, paper_gaussian, paper_cauchy, gaussian, joint_gaussian or rigid");
 }
 
 std::string_view to_string(Prior value) { return find_name<Prior>(k_priors, value); }

@@ -178,7 +178,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR");
   command->add_option("--method", o.method, "How it renders: a preset of the smoothing")
       ->capture_default_str()
-      ->type_name("softras|paper_gaussian|paper_cauchy|joint_gaussian|opendr|nmr");
+      ->type_name("softras|gaussian|joint_gaussian|paper_gaussian|paper_cauchy|opendr|nmr");
   command->add_option("--minutes", o.minutes, "Time for this run, 0 for as long as it takes")
       ->capture_default_str()
       ->type_name("FLOAT");
@@ -195,8 +195,10 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->capture_default_str()
       ->type_name("FLOAT");
   command
-      ->add_option("--sigma", o.sigma,
-                   "Scale of the distance noise, NDC^2 (default: 1e-4; of opendr and nmr the preset's)")
+      ->add_option(
+          "--sigma", o.sigma,
+          "Scale of the distance noise, NDC^2 (default: as wide as SoftRas' noise at 1e-4; of opendr and "
+          "nmr the preset's)")
       ->type_name("FLOAT");
   command->add_option("--gamma", o.gamma, "Scale of the depth noise (default: the same)")->type_name("FLOAT");
   command->add_option("--palette", o.palette, "Colours of a palette")->capture_default_str()->type_name("N");

@@ -22,7 +22,8 @@ struct LearningWeights {
 
 struct TrainingOptions {
   std::string method = "joint_gaussian";  ///< a preset of the smoothing, with the scales below
-  /// Unless given 1e-4 each, as published for SoftRas; of opendr and nmr the preset's.
+  /// Unless given, SoftRas' published 1e-4 each, and what makes another prior's noise as wide
+  /// (Gaussian: 1.79e-4 and 1.24e-4); of opendr and nmr the preset's.
   std::optional<float> sigma, gamma;
   std::uint64_t seed = 1;       ///< of the first weights, the batches, and sampled noise
   std::int64_t palette = 16;    ///< colours of a palette

@@ -11,6 +11,7 @@
 #include "dpr/error.hpp"
 #include "scene/adjacency.hpp"
 #include "scene/checks.hpp"
+#include "scene/prior_functions.hpp"
 #include "scene/set_sigma.hpp"
 #include "scene/temporary_file.hpp"
 #include "torch/checkpoint.hpp"
@@ -250,18 +251,28 @@ TrainingResult result_of(const LoadedCheckpoint& run, const TrainingProgress& la
   return result;
 }
 
+/// The scale at which `prior` spreads as wide as SoftRas' prior of the same noise does at its published
+/// scale. Widths are of the middle nine tenths: Cauchy noise has no variance.
+float published_scale(Prior prior, Prior of_softras) {
+  constexpr double k_softras_scale = 1e-4;  // of distance and depth: Liu et al. 2019, at 64x64
+  const auto width = [](Prior p) { return quantile(p, 0.95) - quantile(p, 0.05); };
+  return static_cast<float>(k_softras_scale * width(of_softras) / width(prior));
+}
+
 }  // namespace
 
 Smoothing training_smoothing(const TrainingOptions& options) {
-  constexpr float k_published_scale = 1e-4F;  // of distance and depth: Liu et al. 2019, at 64x64
   if (options.method == "rigid")
     throw InvalidArgument("method (dpr learn)", "rigid", "one that has gradients");
   Smoothing smoothing = smoothing_preset(options.method, k_image_size, k_image_size);
   const bool has_scales =
       smoothing.occupancy_prior != Prior::uniform;  // else pixels and rigid depths are the scales
-  const float sigma = options.sigma.value_or(has_scales ? k_published_scale : smoothing.sigma);
-  set_sigma(smoothing, sigma);
-  smoothing.gamma = options.gamma.value_or(has_scales ? k_published_scale : smoothing.gamma);
+  if (has_scales) {
+    set_sigma(smoothing, published_scale(smoothing.occupancy_prior, Prior::logistic));
+    smoothing.gamma = published_scale(smoothing.depth_prior, Prior::gumbel);
+  }
+  if (options.sigma) set_sigma(smoothing, *options.sigma);
+  if (options.gamma) smoothing.gamma = *options.gamma;
   validate(smoothing);
   return smoothing;
 }

@@ -223,33 +223,38 @@ TEST_SUITE("pipeline") {
     CHECK(pull.y > 0.1);
   }
 
-  TEST_CASE("joint_gaussian: the expectation of the rigid image") {
-    Scene scene = two_triangles(reduced(24, 8), reduced(20, 8));
-    scene.smoothing = smoothing_preset("joint_gaussian");
-    scene.smoothing.gamma = 0.04F;  // the depths of the two mix
-    Renderer renderer(open_device());
-    renderer.set_scene(scene);
-    const auto formula = [&](double scale) {
-      return [&, scale](const Pixel& pixel) {
-        reference::AggregateParameters p;
-        p.composition = reference::Composition::joint;
-        p.gamma = scale * static_cast<double>(scene.smoothing.gamma);
-        p.znear = 1;
-        p.zfar = 10;
-        p.background = {static_cast<double>(scene.background.x), static_cast<double>(scene.background.y),
-                        static_cast<double>(scene.background.z)};
-        std::vector<reference::FragmentInput> fragments;
-        for (const Fragment& f : pixel) {
-          const reference::Occupancy o = reference::occupancy_forward(
-              reference::Prior::gaussian, f.distance, static_cast<double>(scene.smoothing.sigma));
-          fragments.push_back({f.depth, o.p, o.log_p, {f.color.x, f.color.y, f.color.z}});
-        }
-        const reference::AggregateResult r = reference::aggregate_forward(fragments, p);
-        return glm::dvec4(r.color.x, r.color.y, r.color.z, r.silhouette);
+  TEST_CASE("gaussian: occupancies in the logarithm; joint_gaussian: the expectation of the rigid image") {
+    for (const bool is_joint : {false, true}) {
+      CAPTURE(is_joint);
+      Scene scene = two_triangles(reduced(24, 8), reduced(20, 8));
+      scene.smoothing = smoothing_preset(is_joint ? "joint_gaussian" : "gaussian");
+      scene.smoothing.gamma = 0.04F;            // the depths of the two mix
+      scene.smoothing.background_depth = 0.5F;  // and in the barrier with the background
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      const auto formula = [&](double scale) {
+        return [&, scale](const Pixel& pixel) {
+          reference::AggregateParameters p;
+          p.composition = is_joint ? reference::Composition::joint : reference::Composition::barrier;
+          p.gamma = scale * static_cast<double>(scene.smoothing.gamma);
+          p.znear = 1;
+          p.zfar = 10;
+          p.background_depth = static_cast<double>(scene.smoothing.background_depth);
+          p.background = {static_cast<double>(scene.background.x), static_cast<double>(scene.background.y),
+                          static_cast<double>(scene.background.z)};
+          std::vector<reference::FragmentInput> fragments;
+          for (const Fragment& f : pixel) {
+            const reference::Occupancy o = reference::occupancy_forward(
+                reference::Prior::gaussian, f.distance, static_cast<double>(scene.smoothing.sigma));
+            fragments.push_back({f.depth, o.p, o.log_p, {f.color.x, f.color.y, f.color.z}});
+          }
+          const reference::AggregateResult r = reference::aggregate_forward(fragments, p);
+          return glm::dvec4(r.color.x, r.color.y, r.color.z, r.silhouette);
+        };
       };
-    };
-    CHECK(worst_pixel(renderer, formula(1)) < 1e-5);
-    CHECK(worst_pixel(renderer, formula(1.05)) > 1e-4);
+      CHECK(worst_pixel(renderer, formula(1)) < 1e-5);
+      CHECK(worst_pixel(renderer, formula(1.05)) > 1e-4);
+    }
   }
 }
 

@@ -77,8 +77,8 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("presets") {
-    for (const char* name :
-         {"softras", "opendr", "nmr", "paper_gaussian", "paper_cauchy", "joint_gaussian", "rigid"}) {
+    for (const char* name : {"softras", "opendr", "nmr", "paper_gaussian", "paper_cauchy", "gaussian",
+                             "joint_gaussian", "rigid"}) {
       CHECK_NOTHROW(validate(smoothing_preset(name)));
     }
     const Smoothing softras = smoothing_preset("softras");
@@ -111,8 +111,14 @@ TEST_SUITE("unit") {
     CHECK(nmr.distance == DistanceMetric::euclidean);
     CHECK(nmr.sigma == 1e-3F);
     CHECK(blur_radius(nmr) == 0.5F);
-    CHECK(smoothing_preset("joint_gaussian").composition == Composition::joint);
-    CHECK(smoothing_preset("joint_gaussian").occupancy_prior == Prior::gaussian);
+    for (const bool is_joint : {false, true}) {
+      const Smoothing gaussian = smoothing_preset(is_joint ? "joint_gaussian" : "gaussian");
+      CHECK(gaussian.composition == (is_joint ? Composition::joint : Composition::barrier));
+      CHECK(gaussian.occupancy_prior == Prior::gaussian);
+      CHECK(gaussian.depth_prior == Prior::gaussian);
+      CHECK(gaussian.occupancy_estimator == Estimator::exact);
+      CHECK(gaussian.aggregation_estimator == Estimator::exact);
+    }
     const Smoothing rigid = smoothing_preset("rigid");
     CHECK(rigid.composition == Composition::joint);
     CHECK(rigid.sigma == 1e-12F);
@@ -232,8 +238,9 @@ TEST_SUITE("robustness") {
                           "samples (smoothing): got 1 with leave_one_out, expected at least 2");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::antithetic, 2)),
                           "samples (smoothing): got 2 with leave_one_out, expected at least 4");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(sampled(leave_one_out, Draws::stratified, 8)),
-                          "variance_reduction (smoothing): got leave_one_out (the default) with stratified draws");
+    DPR_CHECK_MESSAGE_HAS(
+        InvalidArgument, validate(sampled(leave_one_out, Draws::stratified, 8)),
+        "variance_reduction (smoothing): got leave_one_out (the default) with stratified draws");
     Smoothing gumbel = sampled(none, Draws::antithetic, 8);
     gumbel.depth_prior = Prior::gumbel;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(gumbel),

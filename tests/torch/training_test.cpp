@@ -101,6 +101,29 @@ TEST_SUITE("unit") {
 }
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("training: every prior's noise is as wide as SoftRas' at 1e-4, unless scales are given") {
+    const auto scales = [](const char* method) {
+      TrainingOptions options;
+      options.method = method;
+      return training_smoothing(options);
+    };
+    CHECK(scales("softras").sigma == doctest::Approx(1e-4));
+    CHECK(scales("softras").gamma == doctest::Approx(1e-4));
+    for (const char* method : {"gaussian", "joint_gaussian", "paper_gaussian"}) {
+      CHECK(scales(method).sigma == doctest::Approx(1e-4 * std::log(19.0) / 1.644854));
+      CHECK(scales(method).gamma == doctest::Approx(1e-4 * (2.970195 + 1.097189) / (2 * 1.644854)));
+    }
+    CHECK(scales("paper_cauchy").sigma == doctest::Approx(1e-4 * std::log(19.0) / 6.313752));
+    CHECK(scales("nmr").sigma == smoothing_preset("nmr").sigma);
+    CHECK(blur_radius(scales("softras")) == doctest::Approx(9.21e-4).epsilon(1e-3));
+    CHECK(blur_radius(scales("gaussian")) == doctest::Approx(3.719 * 1.790e-4).epsilon(1e-3));
+    TrainingOptions options = small_options("softras");
+    options.sigma = 2e-4F;
+    options.gamma = 3e-4F;
+    CHECK(training_smoothing(options).sigma == 2e-4F);
+    CHECK(training_smoothing(options).gamma == 3e-4F);
+  }
+
   TEST_CASE("training: interrupted and resumed gives the same losses, bit by bit") {
     for (const char* method : {"joint_gaussian", "paper_gaussian"}) {
       CAPTURE(std::string(method));
