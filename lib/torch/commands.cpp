@@ -218,7 +218,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->type_name("N");
   add_output_options(*command, common);
   add_device_options(*command, common);
-  command->footer("Example: dpr learn train --data data -o run --method joint_gaussian --minutes 30");
+  command->footer("Example: dpr learn train --data data -o run --minutes 30");
   command->callback([options, &common] { run_train(*options, common); });
 }
 

@@ -21,7 +21,7 @@ struct LearningWeights {
 };
 
 struct TrainingOptions {
-  std::string method = "joint_gaussian";  ///< a preset of the smoothing, with the scales below
+  std::string method = "gaussian";  ///< a preset of the smoothing, with the scales below
   /// Unless given, SoftRas' published 1e-4 each, and what makes another prior's noise as wide
   /// (Gaussian: 1.79e-4 and 1.24e-4); of opendr and nmr the preset's.
   std::optional<float> sigma, gamma;

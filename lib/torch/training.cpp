@@ -265,9 +265,7 @@ Smoothing training_smoothing(const TrainingOptions& options) {
   if (options.method == "rigid")
     throw InvalidArgument("method (dpr learn)", "rigid", "one that has gradients");
   Smoothing smoothing = smoothing_preset(options.method, k_image_size, k_image_size);
-  const bool has_scales =
-      smoothing.occupancy_prior != Prior::uniform;  // else pixels and rigid depths are the scales
-  if (has_scales) {
+  if (smoothing.occupancy_prior != Prior::uniform) {  // else pixels and rigid depths are the scales
     set_sigma(smoothing, published_scale(smoothing.occupancy_prior, Prior::logistic));
     smoothing.gamma = published_scale(smoothing.depth_prior, Prior::gumbel);
   }

@@ -155,7 +155,7 @@ TEST_SUITE("pipeline") {
     CHECK(result.losses.back() < 0.75 * result.losses.front());
     const Evaluation found =
         evaluate(folder / "checkpoint.pt", read(Split::test), 4, [](std::size_t, std::size_t) {});
-    CHECK(found.method == "joint_gaussian");
+    CHECK(found.method == "gaussian");
     CHECK(found.steps == options.steps);
     REQUIRE(found.classes.size() == 2);
     for (const ClassIou& row : found.classes) CHECK(row.images == 8);
