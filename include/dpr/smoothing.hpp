@@ -97,7 +97,7 @@ Smoothing rigid_smoothing();
 /// - "paper_gaussian" (36), "paper_cauchy" (35): both stages of one prior, sampled 8 times as in (11) and
 /// (14),
 ///   blur radius 9.21 sigma: the published program
-/// - "gaussian": the default above, Gaussian noise in the barrier, exact: (36), then the expectation of (2)
+/// - "gaussian": the default above, Gaussian noise in the barrier, exact: (36), (10)
 /// - "joint_gaussian": the joint composition, exact: the expectation of (3) under (8)
 /// - "rigid": rigid_smoothing()
 Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
