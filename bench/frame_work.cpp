@@ -8,7 +8,7 @@
 #include <string>
 
 #include "device/kernel_sources.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr::bench {
 namespace {

@@ -1,8 +1,8 @@
 // Times a workload: wall clock of the passes, device time of the stages, memory.
 #pragma once
 
+#include "cli/provenance.hpp"
 #include "peaks.hpp"
-#include "provenance.hpp"
 #include "workloads.hpp"
 
 namespace dpr::bench {

@@ -2,8 +2,8 @@
 
 #include <fstream>
 
+#include "base/json_node.hpp"
 #include "dpr/error.hpp"
-#include "scene/json_node.hpp"
 
 namespace dpr::bench {
 namespace {

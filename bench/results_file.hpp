@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "provenance.hpp"
+#include "cli/provenance.hpp"
 
 namespace dpr::bench {
 

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "cli/progress.hpp"
+#include "cli/provenance.hpp"
 #include "dpr/smoothing.hpp"
-#include "provenance.hpp"
 
 namespace dpr::experiments {
 

@@ -4,7 +4,7 @@
 #include "cli/plot.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
-#include "scene/set_sigma.hpp"
+#include "smoothing/set_sigma.hpp"
 
 namespace dpr::experiments {
 
@@ -42,7 +42,7 @@ void announce(const Settings& settings, const std::string& file) {
 
 void write_data(const Settings& settings, const std::string& name, const Json& data) {
   Json file{{"experiment", name}};
-  file.update(bench::provenance(settings.device));
+  file.update(cli::provenance(settings.device));
   file["smoke"] = settings.smoke;
   file.update(data);
   cli::write_json(settings.folder / (name + ".json"), file);

@@ -2,11 +2,11 @@
 #include <memory>
 #include <sstream>
 
+#include "base/temporary_file.hpp"
 #include "cli/plot.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 #include "experiment.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::experiments {
 namespace {

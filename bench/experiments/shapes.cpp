@@ -13,7 +13,7 @@
 #include "dpr/shape.hpp"
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
-#include "scene/bounding_box.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr::experiments {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
-#include "solve/is_sampled.hpp"
+#include "smoothing/is_sampled.hpp"
 
 namespace dpr::cli {
 namespace {

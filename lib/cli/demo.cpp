@@ -3,12 +3,12 @@
 #include <memory>
 #include <random>
 
+#include "base/uniform_number.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "dpr/renderer.hpp"
-#include "scene/uniform_number.hpp"
 #include "solve/polar.hpp"
 
 namespace dpr::cli {

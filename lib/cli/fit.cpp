@@ -3,13 +3,13 @@
 #include <cstdio>
 #include <memory>
 
+#include "base/checks.hpp"
+#include "base/temporary_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/folder.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
-#include "scene/checks.hpp"
-#include "scene/temporary_file.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr::cli {

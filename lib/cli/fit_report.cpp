@@ -6,13 +6,13 @@
 #include <cstdio>
 #include <memory>
 
+#include "base/temporary_file.hpp"
 #include "cli/folder.hpp"
 #include "cli/page.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "dpr/renderer.hpp"
-#include "scene/bounding_box.hpp"
-#include "scene/temporary_file.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <ostream>
 
-#include "scene/temporary_file.hpp"
+#include "base/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -10,8 +10,8 @@
 #include <limits>
 #include <sstream>
 
+#include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {

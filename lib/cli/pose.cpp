@@ -3,13 +3,13 @@
 #include <memory>
 #include <optional>
 
+#include "base/temporary_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "base/temporary_file.hpp"
 #include "cli/page.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include "cli/text.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
-#include "scene/bounding_box.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -4,8 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
-#include "scene/checks.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -4,8 +4,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "base/input_file.hpp"
 #include "dpr/error.hpp"
-#include "scene/input_file.hpp"
 
 namespace dpr::learn {
 namespace {

@@ -7,7 +7,7 @@
 #include <glm/glm.hpp>
 #include <random>
 
-#include "scene/uniform_number.hpp"
+#include "base/uniform_number.hpp"
 
 namespace dpr::learn {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <ostream>
 
+#include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::learn {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
-#include "scene/temporary_file.hpp"
 
 namespace dpr::learn {
 namespace {

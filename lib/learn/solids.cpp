@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "scene/bounding_box.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr::learn {
 namespace {

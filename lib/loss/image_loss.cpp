@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "base/checks.hpp"
 #include "loss/image_loss_impl.hpp"
-#include "renderer_impl.hpp"
-#include "scene/checks.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr {
 namespace {

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "base/checks.hpp"
 #include "loss/mesh_loss_impl.hpp"
-#include "renderer_impl.hpp"
-#include "scene/adjacency.hpp"
-#include "scene/checks.hpp"
+#include "mesh/adjacency.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr {
 namespace {

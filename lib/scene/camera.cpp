@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "scene/checks.hpp"
+#include "base/checks.hpp"
 
 namespace dpr {
 namespace {

@@ -1,7 +1,7 @@
 // What makes lights that can be rendered with.
 #include "dpr/light.hpp"
 
-#include "scene/checks.hpp"
+#include "base/checks.hpp"
 
 namespace dpr {
 

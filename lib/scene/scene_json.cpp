@@ -6,9 +6,9 @@
 #include <limits>
 #include <string>
 
+#include "base/checks.hpp"
 #include "dpr/scene.hpp"
-#include "scene/checks.hpp"
-#include "scene/set_sigma.hpp"
+#include "smoothing/set_sigma.hpp"
 
 namespace dpr {
 namespace {

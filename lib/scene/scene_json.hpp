@@ -1,9 +1,9 @@
 // The parts of the scene format that other files share with it.
 #pragma once
 
+#include "base/json_node.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/smoothing.hpp"
-#include "scene/json_node.hpp"
 
 namespace dpr {
 

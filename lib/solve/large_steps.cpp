@@ -2,7 +2,7 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "scene/adjacency.hpp"
+#include "mesh/adjacency.hpp"
 
 namespace dpr {
 

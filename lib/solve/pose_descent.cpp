@@ -11,7 +11,7 @@
 #include <variant>
 
 #include "dpr/renderer.hpp"
-#include "solve/is_sampled.hpp"
+#include "smoothing/is_sampled.hpp"
 #include "solve/polar.hpp"
 #include "solve/require.hpp"
 

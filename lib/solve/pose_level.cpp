@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer_impl.hpp"
-#include "scene/cluster_vertices.hpp"
+#include "mesh/cluster_vertices.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr {

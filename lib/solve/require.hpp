@@ -1,8 +1,8 @@
 // One line for each check of an option.
 #pragma once
 
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
-#include "scene/checks.hpp"
 
 namespace dpr {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "dpr/error.hpp"
-#include "scene/prior_functions.hpp"
+#include "smoothing/prior_functions.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <string>
 
-#include "scene/checks.hpp"
+#include "base/checks.hpp"
 
 namespace dpr {
 namespace {

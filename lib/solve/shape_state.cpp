@@ -8,10 +8,10 @@
 #include <string_view>
 #include <type_traits>
 
+#include "base/input_file.hpp"
+#include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
-#include "scene/input_file.hpp"
-#include "scene/set_sigma.hpp"
-#include "scene/temporary_file.hpp"
+#include "smoothing/set_sigma.hpp"
 
 namespace dpr {
 namespace {

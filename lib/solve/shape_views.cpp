@@ -1,9 +1,9 @@
 // The views format: images with their cameras.
 #include <string>
 
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "dpr/shape.hpp"
-#include "scene/checks.hpp"
 #include "scene/scene_json.hpp"
 
 namespace dpr {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "scene/checks.hpp"
-#include "scene/set_sigma.hpp"
+#include "base/checks.hpp"
+#include "smoothing/set_sigma.hpp"
 #include "torch/errors.hpp"
 
 namespace dpr::torch_op {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/json_node.hpp"
 #include "cli/json.hpp"
-#include "scene/json_node.hpp"
 #include "support/command.hpp"
 
 using dpr::cli::Json;

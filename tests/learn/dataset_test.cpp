@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "learn/generate.hpp"
-#include "scene/bounding_box.hpp"
+#include "mesh/bounding_box.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"

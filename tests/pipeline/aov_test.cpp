@@ -13,7 +13,7 @@
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"

@@ -7,7 +7,7 @@
 
 #include "dpr/dpr.hpp"
 #include "pipeline/determinism.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 

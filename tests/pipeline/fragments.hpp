@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr::test::pipeline {
 

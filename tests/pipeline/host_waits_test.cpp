@@ -8,7 +8,7 @@
 #include "dpr/dpr.hpp"
 #include "dpr/opencl.hpp"
 #include "pipeline/determinism.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 
 using namespace dpr;

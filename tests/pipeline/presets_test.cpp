@@ -12,7 +12,7 @@
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "reference/occupancy.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/reduced.hpp"
 
 using namespace dpr;

@@ -10,7 +10,7 @@
 #include "dpr/dpr.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 

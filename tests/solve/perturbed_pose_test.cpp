@@ -16,7 +16,7 @@
 #include "dpr/optimizer.hpp"
 #include "dpr/pose.hpp"
 #include "reference/priors.hpp"
-#include "scene/prior_functions.hpp"
+#include "smoothing/prior_functions.hpp"
 #include "solve/score_estimator.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"

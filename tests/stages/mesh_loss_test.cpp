@@ -15,9 +15,9 @@
 #include "dpr/loss.hpp"
 #include "dpr/renderer.hpp"
 #include "loss/mesh_loss_impl.hpp"
+#include "mesh/adjacency.hpp"
 #include "reference/finite_difference.hpp"
 #include "reference/mesh_loss.hpp"
-#include "scene/adjacency.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "dpr/dpr.hpp"
 #include "reference/shade.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/aggregate_errors.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"

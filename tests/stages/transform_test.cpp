@@ -7,7 +7,7 @@
 
 #include "dpr/dpr.hpp"
 #include "reference/transform.hpp"
-#include "renderer_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/aggregate_errors.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"

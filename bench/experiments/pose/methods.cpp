@@ -7,7 +7,7 @@
 
 #include "dpr/error.hpp"
 #include "experiments/pose/protocol.hpp"
-#include "scene/set_sigma.hpp"
+#include "smoothing/set_sigma.hpp"
 
 namespace dpr::bench {
 namespace {

@@ -9,10 +9,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <random>
 
+#include "base/uniform_number.hpp"
 #include "cli/json.hpp"
 #include "dpr/error.hpp"
-#include "scene/bounding_box.hpp"
-#include "scene/uniform_number.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr::bench {
 namespace {

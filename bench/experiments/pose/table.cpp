@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "cli/progress.hpp"
+#include "cli/provenance.hpp"
 #include "dpr/error.hpp"
 #include "experiments/pose/methods.hpp"
 
@@ -93,7 +94,7 @@ Json head(const Device& device, const PoseRun& run) {
   const DeviceInfo& info = device.info();
   return {
       {"schema", k_schema},
-      {"commit", DPR_COMMIT},
+      {"commit", cli::commit()},
       {"device", {{"platform", info.platform}, {"name", info.name}, {"compute_units", info.compute_units}}},
       {"method", label(run.method)},
       {"set", to_json(run.set)},

@@ -1,0 +1,103 @@
+// dpr bench: measures the workloads, compares files of results, draws them.
+#include "bench_command.hpp"
+
+#include <cstdio>
+#include <memory>
+
+#include "compare.hpp"
+#include "dpr/error.hpp"
+#include "measure_command.hpp"
+#include "report/report.hpp"
+
+namespace dpr::cli {
+namespace {
+
+struct BenchOptions {
+  BenchMeasureOptions measure;
+  std::vector<std::string> compared, files;
+  std::string report;
+};
+
+void run_compare(const BenchOptions& options, const CommonOptions& common) {
+  const Json comparison =
+      bench::compare(bench::read_results(options.compared[0]), bench::read_results(options.compared[1]));
+  if (!common.quiet) std::printf("%s", bench::to_lines(comparison).c_str());
+  if (!options.measure.output.empty()) write_json(options.measure.output, comparison);
+}
+
+void run_report(const BenchOptions& options, const CommonOptions& common) {
+  if (options.files.empty()) {
+    throw InvalidArgument("files (command line)", "none", "one or more files of results after --report DIR");
+  }
+  std::vector<Json> results;
+  for (const std::string& file : options.files) results.push_back(bench::read_results(file));
+  for (const std::string& picture : bench::write_report(options.report, results)) {
+    if (!common.quiet) std::printf("%s\n", picture.c_str());
+  }
+}
+
+void run(const BenchOptions& options, const CommonOptions& common) {
+  if (!options.compared.empty()) return run_compare(options, common);
+  if (!options.report.empty()) return run_report(options, common);
+  if (!options.files.empty()) {
+    throw InvalidArgument("files (command line)", "\"" + options.files.front() + "\"",
+                          "none without --report");
+  }
+  run_bench(options.measure, common);
+}
+
+/// What --help says after the options.
+std::string footer() {
+  std::string text = "Workloads:\n";
+  for (const auto& names : {bench::workload_names(), bench::sweep_names()}) {
+    for (const std::string_view name : names) {
+      const std::string pad(18 - name.size(), ' ');
+      text += "  " + std::string(name) + pad + std::string(bench::describe(name)) + "\n";
+    }
+  }
+  return text +
+         "--compare calls a row faster or slower where the medians differ by more than 5% and the middle "
+         "halves of the\n"
+         "runs do not overlap; unclear where they do, or with fewer than 5 runs; the same within 5%.\n"
+         "Example: dpr bench --workload sphere256 -o results.json";
+}
+
+void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
+  command
+      .add_option("--workload", options.workloads,
+                  "What to measure, may be repeated; all but sweeps if left out")
+      ->type_name("NAME");
+  command.add_flag("--sweeps", options.sweeps, "Measure the sweeps too");
+  command
+      .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")
+      ->type_name("NAME");
+  command.add_option("-o,--output", options.output, "Results, or the comparison, as JSON")->type_name("FILE");
+  command
+      .add_option("--repetitions", options.each.repetitions, "Timed runs of each row, after one to warm up")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--max-seconds", options.each.max_seconds, "A slow row stops repeating after that")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_bench_options(CLI::App& application, CommonOptions& common) {
+  const auto options = std::make_shared<BenchOptions>();
+  add_measure_options(application, options->measure);
+  auto* compare =
+      application.add_option("--compare", options->compared, "Two files of results, the earlier first")
+          ->expected(2)
+          ->type_name("A.json B.json");
+  application.add_option("--report", options->report, "Folder for plots of the files of results that follow")
+      ->type_name("DIR")
+      ->excludes(compare);
+  application.add_option("files", options->files, "Files of results, for --report")->type_name("R.json");
+  add_device_options(application, common);
+  add_output_options(application, common);
+  application.footer(footer());
+  application.callback([options, &common] { run(*options, common); });
+}
+
+}  // namespace dpr::cli

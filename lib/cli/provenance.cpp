@@ -1,0 +1,23 @@
+#include "cli/provenance.hpp"
+
+#include "device/kernel.hpp"
+
+namespace dpr::cli {
+
+const char* commit() { return DPR_COMMIT; }
+
+Json provenance(const Device& device) {
+  const DeviceInfo& info = device.info();
+  return {{"commit", commit()},
+          {"device",
+           {{"platform", info.platform},
+            {"name", info.name},
+            {"type", info.type},
+            {"version", info.version},
+            {"driver", info.driver},
+            {"compute_units", info.compute_units},
+            {"lanes", info.lanes}}},
+          {"build_options", build_options(device.impl())}};
+}
+
+}  // namespace dpr::cli

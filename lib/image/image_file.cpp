@@ -1,0 +1,151 @@
+// Images on disk, by way of OpenImageIO.
+#include "dpr/image.hpp"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "base/checks.hpp"
+#include "base/input_file.hpp"
+#include "base/temporary_file.hpp"
+#include "dpr/error.hpp"
+
+namespace dpr {
+namespace {
+
+// Alpha is the silhouette, not a factor of the colours. OpenImageIO multiplies it in while reading PNG and
+// the like, and takes it out again while writing, unless both sides are told that it is not there.
+constexpr const char* k_unassociated_alpha = "oiio:UnassociatedAlpha";
+
+struct Format {
+  std::string_view extension;
+  int channels;
+  OIIO::TypeDesc::BASETYPE type;
+};
+
+constexpr std::array<Format, 9> k_formats{{{".exr", 4, OIIO::TypeDesc::FLOAT},
+                                           {".png", 4, OIIO::TypeDesc::UINT8},
+                                           {".tif", 4, OIIO::TypeDesc::UINT8},
+                                           {".tiff", 4, OIIO::TypeDesc::UINT8},
+                                           {".tga", 4, OIIO::TypeDesc::UINT8},
+                                           {".bmp", 3, OIIO::TypeDesc::UINT8},
+                                           {".jpg", 3, OIIO::TypeDesc::UINT8},
+                                           {".jpeg", 3, OIIO::TypeDesc::UINT8},
+                                           {".ppm", 3, OIIO::TypeDesc::UINT8}}};
+
+const Format& format_of(const std::filesystem::path& file) {
+  const std::string extension = lower_case_extension(file);
+  std::string known;
+  for (const Format& format : k_formats) {
+    if (format.extension == extension) return format;
+    if (!known.empty()) known += ", ";
+    known += format.extension;
+  }
+  throw IoError(file, "got the extension \"" + extension + "\", expected one of " + known);
+}
+
+std::string pixel_name(std::size_t index, int width) {
+  const auto row_length = static_cast<std::size_t>(width);
+  return "column " + std::to_string(index % row_length) + ", row " + std::to_string(index / row_length);
+}
+
+bool is_finite(const glm::vec4& pixel) {
+  return std::isfinite(pixel.r) && std::isfinite(pixel.g) && std::isfinite(pixel.b) && std::isfinite(pixel.a);
+}
+
+void require_finite(const std::filesystem::path& file, const Image& image) {
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    if (is_finite(image.pixels[i])) continue;
+    throw IoError(file, "the pixel in " + pixel_name(i, image.width) + " is not finite");
+  }
+}
+
+// Reasons span lines at times; an error is one line.
+std::string one_line(std::string reason) {
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  while (!reason.empty() && reason.back() == ' ') reason.pop_back();
+  return reason.empty() ? "OpenImageIO gives no reason" : reason;
+}
+
+std::unique_ptr<OIIO::ImageInput> open(const std::filesystem::path& file) {
+  require_file(file);
+  OIIO::ImageSpec configuration;
+  configuration.attribute(k_unassociated_alpha, 1);
+  auto input = OIIO::ImageInput::open(file.string(), &configuration);
+  if (!input) throw IoError(file, "cannot be read: " + one_line(OIIO::geterror()));
+  return input;
+}
+
+// Which of the file's channels is red, green, blue and alpha; -1 where there is none.
+std::array<int, 4> channels_of(const OIIO::ImageSpec& spec) {
+  if (spec.nchannels == 1) return {0, 0, 0, -1};
+  if (spec.nchannels == 2) return {0, 0, 0, 1};
+  if (spec.nchannels == 4) return {0, 1, 2, 3};
+  return {0, 1, 2, spec.alpha_channel > 2 ? spec.alpha_channel : -1};
+}
+
+}  // namespace
+
+Image read_image(const std::filesystem::path& file, bool* has_alpha) {
+  const auto input = open(file);
+  const OIIO::ImageSpec& spec = input->spec();
+  if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
+      spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {
+    throw IoError(file, "got " + checks::size(spec.width, spec.height) + " pixels in " +
+                            std::to_string(spec.nchannels) + " channels, expected 1 to " +
+                            std::to_string(checks::k_largest_side) +
+                            " pixels on a side in one channel or more");
+  }
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  const std::array<int, 4> source = channels_of(spec);
+  Image image(spec.width, spec.height, glm::vec4(1));
+  std::vector<float> values(image.pixels.size() * channels);
+  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, values.data())) {
+    throw IoError(file, "cannot be read: " + one_line(input->geterror()));
+  }
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    for (int c = 0; c < 4; ++c) {
+      const int from = source[static_cast<std::size_t>(c)];
+      if (from >= 0) image.pixels[i][c] = values[i * channels + static_cast<std::size_t>(from)];
+    }
+  }
+  require_finite(file, image);
+  if (has_alpha) *has_alpha = source[3] >= 0;
+  return image;
+}
+
+void write_image(const std::filesystem::path& file, const Image& image) {
+  const Format& format = format_of(file);
+  const auto width = static_cast<std::size_t>(std::max(image.width, 0));
+  if (image.width < 1 || image.height < 1 ||
+      image.pixels.size() != width * static_cast<std::size_t>(image.height)) {
+    throw InvalidArgument(
+        "image (for " + file.string() + ")",
+        checks::size(image.width, image.height) + " with " + std::to_string(image.pixels.size()) + " pixels",
+        "at least 1x1, and width times height pixels");
+  }
+  require_finite(file, image);
+  std::vector<float> values;
+  values.reserve(image.pixels.size() * static_cast<std::size_t>(format.channels));
+  const bool clamps = format.type == OIIO::TypeDesc::UINT8;
+  for (const glm::vec4& pixel : image.pixels) {
+    const glm::vec4 value = clamps ? glm::clamp(pixel, 0.0F, 1.0F) : pixel;
+    for (int c = 0; c < format.channels; ++c) values.push_back(value[c]);
+  }
+  TemporaryFile temporary(file);
+  const auto output = OIIO::ImageOutput::create(temporary.path().string());
+  if (!output) throw IoError(file, "cannot be written: " + one_line(OIIO::geterror()));
+  OIIO::ImageSpec spec(image.width, image.height, format.channels, OIIO::TypeDesc(format.type));
+  spec.attribute(k_unassociated_alpha, 1);
+  if (!output->open(temporary.path().string(), spec) ||
+      !output->write_image(OIIO::TypeDesc::FLOAT, values.data()) || !output->close()) {
+    throw IoError(file, "cannot be written: " + one_line(output->geterror()));
+  }
+  temporary.commit();
+}
+
+}  // namespace dpr

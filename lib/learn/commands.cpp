@@ -1,0 +1,329 @@
+// dpr learn data, train, eval, show: from the command line to the library and back.
+#include "learn/commands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "base/temporary_file.hpp"
+#include "cli/folder.hpp"
+#include "cli/json.hpp"
+#include "cli/plot.hpp"
+#include "cli/progress.hpp"
+#include "cli/provenance.hpp"
+#include "learn/generate.hpp"
+#include "learn/learning.hpp"
+
+namespace dpr::cli {
+namespace {
+
+using learn::Dataset;
+using learn::Split;
+
+/// Where data is, and of which classes.
+struct DataOptions {
+  std::string folder;
+  std::vector<std::string> classes;
+};
+
+void add_classes(CLI::App& command, std::vector<std::string>& classes) {
+  command
+      .add_option("--classes", classes,
+                  "Classes by name or synset, separated by commas (default: all thirteen)")
+      ->delimiter(',')
+      ->type_name("NAME,...");
+}
+
+void add_data(CLI::App& command, DataOptions& options) {
+  command.add_option("--data", options.folder, "Folder of the data")->required()->type_name("DIR");
+  add_classes(command, options.classes);
+}
+
+void add_checkpoint(CLI::App& command, std::string& file) {
+  command.add_option("--checkpoint", file, "The trained network")->required()->type_name("FILE.pt");
+}
+
+void add_split(CLI::App& command, std::string& split) {
+  command.add_option("--split", split, "Which objects")->capture_default_str()->type_name("train|val|test");
+}
+
+std::vector<std::size_t> class_indices(const std::vector<std::string>& words) {
+  std::vector<std::size_t> indices;
+  for (const std::string& word : words) {
+    const std::size_t c = learn::find_class(word);
+    if (std::ranges::find(indices, c) == indices.end()) indices.push_back(c);
+  }
+  if (words.empty()) {
+    for (std::size_t i = 0; i < learn::object_classes().size(); ++i) indices.push_back(i);
+  }
+  return indices;
+}
+
+Dataset read(const DataOptions& options, Split split) {
+  return {options.folder, split, class_indices(options.classes)};
+}
+
+// data
+
+struct DataCommand {
+  std::string output;
+  std::vector<std::string> classes;
+  learn::GenerateOptions generate;
+};
+
+void run_data(DataCommand& command, const CommonOptions& common) {
+  command.generate.classes = class_indices(command.classes);
+  make_folder(command.output);
+  {
+    std::unique_ptr<Progress> bar;
+    learn::generate(open_device(common), command.generate, command.output,
+                    [&](std::size_t done, std::size_t all, const std::string& what) {
+                      if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet);
+                      bar->update(static_cast<unsigned>(done), what);
+                    });
+  }
+  const std::filesystem::path sheet = std::filesystem::path(command.output) / "contact_sheet.png";
+  write_image(sheet, learn::contact_sheet(Dataset(command.output, Split::train, command.generate.classes)));
+  if (!common.quiet) std::printf("%s: see %s\n", command.output.c_str(), sheet.c_str());
+}
+
+void add_data_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand("data", "Makes a data set of parametric shapes");
+  const auto options = std::make_shared<DataCommand>();
+  command->add_option("-o,--output", options->output, "Folder to write")->required()->type_name("DIR");
+  add_classes(*command, options->classes);
+  const auto count = [&](const char* name, Split split, const char* what) {
+    command->add_option(name, options->generate.objects[static_cast<std::size_t>(split)], what)
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str()
+        ->type_name("N");
+  };
+  count("--train", Split::train, "Objects of a class to train with");
+  count("--val", Split::val, "Objects of a class to validate with");
+  count("--test", Split::test, "Objects of a class to test with");
+  command->add_option("--seed", options->generate.seed, "Seed of the shapes")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  add_output_options(*command, common);
+  add_device_options(*command, common);
+  command->footer("Example: dpr learn data -o data");
+  command->callback([options, &common] { run_data(*options, common); });
+}
+
+// train
+
+struct TrainCommand {
+  DataOptions data;
+  std::string output;
+  learn::TrainingOptions training;
+};
+
+/// Means of consecutive values, so that a plot of many is not a smear.
+void plot_losses(const std::filesystem::path& file, const std::vector<double>& losses) {
+  constexpr std::size_t k_points = 300;
+  const std::size_t window = std::max<std::size_t>(1, losses.size() / k_points);
+  std::vector<double> steps, means;
+  for (std::size_t first = 0; first + window <= losses.size(); first += window) {
+    double sum = 0;
+    for (std::size_t i = first; i < first + window; ++i) sum += losses[i];
+    steps.push_back(static_cast<double>(first + window));
+    means.push_back(sum / static_cast<double>(window));
+  }
+  if (steps.size() > 1) plot(file, "step", steps, {{"loss", true, {{"mean", means}}}});
+}
+
+void run_train(const TrainCommand& command, const CommonOptions& common) {
+  const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
+  learn::training_smoothing(command.training);  // a wrong method leaves no folder behind
+  make_folder(command.output);
+  constexpr unsigned k_parts = 1000;
+  learn::TrainingResult result;
+  {
+    Progress bar(k_parts, common.quiet);
+    const learn::TrainingOptions& o = command.training;
+    result = learn::train(
+        open_device(common), training, validation, o, command.output, [&](const learn::TrainingProgress& p) {
+          const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
+          const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
+          char text[128];
+          std::snprintf(text, sizeof text, "step %zu, loss %.4f, validation IoU %.3f", p.step, p.loss,
+                        p.validation_iou);
+          bar.update(static_cast<unsigned>(k_parts * std::min(1.0, std::max(steps, time))), text);
+        });
+  }
+  const std::filesystem::path folder(command.output);
+  plot_losses(folder / "losses.png", result.losses);
+  if (result.validation_steps.size() > 1) {
+    plot(folder / "validation.png", "step", result.validation_steps,
+         {{"mean IoU of unseen shapes", false, {{"validation", result.validation_iou}}}});
+  }
+  if (!common.quiet) {
+    std::printf("%s: %zu steps, validation IoU %.3f; %.0f s in this run, %.0f%% of them in the renderer\n",
+                command.output.c_str(), result.losses.size(), result.last.validation_iou, result.last.seconds,
+                100 * result.last.render_share);
+  }
+}
+
+void add_train_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand("train", "Trains a network, or goes on with it");
+  const auto options = std::make_shared<TrainCommand>();
+  learn::TrainingOptions& o = options->training;
+  add_data(*command, options->data);
+  command
+      ->add_option("-o,--output", options->output,
+                   "Folder of the run; where it holds a checkpoint, that goes on")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--method", o.method, "How it renders: a preset of the smoothing")
+      ->capture_default_str()
+      ->type_name("softras|gaussian|joint_gaussian|paper_gaussian|paper_cauchy|opendr|nmr");
+  command->add_option("--minutes", o.minutes, "Time for this run, 0 for as long as it takes")
+      ->capture_default_str()
+      ->type_name("FLOAT");
+  command->add_option("--steps", o.steps, "Steps in all, with those of earlier runs")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--seed", o.seed, "Seed of the weights, the batches and the noise")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--batch", o.batch, "Images a step")->capture_default_str()->type_name("N");
+  command->add_option("--learning-rate", o.learning_rate, "Of Adam")
+      ->capture_default_str()
+      ->type_name("FLOAT");
+  command
+      ->add_option(
+          "--sigma", o.sigma,
+          "Scale of the distance noise, NDC^2 (default: as wide as SoftRas' noise at 1e-4; of opendr and "
+          "nmr the preset's)")
+      ->type_name("FLOAT");
+  command->add_option("--gamma", o.gamma, "Scale of the depth noise (default: the same)")->type_name("FLOAT");
+  command->add_option("--palette", o.palette, "Colours of a palette")->capture_default_str()->type_name("N");
+  command->add_option("--silhouette-weight", o.weights.silhouette, "Of the silhouette's IoU")
+      ->capture_default_str()
+      ->type_name("FLOAT");
+  command->add_option("--color-weight", o.weights.color, "Of the colours' L1")
+      ->capture_default_str()
+      ->type_name("FLOAT");
+  command->add_option("--laplacian-weight", o.weights.laplacian, "Of the Laplacian")
+      ->capture_default_str()
+      ->type_name("FLOAT");
+  command
+      ->add_option("--checkpoint-every", o.checkpoint_every, "Steps between checkpoints, which are validated")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  add_output_options(*command, common);
+  add_device_options(*command, common);
+  command->footer("Example: dpr learn train --data data -o run --minutes 30");
+  command->callback([options, &common] { run_train(*options, common); });
+}
+
+// eval
+
+struct EvalCommand {
+  DataOptions data;
+  std::string checkpoint, split = "test", output;
+  std::size_t views = learn::k_views;
+};
+
+Json to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
+  Json classes = Json::array();
+  for (const learn::ClassIou& row : evaluation.classes) {
+    const learn::ObjectClass& c = learn::object_classes()[row.object_class];
+    classes.push_back({{"class", c.name},
+                       {"synset", c.synset},
+                       {"images", row.images},
+                       {"iou", row.iou},
+                       {"sphere", row.sphere}});
+  }
+  return {{"commit", commit()},         {"method", evaluation.method},
+          {"seed", evaluation.seed},    {"steps", evaluation.steps},
+          {"split", command.split},     {"views", command.views},
+          {"mean_iou", evaluation.iou}, {"sphere_mean_iou", evaluation.sphere},
+          {"classes", classes}};
+}
+
+void run_eval(const EvalCommand& command, const CommonOptions& common) {
+  if (!command.output.empty()) require_writable(command.output);  // before the work, not after it
+  const Dataset dataset = read(command.data, learn::parse_split(command.split));
+  learn::Evaluation evaluation;
+  {
+    std::unique_ptr<Progress> bar;
+    evaluation =
+        learn::evaluate(command.checkpoint, dataset, command.views, [&](std::size_t done, std::size_t all) {
+          if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet);
+          bar->update(static_cast<unsigned>(done), "images");
+        });
+  }
+  if (!command.output.empty()) write_json(command.output, to_json(evaluation, command));
+  if (common.quiet) return;
+  const auto print = [](std::string_view name, double iou, double sphere) {
+    std::printf("%-10s %5.1f%%  (the sphere %4.1f%%)\n", std::string(name).c_str(), 100 * iou, 100 * sphere);
+  };
+  for (const learn::ClassIou& row : evaluation.classes) {
+    print(learn::object_classes()[row.object_class].name, row.iou, row.sphere);
+  }
+  print("mean", evaluation.iou, evaluation.sphere);
+}
+
+void add_eval_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand("eval", "3D IoU at 32^3, by class");
+  const auto options = std::make_shared<EvalCommand>();
+  add_checkpoint(*command, options->checkpoint);
+  add_data(*command, options->data);
+  add_split(*command, options->split);
+  command->add_option("--views", options->views, "Views of each object")
+      ->check(CLI::Range(std::size_t{1}, learn::k_views))
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("-o,--output", options->output, "Table to write")->type_name("R.json");
+  add_output_options(*command, common);
+  command->footer("Example: dpr learn eval --checkpoint run/checkpoint.pt --data data -o iou.json");
+  command->callback([options, &common] { run_eval(*options, common); });
+}
+
+// show
+
+struct ShowCommand {
+  DataOptions data;
+  std::string checkpoint, split = "test", output;
+  std::size_t object = 0;
+};
+
+void add_show_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command = application.add_subcommand("show", "A picture of inputs and their reconstructions");
+  const auto options = std::make_shared<ShowCommand>();
+  add_checkpoint(*command, options->checkpoint);
+  add_data(*command, options->data);
+  add_split(*command, options->split);
+  command->add_option("--object", options->object, "Which object of every class")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("-o,--output", options->output, "Picture to write")->required()->type_name("OUT.png");
+  add_output_options(*command, common);
+  add_device_options(*command, common);
+  command->footer("Example: dpr learn show --checkpoint run/checkpoint.pt --data data -o figure.png");
+  command->callback([options, &common] {
+    require_writable(options->output);
+    const Dataset dataset = read(options->data, learn::parse_split(options->split));
+    write_image(options->output,
+                learn::show(open_device(common), options->checkpoint, dataset, options->object));
+    if (!common.quiet) std::printf("%s\n", options->output.c_str());
+  });
+}
+
+}  // namespace
+
+void add_learn_commands(CLI::App& application, CommonOptions& common) {
+  add_data_command(application, common);
+  add_train_command(application, common);
+  add_eval_command(application, common);
+  add_show_command(application, common);
+}
+
+}  // namespace dpr::cli

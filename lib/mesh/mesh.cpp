@@ -1,0 +1,77 @@
+// What makes a mesh one that can be rendered.
+#include "dpr/mesh.hpp"
+
+#include "base/checks.hpp"
+
+namespace dpr {
+namespace {
+
+void validate_colors(const std::vector<glm::vec3>& colors, std::size_t expected, const std::string& list,
+                     const std::string& elements, const std::string& name) {
+  if (!colors.empty() && colors.size() != expected) {
+    throw InvalidArgument(checks::in(list, name), std::to_string(colors.size()) + " colours",
+                          std::to_string(expected) + ", one for each of the " + elements + ", or none");
+  }
+  for (std::size_t i = 0; i < colors.size(); ++i) {
+    if (checks::is_finite(colors[i])) continue;
+    throw InvalidArgument(checks::in(checks::element(list, i), name), checks::text(colors[i]),
+                          "finite numbers");
+  }
+}
+
+void validate_texcoords(const Mesh& mesh, const std::string& name) {
+  if (!mesh.face_texcoords.empty() && mesh.face_texcoords.size() != mesh.faces.size()) {
+    throw InvalidArgument(checks::in("face_texcoords", name), std::to_string(mesh.face_texcoords.size()),
+                          std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
+  }
+  for (std::size_t i = 0; i < mesh.texcoords.size(); ++i) {
+    const glm::vec3 uv(mesh.texcoords[i], 0);
+    if (checks::is_finite(uv)) continue;
+    throw InvalidArgument(checks::in(checks::element("texcoords", i), name), checks::text(uv),
+                          "finite numbers");
+  }
+  for (std::size_t i = 0; i < mesh.face_texcoords.size(); ++i) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t index = mesh.face_texcoords[i][corner];
+      if (index < mesh.texcoords.size()) continue;
+      throw InvalidArgument(
+          checks::in(checks::element("face_texcoords", i), name),
+          "texture coordinate " + std::to_string(index),
+          "an index below the number of texcoords, " + std::to_string(mesh.texcoords.size()));
+    }
+  }
+}
+
+void validate_faces(const Mesh& mesh, const std::string& name) {
+  for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t index = mesh.faces[i][corner];
+      if (index < mesh.positions.size()) continue;
+      throw InvalidArgument(
+          checks::in(checks::element("faces", i), name), "vertex " + std::to_string(index),
+          "an index below the number of vertices, " + std::to_string(mesh.positions.size()));
+    }
+  }
+}
+
+}  // namespace
+
+void validate(const Mesh& mesh, const std::string& name) {
+  if (mesh.faces.empty()) throw InvalidArgument(checks::in("faces", name), "none", "at least one");
+  // Names are put together only where something is wrong: a mesh may have millions of vertices.
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    if (checks::is_finite(mesh.positions[i])) continue;
+    throw InvalidArgument(checks::in(checks::element("positions", i), name), checks::text(mesh.positions[i]),
+                          "finite numbers");
+  }
+  validate_faces(mesh, name);
+  if (!mesh.vertex_colors.empty() && !mesh.face_colors.empty()) {
+    throw InvalidArgument(checks::in("vertex_colors", name), "them beside face_colors",
+                          "at most one of the two");
+  }
+  validate_colors(mesh.vertex_colors, mesh.positions.size(), "vertex_colors", "vertices", name);
+  validate_colors(mesh.face_colors, mesh.faces.size(), "face_colors", "faces", name);
+  validate_texcoords(mesh, name);
+}
+
+}  // namespace dpr

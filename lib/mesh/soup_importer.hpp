@@ -1,0 +1,134 @@
+// An importer for OpenMesh's readers that keeps what they read as it comes.
+//
+// OpenMesh's own importer fills a halfedge mesh: it refuses faces that would make an edge non-manifold, or
+// adds them again with copies of their vertices. This one records vertices and polygons in the order of the
+// file, so that soup stays soup and the indices stay those of the file.
+#pragma once
+
+#include <OpenMesh/Core/IO/importer/BaseImporter.hh>
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "mesh/mesh_scan.hpp"
+
+namespace dpr {
+
+class SoupImporter final : public OpenMesh::IO::BaseImporter {
+ public:
+  using VertexHandle = OpenMesh::VertexHandle;
+  using HalfedgeHandle = OpenMesh::HalfedgeHandle;
+  using EdgeHandle = OpenMesh::EdgeHandle;
+  using FaceHandle = OpenMesh::FaceHandle;
+
+  std::vector<glm::vec3> positions;
+  std::vector<Polygon> polygons;         // indices as the file has them: they may be out of range
+  std::vector<glm::vec3> vertex_colors;  // as long as the last vertex that was given one
+  std::vector<glm::vec3> face_colors;    // as long as the last polygon that was given one
+
+  VertexHandle add_vertex(const OpenMesh::Vec3f& point) override {
+    positions.emplace_back(point[0], point[1], point[2]);
+    kernel_.resize(positions.size(), polygons.size());
+    return VertexHandle(static_cast<int>(positions.size() - 1));
+  }
+  VertexHandle add_vertex() override { return add_vertex(OpenMesh::Vec3f(0, 0, 0)); }
+  void set_point(VertexHandle v, const OpenMesh::Vec3f& point) override {
+    positions[index(v)] = {point[0], point[1], point[2]};
+  }
+  FaceHandle add_face(const VHandles& corners) override {
+    Polygon& polygon = polygons.emplace_back();
+    for (const VertexHandle corner : corners) polygon.push_back(static_cast<std::uint32_t>(corner.idx()));
+    kernel_.resize(positions.size(), polygons.size());
+    return FaceHandle(static_cast<int>(polygons.size() - 1));
+  }
+
+  void set_color(VertexHandle v, const OpenMesh::Vec3uc& c) override {
+    put(vertex_colors, index(v), bytes(c));
+  }
+  void set_color(VertexHandle v, const OpenMesh::Vec4uc& c) override {
+    put(vertex_colors, index(v), bytes(c));
+  }
+  void set_color(VertexHandle v, const OpenMesh::Vec3f& c) override {
+    put(vertex_colors, index(v), floats(c));
+  }
+  void set_color(VertexHandle v, const OpenMesh::Vec4f& c) override {
+    put(vertex_colors, index(v), floats(c));
+  }
+  void set_color(FaceHandle f, const OpenMesh::Vec3uc& c) override { put(face_colors, index(f), bytes(c)); }
+  void set_color(FaceHandle f, const OpenMesh::Vec4uc& c) override { put(face_colors, index(f), bytes(c)); }
+  void set_color(FaceHandle f, const OpenMesh::Vec3f& c) override { put(face_colors, index(f), floats(c)); }
+  void set_color(FaceHandle f, const OpenMesh::Vec4f& c) override { put(face_colors, index(f), floats(c)); }
+
+  size_t n_vertices() const override { return positions.size(); }
+  size_t n_faces() const override { return polygons.size(); }
+  size_t n_edges() const override { return 0; }
+
+  /// Custom properties of PLY files go here; readers that find a list need one even if nobody looks at it.
+  OpenMesh::BaseKernel* kernel() override { return &kernel_; }
+
+  // The rest of what a file may hold is of no use here.
+  HalfedgeHandle add_edge(VertexHandle, VertexHandle) override { return HalfedgeHandle(); }
+  FaceHandle add_face(HalfedgeHandle) override { return FaceHandle(); }
+  void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<OpenMesh::Vec2f>&) override {}
+  void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<OpenMesh::Vec3f>&) override {}
+  void set_face_texindex(FaceHandle, int) override {}
+  void set_halfedge(VertexHandle, HalfedgeHandle) override {}
+  void set_normal(VertexHandle, const OpenMesh::Vec3f&) override {}
+  void set_normal(VertexHandle, const OpenMesh::Vec3d&) override {}
+  void set_normal(FaceHandle, const OpenMesh::Vec3f&) override {}
+  void set_normal(FaceHandle, const OpenMesh::Vec3d&) override {}
+  void set_texcoord(VertexHandle, const OpenMesh::Vec2f&) override {}
+  void set_texcoord(HalfedgeHandle, const OpenMesh::Vec2f&) override {}
+  void set_texcoord(VertexHandle, const OpenMesh::Vec3f&) override {}
+  void set_texcoord(HalfedgeHandle, const OpenMesh::Vec3f&) override {}
+  void set_status(VertexHandle, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_status(HalfedgeHandle, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_status(EdgeHandle, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_status(FaceHandle, const OpenMesh::Attributes::StatusInfo&) override {}
+  void set_next(HalfedgeHandle, HalfedgeHandle) override {}
+  void set_face(HalfedgeHandle, FaceHandle) override {}
+  void request_face_texcoords2D() override {}
+  void set_color(EdgeHandle, const OpenMesh::Vec3uc&) override {}
+  void set_color(EdgeHandle, const OpenMesh::Vec4uc&) override {}
+  void set_color(EdgeHandle, const OpenMesh::Vec3f&) override {}
+  void set_color(EdgeHandle, const OpenMesh::Vec4f&) override {}
+  void add_texture_information(int, std::string) override {}
+
+ private:
+  // Properties without a mesh: as many as there are vertices and faces.
+  class Kernel final : public OpenMesh::BaseKernel {
+   public:
+    void resize(std::size_t vertices, std::size_t faces) {
+      if (vertices != vertices_) vprops_resize(vertices);
+      if (faces != faces_) fprops_resize(faces);
+      vertices_ = vertices;
+      faces_ = faces;
+    }
+    size_t n_vertices() const override { return vertices_; }
+    size_t n_faces() const override { return faces_; }
+
+   private:
+    std::size_t vertices_ = 0, faces_ = 0;
+  };
+
+  static std::size_t index(OpenMesh::BaseHandle handle) { return static_cast<std::size_t>(handle.idx()); }
+
+  // What has no colour of its own beside others that have one is white.
+  static void put(std::vector<glm::vec3>& colors, std::size_t place, const glm::vec3& color) {
+    if (colors.size() <= place) colors.resize(place + 1, glm::vec3(1));
+    colors[place] = color;
+  }
+
+  template <typename Color>
+  static glm::vec3 bytes(const Color& c) {
+    return glm::vec3(c[0], c[1], c[2]) / 255.0F;
+  }
+  template <typename Color>
+  static glm::vec3 floats(const Color& c) {
+    return {c[0], c[1], c[2]};
+  }
+
+  Kernel kernel_;
+};
+
+}  // namespace dpr

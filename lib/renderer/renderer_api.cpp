@@ -1,0 +1,236 @@
+// The public face of the renderer: checks what it is given and hands it to the pipeline.
+#include "dpr/renderer.hpp"
+
+#include "base/checks.hpp"
+#include "dpr/opencl.hpp"
+#include "loss/image_loss_impl.hpp"
+#include "loss/mesh_loss_impl.hpp"
+#include "renderer/renderer_impl.hpp"
+
+namespace dpr {
+
+Renderer::Renderer(Device device) : impl_(std::make_unique<Impl>(std::move(device))) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+void Renderer::set_scene(const Scene& scene) {
+  validate(scene);
+  Impl& m = *impl_;
+  m.scene = scene;
+  m.views.clear();
+  m.last_counts.reset();
+  m.rendered = false;
+  m.geometry.emplace(m.device.impl(), scene);
+  m.shade.set_lights(scene.lights);
+  m.set_smoothing(scene.smoothing);
+  View view{scene.camera, {}};
+  for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
+  m.set_views(std::span(&view, 1), 0);
+}
+
+void Renderer::set_views(std::span<const View> views, std::size_t first_view) {
+  impl_->require_scene("Renderer::set_views");
+  impl_->set_views(views, first_view);
+}
+
+void Renderer::set_smoothing(const Smoothing& smoothing) {
+  impl_->require_scene("Renderer::set_smoothing");
+  validate(smoothing);
+  impl_->set_smoothing(smoothing);
+}
+
+namespace {
+
+void check_values(const std::string& name, std::span<const glm::vec3> values, std::size_t expected) {
+  if (values.size() != expected) {
+    throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) checks::require_finite(values[i], checks::element(name, i));
+}
+
+}  // namespace
+
+void Renderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_positions");
+  if (mesh >= m.scene.meshes.size()) {
+    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
+  }
+  check_values("positions", positions, m.scene.meshes[mesh].mesh.positions.size());
+  m.scene.meshes[mesh].mesh.positions.assign(positions.begin(), positions.end());
+  write_range(m.device.impl(), m.geometry->positions, m.geometry->meshes[mesh].first_vertex, positions);
+  m.rendered = false;
+}
+
+void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_colors");
+  if (mesh >= m.scene.meshes.size()) {
+    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
+  }
+  Mesh& target = m.scene.meshes[mesh].mesh;
+  std::vector<glm::vec3>& values = target.vertex_colors.empty() ? target.face_colors : target.vertex_colors;
+  check_values("colors", colors, values.size());
+  values.assign(colors.begin(), colors.end());
+  write_range(m.device.impl(), m.geometry->color_values, m.geometry->meshes[mesh].first_color, colors);
+  m.rendered = false;
+}
+
+void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
+  Impl& m = *impl_;
+  m.require_scene("Renderer::set_shapes");
+  if (!positions.empty()) check_values("positions", positions, m.views.size() * m.geometry->vertices);
+  if (!colors.empty()) check_values("colors", colors, m.views.size() * m.geometry->colors);
+  m.set_shapes(positions, colors);
+}
+
+void Renderer::set_background(const glm::vec3& background) {
+  impl_->require_scene("Renderer::set_background");
+  checks::require_finite(background, "background");
+  impl_->scene.background = background;
+  impl_->rendered = false;
+}
+
+void Renderer::set_gradients(const GradientRequest& gradients) {
+  impl_->require_scene("Renderer::set_gradients");
+  impl_->scene.gradients = gradients;
+}
+
+const Scene& Renderer::scene() const { return impl_->scene; }
+std::span<const View> Renderer::views() const { return impl_->views; }
+const Device& Renderer::device() const { return impl_->device; }
+
+void Renderer::forward() { impl_->forward(); }
+
+namespace {
+
+void require_pixel_count(std::size_t found, std::size_t expected) {
+  if (found == expected) return;
+  throw InvalidArgument("pixels", std::to_string(found),
+                        std::to_string(expected) + ", views x height x width");
+}
+
+}  // namespace
+
+Image Renderer::image(std::size_t view) const {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::image");
+  if (view >= m.views.size()) {
+    throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views.size()));
+  }
+  Image image(m.scene.width, m.scene.height);
+  std::vector<cl_float4> values(image.pixels.size());
+  m.aggregate.image.download(values, view * values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    image.pixels[i] = glm::vec4(values[i].s[0], values[i].s[1], values[i].s[2], values[i].s[3]);
+  }
+  return image;
+}
+
+void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::read_pixels");
+  require_pixel_count(pixels.size(), m.aggregate.image.size());
+  check_cl(m.device.impl().queue.enqueueReadBuffer(m.aggregate.image.cl_buffer(), CL_TRUE, 0,
+                                                   pixels.size_bytes(), pixels.data()),
+           "clEnqueueReadBuffer");
+}
+
+SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::backward_pixels");
+  require_pixel_count(grad_pixels.size(), m.aggregate.image.size());
+  checks::require_finite(grad_pixels, "grad_pixels");
+  m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
+  check_cl(m.device.impl().queue.enqueueWriteBuffer(m.host_grad_images.cl_buffer(), CL_TRUE, 0,
+                                                    grad_pixels.size_bytes(), grad_pixels.data()),
+           "clEnqueueWriteBuffer");
+  return m.backward(m.host_grad_images);
+}
+
+SceneGradient Renderer::backward(std::span<const Image> grad_images) {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::backward");
+  if (grad_images.size() != m.views.size()) {
+    throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
+                          "one for each of the " + std::to_string(m.views.size()) + " views");
+  }
+  std::vector<cl_float4> values;
+  for (const Image& image : grad_images) {
+    if (image.width != m.scene.width || image.height != m.scene.height) {
+      throw InvalidArgument("size (grad_images)", checks::size(image.width, image.height),
+                            checks::size(m.scene.width, m.scene.height));
+    }
+    checks::require_pixels(image, "grad_images");
+    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  m.host_grad_images.upload(m.device.impl(), values);
+  return m.backward(m.host_grad_images);
+}
+
+namespace {
+
+/// Throws unless what was evaluated was the last frame.
+void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const char* what) {
+  if (evaluated == rendered) return;
+  throw InvalidArgument(std::string(what) + " (Renderer::backward)", "the gradient of other images",
+                        "a loss evaluated on this renderer's last forward()");
+}
+
+}  // namespace
+
+SceneGradient Renderer::backward(const ImageLoss& loss) {
+  impl_->require_forward("Renderer::backward");
+  require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
+  return impl_->backward(loss.impl().grad_image);
+}
+
+SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_loss) {
+  impl_->require_forward("Renderer::backward");
+  require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
+  require_same_frame(mesh_loss.impl().frame_number, impl_->frame_number, "mesh_loss");
+  if (!impl_->scene.gradients.positions) {
+    throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
+                          "GradientRequest::positions");
+  }
+  return impl_->backward(loss.impl().grad_image, &mesh_loss.impl());
+}
+
+RenderStatistics Renderer::statistics() const {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::statistics");
+  RenderStatistics s;
+  s.faces = std::size_t{m.frame.views} * m.frame.faces;
+  for (const shared::Triangle& triangle : m.setup.triangles.download()) {
+    if (triangle.orientation == 0.0F) ++s.faces_dropped;
+  }
+  s.pairs = m.bin.pairs;
+  s.fragments = m.rasterize.listed_fragments;
+  s.bands = m.bands.size();
+  s.device_bytes = m.bytes();
+  return s;
+}
+
+cl::Buffer image_buffer(const Renderer& renderer) {
+  renderer.impl().require_forward("image_buffer");
+  return renderer.impl().aggregate.image.cl_buffer();
+}
+
+SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_forward("backward");
+  const std::size_t count = m.aggregate.image.size();
+  const std::size_t bytes = grad_images.getInfo<CL_MEM_SIZE>();
+  if (bytes < count * sizeof(cl_float4)) {
+    throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
+                          std::to_string(count * sizeof(cl_float4)));
+  }
+  m.host_grad_images.resize(m.device.impl(), count);
+  check_cl(m.device.impl().queue.enqueueCopyBuffer(grad_images, m.host_grad_images.cl_buffer(), 0, 0,
+                                                   count * sizeof(cl_float4)),
+           "clEnqueueCopyBuffer");
+  return m.backward(m.host_grad_images);
+}
+
+}  // namespace dpr

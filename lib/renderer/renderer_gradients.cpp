@@ -1,0 +1,167 @@
+// From what the stages' backward passes left on the device to the gradients on the host.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "loss/mesh_loss_impl.hpp"
+#include "renderer/renderer_impl.hpp"
+
+namespace dpr {
+
+using glm::dvec3;
+
+namespace {
+
+/// A mesh's part of a joined buffer.
+std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count) {
+  std::vector<cl_float4> values(count);
+  buffer.download(values, first);
+  std::vector<glm::vec3> result;
+  result.reserve(count);
+  for (const cl_float4& v : values) result.emplace_back(v.s[0], v.s[1], v.s[2]);
+  return result;
+}
+
+/// A mesh without colours of its own is white.
+bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
+
+}  // namespace
+
+void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl* mesh_loss) {
+  if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
+  if (mesh_loss != nullptr) mesh_loss->add_gradient(geometry->positions, transform.grad_positions);
+  const bool colors = scene.gradients.colors &&
+                      std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
+  if (colors && frame.color_stride != 0) {
+    gather.per_view(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+                    grad_colors);
+  } else if (colors) {
+    gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+                      grad_colors);
+  }
+  const bool own_positions = frame.position_stride != 0, own_colors = frame.color_stride != 0;
+  if (scene.gradients.positions && own_positions) {
+    gradient.shapes.positions = read_range(transform.grad_positions, 0, transform.grad_positions.size());
+  }
+  if (colors && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const MeshRange& range = geometry->meshes[m];
+    const Mesh& mesh = scene.meshes[m].mesh;
+    if (scene.gradients.positions && !own_positions) {
+      gradient.meshes[m].positions = read_range(transform.grad_positions, range.first_vertex, range.vertices);
+    }
+    if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
+      gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
+    }
+  }
+}
+
+namespace {
+
+/// From the gradients of the projection's scale and offset to those of the camera's own parameters.
+void add_projection_gradient(const std::array<double, 4>& grad, const Camera& camera, int width, int height,
+                             CameraGradient& out) {
+  const double short_side = std::min(width, height);
+  if (camera.intrinsics) {
+    const double factor = 2.0 / short_side;
+    out.intrinsics = {grad[0] * factor, grad[1] * factor, grad[2] * factor, -grad[3] * factor};
+    return;
+  }
+  const double half_angle = glm::radians(static_cast<double>(camera.fov_y_degrees)) / 2;
+  const double scale_by_half_angle = -height / short_side / std::pow(std::sin(half_angle), 2);
+  out.fov_y_degrees = (grad[0] + grad[1]) * scale_by_half_angle * glm::radians(0.5);
+}
+
+/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS][view][mesh].
+void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std::span<const View> views,
+                        SceneGradient& gradient) {
+  const std::size_t meshes = scene.meshes.size(), segments = views.size() * meshes;
+  const auto sum = [&](std::size_t channel, std::size_t segment) {
+    return static_cast<double>(sums[channel * segments + segment]);
+  };
+  const auto sum3 = [&](std::size_t channel, std::size_t segment) {
+    return dvec3(sum(channel, segment), sum(channel + 1, segment), sum(channel + 2, segment));
+  };
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    CameraGradient camera;
+    std::array<double, 4> projected{};
+    for (std::size_t m = 0; m < meshes; ++m) {
+      const std::size_t segment = v * meshes + m;
+      if (scene.gradients.transform) {
+        gradient.views[v].transforms[m] = {sum3(DPR_CHANNEL_MODEL, segment),
+                                           sum3(DPR_CHANNEL_MODEL + 3, segment)};
+      }
+      camera.view.rotation += sum3(DPR_CHANNEL_VIEW, segment);
+      camera.view.translation += sum3(DPR_CHANNEL_VIEW + 3, segment);
+      for (std::size_t k = 0; k < 4; ++k) projected[k] += sum(DPR_CHANNEL_PROJECTION + k, segment);
+    }
+    add_projection_gradient(projected, views[v].camera, scene.width, scene.height, camera);
+    if (scene.gradients.camera) gradient.views[v].camera = camera;
+  }
+}
+
+/// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
+/// translation. From sums by [3][view].
+void add_eye_gradients(const std::vector<float>& sums, std::span<const View> views, SceneGradient& gradient) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const dvec3 grad_eye(sums[v], sums[views.size() + v], sums[2 * views.size() + v]);
+    const glm::dmat4 view(views[v].camera.view);
+    const dvec3 in_camera = glm::transpose(glm::inverse(glm::dmat3(view))) * grad_eye;
+    PoseGradient& out = gradient.views[v].camera.view;
+    out.rotation += glm::cross(dvec3(view[3]), in_camera);
+    out.translation -= in_camera;
+  }
+}
+
+/// From sums by [light][k_light_channels].
+void add_light_gradients(const std::vector<float>& sums, std::size_t lights, SceneGradient& gradient) {
+  const auto sum3 = [&](std::size_t at) { return dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  gradient.lights.resize(lights);
+  for (std::size_t light = 0; light < lights; ++light) {
+    const std::size_t at = light * k_light_channels;
+    gradient.lights[light] = {sum3(at), sum3(at + 3), sum3(at + 6)};
+  }
+  gradient.ambient = sum3(k_light_channels - 3);  // the same in every light's channels
+}
+
+}  // namespace
+
+void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
+  const GradientRequest& wanted = scene.gradients;
+  const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
+  const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
+  const std::size_t faces = std::size_t{frame.views} * frame.faces;
+  const bool poses = wanted.transform || wanted.camera, eye = wanted.camera && shade.lit(),
+             lights = wanted.lights && shade.lit();
+  const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
+  // In the sampled joint composition the pixels hold what the pairs hold otherwise.
+  const std::size_t sigmas = channels(wanted.smoothing, 1);
+  const Summation sigma = aggregate.perturbs_distances()
+                              ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
+                              : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma};
+  // One wait for all of them.
+  const std::vector<std::vector<float>> sums =
+      reduce.read({{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1,
+                    all_pixels, aggregate.channels},
+                   sigma,
+                   {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
+                    view_vertex_starts, transform.channels},
+                   {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
+                   {bin.pairs, channels(lights, k_light_channels * shade.light_sets()), 1, faces,
+                    bin.pair_starts, shade.light_channels}});
+  const std::vector<float>& pixel_sums = sums[0];
+  if (wanted.smoothing) {
+    gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
+    gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
+    gradient.sigma = sums[1][0];
+  }
+  if (wanted.background) {
+    gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],
+                                pixel_sums[DPR_CHANNEL_BACKGROUND + 2]);
+  }
+  if (poses) add_pose_gradients(sums[2], scene, views, gradient);
+  if (eye) add_eye_gradients(sums[3], views, gradient);
+  if (lights) add_light_gradients(sums[4], shade.lights(), gradient);
+}
+
+}  // namespace dpr
