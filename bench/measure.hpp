@@ -1,11 +1,14 @@
 // Times a workload: wall clock of the passes, device time of the stages, memory.
 #pragma once
 
-#include "cli/provenance.hpp"
+#include "cli/json.hpp"
+#include "dpr/device.hpp"
 #include "peaks.hpp"
 #include "workloads.hpp"
 
 namespace dpr::bench {
+
+using cli::Json;
 
 struct MeasureOptions {
   unsigned repetitions = 15;  ///< timed runs of a row, after one to warm up; then as many of its stages

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "base/temporary_file.hpp"
+#include "cli/provenance.hpp"
 #include "dpr/error.hpp"
 #include "results_file.hpp"
 #include "stages.hpp"

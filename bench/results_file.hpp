@@ -5,9 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "cli/provenance.hpp"
+#include "cli/json.hpp"
 
 namespace dpr::bench {
+
+using cli::Json;
 
 /// Of a results file: {"schema", "commit", "device", "build_options", "repetitions", "max_seconds",
 /// "results": [...]}.

@@ -8,8 +8,9 @@
 #include <span>
 #include <string>
 
+#include "cli/json.hpp"
 #include "cli/progress.hpp"
-#include "cli/provenance.hpp"
+#include "dpr/device.hpp"
 #include "dpr/smoothing.hpp"
 
 namespace dpr::experiments {

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "cli/plot.hpp"
+#include "cli/provenance.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
 #include "smoothing/set_sigma.hpp"
