@@ -63,11 +63,11 @@ void paint(Mesh& mesh) {
   }
 }
 
-/// Spot and the fish where the folder of meshes is there, else a shape of our own.
+/// Spot and the fish; for a smoke test a shape of our own, which is coarser.
 std::vector<Shape> make_shapes(bool smoke) {
-  const std::filesystem::path folder = DPR_MESH_FOLDER;
+  const std::filesystem::path folder = DPR_BENCH_DATA;
   std::vector<Shape> shapes;
-  if (!smoke && std::filesystem::is_directory(folder)) {
+  if (!smoke) {
     shapes.push_back({"spot", read_mesh(folder / "spot_low.obj")});
     shapes.push_back({"fish", read_mesh(folder / "fish_low.obj")});
   } else {

@@ -1,14 +1,14 @@
-// Images and gradients against the cases in ../shared/conformance, computed in double precision by other
-// software. Runs where that folder is; elsewhere there is nothing to compare with.
+// Images and gradients against the cases in tests/data/conformance, which other software computed in double
+// precision.
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "dpr/dpr.hpp"
+#include "support/data.hpp"
 #include "support/reduced.hpp"
 
 namespace {
@@ -16,16 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+/// The scenes. None under the simulator, where one takes minutes.
 std::vector<fs::path> cases() {
-  std::vector<fs::path> found;
-  const char* shared = std::getenv("DPR_SHARED_DIR");
-  if (dpr::test::is_reduced()) return found;  // under the simulator a scene takes minutes
-  if (shared == nullptr || !fs::exists(fs::path(shared) / "conformance/scenes")) return found;
-  for (const auto& entry : fs::directory_iterator(fs::path(shared) / "conformance/scenes")) {
-    if (entry.path().extension() == ".json" && entry.path().stem().extension() != ".grad")
-      found.push_back(entry.path());
-  }
-  std::ranges::sort(found);
+  if (dpr::test::is_reduced()) return {};
+  std::vector<fs::path> found = dpr::test::files_in(dpr::test::data_folder() / "conformance/scenes", ".json");
+  std::erase_if(found, [](const fs::path& path) { return path.stem().extension() == ".grad"; });
   return found;
 }
 

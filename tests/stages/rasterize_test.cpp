@@ -1,16 +1,15 @@
 // Rasterization against the brute-force reference: the set of fragments, their distance, depth and
-// barycentrics, the gradients of the corners; and against the tables of ../shared/conformance/rasterizer,
-// where that folder is.
+// barycentrics, the gradients of the corners; and against the tables of tests/data/conformance/rasterizer.
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <bit>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "reference/finite_difference.hpp"
+#include "support/data.hpp"
 #include "support/ndc_triangles.hpp"
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
@@ -190,17 +189,6 @@ Worst compare_gradients(const NdcFrame& frame, const std::vector<NdcTriangle>& t
 /// Measured 1.2e-5.
 constexpr double k_gradient = 2.4e-5;
 
-std::vector<fs::path> tables() {
-  std::vector<fs::path> found;
-  const char* shared = std::getenv("DPR_SHARED_DIR");
-  if (shared == nullptr || !fs::exists(fs::path(shared) / "conformance/rasterizer")) return found;
-  for (const auto& entry : fs::directory_iterator(fs::path(shared) / "conformance/rasterizer")) {
-    if (entry.path().extension() == ".json") found.push_back(entry.path());
-  }
-  std::ranges::sort(found);
-  return found;
-}
-
 }  // namespace
 
 TEST_SUITE("unit") {
@@ -297,7 +285,8 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("rasterize: the tables of the conformance folder") {
-    for (const fs::path& path : tables()) {
+    for (const fs::path& path :
+         dpr::test::files_in(dpr::test::data_folder() / "conformance/rasterizer", ".json")) {
       CAPTURE(path.filename().string());
       const nlohmann::json table = nlohmann::json::parse(std::ifstream(path));
       NdcFrame frame{table["width"], table["height"], table["blur_radius"].get<float>()};
