@@ -3,10 +3,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source cmake/packages.sh
-install_packages
+install_packages demo
 
-cmake --preset release
-cmake --build --preset release
-build/release/bin/dpr demo -o demo-output
-echo "The pictures are in $PWD/demo-output:"
-ls -1 demo-output
+cmake --preset demo
+cmake --build --preset demo
+echo "The pictures are in $PWD/demo-output; index.html shows them."

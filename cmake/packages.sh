@@ -1,30 +1,42 @@
-# Sourced by demo.sh and test.sh: installs what the build needs and the machine lacks, on Debian and the like.
-# shellcheck shell=bash
+# Sourced by demo.sh and test.sh: installs what a build needs and the machine lacks, on Debian and the like.
+# shellcheck shell=bash disable=SC2034 # the sets are named by install_packages's arguments
 
-dpr_packages=(
-  g++ cmake ninja-build pkg-config
+# The command and its demo.
+dpr_packages_demo=(
+  g++ cmake ninja-build
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
   libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
-  libzip-dev libtorch-dev libopenblas0-pthread python3-torch
-  doctest-dev gnuplot-nox clinfo oclgrind clang
+  gnuplot-nox
 )
+# The tests, and the reference manual.
+dpr_packages_tests=(doctest-dev clang doxygen git pkg-config libzip-dev python3)
+# The operator of libtorch and dpr learn.
+dpr_packages_learning=(libtorch-dev libopenblas0-pthread python3-torch)
+# The tests under a simulator of the kernels.
+dpr_packages_oclgrind=(oclgrind)
 
-# Prints the packages of the list that are not installed.
+# Prints those of the packages that are not installed.
 missing_packages() {
   local package
-  for package in "${dpr_packages[@]}"; do
+  for package in "$@"; do
     dpkg-query -W -f '${db:Status-Abbrev}' "$package" 2>/dev/null | grep -q '^ii' || echo "$package"
   done
 }
 
+# install_packages SET...: demo, tests, learning, oclgrind.
 install_packages() {
+  local packages=() set
+  for set in "$@"; do
+    local -n members=dpr_packages_$set
+    packages+=("${members[@]}")
+  done
   if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
     # Elsewhere the packages have other names: their installation is left to the user.
     local tool
     for tool in c++ cmake ninja; do
       if ! command -v "$tool" >/dev/null; then
         echo "$tool is missing. Needed are, under the names this system gives them:" >&2
-        echo "  ${dpr_packages[*]}" >&2
+        echo "  ${packages[*]}" >&2
         exit 1
       fi
     done
@@ -32,7 +44,7 @@ install_packages() {
   fi
 
   local missing
-  mapfile -t missing < <(missing_packages)
+  mapfile -t missing < <(missing_packages "${packages[@]}")
   if ((${#missing[@]} == 0)); then return; fi
   local sudo=()
   if (($(id -u) != 0)); then

@@ -1,13 +1,20 @@
 #!/usr/bin/env bash
-# Installs what is missing, then builds and tests each preset named as an argument; without any: the release,
-# under the sanitizers, and under oclgrind.
+# Installs what is missing, then builds and tests each preset named as an argument; without any, the release.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source cmake/packages.sh
-install_packages
 
 presets=("$@")
-if ((${#presets[@]} == 0)); then presets=(release asan-ubsan oclgrind); fi
+if ((${#presets[@]} == 0)); then presets=(release); fi
+
+sets=(demo tests)
+for preset in "${presets[@]}"; do
+  case $preset in
+    release) sets+=(learning) ;;
+    oclgrind) sets+=(oclgrind) ;;
+  esac
+done
+install_packages "${sets[@]}"
 
 summary=()
 status=0
