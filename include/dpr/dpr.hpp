@@ -13,6 +13,7 @@
 #include "dpr/mesh.hpp"
 #include "dpr/mesh_loss.hpp"
 #include "dpr/multi_device.hpp"
+#include "dpr/notes.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/perturbed_pose.hpp"
 #include "dpr/pose.hpp"

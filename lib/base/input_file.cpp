@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
-#include <sstream>
-#include <utility>
 
 #include "dpr/error.hpp"
 
 namespace dpr {
+namespace {
+
+/// Of a pipe or a device: what is longer has no end, such as /dev/zero.
+constexpr std::size_t k_most_streamed = std::size_t{1} << 28U;
+
+constexpr std::size_t k_chunk = std::size_t{1} << 16U;
+
+}  // namespace
 
 void require_file(const std::filesystem::path& file) {
   std::error_code error;
@@ -19,10 +25,25 @@ void require_file(const std::filesystem::path& file) {
 std::string read_file(const std::filesystem::path& file) {
   require_file(file);
   std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (!in.is_open() || in.bad() || text.fail()) throw IoError(file, "the file cannot be read");
-  return std::move(text).str();
+  if (!in.is_open()) throw IoError(file, "the file cannot be read");
+  std::error_code error;
+  const bool is_regular = std::filesystem::is_regular_file(file, error);
+  std::string bytes;
+  // A first guess: the size of a regular file, which may grow meanwhile, or be 0 as those of /proc are.
+  const std::uintmax_t size = is_regular ? std::filesystem::file_size(file, error) : 0;
+  if (!error) bytes.reserve(static_cast<std::size_t>(size) + k_chunk);
+  while (in) {
+    const std::size_t before = bytes.size();
+    if (!is_regular && before > k_most_streamed) {
+      throw IoError(file, "is no regular file and does not end: expected at most " +
+                              std::to_string(k_most_streamed >> 20U) + " MiB from a pipe or a device");
+    }
+    bytes.resize(before + k_chunk);
+    in.read(bytes.data() + before, k_chunk);
+    bytes.resize(before + static_cast<std::size_t>(in.gcount()));
+  }
+  if (in.bad()) throw IoError(file, "the file cannot be read");
+  return bytes;
 }
 
 std::string lower_case_extension(const std::filesystem::path& file) {

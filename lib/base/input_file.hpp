@@ -9,7 +9,8 @@ namespace dpr {
 /// Throws IoError where there is no such file, or a folder in its place.
 void require_file(const std::filesystem::path& file);
 
-/// The bytes of a file. Throws IoError.
+/// The bytes of a file, read once from front to back. Throws IoError, also where a pipe or a device does not
+/// end.
 std::string read_file(const std::filesystem::path& file);
 
 /// ".png" for "a.PNG".

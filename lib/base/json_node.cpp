@@ -65,8 +65,9 @@ std::string reason_of(const nlohmann::json::exception& error) {
 
 }  // namespace
 
-nlohmann::json read_json(const std::filesystem::path& file) {
-  const std::string text = read_file(file);
+nlohmann::json read_json(const std::filesystem::path& file) { return parse_json(file, read_file(file)); }
+
+nlohmann::json parse_json(const std::filesystem::path& file, std::string_view text) {
   DuplicateKeys duplicates(file);
   try {
     return nlohmann::json::parse(text, [&](int, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {

@@ -18,6 +18,9 @@ namespace dpr {
 /// where an object has the same key twice (the JSON library would keep the last one without a word).
 nlohmann::json read_json(const std::filesystem::path& file);
 
+/// The same of a text; `file` is what messages call it.
+nlohmann::json parse_json(const std::filesystem::path& file, std::string_view text);
+
 /// A value of a JSON document and the path to it, such as "meshes[0].transform[2]". A view: the document must
 /// outlive it. Every function that returns a value throws InvalidArgument where the value is of another kind.
 class JsonNode {

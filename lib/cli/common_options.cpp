@@ -142,8 +142,15 @@ void apply(const CommonOptions& options, Scene& scene) {
   apply_value(options.seed, scene.smoothing.seed);
 }
 
+void print_notes(const Notes& notes, const CommonOptions& options) {
+  if (options.quiet) return;
+  for (const std::string& note : notes) std::fprintf(stderr, "dpr: note: %s\n", note.c_str());
+}
+
 Scene read_scene(const std::string& file, const CommonOptions& options) {
-  Scene scene = dpr::read_scene(file);
+  Notes notes;
+  Scene scene = dpr::read_scene(file, notes);
+  print_notes(notes, options);
   apply(options, scene);
   return scene;
 }

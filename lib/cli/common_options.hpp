@@ -7,6 +7,7 @@
 #include <string>
 
 #include "dpr/device.hpp"
+#include "dpr/notes.hpp"
 #include "dpr/scene.hpp"
 
 namespace dpr::cli {
@@ -44,7 +45,10 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 Device open_device(const CommonOptions& options);
 /// Puts --size, --seed and the smoothing flags into the scene. Throws InvalidArgument.
 void apply(const CommonOptions& options, Scene& scene);
-/// read_scene() and apply().
+/// What a file asked for and the program leaves out, one line each on stderr; with --quiet nothing.
+void print_notes(const Notes& notes, const CommonOptions& options);
+
+/// read_scene(), print_notes() and apply().
 Scene read_scene(const std::string& file, const CommonOptions& options);
 
 }  // namespace dpr::cli

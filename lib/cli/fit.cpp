@@ -72,7 +72,9 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
-  ShapeViews views = read_views(options.views);
+  Notes notes;
+  ShapeViews views = read_views(options.views, notes);
+  print_notes(notes, common);
   apply(command, common, options.solver, views);
   const Device device = open_device(common);
   const ShapeSolver solver(device, views, options.solver);

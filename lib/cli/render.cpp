@@ -80,7 +80,9 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   constexpr int k_size = 256;
   Scene scene;
   scene.width = scene.height = k_size;
-  scene.meshes.push_back({read_mesh(options.mesh), glm::mat4(1.0F)});
+  Notes notes;
+  scene.meshes.push_back({read_mesh(options.mesh, notes), glm::mat4(1.0F)});
+  print_notes(notes, common);
   const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
   scene.smoothing = picture_smoothing(size.x, size.y);
   apply(common, scene);

@@ -35,7 +35,7 @@ std::vector<std::uint32_t> assign_cells(const Mesh& mesh, float cell) {
 /// The same corners in the same direction, beginning with the least.
 std::array<std::uint32_t, 3> canonical(const glm::uvec3& face) {
   std::array<std::uint32_t, 3> corners{face.x, face.y, face.z};
-  std::ranges::rotate(corners, std::ranges::min_element(corners));
+  std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
   return corners;
 }
 

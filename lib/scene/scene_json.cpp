@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/checks.hpp"
+#include "base/input_file.hpp"
 #include "dpr/scene.hpp"
 #include "smoothing/set_sigma.hpp"
 
@@ -74,7 +75,7 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
   }
 }
 
-Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder) {
+Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors"});
   Instance instance;
   const auto file = node.find("file");
@@ -82,7 +83,7 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
     node.fail("file beside positions or faces", "a file, or positions and faces");
   }
   if (file) {
-    instance.mesh = read_mesh(folder / file->string());
+    instance.mesh = read_mesh(folder / file->string(), notes);
   } else if (node.find("positions") || node.find("faces")) {
     instance.mesh.positions = vec3_list(node.at("positions"));
     instance.mesh.faces = parse_faces(node.at("faces"));
@@ -161,7 +162,7 @@ void take_reach(const JsonNode& node, Smoothing& smoothing) {
   take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
 }
 
-Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder) {
+Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   node.require_keys({"width", "height", "camera", "background", "meshes", "lights", "smoothing",
                      "perspective_correct", "gradients"});
   Scene scene;
@@ -170,7 +171,7 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder) {
   take(node, "camera", scene.camera, parse_camera);
   take_vec3(node, "background", scene.background);
   for (const JsonNode& mesh : node.at("meshes").elements())
-    scene.meshes.push_back(parse_instance(mesh, folder));
+    scene.meshes.push_back(parse_instance(mesh, folder, notes));
   take(node, "lights", scene.lights, parse_lights);
   take(node, "smoothing", scene.smoothing,
        [&](const JsonNode& n) { return parse_smoothing(n, scene.width, scene.height); });
@@ -247,11 +248,20 @@ void validate(const Scene& scene) {
   validate(scene.smoothing);
 }
 
-Scene read_scene(const std::filesystem::path& file) {
-  const nlohmann::json document = read_json(file);
-  Scene scene = parse_scene(JsonNode(document, file), file.parent_path());
+Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+  const nlohmann::json document = parse_json(file, text);
+  Scene scene = parse_scene(JsonNode(document, file), file.parent_path(), notes);
   validate(scene);
   return scene;
+}
+
+Scene read_scene(const std::filesystem::path& file, Notes& notes) {
+  return parse_scene(file, read_file(file), notes);
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  Notes ignored;
+  return read_scene(file, ignored);
 }
 
 }  // namespace dpr

@@ -2,9 +2,11 @@
 #include <string>
 
 #include "base/checks.hpp"
+#include "base/input_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/shape.hpp"
 #include "scene/scene_json.hpp"
+#include "solve/shape_views.hpp"
 
 namespace dpr {
 namespace {
@@ -32,8 +34,17 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
 
 }  // namespace
 
+ShapeViews read_views(const std::filesystem::path& file, Notes& notes) {
+  return parse_views(file, read_file(file), notes);
+}
+
 ShapeViews read_views(const std::filesystem::path& file) {
-  const nlohmann::json document = read_json(file);
+  Notes ignored;
+  return read_views(file, ignored);
+}
+
+ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+  const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
   node.require_keys({"width", "height", "background", "views", "initial", "smoothing"});
   ShapeViews views;
@@ -44,7 +55,7 @@ ShapeViews read_views(const std::filesystem::path& file) {
   for (const JsonNode& view : node.at("views").elements())
     views.views.push_back(parse_view(view, folder, views));
   if (views.views.empty()) node.at("views").fail("none", "at least one");
-  if (const auto initial = node.find("initial")) views.initial = read_mesh(folder / initial->string());
+  if (const auto initial = node.find("initial")) views.initial = read_mesh(folder / initial->string(), notes);
   if (const auto smoothing = node.find("smoothing")) {
     views.smoothing = parse_smoothing(*smoothing, views.width, views.height);
     validate(*views.smoothing);

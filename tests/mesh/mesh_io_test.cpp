@@ -1,14 +1,18 @@
 // Mesh files: what they hold arrives, in order and in full, or the error says where it is wrong.
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <bit>
+#include <chrono>
 #include <cstring>
 #include <iostream>
 #include <locale>
 #include <sstream>
+#include <thread>
 
 #include "dpr/mesh.hpp"
+#include "dpr/notes.hpp"
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
@@ -50,6 +54,17 @@ std::string binary_stl(const std::vector<std::array<glm::vec3, 3>>& facets) {
 std::string text_facet(const std::string& a, const std::string& b, const std::string& c) {
   return "facet normal 0 0 1\n  outer loop\n    vertex " + a + "\n    vertex " + b + "\n    vertex " + c +
          "\n  endloop\nendfacet\n";
+}
+
+std::string one_facet() { return binary_stl({{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}); }
+
+// A triangle in every format, its first coordinate to be given; all of them of text.
+std::vector<std::pair<std::string, std::string>> text_triangles(const std::string& x) {
+  return {{"a.obj", "v " + x + " 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
+          {"a.ply", k_ply_start + "element face 1\n" + k_ply_corners + "end_header\n" + x +
+                        " 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+          {"a.off", "OFF\n3 1 0\n" + x + " 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+          {"a.stl", "solid a\n" + text_facet(x + " 0 0", "1 0 0", "0 1 0") + "endsolid a\n"}};
 }
 
 // Numbers as in much of Europe: 1.234,5.
@@ -129,11 +144,138 @@ TEST_SUITE("unit") {
   TEST_CASE("OBJ: materials are face colours, and stay in their file") {
     const TempDir folder;
     folder.write("m.mtl", "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n");
-    const std::string faces = "usemtl red\nf 1 2 3 4\nusemtl blue\nf 2 2 3\nf 1 2 3\n";
+    const std::string faces = "usemtl red\nf 1 2 3 4\nusemtl none\nf 2 2 3\nusemtl blue\nf 1 2 3\n";
     const Mesh mesh = read_mesh(folder.write("a.obj", "mtllib m.mtl\n" + k_obj_square + faces));
     CHECK(mesh.face_colors == std::vector<glm::vec3>{{1, 0, 0}, {1, 0, 0}, {1, 1, 1}, {0, 0, 1}});
     CHECK(read_mesh(folder.write("b.obj", k_obj_square + faces)).face_colors.empty());
     CHECK(read_mesh(folder.write("c.obj", "mtllib no.mtl\n" + k_obj_square + faces)).face_colors.empty());
+  }
+
+  TEST_CASE("OBJ: material libraries: several on a line, names with spaces and #, comments, one number") {
+    const TempDir folder;
+    folder.write("a.mtl", "\xEF\xBB\xBFnewmtl dark #1\r\n Kd 0.25 # all three\r\nKs 1 1 1\r\n");
+    folder.write("b.mtl", "Kd 9 9 9\nnewmtl plain\nnewmtl red\nKd 1 0 0.1\n");
+    folder.write("c d.mtl", "newmtl green\nKd 0 1e-400 1\n");
+    const Mesh mesh = read_mesh(folder.write(
+        "a.obj",
+        "mtllib a.mtl b.mtl\nmtllib c d.mtl\n" + k_obj_square +
+            "usemtl dark #1\nf 1 2 3\nusemtl red\nf 1 2 3\nusemtl green\nf 1 2 3\nusemtl plain\nf 1 2 3\n"));
+    CHECK(mesh.face_colors ==
+          std::vector<glm::vec3>{glm::vec3(0.25F), {1, 0, 0.1F}, {0, 0, 1}, glm::vec3(1)});
+    folder.write("a.mtl", "newmtl a\nKd 1 2\n");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "a.obj"), "a.mtl:2: expected Kd with one or three");
+  }
+
+  TEST_CASE("OBJ: what is left out is noted") {
+    const TempDir folder;
+    folder.write("m.mtl",
+                 "newmtl oak\nKd 0.5 0.5 0.5\nmap_Kd -s 2 2 2 oak bark.png\nnewmtl ash\nmap_Kd ash.png\n");
+    Notes notes;
+    const std::string faces =
+        k_obj_square + "usemtl oak\nf 1 2 3\nusemtl elm\nf 1 2 3\nusemtl oak\nf 1 2 3\n";
+    CHECK(read_mesh(folder.write("a.obj", "mtllib m.mtl\n" + faces), notes).face_colors.size() == 3);
+    REQUIRE(notes.size() == 2);  // of what the faces use, once
+    CHECK(
+        notes[0].find("the texture \"-s 2 2 2 oak bark.png\" of the material \"oak\" (map_Kd) is not read") !=
+        std::string::npos);
+    CHECK(notes[1].find("the material \"elm\" is in no material library") != std::string::npos);
+    notes.clear();
+    CHECK(read_mesh(folder.write("b.obj", "mtllib no.mtl\n" + faces), notes).faces.size() == 3);
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("b.obj: the material library \"no.mtl\" is no regular file") != std::string::npos);
+  }
+
+  TEST_CASE("a byte-order mark before a text") {
+    const TempDir folder;
+    for (const auto& [name, text] : text_triangles("0.5")) {
+      const Mesh mesh = read_mesh(folder.write(name, "\xEF\xBB\xBF" + text));
+      CHECK_MESSAGE((mesh.positions == std::vector<glm::vec3>{{0.5F, 0, 0}, {1, 0, 0}, {0, 1, 0}}), name);
+      CHECK_MESSAGE(mesh.faces[0] == glm::uvec3(0, 1, 2), name);
+    }
+  }
+
+  TEST_CASE("numbers too small for a float are zero or denormal, those too large are refused") {
+    const TempDir folder;
+    const std::string zeros = "0." + std::string(400, '0') + "1", digits = "2" + std::string(400, '0');
+    for (const char* tiny : {"1e-400", "-1e-400", "+1E-46", "1e-99999999999999999999"}) {
+      for (const auto& [name, text] : text_triangles(tiny))
+        CHECK_MESSAGE(read_mesh(folder.write(name, text)).positions[0].x == 0, name << " " << tiny);
+    }
+    for (const auto& [name, text] : text_triangles("1e-40"))
+      CHECK_MESSAGE(read_mesh(folder.write(name, text)).positions[0].x == 1e-40F, name);
+    for (const auto& [name, text] : text_triangles(zeros))
+      CHECK_MESSAGE(read_mesh(folder.write(name, text)).positions[0].x == 0, name);
+    for (const auto& [name, text] : text_triangles(digits + "e-400"))
+      CHECK_MESSAGE(read_mesh(folder.write(name, text)).positions[0].x == 2, name);
+    for (const std::string& bad : {std::string("1e400"), digits, std::string("1e99999999999999999999"),
+                                   std::string("-1e39"), std::string("nan"), std::string("inf")}) {
+      for (const auto& [name, text] : text_triangles(bad))
+        CHECK_THROWS_AS_MESSAGE(read_mesh(folder.write(name, text)), Error, name << " " << bad);
+    }
+  }
+
+  TEST_CASE("lines that end as on Windows") {
+    const TempDir folder;
+    for (auto [name, text] : text_triangles("0.5")) {
+      for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += 2)
+        text.replace(i, 1, "\r\n");
+      const Mesh mesh = read_mesh(folder.write(name, text));
+      CHECK_MESSAGE(mesh.positions[0] == glm::vec3(0.5F, 0, 0), name);
+      CHECK_MESSAGE(mesh.faces[0] == glm::uvec3(0, 1, 2), name);
+    }
+  }
+
+  TEST_CASE("OBJ: comments behind numbers") {
+    const TempDir folder;
+    const Mesh mesh = read_mesh(folder.write("a.obj",
+                                             "v 0 0 0 # first\nv 1 0 0#second\nv 0 1 0 1 0 0 # red\nvt 0 0 # "
+                                             "a\nf 1/1 2/1 3/1 # f\nf 3 2 1# \\\n"));
+    CHECK(mesh.faces == std::vector<glm::uvec3>{{0, 1, 2}, {2, 1, 0}});
+    CHECK(mesh.vertex_colors == std::vector<glm::vec3>{{1, 1, 1}, {1, 1, 1}, {1, 0, 0}});
+  }
+
+  TEST_CASE("a file of any format comes through a pipe") {
+    const TempDir folder;
+    auto files = text_triangles("0.5");
+    files.emplace_back("b.stl", one_facet());
+    for (const auto& [name, text] : files) {
+      const std::filesystem::path pipe = folder / ("pipe-" + name);
+      REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+      std::thread writer([&folder, &text = text, &name = name] { folder.write("pipe-" + name, text); });
+      CHECK_MESSAGE(read_mesh(pipe).faces.size() == 1, name);
+      writer.join();
+    }
+  }
+
+  TEST_CASE("a polygon of 300,000 corners, and as many equal vertices, take no time") {
+    constexpr int k_corners = 300000;
+    const TempDir folder;
+    std::string vertices, obj = "f", off;
+    for (int i = 0; i < k_corners; ++i) {
+      vertices += std::to_string(i) + " 0 1\n";
+      obj += " " + std::to_string(i + 1);
+      off += " " + std::to_string(i);
+    }
+    std::string obj_vertices = "v " + vertices;
+    for (std::size_t i = 2; (i = obj_vertices.find('\n', i)) + 1 < obj_vertices.size(); i += 3)
+      obj_vertices.insert(i + 1, "v ");
+    const std::string count = std::to_string(k_corners);
+    std::string ply = "ply\nformat ascii 1.0\nelement vertex " + count +
+                      "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                      "property list int int vertex_indices\nend_header\n" +
+                      vertices + count + off;
+    const std::vector<std::pair<std::string, std::string>> files{
+        {"a.obj", obj_vertices + obj},
+        {"a.off", "OFF\n" + count + " 1\n" + vertices + count + off},
+        {"a.ply", ply}};
+    for (const auto& [name, text] : files) {
+      const auto start = std::chrono::steady_clock::now();
+      CHECK_MESSAGE(read_mesh(folder.write(name, text)).faces.size() == k_corners - 2, name);
+      // A loop over all pairs takes 20 s and more.
+      CHECK_MESSAGE(std::chrono::steady_clock::now() - start < std::chrono::seconds(10), name);
+    }
+    const std::vector<std::array<glm::vec3, 3>> facets(k_corners / 3, {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}});
+    CHECK(read_mesh(folder.write("a.stl", binary_stl(facets))).positions.size() == 3);
   }
 
   TEST_CASE("OBJ: written and read back, bit for bit") {
@@ -240,6 +382,16 @@ TEST_SUITE("unit") {
         "mesh.off", "COFF 3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n"));
     CHECK(colored.vertex_colors == std::vector<glm::vec3>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
     CHECK(colored.faces.size() == 1);
+    const Mesh all =
+        read_mesh(folder.write("mesh.off",
+                               "STCNOFF\n3 1\n0 0 0 0 0 1 255 0 0 255 .5 1\n1 0 0 0 0 1 0 255 0 255 .5 1\n"
+                               "0 1 0 0 0 1 0 0 255 255 .5 1\n3 0 1 2 7\n"));
+    CHECK(all.vertex_colors == colored.vertex_colors);
+    CHECK(all.positions == colored.positions);
+    const Mesh normals =
+        read_mesh(folder.write("mesh.off", "NOFF\n3 1 3\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n"));
+    CHECK(normals.positions == colored.positions);
+    CHECK(normals.vertex_colors.empty());
   }
 
   TEST_CASE("STL: text and binary; equal positions become one vertex") {
@@ -248,8 +400,8 @@ TEST_SUITE("unit") {
                              text_facet("0 0 0", "0 0 0", "1 1 1") + text_facet("1 0 0", "1 1 0", "0 1 0") +
                              "endsolid the outer one\n";
     const Mesh from_text = read_mesh(folder.write("text.stl", text));
-    CHECK(from_text.positions.size() == 5);  // that of the facet without an area is there, unused
-    CHECK(from_text.faces == std::vector<glm::uvec3>{{0, 1, 2}, {1, 4, 2}});
+    CHECK(from_text.positions == std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+    CHECK(from_text.faces == std::vector<glm::uvec3>{{0, 1, 2}, {1, 3, 2}});
     const std::array<glm::vec3, 3> low{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
         high{{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
     const std::array<glm::vec3, 3> degenerate{{{0, 0, 0}, {0, 0, 0}, {0, 1, 0}}};
@@ -318,6 +470,10 @@ TEST_SUITE("robustness") {
     check("f 1 2\n", "mesh.obj:5: a face with 2 corners");
     check("f\n", "mesh.obj:5: a face with 0 corners");
     check("f 1 2 x\n", "mesh.obj:5: got the corner \"x\"");
+    check("f 1 2 3/1/y\n", "mesh.obj:5: got the corner \"3/1/y\"");
+    check("f 1 2 3/1/1/1\n", "mesh.obj:5: got the corner");
+    check("v 0 0 0 w\nf 1 2 3\n", "mesh.obj:5: got \"w\"");
+    check("\xEF\xBB\xBFv 0 0 0\nf 1 2 3\n", "mesh.obj:5: the line begins with bytes that are no text");
     check("f 1 2 /3\n", "mesh.obj:5: got the corner \"/3\"");
     check("f 1 2 \\\n3\n", "mesh.obj:5: a line continued by a backslash");
     check("v 1 2\nf 1 2 3\n", "mesh.obj:5: too few numbers");
@@ -375,13 +531,28 @@ TEST_SUITE("robustness") {
     check("", "truncated");
     check("0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n3 0 1 2\n", "mesh.ply:12: got no number where one must be");
     check(k_ply_vertices + "3 0 1 2\n3 0 x 2\n", "mesh.ply:15:");
-    check(k_ply_vertices + "3 0 1 2\n2 0 1\n", "face 1 has 2 corners");
+    check(k_ply_vertices + "3 0 1 2\n2 0 1\n", "face 1 has fewer than three corners");
     const std::string lists =
         "element face 1\n" + k_ply_corners + "property list uchar float s\nend_header\n";
     DPR_CHECK_MESSAGE_HAS(
         IoError,
         read_mesh(folder.write("mesh.ply", k_ply_start + lists + k_ply_vertices + "3 0 1 2 4000000000 1\n")),
         "mesh.ply:15: too few numbers for a face");
+    const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    DPR_CHECK_MESSAGE_HAS(
+        IoError,
+        read_mesh(folder.write("mesh.ply", k_ply_start + colors + "element face 1\n" + k_ply_corners +
+                                               "end_header\n0 0 0 0 0 300\n1 0 0 0 0 0\n"
+                                               "0 1 0 0 0 0\n3 0 1 2\n")),
+        "a colour in bytes that is not from 0 to 255");
+    DPR_CHECK_MESSAGE_HAS(
+        IoError,
+        read_mesh(folder.write(
+            "mesh.ply",
+            "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty double x\n"
+            "property double y\nproperty double z\nelement face 1\n" +
+                k_ply_corners + "end_header\n")),
+        "its header promises 96000000001 bytes or more");
     check(k_ply_vertices + "4000000000 0 1 2\n3 0 1 2\n", "truncated");
     check(k_ply_vertices + "3 0 1 2\n3 0 1 2\n3 0 1 2\n", "goes on after the last face");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument,
@@ -397,7 +568,11 @@ TEST_SUITE("robustness") {
       DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.off", text)), part);
     };
     const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n";
-    check("NOFF\n3 1 0\n", "mesh.off:1: got the header \"NOFF\"");
+    check("4OFF\n3 1 0\n", "mesh.off:1: got the header \"4OFF\"");
+    check("NOFF\n3 1 0\n0 0 0\n", "mesh.off:3: too few numbers");
+    check("STOFF\n3 1 0\n0 0 0 1\n", "mesh.off:3: too few numbers");
+    check("OFF\n3 1 0\n" + vertices + "3 0 1 2\n\n# and\n3 0 1 2\n", "mesh.off:9: the file goes on after");
+    check("OFF\n3 1 0\n" + vertices + "3 0 1 2 x\n", "mesh.off:6: got \"x\"");
     check("OFF BINARY\n", "mesh.off:1: a binary OFF file");
     check("OFF\n3 x 0\n", "mesh.off:2: got \"x\", expected the number of faces");
     check("OFF\n3 5 0\n" + vertices + "3 0 1 2\n",
@@ -419,25 +594,50 @@ TEST_SUITE("robustness") {
     check("solid a\n" + facet, "expected \"endsolid\"");
     check("solid a\n" + facet.substr(0, 60), "mesh.stl:");
     check("solid a\n" + text_facet("0 0 0", "nan 0 0", "0 1 0") + "endsolid\n", "mesh.stl:5: got \"nan\"");
-    check("solid a\n" + text_facet("0 0 0", "1 0", "0 1 0") + "endsolid\n", "mesh.stl:5: too few numbers");
+    check("solid a\n" + text_facet("0 0 0", "1 0", "0 1 0") + "endsolid\n",
+          "mesh.stl:5: expected three numbers");
     check("solid a\nouter loop\nvertex 0 0 0\nendloop\nendsolid\n",
           "mesh.stl:4: a loop without three vertices");
-    const std::string bytes = binary_stl({{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}});
+    check("solid a\n" + facet + "endsolid a\nmore\n", "expected \"endsolid\"");
+    check("solid a\n" + text_facet("0 0 0", "1 0 0 0", "0 1 0") + "endsolid\n",
+          "mesh.stl:5: expected three numbers");
+    const std::string bytes = one_facet();
     std::string shortened = bytes.substr(0, bytes.size() - 7);
     shortened[0] = 'S';
     check(shortened, "truncated: expected 1 facets, got 0");
+    std::string extended = bytes + "x";
+    extended[0] = 'S';
+    check(extended, "goes on after the last of the 1 facets");
     check("short", "too short");
     std::string not_finite = bytes;
     not_finite.replace(84 + 12, 4, std::string("\0\0\xc0\x7f", 4));
     check(not_finite, "facet 0 has a coordinate that is not finite");
   }
 
+  TEST_CASE("what has no end is refused, and is not even opened as a material library") {
+    const TempDir folder;
+    for (const char* name : {"endless.obj", "endless.ply", "endless.off", "endless.stl"}) {
+      std::filesystem::create_symlink("/dev/zero", folder / name);
+      DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / name), "does not end");
+    }
+    REQUIRE(mkfifo((folder / "pipe.mtl").c_str(), 0600) == 0);  // nobody writes to it
+    for (const char* library : {"pipe.mtl", "/dev/zero"}) {
+      Notes notes;
+      const auto file =
+          folder.write("a.obj", std::string("mtllib ") + library + "\n" + k_obj_square + "f 1 2 3\n");
+      CHECK(read_mesh(file, notes).faces.size() == 1);
+      REQUIRE(notes.size() == 1);
+      CHECK(notes[0].find(library) != std::string::npos);
+    }
+  }
+
   TEST_CASE("OpenMesh is silent") {
     const TempDir folder;
     const auto file =
-        folder.write("mesh.obj", "mtllib no.mtl\n" + k_obj_square + "usemtl x\nvn 0 0 1\nf 1//9 2 3\n");
+        folder.write("mesh.ply", k_ply_start + "element face 1\n" + k_ply_corners +
+                                     "property ushort a\nend_header\n" + k_ply_vertices + "3 0 1");
     const Captured captured;
-    CHECK_NOTHROW(read_mesh(file));
+    CHECK_THROWS_AS(read_mesh(file), IoError);
     CHECK(captured.text().empty());
   }
 

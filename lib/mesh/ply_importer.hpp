@@ -1,4 +1,4 @@
-// An importer for OpenMesh's readers that keeps what they read as it comes.
+// Where OpenMesh's reader of PLY puts what it reads: straight into a mesh.
 //
 // OpenMesh's own importer fills a halfedge mesh: it refuses faces that would make an edge non-manifold, or
 // adds them again with copies of their vertices. This one records vertices and polygons in the order of the
@@ -10,25 +10,26 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "mesh/mesh_scan.hpp"
+#include "mesh/mesh_reader.hpp"
 
 namespace dpr {
 
-class SoupImporter final : public OpenMesh::IO::BaseImporter {
+class PlyImporter final : public OpenMesh::IO::BaseImporter {
  public:
   using VertexHandle = OpenMesh::VertexHandle;
   using HalfedgeHandle = OpenMesh::HalfedgeHandle;
   using EdgeHandle = OpenMesh::EdgeHandle;
   using FaceHandle = OpenMesh::FaceHandle;
 
-  std::vector<glm::vec3> positions;
-  std::vector<Polygon> polygons;         // indices as the file has them: they may be out of range
-  std::vector<glm::vec3> vertex_colors;  // as long as the last vertex that was given one
-  std::vector<glm::vec3> face_colors;    // as long as the last polygon that was given one
+  std::vector<glm::vec3> positions, vertex_colors;
+  std::vector<glm::uvec3> triangles;  // indices as the file has them: they may be out of range
+  std::vector<glm::vec3> polygon_colors;
+  std::vector<std::size_t> polygon_ends;     // [polygon] how many triangles there are with its own
+  std::optional<std::size_t> short_polygon;  // the last one with fewer than three corners
 
   VertexHandle add_vertex(const OpenMesh::Vec3f& point) override {
     positions.emplace_back(point[0], point[1], point[2]);
-    kernel_.resize(positions.size(), polygons.size());
+    kernel_.resize(positions.size(), polygon_ends.size());
     return VertexHandle(static_cast<int>(positions.size() - 1));
   }
   VertexHandle add_vertex() override { return add_vertex(OpenMesh::Vec3f(0, 0, 0)); }
@@ -36,37 +37,36 @@ class SoupImporter final : public OpenMesh::IO::BaseImporter {
     positions[index(v)] = {point[0], point[1], point[2]};
   }
   FaceHandle add_face(const VHandles& corners) override {
-    Polygon& polygon = polygons.emplace_back();
-    for (const VertexHandle corner : corners) polygon.push_back(static_cast<std::uint32_t>(corner.idx()));
-    kernel_.resize(positions.size(), polygons.size());
-    return FaceHandle(static_cast<int>(polygons.size() - 1));
+    if (corners.size() < 3) short_polygon = polygon_ends.size();
+    corners_.clear();
+    for (const VertexHandle corner : corners) corners_.push_back(static_cast<std::uint32_t>(corner.idx()));
+    append_fan(corners_, triangles);
+    polygon_ends.push_back(triangles.size());
+    kernel_.resize(positions.size(), polygon_ends.size());
+    return FaceHandle(static_cast<int>(polygon_ends.size() - 1));
   }
 
-  void set_color(VertexHandle v, const OpenMesh::Vec3uc& c) override {
-    put(vertex_colors, index(v), bytes(c));
-  }
   void set_color(VertexHandle v, const OpenMesh::Vec4uc& c) override {
-    put(vertex_colors, index(v), bytes(c));
+    append_color(glm::vec3(c[0], c[1], c[2]) / 255.0F, index(v), index(v) + 1, vertex_colors);
   }
-  void set_color(VertexHandle v, const OpenMesh::Vec3f& c) override {
-    put(vertex_colors, index(v), floats(c));
+  void set_color(FaceHandle f, const OpenMesh::Vec4uc& c) override {
+    append_color(glm::vec3(c[0], c[1], c[2]) / 255.0F, index(f), index(f) + 1, polygon_colors);
   }
-  void set_color(VertexHandle v, const OpenMesh::Vec4f& c) override {
-    put(vertex_colors, index(v), floats(c));
-  }
-  void set_color(FaceHandle f, const OpenMesh::Vec3uc& c) override { put(face_colors, index(f), bytes(c)); }
-  void set_color(FaceHandle f, const OpenMesh::Vec4uc& c) override { put(face_colors, index(f), bytes(c)); }
-  void set_color(FaceHandle f, const OpenMesh::Vec3f& c) override { put(face_colors, index(f), floats(c)); }
-  void set_color(FaceHandle f, const OpenMesh::Vec4f& c) override { put(face_colors, index(f), floats(c)); }
 
   size_t n_vertices() const override { return positions.size(); }
-  size_t n_faces() const override { return polygons.size(); }
+  size_t n_faces() const override { return polygon_ends.size(); }
   size_t n_edges() const override { return 0; }
 
-  /// Custom properties of PLY files go here; readers that find a list need one even if nobody looks at it.
+  /// Custom properties go here; a reader that finds a list needs one even if nobody looks at it.
   OpenMesh::BaseKernel* kernel() override { return &kernel_; }
 
   // The rest of what a file may hold is of no use here.
+  void set_color(VertexHandle, const OpenMesh::Vec3uc&) override {}
+  void set_color(VertexHandle, const OpenMesh::Vec3f&) override {}
+  void set_color(VertexHandle, const OpenMesh::Vec4f&) override {}
+  void set_color(FaceHandle, const OpenMesh::Vec3uc&) override {}
+  void set_color(FaceHandle, const OpenMesh::Vec3f&) override {}
+  void set_color(FaceHandle, const OpenMesh::Vec4f&) override {}
   HalfedgeHandle add_edge(VertexHandle, VertexHandle) override { return HalfedgeHandle(); }
   FaceHandle add_face(HalfedgeHandle) override { return FaceHandle(); }
   void add_face_texcoords(FaceHandle, VertexHandle, const std::vector<OpenMesh::Vec2f>&) override {}
@@ -113,21 +113,7 @@ class SoupImporter final : public OpenMesh::IO::BaseImporter {
 
   static std::size_t index(OpenMesh::BaseHandle handle) { return static_cast<std::size_t>(handle.idx()); }
 
-  // What has no colour of its own beside others that have one is white.
-  static void put(std::vector<glm::vec3>& colors, std::size_t place, const glm::vec3& color) {
-    if (colors.size() <= place) colors.resize(place + 1, glm::vec3(1));
-    colors[place] = color;
-  }
-
-  template <typename Color>
-  static glm::vec3 bytes(const Color& c) {
-    return glm::vec3(c[0], c[1], c[2]) / 255.0F;
-  }
-  template <typename Color>
-  static glm::vec3 floats(const Color& c) {
-    return {c[0], c[1], c[2]};
-  }
-
+  std::vector<std::uint32_t> corners_;  // of the polygon that arrives
   Kernel kernel_;
 };
 

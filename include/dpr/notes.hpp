@@ -1,0 +1,23 @@
+// What a file asks for and the library leaves out: the readers that tell.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dpr/mesh.hpp"
+#include "dpr/scene.hpp"
+#include "dpr/shape.hpp"
+
+namespace dpr {
+
+/// A sentence each: a texture of a material that is not read, a material library that is not there, a
+/// material that is in no library. None of them is an error.
+using Notes = std::vector<std::string>;
+
+// As the functions without notes, which keep silent about them; what was found is appended to `notes`.
+Mesh read_mesh(const std::filesystem::path& file, Notes& notes);
+Scene read_scene(const std::filesystem::path& file, Notes& notes);
+ShapeViews read_views(const std::filesystem::path& file, Notes& notes);
+
+}  // namespace dpr

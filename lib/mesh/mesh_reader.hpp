@@ -1,0 +1,56 @@
+// The readers of mesh files, one for each format: from the bytes of a file to a mesh, in one pass.
+//
+// PLY is read by OpenMesh. OBJ, OFF and STL are not: its readers of these pass over what they do not
+// understand, so that a vertex line that does not parse shifts every later index, and a check would have to
+// parse the whole file a second time.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <glm/glm.hpp>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dpr/mesh.hpp"
+#include "dpr/notes.hpp"
+
+namespace dpr {
+
+/// Reads the content of a file in the format of its extension; the mesh is valid. `file` is what messages
+/// call it, and beside it the material libraries of an OBJ are looked for. Throws as read_mesh() does.
+Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& notes);
+
+// The formats. What they return may have no face or an index out of range: parse_mesh() checks that for all.
+Mesh read_obj(const std::filesystem::path& file, std::string_view text, Notes& notes);
+Mesh read_ply(const std::filesystem::path& file, std::string bytes);
+Mesh read_off(const std::filesystem::path& file, std::string_view text);
+Mesh read_stl(const std::filesystem::path& file, std::string_view bytes);
+
+/// A material of OBJ, as far as it is of use.
+struct Material {
+  std::optional<glm::vec3> diffuse;  ///< Kd
+  std::string texture;               ///< map_Kd; empty if there is none
+};
+using Materials = std::map<std::string, Material, std::less<>>;
+
+/// Adds the materials of an OBJ's library. Throws IoError where a colour cannot be read.
+void read_mtl(const std::filesystem::path& file, std::string_view text, Materials& materials);
+
+/// Appends a polygon as a fan of triangles about its first corner.
+inline void append_fan(std::span<const std::uint32_t> corners, std::vector<glm::uvec3>& triangles) {
+  for (std::size_t i = 2; i < corners.size(); ++i)
+    triangles.emplace_back(corners[0], corners[i - 1], corners[i]);
+}
+
+/// Gives the elements from `first` to `end` a colour. Those before without one become white.
+inline void append_color(const glm::vec3& color, std::size_t first, std::size_t end,
+                         std::vector<glm::vec3>& colors) {
+  colors.resize(first, glm::vec3(1));
+  colors.resize(end, color);
+}
+
+}  // namespace dpr

@@ -1,0 +1,211 @@
+// The reader of OBJ: vertices with their colours, texture coordinates, polygons and the diffuse colours of
+// materials.
+//
+// The format: Wavefront's "Object Files", version 3.0. Words that say nothing of polygons are passed over.
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <system_error>
+
+#include "base/input_file.hpp"
+#include "dpr/error.hpp"
+#include "mesh/mesh_reader.hpp"
+#include "mesh/scan_text.hpp"
+
+namespace dpr {
+namespace {
+
+using Indices = std::vector<std::uint32_t>;
+
+class ObjReader {
+ public:
+  ObjReader(const std::filesystem::path& file, std::string_view text, Notes& notes)
+      : file_(file), lines_(scan::without_byte_order_mark(text)), notes_(notes) {}
+
+  void run() {
+    while (lines_.next()) {
+      scan::split(lines_.line(), words_);
+      if (words_.empty() || words_[0].front() == '#') continue;
+      statement();
+    }
+    require_known(farthest_vertex_, mesh.positions.size(), "vertex");
+    finish_colors();
+    finish_texcoords();
+  }
+
+  Mesh mesh;
+
+ private:
+  /// An index that a face uses and the line it does so on; of the largest one.
+  struct Reference {
+    std::int64_t index = -1;
+    std::size_t line = 0;
+  };
+
+  [[noreturn]] void fail(const std::string& reason) const { throw IoError(file_, reason, lines_.number()); }
+
+  void statement() {
+    const std::string_view keyword = words_[0];
+    const auto is_text = [](unsigned char c) { return c > 0x20 && c < 0x7f; };
+    if (!std::ranges::all_of(keyword, is_text)) fail("the line begins with bytes that are no text");
+    const bool is_read = keyword == "v" || keyword == "vt" || keyword == "f";
+    // A comment may follow numbers, but names may have a # in them.
+    if (is_read) scan::split(lines_.line().substr(0, lines_.line().find('#')), words_);
+    if (words_.back().back() == '\\')
+      fail("a line continued by a backslash: expected the whole on one line");
+    if (keyword == "v") vertex();
+    if (keyword == "vt") texture_coordinate();
+    if (keyword == "f") face();
+    if (keyword == "mtllib") material_libraries();
+    if (keyword == "usemtl") use_material();
+  }
+
+  float number(std::size_t word) const {
+    if (word >= words_.size()) fail("too few numbers after \"" + std::string(words_[0]) + "\"");
+    const std::optional<float> value = scan::parse_coordinate(words_[word]);
+    if (!value) fail("got " + scan::quoted(words_[word]) + ", expected a finite number");
+    return *value;
+  }
+
+  /// x y z, perhaps w, or x y z r g b.
+  void vertex() {
+    mesh.positions.emplace_back(number(1), number(2), number(3));
+    for (std::size_t i = 4; i < words_.size(); ++i) number(i);
+    if (words_.size() < 7) return;
+    const std::size_t vertices = mesh.positions.size();
+    append_color({number(4), number(5), number(6)}, vertices - 1, vertices, mesh.vertex_colors);
+  }
+
+  void texture_coordinate() { mesh.texcoords.emplace_back(number(1), number(2)); }
+
+  void face() {
+    corners_.clear();
+    texcoords_.clear();
+    for (std::size_t i = 1; i < words_.size(); ++i) corner(words_[i]);
+    if (corners_.size() < 3) {
+      fail("a face with " + std::to_string(corners_.size()) + " corners: expected at least three");
+    }
+    const std::size_t first = mesh.faces.size();
+    append_fan(corners_, mesh.faces);
+    if (texcoords_.size() == corners_.size()) append_fan(texcoords_, mesh.face_texcoords);
+    if (color_) append_color(*color_, first, mesh.faces.size(), mesh.face_colors);
+  }
+
+  /// vertex, vertex/texture, vertex//normal or vertex/texture/normal.
+  void corner(std::string_view word) {
+    const std::size_t slash = std::min(word.find('/'), word.size());
+    const std::size_t second = std::min(word.find('/', slash + 1), word.size());
+    const std::string_view texture = slash < word.size() ? word.substr(slash + 1, second - slash - 1) : "";
+    const std::string_view normal = second < word.size() ? word.substr(second + 1) : "";
+    corners_.push_back(index(word, word.substr(0, slash), mesh.positions.size(), "vertex", farthest_vertex_));
+    if (!texture.empty()) {
+      texcoords_.push_back(
+          index(word, texture, mesh.texcoords.size(), "texture coordinate", farthest_texcoord_));
+    }
+    if (!normal.empty() && !scan::parse<std::int64_t>(normal)) fail_corner(word);
+  }
+
+  /// An index from zero: the file counts from one, or back from the last of those `known`. It may be one that
+  /// follows.
+  std::uint32_t index(std::string_view word, std::string_view text, std::size_t known,
+                      const std::string& what, Reference& farthest) {
+    const std::optional<std::int64_t> value = scan::parse<std::int64_t>(text);
+    if (!value) fail_corner(word);
+    const std::int64_t index = *value < 0 ? *value + static_cast<std::int64_t>(known) : *value - 1;
+    if (index < 0 || index > std::numeric_limits<std::int32_t>::max())
+      fail_index(*value, known, what, lines_.number());
+    if (index > farthest.index) farthest = {index, lines_.number()};
+    return static_cast<std::uint32_t>(index);
+  }
+
+  [[noreturn]] void fail_corner(std::string_view word) const {
+    fail("got the corner " + scan::quoted(word) + ", expected vertex, vertex/texture or the like");
+  }
+
+  [[noreturn]] void fail_index(std::int64_t index, std::size_t known, const std::string& what,
+                               std::size_t line) const {
+    throw IoError(file_,
+                  "a face with the " + what + " " + std::to_string(index) + ": expected 1 to " +
+                      std::to_string(known) + ", or a negative number that counts back from those so far",
+                  line);
+  }
+
+  void require_known(const Reference& farthest, std::size_t known, const std::string& what) const {
+    if (farthest.index < static_cast<std::int64_t>(known)) return;
+    fail_index(farthest.index + 1, known, what, farthest.line);
+  }
+
+  /// Colours of vertices take the place of those of materials; what has none beside others that have one is
+  /// white.
+  void finish_colors() {
+    if (!mesh.vertex_colors.empty()) {
+      mesh.vertex_colors.resize(mesh.positions.size(), glm::vec3(1));
+      mesh.face_colors.clear();
+    }
+    if (!mesh.face_colors.empty()) mesh.face_colors.resize(mesh.faces.size(), glm::vec3(1));
+  }
+
+  /// Without the texture coordinates of every corner there are none.
+  void finish_texcoords() {
+    require_known(farthest_texcoord_, mesh.texcoords.size(), "texture coordinate");
+    if (mesh.face_texcoords.size() < mesh.faces.size()) mesh.face_texcoords.clear();
+    if (mesh.face_texcoords.empty()) mesh.texcoords.clear();
+  }
+
+  /// Names may have spaces inside, and a line may have several names.
+  void material_libraries() {
+    const std::string_view rest = scan::behind(lines_.line(), words_[0]);
+    if (material_library(rest)) return;
+    for (std::size_t i = 1; i < words_.size(); ++i) {
+      if (words_.size() > 2 && material_library(words_[i])) continue;
+      lacks_library_ = true;
+      notes_.push_back(file_.string() + ": the material library " + scan::quoted(words_[i]) +
+                       " is no regular file: faces have no colours of it");
+    }
+  }
+
+  bool material_library(std::string_view name) {
+    const std::filesystem::path library = file_.parent_path() / name;
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(library, error)) return false;
+    if (libraries_.insert(library).second) read_mtl(library, read_file(library), materials_);
+    return true;
+  }
+
+  void use_material() {
+    const std::string_view name = scan::behind(lines_.line(), words_[0]);
+    const auto found = materials_.find(name);
+    color_ = found == materials_.end() ? std::nullopt : found->second.diffuse;
+    if (!used_.insert(std::string(name)).second) return;
+    if (found == materials_.end() && !lacks_library_) {
+      notes_.push_back(file_.string() + ": the material " + scan::quoted(name) +
+                       " is in no material library: its faces have no colour of it");
+    }
+    if (found == materials_.end() || found->second.texture.empty()) return;
+    notes_.push_back(file_.string() + ": the texture " + scan::quoted(found->second.texture) +
+                     " of the material " + scan::quoted(name) +
+                     " (map_Kd) is not read: its faces have the colour Kd alone");
+  }
+
+  const std::filesystem::path& file_;
+  scan::Lines lines_;
+  std::vector<std::string_view> words_;
+  Indices corners_, texcoords_;  // of a face
+  Reference farthest_vertex_, farthest_texcoord_;
+  std::set<std::filesystem::path> libraries_;
+  Materials materials_;
+  std::set<std::string> used_;      // names of materials
+  std::optional<glm::vec3> color_;  // of the material in use
+  bool lacks_library_ = false;
+  Notes& notes_;
+};
+
+}  // namespace
+
+Mesh read_obj(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+  ObjReader reader(file, text, notes);
+  reader.run();
+  return std::move(reader.mesh);
+}
+
+}  // namespace dpr
