@@ -15,6 +15,9 @@ dpr_packages_learning=(libtorch-dev libopenblas0-pthread python3-torch)
 # The tests under a simulator of the kernels.
 dpr_packages_oclgrind=(oclgrind)
 
+# Fuzzing the readers.
+dpr_packages_fuzzing=(clang-14 libclang-rt-14-dev)
+
 # Prints those of the packages that are not installed.
 missing_packages() {
   local package
@@ -23,7 +26,7 @@ missing_packages() {
   done
 }
 
-# install_packages SET...: demo, tests, learning, oclgrind.
+# install_packages SET...: demo, tests, learning, oclgrind, fuzzing.
 install_packages() {
   local packages=() set
   for set in "$@"; do

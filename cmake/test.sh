@@ -12,6 +12,7 @@ for preset in "${presets[@]}"; do
   case $preset in
     release) sets+=(learning) ;;
     oclgrind) sets+=(oclgrind) ;;
+    fuzz) sets+=(fuzzing) ;;
   esac
 done
 install_packages "${sets[@]}"
