@@ -8,7 +8,7 @@
 #include <string>
 
 #include "device/kernel_sources.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/frame.hpp"
 
 namespace dpr::bench {
 namespace {
@@ -48,12 +48,12 @@ struct Fragments {
   std::vector<cl_uint> starts, list;
   std::vector<float> depth, log_occupancy, occupancy;
 
-  explicit Fragments(const Renderer::Impl& r)
-      : starts(r.rasterize.pixel_starts.download()),
-        list(r.rasterize.list.download()),
-        depth(r.rasterize.depth.download()),
-        log_occupancy(r.occupancy.log_occupancy.download()),
-        occupancy(r.occupancy.occupancy.download()) {}
+  explicit Fragments(const FrameFragments& f)
+      : starts(f.pixel_starts.download()),
+        list(f.list.download()),
+        depth(f.depth.download()),
+        log_occupancy(f.log_occupancy.download()),
+        occupancy(f.occupancy.download()) {}
 
   std::span<const cl_uint> pixel(std::size_t i) const {
     return std::span(list).subspan(starts[i], starts[i + 1] - starts[i]);
@@ -139,22 +139,21 @@ Evaluations count_pixel(const Fragments& f, std::span<const cl_uint> run, const 
 }  // namespace
 
 FrameWork count_work(const Renderer& renderer) {
-  Renderer::Impl& r = renderer.impl();
-  r.require_forward("count_work");
-  if (r.bands.size() > 1) {
-    throw InvalidArgument("bands (count_work)", std::to_string(r.bands.size()), "a frame in one");
-  }
-  const std::size_t pixels_per_view = std::size_t{r.frame.width} * r.frame.height;
+  const FrameFragments found = last_fragments(renderer, "count_work");
+  const Scene& scene = renderer.scene();
+  const std::size_t pixels_per_view =
+      static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
   FrameWork work;
-  work.pairs = static_cast<double>(r.bin.pairs);
-  work.fragments = static_cast<double>(r.rasterize.listed_fragments);
-  work.padded = static_cast<double>(r.rasterize.fragments);
-  work.pixels = static_cast<double>(pixels_per_view * r.views.size());
-  const Fragments f(r);
-  for (std::size_t i = 0; i < pixels_per_view * r.views.size(); ++i) {
+  work.pairs = static_cast<double>(found.pairs);
+  work.fragments = static_cast<double>(found.fragments);
+  work.padded = static_cast<double>(found.padded);
+  work.pixels = static_cast<double>(pixels_per_view * renderer.views().size());
+  const Fragments f(found);
+  for (std::size_t i = 0; i < pixels_per_view * renderer.views().size(); ++i) {
     const std::span<const cl_uint> run = f.pixel(i);
     if (run.empty()) continue;
-    const Evaluations pixel = count_pixel(f, run, r.scene.smoothing, r.views[i / pixels_per_view].camera);
+    const Evaluations pixel =
+        count_pixel(f, run, scene.smoothing, renderer.views()[i / pixels_per_view].camera);
     work.forward_evaluations += pixel.forward;
     work.backward_evaluations += pixel.backward;
   }

@@ -163,7 +163,7 @@ Json describe_row(const Workload& workload, const Variant& variant) {
 void measure_into(Json& result, const Device& device, const Peaks& peaks, const Workload& workload,
                   const Variant& variant, const MeasureOptions& options) {
   Device::Impl& impl = device.impl();
-  impl.peak_allocated_bytes = impl.allocated_bytes;
+  impl.peak_allocated_bytes = impl.allocated_bytes.load();
   reset_peak_resident_bytes();
   Row row(device, workload, variant);
   row.forward();  // kernels are compiled, buffers grow

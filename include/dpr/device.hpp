@@ -24,8 +24,8 @@ struct DeviceInfo {
 std::vector<DeviceInfo> list_devices();
 
 /// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them,
-/// and they live as long as the last copy. One Device may serve several renderers of one thread; use one a
-/// thread.
+/// and they live as long as the last copy. One Device may serve several renderers, each on a thread of its
+/// own; their work shares its queue.
 class Device {
  public:
   /// The device's state; lib/device/context.hpp, and opencl.hpp for embedding.

@@ -39,7 +39,7 @@ class ImageLoss {
   ImageLoss& operator=(ImageLoss&&) noexcept;
 
   /// The loss of the renderer's last images; keeps d loss / d image on the device for Renderer::backward.
-  /// Blocks. Throws InvalidArgument if number or size of the images differ from the targets'.
+  /// Blocks. Throws InvalidArgument for images of another number or size, and a renderer of another Device.
   double evaluate(const Renderer& renderer);
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;

@@ -40,8 +40,8 @@ class MeshLoss {
   MeshLoss& operator=(MeshLoss&&) noexcept;
 
   /// The loss of a mesh of the renderer's scene, at the positions of its last forward(); for
-  /// Renderer::backward(image_loss, mesh_loss). Blocks. Throws InvalidArgument if there is no such
-  /// mesh, if it has another number of vertices, or if every view has a shape of its own (set_shapes()).
+  /// Renderer::backward(image_loss, mesh_loss). Blocks. Throws InvalidArgument for another Device's renderer,
+  /// a mesh that is not there or has other vertices, and where every view has a shape of its own.
   double evaluate(const Renderer& renderer, std::size_t mesh = 0);
   /// The terms of the last evaluate().
   const MeshLossTerms& terms() const;

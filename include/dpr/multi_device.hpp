@@ -24,13 +24,13 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units);
 /// was free. One thread a device, for the time of a call. Not thread-safe.
 class MultiDeviceRenderer {
  public:
-  /// Throws InvalidArgument if there is no device.
+  /// Throws InvalidArgument if there is no device, or the same Device twice: each needs a queue of its own.
   explicit MultiDeviceRenderer(std::vector<Device> devices);
   ~MultiDeviceRenderer();
   MultiDeviceRenderer(MultiDeviceRenderer&&) noexcept;
   MultiDeviceRenderer& operator=(MultiDeviceRenderer&&) noexcept;
 
-  /// As Renderer's; every device gets the geometry.
+  /// As Renderer's, and checked as there; what fails on a device is thrown by the call that renders there.
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views);
   void set_smoothing(const Smoothing& smoothing);

@@ -9,7 +9,8 @@
 
 namespace dpr {
 
-/// Uses the caller's context and in-order queue instead of making its own. The objects are retained.
+/// Uses the caller's context and in-order queue instead of making its own. The objects are retained. Throws
+/// InvalidArgument for an out-of-order queue and for a queue of another context.
 Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue);
 
 /// The rendered images, float4 RGBA [view][height][width], as forward() leaves them on the device. Valid
@@ -18,7 +19,7 @@ Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue);
 cl::Buffer image_buffer(const Renderer& renderer);
 
 /// Runs the backward pass from a buffer of d loss / d image, float4 RGBA [view][height][width], on the
-/// device's context.
+/// device's context. Throws InvalidArgument for a buffer of another context.
 SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images);
 
 }  // namespace dpr

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "device/context.hpp"
@@ -13,8 +14,22 @@ namespace dpr {
 /// Room to make for elements that may become more from frame to frame.
 constexpr std::size_t with_headroom(std::size_t count) { return count + count / 4; }
 
+/// How many elements a buffer holds: a number, or an upper bound where so far only the device knows it.
+struct Length {
+  Length(std::size_t count_) : count(count_) {}
+  static Length at_most(std::size_t count) {
+    Length length(count);
+    length.is_known = false;
+    return length;
+  }
+
+  std::size_t count;
+  bool is_known = true;
+};
+
 /// Elements of T on a device. Movable. Capacity is rounded up so that a kernel may load a whole vector of
-/// lanes at the last element; what lies behind size() is never read as a result.
+/// lanes at the last element; what lies behind size() cannot be read. A buffer whose length only the device
+/// knows has no size() and cannot be read before settle().
 template <class T>
 class Buffer {
  public:
@@ -28,13 +43,19 @@ class Buffer {
     return *this;
   }
 
-  /// Makes room for `count` elements and forgets the content if it has to grow; growth leaves headroom, so
-  /// that sizes that vary from frame to frame settle.
-  void resize(Device::Impl& device, std::size_t count) {
-    if (count > capacity_) {
-      allocate(device, capacity_ == 0 ? count : with_headroom(count));
-    }
-    size_ = count;
+  /// Makes room and forgets the content if it has to grow; growth leaves headroom, so that sizes that vary
+  /// from frame to frame settle. Where it throws, the buffer is empty.
+  void resize(Device::Impl& device, Length length) {
+    if (length.count > capacity_)
+      allocate(device, capacity_ == 0 ? length.count : with_headroom(length.count));
+    length_ = length;
+  }
+
+  /// The length, now that the device's count is known. Nothing where the length was known.
+  void settle(std::size_t count) {
+    if (length_.is_known) return;
+    if (count > length_.count) throw std::logic_error("a buffer holds more than there is room for");
+    length_ = count;
   }
 
   void upload(Device::Impl& device, std::span<const T> values) {
@@ -44,8 +65,11 @@ class Buffer {
              "clEnqueueWriteBuffer");
   }
 
-  /// Blocks until everything enqueued before has run.
+  /// Blocks until everything enqueued before has run. Throws std::logic_error for elements that are not
+  /// there.
   void download(std::span<T> values, std::size_t first = 0) const {
+    if (first > size() || values.size() > size() - first)
+      throw std::logic_error("more is read of a buffer than it holds");
     if (values.empty()) return;
     ++device_->host_waits;
     check_cl(device_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
@@ -53,24 +77,29 @@ class Buffer {
              "clEnqueueReadBuffer");
   }
   std::vector<T> download() const {
-    std::vector<T> values(size_);
+    std::vector<T> values(size());
     download(values);
     return values;
   }
 
   void fill(const T& value) {
-    if (size_ == 0) return;
-    check_cl(device_->queue.enqueueFillBuffer(buffer_, value, 0, size_ * sizeof(T)), "clEnqueueFillBuffer");
+    if (size() == 0) return;
+    check_cl(device_->queue.enqueueFillBuffer(buffer_, value, 0, size() * sizeof(T)), "clEnqueueFillBuffer");
   }
 
   /// Copies everything on the device; `other` must be as large.
   void copy_to(Buffer& other) const {
-    if (size_ == 0) return;
-    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, 0, size_ * sizeof(T)),
+    if (size() == 0) return;
+    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, 0, size() * sizeof(T)),
              "clEnqueueCopyBuffer");
   }
 
-  std::size_t size() const { return size_; }
+  /// Throws std::logic_error where only the device knows.
+  std::size_t size() const {
+    if (!length_.is_known) throw std::logic_error("a buffer's length is asked for before it is known");
+    return length_.count;
+  }
+  Length length() const { return length_; }
   /// Elements that it was made for at least, without the rounding.
   std::size_t room() const { return capacity_ - std::min(capacity_, 2 * k_padding); }
   std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
@@ -81,37 +110,41 @@ class Buffer {
   static constexpr std::size_t k_padding = 16;  // the widest vector
 
   void allocate(Device::Impl& device, std::size_t count) {
-    release();
+    release();  // before there is a new one, so that both need not fit
     const std::size_t capacity = (count / k_padding + 2) * k_padding;
     int error = CL_SUCCESS;
-    buffer_ = cl::Buffer(device.context, CL_MEM_READ_WRITE, capacity * sizeof(T), nullptr, &error);
-    check_cl(error, "clCreateBuffer of " + std::to_string(capacity * sizeof(T)) + " bytes");
+    cl::Buffer buffer(device.context, CL_MEM_READ_WRITE, capacity * sizeof(T), nullptr, &error);
+    if (error != CL_SUCCESS) {
+      throw DeviceError(error, "clCreateBuffer of " + std::to_string(capacity * sizeof(T)) + " bytes");
+    }
+    buffer_ = std::move(buffer);
     device_ = &device;
     capacity_ = capacity;
-    device.allocated_bytes += capacity_bytes();
-    device.peak_allocated_bytes = std::max(device.peak_allocated_bytes, device.allocated_bytes);
+    device.count_allocated(capacity_bytes());
   }
 
-  void release() {
+  void release() noexcept {
     if (device_ != nullptr) {
       device_->allocated_bytes -= capacity_bytes();
       device_->before_release(buffer_);
     }
     buffer_ = cl::Buffer();
     device_ = nullptr;
-    capacity_ = size_ = 0;
+    capacity_ = 0;
+    length_ = 0;
   }
 
   void swap(Buffer& other) noexcept {
     std::swap(device_, other.device_);
     std::swap(buffer_, other.buffer_);
     std::swap(capacity_, other.capacity_);
-    std::swap(size_, other.size_);
+    std::swap(length_, other.length_);
   }
 
   Device::Impl* device_ = nullptr;
   cl::Buffer buffer_;
-  std::size_t capacity_ = 0, size_ = 0;
+  std::size_t capacity_ = 0;
+  Length length_ = 0;
 };
 
 /// One element of a buffer on its way to the host.
@@ -120,27 +153,28 @@ class PendingRead {
  public:
   PendingRead() = default;
   ~PendingRead() {
-    if (device_ != nullptr) arrived_.wait();  // it writes here
+    // It writes here.
+    if (device_ != nullptr && arrived_.wait() != CL_SUCCESS) device_->queue.finish();
   }
   PendingRead(const PendingRead&) = delete;
   PendingRead& operator=(const PendingRead&) = delete;
 
   /// Does not block. What an earlier start() was to read is lost.
   void start(const Buffer<T>& buffer, std::size_t index) {
-    device_ = buffer.device();
-    check_cl(device_->queue.enqueueReadBuffer(buffer.cl_buffer(), CL_FALSE, index * sizeof(T), sizeof(T),
-                                              &value_, nullptr, &arrived_),
+    Device::Impl* const device = buffer.device();
+    check_cl(device->queue.enqueueReadBuffer(buffer.cl_buffer(), CL_FALSE, index * sizeof(T), sizeof(T),
+                                             &value_, nullptr, &arrived_),
              "clEnqueueReadBuffer");
-    check_cl(device_->queue.flush(), "clFlush");
+    device_ = device;
+    check_cl(device->queue.flush(), "clFlush");
   }
 
-  bool is_pending() const { return device_ != nullptr; }
-
-  /// Blocks until it has arrived, but not for what was enqueued after it.
+  /// Blocks until it has arrived, but not for what was enqueued after it. Where it throws, it may be called
+  /// again.
   T take() {
     ++device_->host_waits;
-    device_ = nullptr;
     check_cl(arrived_.wait(), "clWaitForEvents");
+    device_ = nullptr;
     return value_;
   }
 

@@ -1,6 +1,7 @@
 // What a Device holds: its OpenCL context and queue, the programs built for it, and the count of its memory.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <mutex>
@@ -17,11 +18,12 @@ namespace dpr {
 
 class Profile;
 
-/// Throws DeviceError unless `code` is CL_SUCCESS. `where` is the call, or the kernel with its sizes.
+/// Throws DeviceError unless `code` is CL_SUCCESS. `where` is the call.
 inline void check_cl(int code, std::string_view where) {
   if (code != CL_SUCCESS) throw DeviceError(code, std::string(where));
 }
 
+/// May be used from several threads, except for `profile`.
 struct Device::Impl {
   cl::Device device;
   cl::Context context;
@@ -38,13 +40,20 @@ struct Device::Impl {
 
   /// To be called before a buffer is let go. oclgrind 21.10 takes a new buffer for initialised as far as an
   /// old one of the same number was, so there none is ever released.
-  void before_release(const cl::Buffer& buffer) const {
+  void before_release(const cl::Buffer& buffer) const noexcept {
     if (info.platform == "Oclgrind") clRetainMemObject(buffer());
   }
 
-  std::size_t allocated_bytes = 0, peak_allocated_bytes = 0;
-  std::size_t host_waits = 0;  ///< how often the host has waited to read from the device
-  std::size_t memory_budget = 0;
+  void count_allocated(std::size_t bytes) noexcept {
+    const std::size_t now = allocated_bytes += bytes;
+    std::size_t peak = peak_allocated_bytes;
+    while (peak < now && !peak_allocated_bytes.compare_exchange_weak(peak, now)) {
+    }
+  }
+
+  std::atomic<std::size_t> allocated_bytes = 0, peak_allocated_bytes = 0;
+  std::atomic<std::size_t> host_waits = 0;  ///< how often the host has waited to read from the device
+  std::atomic<std::size_t> memory_budget = 0;
 
  private:
   std::mutex mutex_;

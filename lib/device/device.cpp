@@ -141,7 +141,18 @@ Device open_device(const std::string& selector) {
 }
 
 Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
-  const cl::Device device = queue.getInfo<CL_QUEUE_DEVICE>();
+  cl::Device device;
+  cl::Context queue_context;
+  cl_command_queue_properties properties = 0;
+  check_cl(queue.getInfo(CL_QUEUE_DEVICE, &device), "clGetCommandQueueInfo");
+  check_cl(queue.getInfo(CL_QUEUE_CONTEXT, &queue_context), "clGetCommandQueueInfo");
+  check_cl(queue.getInfo(CL_QUEUE_PROPERTIES, &properties), "clGetCommandQueueInfo");
+  if (queue_context() != context()) {
+    throw InvalidArgument("queue (adopt_device)", "a queue of another context", "one of the context");
+  }
+  if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) != 0) {
+    throw InvalidArgument("queue (adopt_device)", "an out-of-order queue", "an in-order one");
+  }
   return make_device(device, context, queue);
 }
 

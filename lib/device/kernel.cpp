@@ -28,16 +28,22 @@ namespace {
 
 std::string argument_text(const ArgumentType& type) { return (type.is_const ? "const " : "") + type.name; }
 
+/// Without a name where the program keeps none: that is optional for one not built from source.
 ArgumentType argument_in_source(const cl::Kernel& kernel, unsigned index) {
   ArgumentType found;
+  std::string name;
+  const int error = kernel.getArgInfo(index, CL_KERNEL_ARG_TYPE_NAME, &name);
+  if (error == CL_KERNEL_ARG_INFO_NOT_AVAILABLE) return found;
+  check_cl(error, "clGetKernelArgInfo");
+  cl_kernel_arg_type_qualifier qualifiers = CL_KERNEL_ARG_TYPE_NONE;
+  check_cl(kernel.getArgInfo(index, CL_KERNEL_ARG_TYPE_QUALIFIER, &qualifiers), "clGetKernelArgInfo");
   // Compilers differ in spacing ("float *", "float*") and in the tag of a struct.
-  for (const char c : kernel.getArgInfo<CL_KERNEL_ARG_TYPE_NAME>(index)) {
+  for (const char c : name) {
     if (c == '\0') break;
     if (c != ' ') found.name += c;
   }
   if (found.name.starts_with("struct")) found.name.erase(0, std::string_view("struct").size());
   found.is_pointer = found.name.ends_with('*');
-  const auto qualifiers = kernel.getArgInfo<CL_KERNEL_ARG_TYPE_QUALIFIER>(index);
   found.is_const = found.is_pointer && (qualifiers & CL_KERNEL_ARG_TYPE_CONST) != 0;
   return found;
 }
@@ -46,14 +52,15 @@ ArgumentType argument_in_source(const cl::Kernel& kernel, unsigned index) {
 
 void check_signature(const cl::Kernel& kernel, const std::string& name,
                      std::span<const ArgumentType> expected) {
-  const auto count = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+  cl_uint count = 0;
+  check_cl(kernel.getInfo(CL_KERNEL_NUM_ARGS, &count), "clGetKernelInfo");
   if (count != expected.size()) {
     throw std::logic_error("kernel " + name + " has " + std::to_string(count) + " arguments, its signature " +
                            std::to_string(expected.size()));
   }
   for (unsigned index = 0; index < count; ++index) {
     const ArgumentType found = argument_in_source(kernel, index);
-    if (found.name.empty()) return;  // arg info is optional for a program that was not built from source
+    if (found.name.empty()) return;
     const ArgumentType& wanted = expected[index];
     if (found.name != wanted.name || found.is_const != wanted.is_const) {
       throw std::logic_error("kernel " + name + ", argument " + std::to_string(index) + ": the source says " +

@@ -99,7 +99,7 @@ class Kernel {
       : device_(&device), file_(file), name_(name) {
     int error = CL_SUCCESS;
     kernel_ = cl::Kernel(device.program(file, build_options(device, options)), name, &error);
-    check_cl(error, "clCreateKernel " + name_);
+    if (error != CL_SUCCESS) throw DeviceError(error, "clCreateKernel " + name_);
     const std::array<ArgumentType, sizeof...(Args)> expected{detail::Argument<Args>::type()...};
     detail::check_signature(kernel_, name_, expected);
   }
@@ -109,7 +109,7 @@ class Kernel {
   void operator()(const Range& range, const typename detail::Argument<Args>::Value&... args) {
     if (range.count == 0) return;
     unsigned index = 0;
-    (check_cl(detail::Argument<Args>::set(kernel_, index++, args), "clSetKernelArg " + name_), ...);
+    (check_argument(detail::Argument<Args>::set(kernel_, index++, args)), ...);
     const std::size_t local = device_->local_size();
     const std::size_t global = (range.count + local - 1) / local * local;
     cl::Event finished;
@@ -124,6 +124,10 @@ class Kernel {
   }
 
  private:
+  void check_argument(int error) const {
+    if (error != CL_SUCCESS) throw DeviceError(error, "clSetKernelArg " + name_);
+  }
+
   Device::Impl* device_;
   std::string file_, name_;
   cl::Kernel kernel_;

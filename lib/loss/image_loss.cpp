@@ -6,7 +6,7 @@
 
 #include "base/checks.hpp"
 #include "loss/image_loss_impl.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/frame.hpp"
 
 namespace dpr {
 namespace {
@@ -103,15 +103,15 @@ ImageLoss& ImageLoss::operator=(ImageLoss&&) noexcept = default;
 
 double ImageLoss::evaluate(const Renderer& renderer) {
   Impl& m = *impl_;
-  Renderer::Impl& r = renderer.impl();
-  r.require_forward("ImageLoss::evaluate");
-  if (r.frame.views != m.views) {
+  require_same_device(m.device, renderer, "ImageLoss::evaluate");
+  const Frame frame = last_frame(renderer, "ImageLoss::evaluate");
+  if (frame.views != m.views) {
     throw InvalidArgument("targets (loss)", std::to_string(m.views) + " images",
-                          "one for each of the " + std::to_string(r.frame.views) + " views");
+                          "one for each of the " + std::to_string(frame.views) + " views");
   }
-  if (r.scene.width != m.width || r.scene.height != m.height) {
+  if (frame.width != m.width || frame.height != m.height) {
     throw InvalidArgument("target size (loss)", checks::size(m.width, m.height),
-                          "the size of the render, " + checks::size(r.scene.width, r.scene.height));
+                          "the size of the render, " + checks::size(frame.width, frame.height));
   }
   const std::size_t pixels_per_view = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
   const std::size_t pixels = pixels_per_view * m.views;
@@ -120,10 +120,10 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   p.l1 = m.weights.l1;
   p.views = static_cast<cl_uint>(m.views);
   p.pixels_per_view = static_cast<cl_uint>(pixels_per_view);
-  m.forward(pixels, p, r.aggregate.image, m.target, m.channels);
+  m.frame_number = 0;  // until everything of this one is there
+  m.forward(pixels, p, frame.image, m.target, m.channels);
   m.reduce({pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
-  m.backward(pixels, p, r.aggregate.image, m.target, m.sums, m.view_silhouettes, m.grad_image);
-  m.frame_number = r.frame_number;
+  m.backward(pixels, p, frame.image, m.target, m.sums, m.view_silhouettes, m.grad_image);
 
   const std::vector<float> sums = m.sums.download();
   double total = 0;
@@ -135,6 +135,7 @@ double ImageLoss::evaluate(const Renderer& renderer) {
                        static_cast<double>(m.silhouettes[view]) * (1 - iou);
     total += m.per_view[view] / static_cast<double>(m.views);
   }
+  m.frame_number = frame.number;
   return total;
 }
 

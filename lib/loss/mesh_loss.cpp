@@ -7,7 +7,7 @@
 #include "base/checks.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "mesh/adjacency.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/frame.hpp"
 
 namespace dpr {
 namespace {
@@ -110,22 +110,23 @@ MeshLoss& MeshLoss::operator=(MeshLoss&&) noexcept = default;
 
 double MeshLoss::evaluate(const Renderer& renderer, std::size_t mesh) {
   Impl& m = *impl_;
-  Renderer::Impl& r = renderer.impl();
-  r.require_forward("MeshLoss::evaluate");
-  if (r.frame.position_stride != 0) {
+  require_same_device(m.device, renderer, "MeshLoss::evaluate");
+  const Frame frame = last_frame(renderer, "MeshLoss::evaluate");
+  if (frame.has_own_shapes) {
     throw InvalidArgument("mesh (mesh loss)", "a shape of its own for every view", "one for all views");
   }
-  if (mesh >= r.geometry->meshes.size()) {
+  if (mesh >= frame.meshes.size()) {
     throw InvalidArgument("mesh (mesh loss)", std::to_string(mesh),
-                          "below " + std::to_string(r.geometry->meshes.size()));
+                          "below " + std::to_string(frame.meshes.size()));
   }
-  const MeshRange& range = r.geometry->meshes[mesh];
+  const MeshRange& range = frame.meshes[mesh];
   if (range.vertices != m.params.vertices) {
     throw InvalidArgument("vertices (mesh loss)", std::to_string(range.vertices) + " in the scene",
                           std::to_string(m.params.vertices));
   }
-  const double loss = m.evaluate(r.geometry->positions, range.first_vertex);
-  m.frame_number = r.frame_number;
+  m.frame_number = 0;  // until everything of this one is there
+  const double loss = m.evaluate(frame.positions, range.first_vertex);
+  m.frame_number = frame.number;
   return loss;
 }
 

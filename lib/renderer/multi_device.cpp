@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "renderer/setter_checks.hpp"
 
 namespace dpr {
 namespace {
@@ -24,8 +26,9 @@ struct Chunk {
   std::size_t size() const { return last - first; }
 };
 
-std::vector<Chunk> make_chunks(std::size_t views) {
-  const std::size_t size = (views + k_chunks - 1) / k_chunks;
+/// The same whatever devices there are; none with more views than a frame may have.
+std::vector<Chunk> make_chunks(std::size_t views, std::size_t most) {
+  const std::size_t size = std::min((views + k_chunks - 1) / k_chunks, most);
   std::vector<Chunk> chunks;
   for (std::size_t first = 0; first < views; first += size)
     chunks.push_back({first, std::min(first + size, views)});
@@ -94,33 +97,58 @@ class GradientSum {
   SceneGradient sum_;
 };
 
+
+/// How often each part of the scene has been set.
+struct Versions {
+  std::uint64_t scene = 0, smoothing = 0;
+  std::vector<std::uint64_t> positions, colors;  // [mesh]
+};
+
 }  // namespace
 
+/// Setters change what is here. A device's renderer catches up before its next chunk, so that an error of one
+/// device leaves no two of them with different scenes.
 struct MultiDeviceRenderer::Impl {
-  /// A device's renderer, and the losses of the chunks it has met.
+  /// A device's renderer, which version of the scene it has, and the losses of the chunks it has met.
   struct Worker {
     explicit Worker(const Device& device) : renderer(device) {}
     Renderer renderer;
+    Versions has;
+    std::uint64_t losses_of = 0;
     std::vector<std::optional<ImageLoss>> losses;  // [chunk]
     std::size_t views_rendered = 0;
   };
 
   std::vector<Worker> workers;
+  Scene scene;
+  Versions now;
   std::vector<View> views;
   std::vector<Chunk> chunks;
   LossWeights weights;
   std::vector<Image> targets;
+  std::uint64_t losses = 0;  // how often chunks or targets have changed
 
-  void replace_views(std::vector<View> new_views) {
-    views = std::move(new_views);
-    chunks = make_chunks(views.size());
-    forget_losses();
-  }
-
-  void forget_losses() {
-    for (Worker& worker : workers) {
-      worker.losses.clear();
-      worker.losses.resize(chunks.size());
+  void catch_up(Worker& worker) const {
+    Renderer& renderer = worker.renderer;
+    if (worker.has.scene != now.scene) {
+      Versions all = now;
+      renderer.set_scene(scene);
+      std::swap(worker.has, all);
+      return;
+    }
+    if (worker.has.smoothing != now.smoothing) {
+      renderer.set_smoothing(scene.smoothing);
+      worker.has.smoothing = now.smoothing;
+    }
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      if (worker.has.positions[m] != now.positions[m]) {
+        renderer.set_positions(m, scene.meshes[m].mesh.positions);
+        worker.has.positions[m] = now.positions[m];
+      }
+      if (worker.has.colors[m] != now.colors[m]) {
+        renderer.set_colors(m, colors_of(scene.meshes[m].mesh));
+        worker.has.colors[m] = now.colors[m];
+      }
     }
   }
 
@@ -142,6 +170,7 @@ struct MultiDeviceRenderer::Impl {
     const auto run = [&](Worker& worker) {
       for (std::size_t c = next++; c < chunks.size(); c = next++) {
         try {
+          catch_up(worker);
           worker.renderer.set_views(views_of(chunks[c]), chunks[c].first);
           worker.renderer.forward();
           work(worker, c);
@@ -163,6 +192,11 @@ struct MultiDeviceRenderer::Impl {
   }
 
   ImageLoss& loss_of(Worker& worker, std::size_t chunk) const {
+    if (worker.losses_of != losses) {
+      worker.losses.clear();
+      worker.losses.resize(chunks.size());
+      worker.losses_of = losses;
+    }
     std::optional<ImageLoss>& loss = worker.losses[chunk];
     if (!loss) {
       loss.emplace(worker.renderer.device(), weights,
@@ -174,7 +208,15 @@ struct MultiDeviceRenderer::Impl {
 
 MultiDeviceRenderer::MultiDeviceRenderer(std::vector<Device> devices) : impl_(std::make_unique<Impl>()) {
   if (devices.empty()) throw InvalidArgument("devices", "none", "at least one");
-  for (const Device& device : devices) impl_->workers.emplace_back(device);
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    for (std::size_t other = 0; other < d; ++other) {
+      if (&devices[d].impl() != &devices[other].impl()) continue;
+      throw InvalidArgument("devices[" + std::to_string(d) + "]",
+                            "the same Device as devices[" + std::to_string(other) + "]",
+                            "one with a queue of its own, open_device() or split_device()");
+    }
+    impl_->workers.emplace_back(devices[d]);
+  }
 }
 
 MultiDeviceRenderer::~MultiDeviceRenderer() = default;
@@ -183,27 +225,49 @@ MultiDeviceRenderer& MultiDeviceRenderer::operator=(MultiDeviceRenderer&&) noexc
 
 void MultiDeviceRenderer::set_scene(const Scene& scene) {
   validate(scene);
-  for (Impl::Worker& worker : impl_->workers) worker.renderer.set_scene(scene);
-  const std::span<const View> only = impl_->workers.front().renderer.views();
-  impl_->replace_views({only.begin(), only.end()});
+  Impl& m = *impl_;
+  Scene new_scene = scene;
+  std::vector<View> only{own_view(scene)};
+  std::vector<Chunk> chunks = make_chunks(1, 1);
+  Versions versions{m.now.scene + 1, 0, std::vector<std::uint64_t>(scene.meshes.size()),
+                    std::vector<std::uint64_t>(scene.meshes.size())};
+  std::swap(m.scene, new_scene);
+  std::swap(m.views, only);
+  std::swap(m.chunks, chunks);
+  std::swap(m.now, versions);
+  ++m.losses;
 }
 
 void MultiDeviceRenderer::set_views(std::span<const View> views) {
-  impl_->require_views("MultiDeviceRenderer::set_views");
-  impl_->workers.front().renderer.set_views(views);  // checks them
-  impl_->replace_views({views.begin(), views.end()});
+  Impl& m = *impl_;
+  m.require_views("MultiDeviceRenderer::set_views");
+  check_views(m.scene, views);
+  std::vector<View> new_views(views.begin(), views.end());
+  std::vector<Chunk> chunks = make_chunks(views.size(), most_views(m.scene));
+  std::swap(m.views, new_views);
+  std::swap(m.chunks, chunks);
+  ++m.losses;
 }
 
 void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
-  for (Impl::Worker& worker : impl_->workers) worker.renderer.set_smoothing(smoothing);
+  impl_->require_views("MultiDeviceRenderer::set_smoothing");
+  validate(smoothing);
+  impl_->scene.smoothing = smoothing;
+  ++impl_->now.smoothing;
 }
 
 void MultiDeviceRenderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  for (Impl::Worker& worker : impl_->workers) worker.renderer.set_positions(mesh, positions);
+  impl_->require_views("MultiDeviceRenderer::set_positions");
+  check_positions(impl_->scene, mesh, positions);
+  std::ranges::copy(positions, impl_->scene.meshes[mesh].mesh.positions.begin());
+  ++impl_->now.positions[mesh];
 }
 
 void MultiDeviceRenderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  for (Impl::Worker& worker : impl_->workers) worker.renderer.set_colors(mesh, colors);
+  impl_->require_views("MultiDeviceRenderer::set_colors");
+  check_colors(impl_->scene, mesh, colors);
+  std::ranges::copy(colors, colors_of(impl_->scene.meshes[mesh].mesh).begin());
+  ++impl_->now.colors[mesh];
 }
 
 std::vector<Image> MultiDeviceRenderer::render() {
@@ -236,9 +300,10 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
 void MultiDeviceRenderer::set_loss(LossWeights weights, std::span<const Image> targets) {
   impl_->require_views("MultiDeviceRenderer::set_loss");
   check_loss(weights, targets);
+  std::vector<Image> new_targets(targets.begin(), targets.end());
   impl_->weights = weights;
-  impl_->targets.assign(targets.begin(), targets.end());
-  impl_->forget_losses();
+  std::swap(impl_->targets, new_targets);
+  ++impl_->losses;
 }
 
 MultiDeviceRenderer::Evaluation MultiDeviceRenderer::evaluate() {

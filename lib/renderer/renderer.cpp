@@ -1,69 +1,13 @@
 // The pipeline: the stages in order, then in reverse.
 #include "dpr/renderer.hpp"
 
-#include <array>
 #include <atomic>
-#include <cmath>
 
-#include "base/checks.hpp"
+#include "dpr/error.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
 namespace {
-
-/// A row of an affine matrix: linear part and translation.
-cl_float4 matrix_row(const glm::mat4& m, int row) { return {{m[0][row], m[1][row], m[2][row], m[3][row]}}; }
-
-shared::ViewParams view_params(const Camera& camera, int width, int height) {
-  const Projection projected = projection(camera, width, height);
-  const glm::dmat4 to_world = glm::inverse(glm::dmat4(camera.view));
-  shared::ViewParams v{};
-  for (int row = 0; row < 3; ++row) v.row[row] = matrix_row(camera.view, row);
-  v.projection = {{projected.scale.x, projected.scale.y, projected.offset.x, projected.offset.y}};
-  v.eye = to_cl(glm::vec3(to_world[3]));
-  v.znear = camera.znear;
-  v.zfar = camera.zfar;
-  v.inverse_range = 1.0F / (camera.zfar - camera.znear);
-  return v;
-}
-
-shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
-                                 std::size_t first_view) {
-  shared::FrameParams p{};
-  p.views = static_cast<cl_uint>(views);
-  p.first_view = static_cast<cl_uint>(first_view);
-  p.meshes = static_cast<cl_uint>(scene.meshes.size());
-  p.vertices = static_cast<cl_uint>(geometry.vertices);
-  p.faces = static_cast<cl_uint>(geometry.faces);
-  p.position_stride = geometry.view_positions.size() != 0 ? p.vertices : 0;
-  p.color_stride = geometry.view_colors.size() != 0 ? static_cast<cl_uint>(geometry.colors) : 0;
-  p.width = static_cast<cl_uint>(scene.width);
-  p.height = static_cast<cl_uint>(scene.height);
-  p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
-  p.tiles_y = (p.height + DPR_TILE - 1) / DPR_TILE;
-  p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height));
-  p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
-  const float radius = blur_radius(scene.smoothing);
-  p.blur_distance = p.euclidean != 0 ? radius : std::sqrt(radius);
-  p.perspective_correct = scene.perspective_correct ? 1 : 0;
-  return p;
-}
-
-void check_frame_size(const shared::FrameParams& p) {
-  // The noise of a view is named by its number, in what the counter has left for it.
-  constexpr cl_uint most_views = 1U << 30U;
-  if (p.first_view > most_views - p.views) {
-    throw InvalidArgument("first_view (Renderer::set_views)", std::to_string(p.first_view),
-                          "at most " + std::to_string(most_views - p.views));
-  }
-  const double largest = 4294967295.0;
-  const auto views = static_cast<double>(p.views);
-  const double pixels = views * p.width * p.height;
-  const double corners = views * std::max(p.vertices * double{DPR_POSE_CHANNELS}, p.faces * 3.0);
-  if (std::max(pixels * DPR_PIXEL_CHANNELS, corners) < largest) return;
-  throw InvalidArgument("views (frame)", std::to_string(p.views),
-                        "fewer, so that pixels and vertices can be counted");
-}
 
 /// Gradients that come by way of the vertices.
 bool is_geometric(const GradientRequest& wanted) {
@@ -99,60 +43,6 @@ void Renderer::Impl::require_forward(const char* caller) {
   if (!rendered)
     throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
   settle();
-}
-
-void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
-  if (new_views.empty()) throw InvalidArgument("views", "none", "at least one");
-  std::vector<shared::ViewParams> cameras;
-  std::vector<cl_float4> models;
-  std::vector<cl_uint> starts{0};
-  for (std::size_t v = 0; v < new_views.size(); ++v) {
-    const View& view = new_views[v];
-    validate(view.camera);
-    if (view.transforms.size() != scene.meshes.size()) {
-      throw InvalidArgument(checks::element("views", v) + ".transforms",
-                            std::to_string(view.transforms.size()),
-                            "one for each of the " + std::to_string(scene.meshes.size()) + " meshes");
-    }
-    cameras.push_back(view_params(view.camera, scene.width, scene.height));
-    for (std::size_t m = 0; m < view.transforms.size(); ++m) {
-      checks::require_affine(view.transforms[m],
-                             checks::element(checks::element("views", v) + ".transforms", m));
-      for (int row = 0; row < 3; ++row) models.push_back(matrix_row(view.transforms[m], row));
-      starts.push_back(starts.back() + static_cast<cl_uint>(geometry->meshes[m].vertices));
-    }
-  }
-  check_frame_size(frame_params(scene, *geometry, new_views.size(), first_view));
-
-  geometry->view_positions.resize(device.impl(), 0);
-  geometry->view_colors.resize(device.impl(), 0);
-  const shared::FrameParams wanted = frame_params(scene, *geometry, new_views.size(), first_view);
-  if (wanted.views != frame.views) last_counts.reset();
-  frame = wanted;
-  views.assign(new_views.begin(), new_views.end());
-  device_views.cameras.upload(device.impl(), cameras);
-  device_views.models.upload(device.impl(), models);
-  view_vertex_starts.upload(device.impl(), starts);
-  const std::array<cl_uint, 2> pixels{0, frame.views * frame.width * frame.height};
-  all_pixels.upload(device.impl(), pixels);
-  rendered = false;
-}
-
-void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
-  geometry->view_positions.resize(device.impl(), positions.size());
-  geometry->view_colors.resize(device.impl(), colors.size());
-  write_range(device.impl(), geometry->view_positions, 0, positions);
-  write_range(device.impl(), geometry->view_colors, 0, colors);
-  frame = frame_params(scene, *geometry, views.size(), frame.first_view);
-  rendered = false;
-}
-
-void Renderer::Impl::set_smoothing(const Smoothing& smoothing) {
-  occupancy.set_smoothing(smoothing);
-  aggregate.set_smoothing(smoothing);
-  scene.smoothing = smoothing;
-  if (!views.empty()) frame = frame_params(scene, *geometry, views.size(), frame.first_view);
-  rendered = false;
 }
 
 void Renderer::Impl::forward() {
@@ -200,8 +90,10 @@ void Renderer::Impl::settle() {
   const bool fits = found.fit(*room);
   room.reset();
   if (fits) {
-    bin.pairs = found.pairs;
-    bands = {rasterize.set_counts(frame, found)};
+    bin.settle(found.pairs);
+    bands = {rasterize.settle(frame, found)};
+    shade.settle(found.fragments);
+    occupancy.settle(found.fragments);
     last_counts = found;
     return;
   }
@@ -221,7 +113,8 @@ void Renderer::Impl::shade_and_aggregate() {
   aggregate.forward(aggregate_inputs(), scene.background);
 }
 
-SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images, MeshLoss::Impl* mesh_loss) {
+SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
+                                       const AddToGradient& add_to_positions) {
   const GradientRequest& wanted = scene.gradients;
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
@@ -238,7 +131,7 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images, Mes
   gradient.views.resize(views.size());
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
   read_summed_gradients(gradient);
-  read_mesh_gradients(gradient, mesh_loss);
+  read_mesh_gradients(gradient, add_to_positions);
   return gradient;
 }
 
@@ -266,10 +159,10 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
-         (aov ? aov->bytes() : 0) + device_views.cameras.capacity_bytes() +
-         device_views.models.capacity_bytes() + view_vertex_starts.capacity_bytes() +
-         all_pixels.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
-         grad_world.capacity_bytes() + grad_colors.capacity_bytes();
+         (aov ? aov->bytes() : 0) + ViewSet::bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
+         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
+         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
+         grad_colors.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -6,6 +6,7 @@
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "renderer/setter_checks.hpp"
 
 namespace dpr {
 
@@ -16,65 +17,31 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 void Renderer::set_scene(const Scene& scene) {
   validate(scene);
-  Impl& m = *impl_;
-  m.scene = scene;
-  m.views.clear();
-  m.last_counts.reset();
-  m.rendered = false;
-  m.geometry.emplace(m.device.impl(), scene);
-  m.shade.set_lights(scene.lights);
-  m.set_smoothing(scene.smoothing);
-  View view{scene.camera, {}};
-  for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
-  m.set_views(std::span(&view, 1), 0);
+  impl_->set_scene(scene);
 }
 
 void Renderer::set_views(std::span<const View> views, std::size_t first_view) {
   impl_->require_scene("Renderer::set_views");
+  check_views(impl_->scene, views);
   impl_->set_views(views, first_view);
 }
 
 void Renderer::set_smoothing(const Smoothing& smoothing) {
   impl_->require_scene("Renderer::set_smoothing");
   validate(smoothing);
-  impl_->set_smoothing(smoothing);
+  impl_->set(impl_->prepare(smoothing));
 }
-
-namespace {
-
-void check_values(const std::string& name, std::span<const glm::vec3> values, std::size_t expected) {
-  if (values.size() != expected) {
-    throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
-  }
-  for (std::size_t i = 0; i < values.size(); ++i) checks::require_finite(values[i], checks::element(name, i));
-}
-
-}  // namespace
 
 void Renderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  Impl& m = *impl_;
-  m.require_scene("Renderer::set_positions");
-  if (mesh >= m.scene.meshes.size()) {
-    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
-  }
-  check_values("positions", positions, m.scene.meshes[mesh].mesh.positions.size());
-  m.scene.meshes[mesh].mesh.positions.assign(positions.begin(), positions.end());
-  write_range(m.device.impl(), m.geometry->positions, m.geometry->meshes[mesh].first_vertex, positions);
-  m.rendered = false;
+  impl_->require_scene("Renderer::set_positions");
+  check_positions(impl_->scene, mesh, positions);
+  impl_->set_positions(mesh, positions);
 }
 
 void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  Impl& m = *impl_;
-  m.require_scene("Renderer::set_colors");
-  if (mesh >= m.scene.meshes.size()) {
-    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(m.scene.meshes.size()));
-  }
-  Mesh& target = m.scene.meshes[mesh].mesh;
-  std::vector<glm::vec3>& values = target.vertex_colors.empty() ? target.face_colors : target.vertex_colors;
-  check_values("colors", colors, values.size());
-  values.assign(colors.begin(), colors.end());
-  write_range(m.device.impl(), m.geometry->color_values, m.geometry->meshes[mesh].first_color, colors);
-  m.rendered = false;
+  impl_->require_scene("Renderer::set_colors");
+  check_colors(impl_->scene, mesh, colors);
+  impl_->set_colors(mesh, colors);
 }
 
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
@@ -194,7 +161,10 @@ SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_los
     throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
                           "GradientRequest::positions");
   }
-  return impl_->backward(loss.impl().grad_image, &mesh_loss.impl());
+  return impl_->backward(loss.impl().grad_image,
+                         [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
+                           mesh_loss.impl().add_gradient(positions, grad);
+                         });
 }
 
 RenderStatistics Renderer::statistics() const {
@@ -221,7 +191,13 @@ SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
   Renderer::Impl& m = renderer.impl();
   m.require_forward("backward");
   const std::size_t count = m.aggregate.image.size();
-  const std::size_t bytes = grad_images.getInfo<CL_MEM_SIZE>();
+  cl::Context context;
+  std::size_t bytes = 0;
+  check_cl(grad_images.getInfo(CL_MEM_CONTEXT, &context), "clGetMemObjectInfo");
+  check_cl(grad_images.getInfo(CL_MEM_SIZE, &bytes), "clGetMemObjectInfo");
+  if (context() != m.device.impl().context()) {
+    throw InvalidArgument("grad_images", "a buffer of another context", "one of the device's own");
+  }
   if (bytes < count * sizeof(cl_float4)) {
     throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
                           std::to_string(count * sizeof(cl_float4)));

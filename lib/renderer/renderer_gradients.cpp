@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "loss/mesh_loss_impl.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
@@ -27,9 +26,9 @@ bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.
 
 }  // namespace
 
-void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl* mesh_loss) {
+void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, const AddToGradient& add_to_positions) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
-  if (mesh_loss != nullptr) mesh_loss->add_gradient(geometry->positions, transform.grad_positions);
+  if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
   const bool colors = scene.gradients.colors &&
                       std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
   if (colors && frame.color_stride != 0) {

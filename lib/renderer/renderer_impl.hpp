@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/aov.hpp"
@@ -22,18 +22,44 @@
 
 namespace dpr {
 
-struct Renderer::Impl {
+/// The views on the host and on the device, and what the kernels read of every frame of theirs.
+struct ViewSet {
+  std::vector<View> views;
+  DeviceViews device_views;
+  Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
+  Buffer<cl_uint> all_pixels;          // [2]: one segment
+  shared::FrameParams frame{};
+
+  std::size_t bytes() const;
+};
+
+/// The smoothing of every stage.
+struct SmoothingSetting {
+  Occupancy::Setting occupancy;
+  Aggregate::Setting aggregate;
+  float blur_distance;
+};
+
+/// Adds a gradient of the positions ([vertex], object space) to the one that is there.
+using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad)>;
+
+/// Setters come in two halves: the first prepares everything that can fail beside what is in force, the
+/// second swaps it in and cannot fail. What it replaced is freed or kept as room for the next.
+struct Renderer::Impl : ViewSet {
   explicit Impl(Device device);
 
+  /// What the setters are given is checked already.
+  void set_scene(const Scene& scene);
   void set_views(std::span<const View> views, std::size_t first_view);
-  /// Checked already.
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
-  void set_smoothing(const Smoothing& smoothing);
+  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
+  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+  SmoothingSetting prepare(const Smoothing& smoothing) const;
+  void set(SmoothingSetting&& prepared) noexcept;
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
   /// blocks to read the sizes to allocate.
   void forward();
-  /// `mesh_loss`, where there is one, adds its gradient to that of the positions.
-  SceneGradient backward(const Buffer<cl_float4>& grad_images, MeshLoss::Impl* mesh_loss = nullptr);
+  SceneGradient backward(const Buffer<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
   /// Fills `aov` for the last frame, if it does not hold that already.
   void render_aov();
 
@@ -47,17 +73,12 @@ struct Renderer::Impl {
 
   Device device;
   Scene scene;
-  std::vector<View> views;
   bool rendered = false;            // the stages hold the frame of the current scene, or it is on the way
   std::optional<FrameCounts> room;  // that it was given, until it is known to fit
   std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
   std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
 
   std::optional<Geometry> geometry;
-  DeviceViews device_views;
-  Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
-  Buffer<cl_uint> all_pixels;          // [2]: one segment
-  shared::FrameParams frame{};
   std::vector<Band> bands;  // of the last forward()
 
   Transform transform;
@@ -76,6 +97,11 @@ struct Renderer::Impl {
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
 
  private:
+  void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
+            std::size_t first_view) const;
+  void set(ViewSet& prepared) noexcept;
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
+
   ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
@@ -89,8 +115,12 @@ struct Renderer::Impl {
   void shade_and_aggregate();
   void differentiate(const Buffer<cl_float4>& grad_images);
 
-  void read_mesh_gradients(SceneGradient& gradient, MeshLoss::Impl* mesh_loss);
+  void read_mesh_gradients(SceneGradient& gradient, const AddToGradient& add_to_positions);
   void read_summed_gradients(SceneGradient& gradient);
+
+  // Where the next setter prepares what it sets.
+  ViewSet spare_views_;
+  Buffer<cl_float4> spare_values_, spare_view_positions_, spare_view_colors_;
 };
 
 }  // namespace dpr

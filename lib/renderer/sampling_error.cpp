@@ -52,6 +52,9 @@ void transform_numbers(SceneGradient& gradient, F f) {
       for (glm::vec3& v : *list) three(v);
     }
   }
+  for (auto* list : {&gradient.shapes.positions, &gradient.shapes.colors}) {
+    for (glm::vec3& v : *list) three(v);
+  }
   for (ViewGradient& view : gradient.views) {
     pose(view.camera.view);
     one(view.camera.fov_y_degrees);
@@ -153,13 +156,16 @@ class Replicates {
 /// The renderer's smoothing, and a request that computes the gradients of distances; put back at the end.
 class Restored {
  public:
-  explicit Restored(Renderer& renderer) : renderer_(renderer), smoothing_(renderer.scene().smoothing) {
-    request_ = renderer.impl().scene.gradients;
-    renderer.impl().scene.gradients.smoothing = true;
+  explicit Restored(Renderer::Impl& renderer)
+      : renderer_(renderer),
+        smoothing_(renderer.scene.smoothing),
+        prepared_(renderer.prepare(smoothing_)),
+        request_(renderer.scene.gradients) {
+    renderer.scene.gradients.smoothing = true;
   }
   ~Restored() {
-    renderer_.impl().scene.gradients = request_;
-    if (renderer_.scene().smoothing.seed != smoothing_.seed) renderer_.set_smoothing(smoothing_);
+    renderer_.scene.gradients = request_;
+    if (renderer_.scene.smoothing.seed != smoothing_.seed) renderer_.set(std::move(prepared_));
   }
   Restored(const Restored&) = delete;
   Restored& operator=(const Restored&) = delete;
@@ -168,8 +174,9 @@ class Restored {
   const GradientRequest& request() const { return request_; }
 
  private:
-  Renderer& renderer_;
+  Renderer::Impl& renderer_;
   Smoothing smoothing_;
+  SmoothingSetting prepared_;
   GradientRequest request_;
 };
 
@@ -177,7 +184,7 @@ SamplingError replicate(Renderer& renderer, unsigned replicates,
                         const std::function<SceneGradient()>& backward) {
   require(replicates >= 2, "replicates (sampling error)", replicates, "at least 2");
   renderer.impl().require_scene("estimate_sampling_error");
-  const Restored restored(renderer);
+  const Restored restored(renderer.impl());
   const Smoothing& own = restored.smoothing();
   Replicates found(renderer.impl());
   // The renderer's own seed comes last. Exact estimators need no second frame.

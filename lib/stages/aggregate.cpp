@@ -31,39 +31,32 @@ Aggregate::JointSampled::JointSampled(Device::Impl& device, const std::string& o
     : forward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_forward", options),
       backward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_backward", options) {}
 
-void Aggregate::set_smoothing(const Smoothing& smoothing) {
+Aggregate::Setting Aggregate::prepare(const Smoothing& smoothing) const {
+  Setting prepared{smoothing, now_.kernels};
   const std::string options = prior_options(smoothing);
   const std::string wanted = std::string(to_string(smoothing.composition)) +
                              std::string(to_string(smoothing.aggregation_estimator)) + options;
-  if (wanted != built_) {
-    // New kernels first: if they do not build, the old ones stay.
-    const bool exact = smoothing.aggregation_estimator == Estimator::exact;
-    std::optional<Exact> new_exact;
-    std::optional<Sampled> new_sampled;
-    std::optional<JointSampled> new_joint_sampled;
-    if (exact) {
-      new_exact.emplace(device_, smoothing.composition, options);
-    } else if (samples_jointly(smoothing)) {
-      new_joint_sampled.emplace(device_, options);
-    } else {
-      new_sampled.emplace(device_, options);
-    }
-    exact_ = std::move(new_exact);
-    sampled_ = std::move(new_sampled);
-    joint_sampled_ = std::move(new_joint_sampled);
-    built_ = wanted;
+  if (prepared.kernels && prepared.kernels->built == wanted) return prepared;
+  prepared.kernels = std::make_shared<Kernels>();
+  prepared.kernels->built = wanted;
+  if (smoothing.aggregation_estimator == Estimator::exact) {
+    prepared.kernels->exact.emplace(device_, smoothing.composition, options);
+  } else if (samples_jointly(smoothing)) {
+    prepared.kernels->joint_sampled.emplace(device_, options);
+  } else {
+    prepared.kernels->sampled.emplace(device_, options);
   }
-  smoothing_ = smoothing;
+  return prepared;
 }
 
 shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {
   shared::AggregateParams a{};
   a.background = to_cl(background);
-  a.sigma = smoothing_.sigma;
-  a.gamma = smoothing_.gamma;
-  a.alpha = smoothing_.alpha;
-  a.background_depth = smoothing_.background_depth;
-  a.sampling = sampling_params(smoothing_);
+  a.sigma = now_.smoothing.sigma;
+  a.gamma = now_.smoothing.gamma;
+  a.alpha = now_.smoothing.alpha;
+  a.background_depth = now_.smoothing.background_depth;
+  a.sampling = sampling_params(now_.smoothing);
   a.pixels_per_view = p.width * p.height;
   a.pixels = p.views * a.pixels_per_view;
   a.faces = p.faces;
@@ -76,20 +69,20 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   image.resize(device_, a.pixels);
   const Range pixels = in.rasterize.pixels(in.p);
   const Rasterize& r = in.rasterize;
-  if (exact_) {
+  if (now_.kernels->exact) {
     slots_.resize(device_, r.listed_fragments + a.pixels);
     slot_counts_.resize(device_, a.pixels);
-    exact_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                    in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_,
-                    image);
-  } else if (joint_sampled_) {
-    joint_sampled_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth,
-                            in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face,
-                            image);
+    now_.kernels->exact->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                                 in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
+                                 in.shade.green, in.shade.blue, slots_, slot_counts_, image);
+  } else if (now_.kernels->joint_sampled) {
+    now_.kernels->joint_sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance,
+                                         r.depth, in.shade.red, in.shade.green, in.shade.blue,
+                                         r.fragment_pair, in.bin.pair_face, image);
   } else {
-    sampled_->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                      in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
-                      in.shade.blue, r.fragment_pair, in.bin.pair_face, image);
+    now_.kernels->sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                                   in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
+                                   in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face, image);
   }
 }
 
@@ -103,23 +96,24 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
   channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
   const Range pixels = in.rasterize.pixels(in.p);
   const Rasterize& r = in.rasterize;
-  if (exact_) {
-    exact_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-                     in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_,
-                     slot_counts_, grad_image, grad_depth, grad_log_occupancy, grad_color.red,
-                     grad_color.green, grad_color.blue, channels);
-  } else if (joint_sampled_) {
+  if (now_.kernels->exact) {
+    now_.kernels->exact->backward(
+        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
+        in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_, grad_image,
+        grad_depth, grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
+  } else if (now_.kernels->joint_sampled) {
     grad_distance.resize(device_, in.rasterize.fragments);
     grad_sigma.resize(device_, a.pixels);
-    joint_sampled_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth,
-                             in.shade.red, in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face,
-                             grad_image, grad_distance, grad_depth, grad_color.red, grad_color.green,
-                             grad_color.blue, grad_sigma, channels);
+    now_.kernels->joint_sampled->backward(
+        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth, in.shade.red,
+        in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_distance,
+        grad_depth, grad_color.red, grad_color.green, grad_color.blue, grad_sigma, channels);
   } else {
-    sampled_->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                       in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red, in.shade.green,
-                       in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_depth,
-                       grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
+    now_.kernels->sampled->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
+                                    in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face,
+                                    grad_image, grad_depth, grad_log_occupancy, grad_color.red,
+                                    grad_color.green, grad_color.blue, channels);
   }
 }
 

@@ -1,7 +1,10 @@
 // The perturbed arg-max of every pixel: the image, and the gradients of what it is made of.
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
@@ -26,8 +29,18 @@ class Aggregate {
  public:
   explicit Aggregate(Device::Impl& device) : device_(device) {}
 
-  /// Builds what the smoothing needs; cheap where that is there already.
-  void set_smoothing(const Smoothing& smoothing);
+  struct Kernels;
+  /// A smoothing with the kernels that it needs.
+  struct Setting {
+    Smoothing smoothing;
+    std::shared_ptr<Kernels> kernels;
+  };
+
+  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
+  /// already.
+  Setting prepare(const Smoothing& smoothing) const;
+  void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
+  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
 
   /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
   void forward(const AggregateInputs& in, const glm::vec3& background);
@@ -44,7 +57,7 @@ class Aggregate {
 
   /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
   /// written, but these are.
-  bool perturbs_distances() const { return joint_sampled_.has_value(); }
+  bool perturbs_distances() const;
   Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
   Buffer<float> grad_sigma;     ///< [view][height][width]
 
@@ -89,13 +102,19 @@ class Aggregate {
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
 
   Device::Impl& device_;
-  Smoothing smoothing_;
-  std::string built_;
+  Setting now_;
   Buffer<shared::Slot> slots_;   // [listed fragment + pixel]
   Buffer<cl_uint> slot_counts_;  // [pixel]
-  std::optional<Exact> exact_;
-  std::optional<Sampled> sampled_;
-  std::optional<JointSampled> joint_sampled_;
 };
+
+/// Of one composition, estimator and prior; `built` names them.
+struct Aggregate::Kernels {
+  std::string built;
+  std::optional<Exact> exact;
+  std::optional<Sampled> sampled;
+  std::optional<JointSampled> joint_sampled;
+};
+
+inline bool Aggregate::perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
 
 }  // namespace dpr

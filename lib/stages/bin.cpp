@@ -12,13 +12,21 @@ Bin::Bin(Device::Impl& device)
 
 void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
   count(p, triangles);
-  list(p, triangles,
-       read_total(pair_starts, std::size_t{p.views} * p.faces, "pairs of tiles and triangles (frame)"));
+  const std::size_t found =
+      read_total(pair_starts, std::size_t{p.views} * p.faces, "pairs of tiles and triangles (frame)");
+  list(p, triangles, found);
+  settle(found);
 }
 
 void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room) {
   count(p, triangles);
   list(p, triangles, room);
+}
+
+void Bin::settle(std::size_t known_pairs) {
+  pairs = known_pairs;
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
+    buffer->settle(known_pairs);
 }
 
 void Bin::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
@@ -32,7 +40,7 @@ void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& tri
   pairs = room;
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
-    buffer->resize(device_, pairs);
+    buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
   fill_(std::size_t{p.views} * p.faces, p, n, triangles, pair_starts, pair_count, place_face_, pair_tile,
         places_);

@@ -17,6 +17,8 @@ class Bin {
   /// With room for so many pairs, without waiting to learn how many there are. If they are more, there are
   /// none.
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room);
+  /// Says how many pairs there are, after a forward() that did not wait for it.
+  void settle(std::size_t known_pairs);
 
   std::size_t pairs = 0;        ///< or how many there is room for, until it is known
   Buffer<cl_uint> pair_count;   ///< [1] how many there are, 0 where they do not fit

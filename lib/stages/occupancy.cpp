@@ -31,30 +31,30 @@ Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
     : forward(device, "occupancy_sampled.cl", "occupancy_sampled_forward", options),
       backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
 
-void Occupancy::set_smoothing(const Smoothing& smoothing) {
-  if (samples_jointly(smoothing)) return;
+Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
+  Setting prepared{smoothing, now_.kernels};
+  if (samples_jointly(smoothing)) return prepared;
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
   const bool variable = smoothing.occupancy_width == OccupancyWidth::variable;
   const std::string options =
       prior_option(smoothing.occupancy_prior) + (variable ? " -DDPR_VARIABLE_WIDTH" : "");
   const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
-  if (wanted != built_) {
-    // New kernels first: if they do not build, the old ones stay.
-    std::optional<Exact> new_exact;
-    std::optional<Sampled> new_sampled;
-    if (exact) new_exact.emplace(device_, options);
-    if (!exact) new_sampled.emplace(device_, options);
-    exact_ = std::move(new_exact);
-    sampled_ = std::move(new_sampled);
-    built_ = wanted;
-  }
-  smoothing_ = smoothing;
+  if (prepared.kernels && prepared.kernels->built == wanted) return prepared;
+  prepared.kernels = std::make_shared<Kernels>();
+  prepared.kernels->built = wanted;
+  if (exact) prepared.kernels->exact.emplace(device_, options);
+  if (!exact) prepared.kernels->sampled.emplace(device_, options);
+  return prepared;
+}
+
+void Occupancy::settle(std::size_t fragments) {
+  for (Buffer<float>* buffer : {&log_occupancy, &occupancy}) buffer->settle(fragments);
 }
 
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   shared::OccupancyParams o{};
-  o.sigma = smoothing_.sigma;
-  o.sampling = sampling_params(smoothing_);
+  o.sigma = now_.smoothing.sigma;
+  o.sampling = sampling_params(now_.smoothing);
   o.width = p.width;
   o.faces = p.faces;
   o.first_view = p.first_view;
@@ -62,16 +62,16 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
 }
 
 void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize) {
-  log_occupancy.resize(device_, rasterize.fragments);
-  occupancy.resize(device_, rasterize.fragments);
+  log_occupancy.resize(device_, rasterize.fragment_length());
+  occupancy.resize(device_, rasterize.fragment_length());
   const Range pairs = rasterize.pairs(bin);
-  if (exact_) {
+  if (now_.kernels->exact) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    exact_->forward((rasterize.fragments + width - 1) / width, params(p), pairs.last(),
-                    rasterize.fragment_starts, rasterize.distance, log_occupancy, occupancy);
+    now_.kernels->exact->forward((rasterize.fragments + width - 1) / width, params(p), pairs.last(),
+                                 rasterize.fragment_starts, rasterize.distance, log_occupancy, occupancy);
   } else {
-    sampled_->forward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
-                      rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);
+    now_.kernels->sampled->forward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
+                                   rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);
   }
 }
 
@@ -80,13 +80,13 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
   const Range pairs = rasterize.pairs(bin);
   grad_distance.resize(device_, rasterize.fragments);
   grad_sigma.resize(device_, bin.pairs);
-  if (exact_) {
-    exact_->backward(pairs, params(p), pairs.last(), rasterize.masks, rasterize.fragment_starts,
-                     rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
+  if (now_.kernels->exact) {
+    now_.kernels->exact->backward(pairs, params(p), pairs.last(), rasterize.masks, rasterize.fragment_starts,
+                                  rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
   } else {
-    sampled_->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.masks,
-                       rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, occupancy,
-                       grad_log_occupancy, grad_distance, grad_sigma);
+    now_.kernels->sampled->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.masks,
+                                    rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance,
+                                    occupancy, grad_log_occupancy, grad_distance, grad_sigma);
   }
 }
 

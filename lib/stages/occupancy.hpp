@@ -2,7 +2,10 @@
 // stage: there aggregation perturbs the distances together with the depths.
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
@@ -15,12 +18,24 @@ class Occupancy {
  public:
   explicit Occupancy(Device::Impl& device) : device_(device) {}
 
-  /// Builds what the smoothing needs; cheap where that is there already.
-  void set_smoothing(const Smoothing& smoothing);
+  struct Kernels;
+  /// A smoothing with the kernels that it needs.
+  struct Setting {
+    Smoothing smoothing;
+    std::shared_ptr<Kernels> kernels;
+  };
+
+  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
+  /// already.
+  Setting prepare(const Smoothing& smoothing) const;
+  void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
+  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
 
   void forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize);
   void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                 const Buffer<float>& grad_log_occupancy);
+  /// Says how many fragments there are, where forward() could not know.
+  void settle(std::size_t fragments);
 
   static constexpr std::size_t k_fragment_bytes = 3 * sizeof(float);  ///< of those below
 
@@ -52,10 +67,14 @@ class Occupancy {
   shared::OccupancyParams params(const shared::FrameParams& p) const;
 
   Device::Impl& device_;
-  Smoothing smoothing_;
-  std::string built_;
-  std::optional<Exact> exact_;
-  std::optional<Sampled> sampled_;
+  Setting now_;
+};
+
+/// Of one estimator and prior; `built` names them.
+struct Occupancy::Kernels {
+  std::string built;
+  std::optional<Exact> exact;
+  std::optional<Sampled> sampled;
 };
 
 /// The build option that chooses a prior.

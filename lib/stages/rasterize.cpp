@@ -36,10 +36,10 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
                       const Bin& bin) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = pixels_of(p);
-  masks.resize(device_, pairs);
+  masks.resize(device_, length(pairs));
   counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
   cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
-  scan_(pairs, counts_, fragment_starts);
+  scan_(length(pairs), counts_, fragment_starts);
   count_(tiles_of(p) * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
 
@@ -51,6 +51,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
 
 void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                       const Bin& bin) {
+  counted_ = true;
   count(p, triangles, bin);
   row_starts_.clear();
   for (const cl_uint4& row : device_rows_.download()) row_starts_.push_back({row.s[0], row.s[1], row.s[2]});
@@ -124,9 +125,11 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
   if (next.tiles.count < tiles_of(p)) rebase(next);
   band = next;
   fragments = next.fragments.count;
-  list.resize(device_, next.listed.count);
-  for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel}) buffer->resize(device_, fragments);
-  for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->resize(device_, fragments);
+  list.resize(device_, length(next.listed.count));
+  for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel})
+    buffer->resize(device_, fragment_length());
+  for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2})
+    buffer->resize(device_, fragment_length());
   const std::size_t vectors = vectors_of_tile(device_);
   const Range listing(next.tiles.first * vectors, next.tiles.count * vectors);
   list_(listing, p, listing.last(), bin.tile_starts, masks, fragment_starts, pixel_starts, list);
@@ -142,6 +145,7 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
 
 void Rasterize::forward_within(const FrameCounts& room, const shared::FrameParams& p,
                                const Buffer<shared::Triangle>& triangles, const Bin& bin) {
+  counted_ = false;
   count(p, triangles, bin);
   const std::size_t last_row = device_rows_.size() - 1;
   last_row_.start(device_rows_, last_row);
@@ -158,10 +162,16 @@ FrameCounts Rasterize::read_counts() {
   return {last.s[3], last.s[1], last.s[2]};
 }
 
-Band Rasterize::set_counts(const shared::FrameParams& p, const FrameCounts& counts) {
+Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) {
   band = whole_frame(p, counts);
   fragments = counts.fragments;
   listed_fragments = counts.listed;
+  counted_ = true;
+  masks.settle(counts.pairs);
+  fragment_starts.settle(counts.pairs + 1);
+  list.settle(counts.listed);
+  for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel}) buffer->settle(fragments);
+  for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->settle(fragments);
   return *band;
 }
 

@@ -39,8 +39,9 @@ class Rasterize {
                       const Buffer<shared::Triangle>& triangles, const Bin& bin);
   /// What forward_within() found. Blocks until the device has counted, not until it has rendered.
   FrameCounts read_counts();
-  /// The whole frame as the band whose fragments these are, once their number is known.
-  Band set_counts(const shared::FrameParams& p, const FrameCounts& counts);
+  /// Says what the counts are, after a forward_within() whose room was enough. Returns the whole frame as the
+  /// band whose fragments these are.
+  Band settle(const shared::FrameParams& p, const FrameCounts& counts);
   /// Of a frame that cover() counted.
   FrameCounts counted() const;
   /// Room for so much and a little more, in the buffers that are there.
@@ -63,6 +64,9 @@ class Rasterize {
   Range pixels(const shared::FrameParams& p) const {
     return band ? band->pixels : Range(std::size_t{p.views} * p.width * p.height);
   }
+
+  /// Of what later stages hold of every fragment.
+  Length fragment_length() const { return length(fragments); }
 
   static constexpr std::size_t k_fragment_bytes =
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
@@ -89,6 +93,7 @@ class Rasterize {
 
   Band make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const;
   void rebase(const Band& next);
+  Length length(std::size_t count) const { return counted_ ? Length(count) : Length::at_most(count); }
   void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
 
   Device::Impl& device_;
@@ -113,6 +118,7 @@ class Rasterize {
   Buffer<cl_uint4> device_rows_;
   PendingRead<cl_uint4> last_row_;
   std::vector<RowStart> row_starts_;  // [view * tiles_y + 1]
+  bool counted_ = true;               // the counts are the frame's, not the room for them
   bool in_bands_ = false;             // the starts above are a band's, those below the frame's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };

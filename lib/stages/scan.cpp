@@ -10,9 +10,9 @@ Scan::Scan(Device::Impl& device)
   levels_.resize(4);  // 256^4 = 2^32 counts
 }
 
-void Scan::operator()(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets) {
-  offsets.resize(device_, count + 1);
-  scan_level(count, values, offsets, 0);
+void Scan::operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets) {
+  offsets.resize(device_, count.is_known ? Length(count.count + 1) : Length::at_most(count.count + 1));
+  scan_level(count.count, values, offsets, 0);
 }
 
 void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,

@@ -12,7 +12,7 @@ class Scan {
   explicit Scan(Device::Impl& device);
 
   /// offsets[i] = values[0] + ... + values[i - 1] for i in [0, count]; sums saturate at 2^32 - 1.
-  void operator()(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets);
+  void operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets);
 
   std::size_t bytes() const;
 

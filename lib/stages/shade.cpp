@@ -23,28 +23,31 @@ Shade::Shade(Device::Impl& device)
       forward_(device, "shade.cl", "shade_forward"),
       backward_(device, "shade.cl", "shade_backward") {}
 
-void Shade::set_lights(const std::optional<Lights>& lights) {
-  if (!lights) {
-    lit_.reset();
-    lighting_ = {};
-    return;
-  }
-  if (!lit_ || lit_->shading != lights->shading) lit_.emplace(device_, lights->shading);
-  lighting_.ambient = to_cl(lights->ambient);
-  lighting_.lights = static_cast<cl_uint>(lights->point.size());
-  lighting_.shininess = lights->shininess;
+Shade::Lighting Shade::prepare(const std::optional<Lights>& lights) const {
+  Lighting prepared;
+  if (!lights) return prepared;
+  const bool known = now_.kernels && now_.kernels->shading == lights->shading;
+  prepared.kernels = known ? now_.kernels : std::make_shared<LitShading>(device_, lights->shading);
+  prepared.params.ambient = to_cl(lights->ambient);
+  prepared.params.lights = static_cast<cl_uint>(lights->point.size());
+  prepared.params.shininess = lights->shininess;
   std::vector<shared::Light> values;
   for (const PointLight& light : lights->point) {
     values.push_back({to_cl(light.position), to_cl(light.diffuse), to_cl(light.specular)});
   }
   if (values.empty()) values.emplace_back();  // never read, but an argument all the same
-  lights_.upload(device_, values);
+  prepared.lights.upload(device_, values);
+  return prepared;
+}
+
+void Shade::settle(std::size_t fragments) {
+  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->settle(fragments);
 }
 
 void Shade::forward(const ShadeInputs& in) {
   const Range pairs = in.rasterize.pairs(in.bin);
-  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragments);
-  if (!lit_) {
+  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragment_length());
+  if (!now_.kernels) {
     forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
              in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
              red, green, blue);
@@ -52,21 +55,22 @@ void Shade::forward(const ShadeInputs& in) {
   }
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   normals_.resize(device_, vertices);
-  if (lit_->shading != Shading::flat) {
-    lit_->normals_forward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
-                          in.geometry.vertex_corners.corners, in.transform.world, normals_);
+  if (now_.kernels->shading != Shading::flat) {
+    now_.kernels->normals_forward(vertices, in.p, in.geometry.face_vertices,
+                                  in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
+                                  in.transform.world, normals_);
   }
-  lit_->forward(pairs, in.p, lighting_, pairs.last(), in.views.cameras, lights_, in.geometry.face_vertices,
-                in.geometry.face_colors, in.geometry.colors_of(in.p), in.transform.world, normals_,
-                in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, red,
-                green, blue);
+  now_.kernels->forward(pairs, in.p, now_.params, pairs.last(), in.views.cameras, now_.lights,
+                        in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
+                        in.transform.world, normals_, in.bin.pair_face, in.rasterize.fragment_starts,
+                        in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
 }
 
 void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   const Range pairs = in.rasterize.pairs(in.bin);
   for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
   grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
-  if (!lit_) {
+  if (!now_.kernels) {
     backward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
               in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
@@ -75,39 +79,41 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
-  lit_->backward(pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(), in.views.cameras,
-                 lights_, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
-                 in.transform.world, normals_, in.bin.pair_face, in.rasterize.masks,
-                 in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green,
-                 grad.blue, grad_bary1, grad_bary2, grad_corner_colors, grad_corner_positions_,
-                 grad_corner_normals_, grad_eye);
+  now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
+                         in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
+                         in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
+                         in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
+                         in.rasterize.bary2, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
+                         grad_corner_colors, grad_corner_positions_, grad_corner_normals_, grad_eye);
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_,
                   grad_world);
-  if (lit_->shading == Shading::flat) return;
+  if (now_.kernels->shading == Shading::flat) return;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_,
                   grad_normals_);
-  lit_->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
-  lit_->normals_backward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
-                         in.geometry.vertex_corners.corners, in.transform.world, grad_normals_, grad_world);
+  now_.kernels->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
+  now_.kernels->normals_backward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
+                                 in.geometry.vertex_corners.corners, in.transform.world, grad_normals_,
+                                 grad_world);
 }
 
 void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light) {
   const Range pairs = in.rasterize.pairs(in.bin);
   light_channels.resize(device_, light_sets() * k_light_channels * in.bin.pairs);
-  lit_->backward_lights(pairs, in.p, lighting_, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
-                        static_cast<cl_uint>(light), in.views.cameras, lights_, in.geometry.face_vertices,
-                        in.geometry.face_colors, in.geometry.colors_of(in.p), in.transform.world, normals_,
-                        in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
-                        in.rasterize.bary1, in.rasterize.bary2, grad.red, grad.green, grad.blue,
-                        light_channels);
+  now_.kernels->backward_lights(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
+                                static_cast<cl_uint>(light), in.views.cameras, now_.lights,
+                                in.geometry.face_vertices, in.geometry.face_colors,
+                                in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
+                                in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
+                                in.rasterize.bary2, grad.red, grad.green, grad.blue, light_channels);
 }
 
 std::size_t Shade::bytes() const {
-  std::size_t bytes = lights_.capacity_bytes() + normals_.capacity_bytes() + grad_normals_.capacity_bytes();
+  std::size_t bytes =
+      now_.lights.capacity_bytes() + normals_.capacity_bytes() + grad_normals_.capacity_bytes();
   for (const Buffer<float>* buffer :
        {&red, &green, &blue, &grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye, &light_channels,
         &grad_corner_positions_, &grad_corner_normals_}) {

@@ -1,7 +1,9 @@
 // Fragment colours, unlit or lit, and their gradients.
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include "device/kernel.hpp"
 #include "stages/bin.hpp"
@@ -62,14 +64,24 @@ class Shade {
  public:
   explicit Shade(Device::Impl& device);
 
-  /// No lights: colours as they are.
-  void set_lights(const std::optional<Lights>& lights);
-  bool lit() const { return lit_.has_value(); }
-  std::size_t lights() const { return lighting_.lights; }
+  /// The lights on the device, and the kernels that they need.
+  struct Lighting {
+    std::shared_ptr<LitShading> kernels;  // none: colours as they are
+    shared::LightingParams params{};
+    Buffer<shared::Light> lights;
+  };
+
+  /// Everything about setting the lights that can fail.
+  Lighting prepare(const std::optional<Lights>& lights) const;
+  void set(Lighting&& prepared) noexcept { std::swap(now_, prepared); }
+  bool lit() const { return now_.kernels != nullptr; }
+  std::size_t lights() const { return now_.params.lights; }
   /// Of light_channels: without point lights one launch still finds the ambient light's gradient.
-  std::size_t light_sets() const { return std::max<std::size_t>(lighting_.lights, 1); }
+  std::size_t light_sets() const { return std::max<std::size_t>(lights(), 1); }
 
   void forward(const ShadeInputs& in);
+  /// Says how many fragments there are, where forward() could not know.
+  void settle(std::size_t fragments);
   /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and
   /// the eye.
   void backward(const ShadeInputs& in, const ColorGradients& grad);
@@ -97,9 +109,7 @@ class Shade {
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
          In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       backward_;
-  std::optional<LitShading> lit_;
-  shared::LightingParams lighting_{};
-  Buffer<shared::Light> lights_;
+  Lighting now_;
   Buffer<cl_float4> normals_, grad_normals_;                   // [view][vertex]
   Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
 };

@@ -22,8 +22,8 @@ void Sort::operator()(std::size_t room, const Buffer<cl_uint>& count, std::size_
   const std::size_t blocks = (room + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
   const auto n = static_cast<cl_uint>(room);
   counts_.resize(device_, k_digits * blocks);
-  other_keys_.resize(device_, room);
-  other_values_.resize(device_, room);
+  other_keys_.resize(device_, keys.length());
+  other_values_.resize(device_, values.length());
   for (unsigned shift = 0; room > 0 && shift < 32 && (key_count - 1) >> shift != 0; shift += k_digit_bits) {
     histogram_(blocks, n, shift, count, keys, counts_);
     scan_(k_digits * blocks, counts_, offsets_);

@@ -166,6 +166,35 @@ TEST_SUITE("pipeline") {
           flat_values(own.backward(std::span(&grad, 1))));
   }
 
+  TEST_CASE("device: queues that would not keep the order are refused") {
+    const Caller caller, other;
+    int error = CL_SUCCESS;
+    const cl::CommandQueue unordered(caller.context, caller.device,
+                                     cl_command_queue_properties{CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE},
+                                     &error);
+    if (error == CL_SUCCESS) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context, unordered), "out-of-order");
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context, other.queue), "another context");
+  }
+
+  TEST_CASE("device: losses serve the renderers of their own device") {
+    const Scene scene = small_scene();
+    const Image target = random_image(scene.width, scene.height, 0.0F, 1.0F);
+    const Device device = open_device();
+    Renderer renderer(open_device()), own(device);
+    ImageLoss loss(device, LossWeights::only(LossKind::mse), std::span(&target, 1));
+    MeshLoss mesh_loss(device, {.laplacian = 1}, scene.meshes[0].mesh);
+    for (Renderer* const r : {&renderer, &own}) {
+      r->set_scene(scene);
+      r->forward();
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, loss.evaluate(renderer), "device (ImageLoss::evaluate)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, mesh_loss.evaluate(renderer), "device (MeshLoss::evaluate)");
+    CHECK(loss.evaluate(own) > 0);
+    CHECK(mesh_loss.evaluate(own) > 0);
+  }
+
   TEST_CASE("device: the objects of a caller who lets go of them live on") {
     std::optional<Device> device;
     {
@@ -213,6 +242,9 @@ TEST_SUITE("pipeline") {
 
     const cl::Buffer short_buffer(caller.context, CL_MEM_READ_ONLY, bytes - sizeof(glm::vec4));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, short_buffer), "grad_images");
+    const Caller stranger;
+    const cl::Buffer foreign(stranger.context, CL_MEM_READ_ONLY, bytes);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, foreign), "another context");
     CHECK(flat_values(backward(renderer, buffer)) == from_host);
   }
 }

@@ -18,7 +18,7 @@ namespace {
 
 /// How often forward() makes the host wait.
 std::size_t waits_of_forward(Renderer& renderer) {
-  const std::size_t& waits = renderer.device().impl().host_waits;
+  const std::atomic<std::size_t>& waits = renderer.device().impl().host_waits;
   const std::size_t before = waits;
   renderer.forward();
   return waits - before;

@@ -185,8 +185,22 @@ TEST_SUITE("pipeline") {
 }
 
 TEST_SUITE("robustness") {
+  TEST_CASE("several devices: a batch that is too large for a frame but not for a chunk") {
+    Scene scene = small_scene();
+    scene.width = scene.height = 4096;
+    constexpr std::size_t k_views = 60;
+    MultiDeviceRenderer renderer({open_device()});
+    renderer.set_scene(scene);
+    Renderer single(open_device());
+    single.set_scene(scene);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, single.set_views(ring(scene, k_views)), "views (frame)");
+    CHECK_NOTHROW(renderer.set_views(ring(scene, k_views)));
+  }
+
   TEST_CASE("several devices: wrong input is one clear error, and the renderer works on") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, MultiDeviceRenderer({}), "devices");
+    const Device twice = open_device();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, MultiDeviceRenderer({twice, open_device(), twice}), "devices[2]");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 0), "compute_units");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 100000), "compute_units");
 

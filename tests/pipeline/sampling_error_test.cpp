@@ -191,6 +191,43 @@ TEST_SUITE("pipeline") {
   }
 }
 
+TEST_SUITE("pipeline") {
+  TEST_CASE("sampling error: the same after a larger frame") {
+    const int size = reduced(64, 8);
+    Scene scene = sampled_scene(size);
+    scene.smoothing.samples = 2;
+    const Device device = open_device();
+    const Image grad = random_image(size, size, -1.0F, 1.0F);
+    Renderer fresh(device), used(device);
+    fresh.set_scene(scene);
+    Smoothing wide = scene.smoothing;
+    wide.sigma *= 3;
+    used.set_scene(scene);
+    used.set_smoothing(wide);
+    used.forward();
+    used.image();
+    used.set_smoothing(scene.smoothing);
+    const SamplingError expected = estimate_sampling_error(fresh, std::span(&grad, 1), 4);
+    const SamplingError found = estimate_sampling_error(used, std::span(&grad, 1), 4);
+    CHECK(found.pixel_gradients == expected.pixel_gradients);
+    CHECK(numbers(found.gradient.meshes[0].positions) == numbers(expected.gradient.meshes[0].positions));
+  }
+
+  TEST_CASE("sampling error: of shapes of the views' own, as of the scene's") {
+    Scene scene = sampled_scene(8);
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    const Image grad = random_image(8, 8, -1.0F, 1.0F);
+    const SamplingError shared = estimate_sampling_error(renderer, std::span(&grad, 1), 4);
+    const Mesh& mesh = scene.meshes[0].mesh;
+    renderer.set_shapes(mesh.positions, mesh.face_colors);
+    const SamplingError own = estimate_sampling_error(renderer, std::span(&grad, 1), 4);
+    CHECK(numbers(own.gradient.shapes.positions) == numbers(shared.gradient.meshes[0].positions));
+    CHECK(numbers(own.gradient.shapes.colors) == numbers(shared.gradient.meshes[0].colors));
+    CHECK(norm(numbers(own.gradient.shapes.positions)) > 0);
+  }
+}
+
 TEST_SUITE("robustness") {
   TEST_CASE("sampling error: what cannot be measured is refused") {
     Renderer renderer(open_device());

@@ -1,0 +1,39 @@
+#include "renderer/frame.hpp"
+
+#include "renderer/renderer_impl.hpp"
+
+namespace dpr {
+
+Frame last_frame(const Renderer& renderer, const char* caller) {
+  Renderer::Impl& r = renderer.impl();
+  r.require_forward(caller);
+  return {r.frame_number,    r.views.size(),        r.scene.width,      r.scene.height,
+          r.aggregate.image, r.geometry->positions, r.geometry->meshes, r.frame.position_stride != 0};
+}
+
+FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
+  Renderer::Impl& r = renderer.impl();
+  r.require_forward(caller);
+  if (r.bands.size() > 1) {
+    throw InvalidArgument(std::string("bands (") + caller + ")", std::to_string(r.bands.size()),
+                          "a frame in one");
+  }
+  return {r.bin.pairs,
+          r.rasterize.listed_fragments,
+          r.rasterize.fragments,
+          r.rasterize.pixel_starts,
+          r.rasterize.list,
+          r.rasterize.depth,
+          r.occupancy.log_occupancy,
+          r.occupancy.occupancy};
+}
+
+void require_same_device(const Device& device, const Renderer& renderer, const char* what) {
+  const Device::Impl &mine = device.impl(), &its = renderer.device().impl();
+  if (mine.context() == its.context() && mine.queue() == its.queue()) return;
+  throw InvalidArgument(std::string("device (") + what + ")",
+                        mine.info.name + (mine.device() == its.device() ? ", opened a second time" : ""),
+                        "the renderer's own Device, Renderer::device()");
+}
+
+}  // namespace dpr

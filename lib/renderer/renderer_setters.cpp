@@ -1,0 +1,174 @@
+// The setters of the renderer: each prepares everything that can fail, then swaps it in.
+#include <array>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include "renderer/renderer_impl.hpp"
+#include "renderer/setter_checks.hpp"
+
+namespace dpr {
+namespace {
+
+// Without these the second half of a setter could fail.
+static_assert(std::is_nothrow_swappable_v<Scene> && std::is_nothrow_swappable_v<ViewSet>);
+static_assert(std::is_nothrow_move_constructible_v<Geometry> && std::is_nothrow_move_assignable_v<Geometry>);
+
+/// A row of an affine matrix: linear part and translation.
+cl_float4 matrix_row(const glm::mat4& m, int row) { return {{m[0][row], m[1][row], m[2][row], m[3][row]}}; }
+
+shared::ViewParams view_params(const Camera& camera, int width, int height) {
+  const Projection projected = projection(camera, width, height);
+  const glm::dmat4 to_world = glm::inverse(glm::dmat4(camera.view));
+  shared::ViewParams v{};
+  for (int row = 0; row < 3; ++row) v.row[row] = matrix_row(camera.view, row);
+  v.projection = {{projected.scale.x, projected.scale.y, projected.offset.x, projected.offset.y}};
+  v.eye = to_cl(glm::vec3(to_world[3]));
+  v.znear = camera.znear;
+  v.zfar = camera.zfar;
+  v.inverse_range = 1.0F / (camera.zfar - camera.znear);
+  return v;
+}
+
+float blur_distance(const Smoothing& smoothing) {
+  const float radius = blur_radius(smoothing);
+  return smoothing.distance == DistanceMetric::euclidean ? radius : std::sqrt(radius);
+}
+
+shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
+                                 std::size_t first_view) {
+  shared::FrameParams p{};
+  p.views = static_cast<cl_uint>(views);
+  p.first_view = static_cast<cl_uint>(first_view);
+  p.meshes = static_cast<cl_uint>(scene.meshes.size());
+  p.vertices = static_cast<cl_uint>(geometry.vertices);
+  p.faces = static_cast<cl_uint>(geometry.faces);
+  p.width = static_cast<cl_uint>(scene.width);
+  p.height = static_cast<cl_uint>(scene.height);
+  p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
+  p.tiles_y = (p.height + DPR_TILE - 1) / DPR_TILE;
+  p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height));
+  p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
+  p.blur_distance = blur_distance(scene.smoothing);
+  p.perspective_correct = scene.perspective_correct ? 1 : 0;
+  return p;
+}
+
+void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_view) {
+  // The noise of a view is named by its number, in what the counter has left for it.
+  constexpr std::size_t k_most_numbered = std::size_t{1} << 30U;
+  if (views > most_views(scene)) {
+    throw InvalidArgument("views (frame)", std::to_string(views),
+                          "fewer, so that pixels and vertices can be counted");
+  }
+  if (first_view > k_most_numbered - views) {
+    throw InvalidArgument("first_view (Renderer::set_views)", std::to_string(first_view),
+                          "at most " + std::to_string(k_most_numbered - views));
+  }
+}
+
+}  // namespace
+
+std::size_t ViewSet::bytes() const {
+  return device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
+         view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes();
+}
+
+void Renderer::Impl::set_scene(const Scene& wanted) {
+  const View view = own_view(wanted);
+  check_frame_size(wanted, 1, 0);
+  Scene new_scene = wanted;
+  Geometry new_geometry(device.impl(), wanted);
+  Shade::Lighting lighting = shade.prepare(wanted.lights);
+  SmoothingSetting smoothing = prepare(wanted.smoothing);
+  fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
+
+  std::swap(scene, new_scene);
+  geometry = std::move(new_geometry);
+  shade.set(std::move(lighting));
+  set(spare_views_);
+  set(std::move(smoothing));
+  last_counts.reset();
+}
+
+void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
+  check_frame_size(scene, new_views.size(), first_view);
+  fill(spare_views_, scene, *geometry, new_views, first_view);
+  set(spare_views_);
+}
+
+void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& its,
+                          std::span<const View> its_views, std::size_t first_view) const {
+  std::vector<shared::ViewParams> cameras;
+  std::vector<cl_float4> models;
+  std::vector<cl_uint> starts{0};
+  for (const View& view : its_views) {
+    cameras.push_back(view_params(view.camera, of.width, of.height));
+    for (std::size_t m = 0; m < view.transforms.size(); ++m) {
+      for (int row = 0; row < 3; ++row) models.push_back(matrix_row(view.transforms[m], row));
+      starts.push_back(starts.back() + static_cast<cl_uint>(its.meshes[m].vertices));
+    }
+  }
+  prepared.frame = frame_params(of, its, its_views.size(), first_view);
+  prepared.views.assign(its_views.begin(), its_views.end());
+  prepared.device_views.cameras.upload(device.impl(), cameras);
+  prepared.device_views.models.upload(device.impl(), models);
+  prepared.view_vertex_starts.upload(device.impl(), starts);
+  const shared::FrameParams& p = prepared.frame;
+  prepared.all_pixels.upload(device.impl(), std::array<cl_uint, 2>{0, p.views * p.width * p.height});
+}
+
+void Renderer::Impl::set(ViewSet& prepared) noexcept {
+  if (prepared.frame.views != frame.views) last_counts.reset();
+  std::swap(static_cast<ViewSet&>(*this), prepared);
+  rendered = false;
+}
+
+SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing) const {
+  return {occupancy.prepare(smoothing), aggregate.prepare(smoothing), blur_distance(smoothing)};
+}
+
+void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
+  scene.smoothing = prepared.aggregate.smoothing;
+  frame.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
+  frame.blur_distance = prepared.blur_distance;
+  occupancy.set(std::move(prepared.occupancy));
+  aggregate.set(std::move(prepared.aggregate));
+  rendered = false;
+}
+
+void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
+  spare_view_positions_.resize(device.impl(), positions.size());
+  spare_view_colors_.resize(device.impl(), colors.size());
+  write_range(device.impl(), spare_view_positions_, 0, positions);
+  write_range(device.impl(), spare_view_colors_, 0, colors);
+
+  std::swap(geometry->view_positions, spare_view_positions_);
+  std::swap(geometry->view_colors, spare_view_colors_);
+  frame.position_stride = positions.empty() ? 0 : frame.vertices;
+  frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
+  rendered = false;
+}
+
+void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
+  replace(geometry->positions, geometry->meshes[mesh].first_vertex, positions);
+  std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
+  rendered = false;
+}
+
+void Renderer::Impl::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
+  replace(geometry->color_values, geometry->meshes[mesh].first_color, colors);
+  std::ranges::copy(colors, colors_of(scene.meshes[mesh].mesh).begin());
+  rendered = false;
+}
+
+/// A part of a buffer, in a copy that takes its place.
+void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
+                             std::span<const glm::vec3> values) {
+  spare_values_.resize(device.impl(), buffer.size());
+  if (values.size() < buffer.size()) buffer.copy_to(spare_values_);
+  write_range(device.impl(), spare_values_, first, values);
+  std::swap(buffer, spare_values_);
+}
+
+}  // namespace dpr

@@ -1,0 +1,71 @@
+#include "renderer/setter_checks.hpp"
+
+#include <algorithm>
+
+#include "base/checks.hpp"
+#include "shared_types.h"
+
+namespace dpr {
+
+View own_view(const Scene& scene) {
+  View view{scene.camera, {}};
+  for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
+  return view;
+}
+
+void check_views(const Scene& scene, std::span<const View> views) {
+  if (views.empty()) throw InvalidArgument("views", "none", "at least one");
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const View& view = views[v];
+    validate(view.camera);
+    const std::string name = checks::element("views", v) + ".transforms";
+    if (view.transforms.size() != scene.meshes.size()) {
+      throw InvalidArgument(name, std::to_string(view.transforms.size()),
+                            "one for each of the " + std::to_string(scene.meshes.size()) + " meshes");
+    }
+    for (std::size_t m = 0; m < view.transforms.size(); ++m)
+      checks::require_affine(view.transforms[m], checks::element(name, m));
+  }
+}
+
+void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected) {
+  if (values.size() != expected) {
+    throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!checks::is_finite(values[i])) checks::require_finite(values[i], checks::element(name, i));
+  }
+}
+
+namespace {
+
+void check_mesh(const Scene& scene, std::size_t mesh) {
+  if (mesh < scene.meshes.size()) return;
+  throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));
+}
+
+}  // namespace
+
+void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions) {
+  check_mesh(scene, mesh);
+  check_values("positions", positions, scene.meshes[mesh].mesh.positions.size());
+}
+
+void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> colors) {
+  check_mesh(scene, mesh);
+  check_values("colors", colors, colors_of(scene.meshes[mesh].mesh).size());
+}
+
+std::size_t most_views(const Scene& scene) {
+  std::size_t vertices = 0, faces = 0;
+  for (const Instance& instance : scene.meshes) {
+    vertices += instance.mesh.positions.size();
+    faces += instance.mesh.faces.size();
+  }
+  const std::size_t pixels = static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+  const std::size_t largest =
+      std::max({pixels * DPR_PIXEL_CHANNELS, vertices * DPR_POSE_CHANNELS, faces * 3});
+  return 0xfffffffeU / largest;
+}
+
+}  // namespace dpr

@@ -1,0 +1,30 @@
+// What the setters of a renderer refuse, of one device or of several.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "dpr/renderer.hpp"
+
+namespace dpr {
+
+/// The view of a scene's own camera and transforms.
+View own_view(const Scene& scene);
+
+/// These throw InvalidArgument for what does not suit the scene.
+void check_views(const Scene& scene, std::span<const View> views);
+void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions);
+void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> colors);
+/// As many finite values as expected; `name` says of what.
+void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
+
+/// The colours that a mesh has: of its vertices, or else of its faces.
+template <class AnyMesh>
+auto& colors_of(AnyMesh& mesh) {
+  return mesh.vertex_colors.empty() ? mesh.face_colors : mesh.vertex_colors;
+}
+
+/// How many views of the scene a frame may have, so that what is counted of them can be counted.
+std::size_t most_views(const Scene& scene);
+
+}  // namespace dpr

@@ -1,0 +1,24 @@
+// Makes a chosen OpenCL call fail. The library stands between a program and OpenCL: linked before it, or
+// loaded with LD_PRELOAD, where the environment arms it.
+//
+//   DPR_FAULT=NAME:N   the N-th call of NAME fails; NAME may end in '*', as clEnqueue*
+//   DPR_FAULT_LOG=FILE at its end the process writes "NAME CALLS" of every function there, and of the one
+//   that
+//                      failed " failed"
+#pragma once
+
+#include <cstddef>
+
+namespace dpr::test {
+
+/// From now on the `nth` call (from 1) of a function fails, by any thread, with the code that the function is
+/// likeliest to fail with.
+extern "C" void dpr_arm_opencl_fault(const char* name, std::size_t nth);
+/// No call fails any more. Returns whether one did.
+extern "C" bool dpr_disarm_opencl_fault();
+/// Calls since the last arming of the functions that `name` matches.
+extern "C" std::size_t dpr_opencl_calls(const char* name);
+/// Whether the calling thread is within an OpenCL call.
+extern "C" bool dpr_is_within_opencl();
+
+}  // namespace dpr::test
