@@ -47,6 +47,7 @@ for (const player of document.querySelectorAll('.player')) {
   const show = () => screens.forEach((screen, i) => {
     const figure = rows[slider.value].children[i];
     const [to, from] = [screen, figure].map(f => f.querySelector('img'));
+    if (to.src !== from.src) to.src = from.src;
     to.style.cssText = from.style.cssText;
     to.alt = from.alt;
     screen.querySelector('figcaption').textContent = figure.querySelector('figcaption').textContent;
