@@ -31,7 +31,7 @@ void run_report(const BenchOptions& options, const CommonOptions& common) {
   }
   std::vector<Json> results;
   for (const std::string& file : options.files) results.push_back(bench::read_results(file));
-  for (const std::string& picture : bench::write_report(options.report, results)) {
+  for (const std::string& picture : bench::write_report(options.report, results, common.command_line)) {
     if (!common.quiet) std::printf("%s\n", picture.c_str());
   }
 }
@@ -90,7 +90,9 @@ void add_bench_options(CLI::App& application, CommonOptions& common) {
       application.add_option("--compare", options->compared, "Two files of results, the earlier first")
           ->expected(2)
           ->type_name("A.json B.json");
-  application.add_option("--report", options->report, "Folder for plots of the files of results that follow")
+  application
+      .add_option("--report", options->report,
+                  "Folder for plots of the files of results that follow, and a page that shows them")
       ->type_name("DIR")
       ->excludes(compare);
   application.add_option("files", options->files, "Files of results, for --report")->type_name("R.json");

@@ -168,7 +168,7 @@ class Trial {
     }
     const ShapeSolver solver(settings_.device, views, method.options);
     const std::clock_t start = std::clock();
-    cli::FitObserver observer(solver.most_iterations(), settings_.quiet, false);
+    cli::FitObserver observer(solver.most_iterations(), settings_.quiet);
     const ShapeResult result = solver.solve(observer.callback());
     const double cpu_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     result_ = result.mesh;

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "cli/folder.hpp"
+#include "cli/page.hpp"
 #include "cli/plot.hpp"
 #include "dpr/error.hpp"
 #include "stages.hpp"
@@ -119,9 +120,10 @@ std::string curves(std::span<const Json> files, const Axis& axis,
   return index == 0 ? "" : data.str() + "set xlabel " + gnuplot_quote(axis.label) + "\n" + plots.str() + "\n";
 }
 
-/// Long titles have no place on the curves.
+/// Above the plot: below it the labels of the axis are. Long titles stand below each other.
 std::string key_place(std::span<const Json> files) {
-  return files.size() > 1 ? "below left Left reverse font ',9'" : "top left";
+  return std::string("tmargin center Left reverse samplen 2 ") +
+         (files.size() > 1 ? "vertical font ',9'" : "horizontal width 2");
 }
 
 double median(const Json& timing) { return timing["median"].get<double>(); }
@@ -185,25 +187,61 @@ Plot device_plot(std::span<const Json> files) {
               plots.str() + "\n"};
 }
 
+struct NamedPlot {
+  const char *file, *heading;
+  Plot plot;
+};
+
+cli::TableRow times_of(const Json& row) {
+  if (!is_measured(row)) return {row_name(row), row["status"].get<std::string>(), ""};
+  const auto milliseconds = [&](const char* pass) { return cli::format("%.4g", median(row[pass])); };
+  return {row_name(row), milliseconds("forward_ms"), milliseconds("backward_ms")};
+}
+
+void write_page(const std::filesystem::path& file, std::span<const NamedPlot> plots,
+                std::span<const Json> results, const std::string& command) {
+  std::string devices;
+  for (const Json& result : results) {
+    if (!devices.empty()) devices += "; ";
+    devices +=
+        result["device"]["name"].get<std::string>() + ", commit " + result["commit"].get<std::string>();
+  }
+  cli::Page page({"Benchmark of dpr", command, devices});
+  for (const auto& [name, heading, plot] : plots) {
+    if (plot.script.empty()) continue;
+    page.add_heading(heading);
+    page.add_plot(name, heading, plot.width);
+  }
+  page.add_heading("Medians of the first file");
+  std::vector<cli::TableRow> rows{{"row", "forward, ms", "backward, ms"}};
+  for (const Json& row : results.front()["results"]) rows.push_back(times_of(row));
+  page.add_table(rows);
+  page.write(file);
+}
+
 }  // namespace
 
-std::vector<std::string> write_report(const std::filesystem::path& folder, std::span<const Json> results) {
-  const std::pair<const char*, Plot> plots[] = {{"stages.png", stage_plot(results.front())},
-                                                {"scaling.png", scaling_plot(results)},
-                                                {"memory.png", memory_plot(results)},
-                                                {"devices.png", device_plot(results)}};
-  if (std::ranges::all_of(plots, [](const auto& plot) { return plot.second.script.empty(); })) {
+std::vector<std::string> write_report(const std::filesystem::path& folder, std::span<const Json> results,
+                                      const std::string& command) {
+  const NamedPlot plots[] = {
+      {"stages.png", "Device time by stage, of the first file", stage_plot(results.front())},
+      {"scaling.png", "Time against what grows", scaling_plot(results)},
+      {"memory.png", "Peak memory against samples", memory_plot(results)},
+      {"devices.png", "Time by file", device_plot(results)}};
+  if (std::ranges::all_of(plots, [](const NamedPlot& plot) { return plot.plot.script.empty(); })) {
     throw InvalidArgument("results (report)", "no measured rows", "rows of the workloads, or of --sweeps");
   }
   cli::make_folder(folder);
   std::vector<std::string> written;
-  for (const auto& [name, plot] : plots) {
+  for (const auto& [name, heading, plot] : plots) {
     if (plot.script.empty()) continue;
     const std::filesystem::path file = folder / name;
     if (!cli::draw(file, plot.width, plot.height, plot.script))
       throw IoError(file, "gnuplot is not installed");
     written.push_back(file.string());
   }
+  write_page(folder / "index.html", plots, results, command);
+  written.push_back((folder / "index.html").string());
   return written;
 }
 

@@ -15,8 +15,10 @@ namespace dpr::bench {
 /// - scaling.png: time against triangles, pixels, samples and views, from the sweeps
 /// - memory.png: peak device memory against samples
 /// - devices.png: time of every row by file, where several are given
-/// Returns the files written. Throws InvalidArgument where no plot can be drawn, IoError where the folder
-/// cannot be written or gnuplot is not installed.
-std::vector<std::string> write_report(const std::filesystem::path& folder, std::span<const Json> results);
+/// and index.html, which shows them and the times of the first file. `command` is what the page says it comes
+/// from. Returns the files written. Throws InvalidArgument where no plot can be drawn, IoError where the
+/// folder cannot be written or gnuplot is not installed.
+std::vector<std::string> write_report(const std::filesystem::path& folder, std::span<const Json> results,
+                                      const std::string& command);
 
 }  // namespace dpr::bench

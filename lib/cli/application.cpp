@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
+#include "cli/completion.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -39,9 +41,26 @@ int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
       k_wrong_input);
 }
 
+/// The program by its name, and its arguments, quoted where a shell needs it.
+std::string command_line(const CLI::App& application, int argc, char** argv) {
+  constexpr const char* k_plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-";
+  std::string line = application.get_name();
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool is_plain = !word.empty() && word.find_first_not_of(k_plain) == std::string::npos;
+    line += " " + (is_plain ? word : "'" + word + "'");
+  }
+  return line;
+}
+
 }  // namespace
 
-int run_application(CLI::App& application, const CommonOptions& common, int argc, char** argv) {
+int run_application(CLI::App& application, CommonOptions& common, int argc, char** argv) {
+  if (argc == 2 && argv[1] == std::string_view(k_completion_request)) {
+    std::printf("%s", completion_entries(application).c_str());
+    return 0;
+  }
+  common.command_line = command_line(application, argc, argv);
   try {
     application.parse(argc, argv);
     return 0;

@@ -8,6 +8,8 @@
 namespace dpr::cli {
 
 void add_devices_command(CLI::App& application, CommonOptions& common);
+/// What is in a file; no device is opened.
+void add_info_command(CLI::App& application, CommonOptions& common);
 void add_render_command(CLI::App& application, CommonOptions& common);
 void add_gradient_command(CLI::App& application, CommonOptions& common);
 void add_pose_command(CLI::App& application, CommonOptions& common);
@@ -15,6 +17,10 @@ void add_fit_command(CLI::App& application, CommonOptions& common);
 /// These hand over to the programs dpr-learn and dpr-bench beside this one.
 void add_learn_command(CLI::App& application);
 void add_bench_command(CLI::App& application);
+/// Flushes what was printed, then has each of these programs that is installed print its
+/// completion_entries().
+void print_entries_of_programs();
 void add_demo_command(CLI::App& application, CommonOptions& common);
+void add_completion_command(CLI::App& application);
 
 }  // namespace dpr::cli

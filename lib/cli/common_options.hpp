@@ -20,6 +20,7 @@ struct CommonOptions {
   std::optional<std::size_t> memory_budget;  // MiB
   SmoothingOptions smoothing;
   bool verbose = false, quiet = false;
+  std::string command_line;  ///< as it was typed, for pages
 };
 
 /// The help group of the smoothing's flags.

@@ -8,6 +8,7 @@
 #include "cli/fit_report.hpp"
 #include "cli/folder.hpp"
 #include "cli/pose_report.hpp"
+#include "cli/provenance.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
 
@@ -30,10 +31,12 @@ Mesh demo_cube() {
   return cube;
 }
 
-/// The scene of the paper's pose experiments, with the light where the camera sees what it does.
+/// The scene of the paper's pose experiments, with the camera near enough that the cube fills the image in
+/// any pose, and the light where the camera sees what it does.
 Scene cube_scene() {
+  constexpr float k_distance = 3.7F;  // the sphere about the cube spans 97% of the short side
   Scene scene;
-  scene.camera = orbit_camera(6.7F, 30, 120);
+  scene.camera = orbit_camera(k_distance, 30, 120);
   scene.meshes.push_back({demo_cube(), glm::mat4(1.0F)});
   Lights lights;
   lights.point = {{.position = {3, 5, -4}, .diffuse = glm::vec3(0.5F), .specular = glm::vec3(0.1F)}};
@@ -139,7 +142,8 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   const PoseResult result = solver.solve(start, progress_callback(solver.most_iterations(), common.quiet));
   write_inputs(folder, device, scene, truth, start, target);
   write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(scene, result, truth.rotation));
-  write_pose_report(folder, device, scene, target, result, common.quiet, truth.rotation);
+  write_pose_report(folder, page_source("A cube's pose, found from 50 degrees away", common, device), device,
+                    scene, target, result, common.quiet, truth.rotation);
   if (!common.quiet) {
     std::printf("%s: from %.1f to %.2f degrees from the truth in %u iterations, %.1f s\n", folder.c_str(),
                 angle_degrees(start.rotation, truth.rotation),

@@ -2,13 +2,15 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/temporary_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
-#include "cli/folder.hpp"
+#include "cli/option_names.hpp"
+#include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "solve/resample.hpp"
@@ -80,13 +82,21 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   const ShapeViews views = read_views(command, options, common);
   const Device device = open_device(common);
-  const ShapeSolver solver(device, views, options.solver);
-  if (!options.report.empty()) make_folder(options.report);
-  FitObserver observer(solver.most_iterations(), common.quiet, !options.report.empty());
+  const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},
+                                               [&] { return ShapeSolver(device, views, options.solver); });
+  std::optional<FitReport> report;
+  if (!options.report.empty()) report.emplace(options.report, device, views);
+  const auto keep = [&](const ShapeIteration& step, const Mesh& mesh) {
+    if (report) report->keep(step.iteration, mesh);
+    return true;
+  };
+  FitObserver observer(solver.most_iterations(), common.quiet, keep);
   const ShapeResult result = solver.solve(observer.callback(), options.checkpoint);
   write_mesh(options.output, result.mesh);
-  if (!options.report.empty())
-    write_fit_report(options.report, device, views, result, observer.kept(), common.quiet);
+  if (report) {
+    const std::string views_file = std::filesystem::path(options.views).filename().string();
+    report->write(page_source("The shape in " + views_file, common, device), result, common.quiet);
+  }
   if (!common.quiet) {
     std::printf("%s: %zu vertices, %zu triangles, loss %.4g after %zu iterations, %.1f s\n",
                 options.output.c_str(), result.mesh.positions.size(), result.mesh.faces.size(),

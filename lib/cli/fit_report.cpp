@@ -6,9 +6,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/temporary_file.hpp"
+#include "cli/difference.hpp"
 #include "cli/folder.hpp"
-#include "cli/page.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "dpr/renderer.hpp"
@@ -17,16 +16,11 @@
 namespace dpr::cli {
 namespace {
 
-constexpr std::size_t k_strip_length = 8;
-
-Image strip_of(std::vector<Image> images) {
-  for (Image& image : images) image = opaque(std::move(image));
-  return hstack(images);
-}
+constexpr std::size_t k_most_views = 8, k_iterations_kept = 11, k_turntable_views = 16;
 
 /// Some of the views, at equal distances.
 std::vector<const ShapeView*> some_of(const std::vector<ShapeView>& views) {
-  const std::size_t count = std::min(k_strip_length, views.size());
+  const std::size_t count = std::min(k_most_views, views.size());
   std::vector<const ShapeView*> chosen;
   for (std::size_t i = 0; i < count; ++i) chosen.push_back(&views[i * views.size() / count]);
   return chosen;
@@ -70,7 +64,9 @@ bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIter
       std::ranges::any_of(history, [](const auto& step) { return step.mesh_loss > 0; });
   if (is_regularised) losses.push_back(mesh);
   return plot(file, "iteration", x,
-              {{"loss", true, losses}, {"smoothing", true, {sigma, gamma}}, {"vertices", false, {vertices}}});
+              {{"Loss at the level's resolution", "loss", true, losses},
+               {"Smoothing", "scale", true, {sigma, gamma}},
+               {"Vertices of the mesh", "vertices", false, {vertices}}});
 }
 
 Json to_json(const ShapeResult& result) {
@@ -95,32 +91,29 @@ Json to_json(const ShapeResult& result) {
           {"history", history}};
 }
 
-void write_page(const std::filesystem::path& file, const ShapeResult& result, bool has_iterations,
-                bool has_plot) {
-  write_whole_file(file, [&](std::ostream& out) {
-    write_page_head(out, "Shape");
-    out << "<table>\n";
-    write_row(out, "vertices", std::to_string(result.mesh.positions.size()));
-    write_row(out, "triangles", std::to_string(result.mesh.faces.size()));
-    if (!result.history.empty()) write_row(out, "loss", format("%.4g", result.history.back().loss));
-    write_row(out, "iterations", std::to_string(result.history.size()));
-    write_row(out, "seconds", format("%.1f", result.seconds));
-    out << "</table>\n<h2>Images, and the shape from there</h2>\n";
-    write_wide_picture(out, "targets.png", "images");
-    write_wide_picture(out, "results.png", "the shape as the same cameras see it");
-    out << "<h2>Turntable</h2>\n";
-    write_wide_picture(out, "turntable.png", "turntable");
-    if (has_iterations || has_plot) out << "<h2>On the way</h2>\n";
-    if (has_iterations) write_wide_picture(out, "iterations.png", "iterations");
-    if (has_plot) write_wide_picture(out, "plot.png", "loss, smoothing and vertices");
-    write_page_end(out);
-  });
+std::vector<TableRow> facts(const ShapeResult& result) {
+  std::vector<TableRow> rows{{"vertices", std::to_string(result.mesh.positions.size())},
+                             {"triangles", std::to_string(result.mesh.faces.size())}};
+  if (!result.history.empty()) rows.push_back({"loss", format("%.4g", result.history.back().loss)});
+  rows.push_back({"iterations", std::to_string(result.history.size())});
+  rows.push_back({"time of this run", format("%.1f seconds", result.seconds)});
+  return rows;
 }
+
+/// Rows of one picture each.
+std::vector<std::vector<Picture>> one_by_one(const std::vector<Picture>& pictures) {
+  std::vector<std::vector<Picture>> rows;
+  for (const Picture& picture : pictures) rows.push_back({picture});
+  return rows;
+}
+
+/// Relative to the report's folder.
+std::string iteration_file(unsigned iteration) { return format("iterations/%05u.png", iteration); }
 
 }  // namespace
 
-FitObserver::FitObserver(unsigned iterations, bool quiet, bool keeps_meshes)
-    : iterations_(iterations), quiet_(quiet), keeps_meshes_(keeps_meshes) {}
+FitObserver::FitObserver(unsigned iterations, bool quiet, ShapeSolver::Callback keep)
+    : iterations_(iterations), quiet_(quiet), keep_(std::move(keep)) {}
 
 ShapeSolver::Callback FitObserver::callback() {
   const auto progress = std::make_shared<Progress>(iterations_, quiet_);
@@ -128,10 +121,9 @@ ShapeSolver::Callback FitObserver::callback() {
     progress->update(step.iteration + 1,
                      format("level %u  %dx%d  %zu vertices  loss %.4e  sigma %.1e", step.level + 1,
                             step.width, step.height, step.vertices, step.loss, number(step.smoothing.sigma)));
-    // The last iteration of each of as many parts of the run as the strip is long.
-    const auto part = [&](unsigned i) { return std::size_t{i} * k_strip_length / iterations_; };
-    if (keeps_meshes_ && part(step.iteration + 1) != part(step.iteration)) kept_.push_back(mesh);
-    return true;
+    // The last iteration of each of as many parts of the run as are kept.
+    const auto part = [&](unsigned i) { return std::size_t{i} * k_iterations_kept / iterations_; };
+    return !keep_ || part(step.iteration + 1) == part(step.iteration) || keep_(step, mesh);
   };
 }
 
@@ -155,29 +147,80 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
   return images;
 }
 
-void write_fit_report(const std::filesystem::path& folder, const Device& device, const ShapeViews& views,
-                      const ShapeResult& result, const std::vector<Mesh>& kept, bool quiet) {
-  make_folder(folder);
-  std::vector<Image> targets, stages;
-  std::vector<Camera> cameras;
-  for (const ShapeView* view : some_of(views.views)) {
-    targets.push_back(view->image);
-    cameras.push_back(view->camera);
+FitReport::FitReport(std::filesystem::path folder, Device device, const ShapeViews& views)
+    : folder_(std::move(folder)), device_(std::move(device)), views_(views) {
+  make_folder(folder_ / "iterations");
+}
+
+void FitReport::keep(unsigned iteration, const Mesh& mesh) const {
+  const std::vector<Image> images = render(mesh, {views_.views.front().camera});
+  write_picture(folder_ / iteration_file(iteration), images.front(), "");
+}
+
+std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>& cameras) const {
+  return render_rigidly(device_, mesh, cameras, views_.width, views_.height, views_.background);
+}
+
+/// The start, and the iterations of which there are pictures.
+std::vector<Picture> FitReport::frames(const ShapeResult& result) const {
+  const Image start = render(result.start, {views_.views.front().camera}).front();
+  std::vector<Picture> pictures{write_picture(folder_ / "start.png", start, "start")};
+  for (const ShapeIteration& step : result.history) {
+    const std::string file = iteration_file(step.iteration);
+    if (!std::filesystem::exists(folder_ / file)) continue;
+    pictures.push_back(
+        {file, format("iteration %u, level %u, %zu vertices", step.iteration, step.level + 1, step.vertices),
+         start.width, start.height});
   }
-  const auto render = [&](const Mesh& mesh, const std::vector<Camera>& from) {
-    return render_rigidly(device, mesh, from, views.width, views.height, views.background);
+  return pictures;
+}
+
+std::vector<std::vector<Picture>> FitReport::compare_views(const Mesh& mesh) const {
+  std::vector<Image> images;
+  std::vector<Camera> cameras;
+  std::vector<std::string> numbers;
+  for (const ShapeView* view : some_of(views_.views)) {
+    images.push_back(view->image);
+    cameras.push_back(view->camera);
+    numbers.push_back("image " + std::to_string(view - views_.views.data()));
+  }
+  const std::vector<Image> results = render(mesh, cameras);
+  const Differences difference = differences(results, images);
+  const auto all = [&](const std::string& caption) {
+    return std::vector<std::string>(images.size(), caption);
   };
-  for (const Mesh& mesh : kept) stages.push_back(render(mesh, {cameras.front()}).front());
-  write_image(folder / "targets.png", strip_of(targets));
-  write_image(folder / "results.png", strip_of(render(result.mesh, cameras)));
-  write_image(
-      folder / "turntable.png",
-      strip_of(render(result.mesh, turntable(result.mesh, k_strip_length, views.width, views.height))));
-  if (!stages.empty()) write_image(folder / "iterations.png", strip_of(stages));
-  const bool is_plotted = !result.history.empty() && plot_history(folder / "plot.png", result.history);
+  const std::vector<Picture> targets = write_strip(folder_ / "targets.png", images, numbers);
+  const std::vector<Picture> shapes =
+      write_strip(folder_ / "results.png", results, all("the shape from there"));
+  const std::vector<Picture> gaps =
+      write_strip(folder_ / "differences.png", difference.images, all(difference.caption()));
+  std::vector<std::vector<Picture>> rows;
+  for (std::size_t i = 0; i < targets.size(); ++i) rows.push_back({targets[i], shapes[i], gaps[i]});
+  return rows;
+}
+
+void FitReport::write(const PageSource& source, const ShapeResult& result, bool quiet) const {
+  const std::vector<Camera> around = turntable(result.mesh, k_turntable_views, views_.width, views_.height);
+  std::vector<std::string> sides;
+  for (std::size_t i = 0; i < around.size(); ++i)
+    sides.push_back(
+        format("%.0f degrees", 360.0 * static_cast<double>(i) / static_cast<double>(around.size())));
+  const bool is_plotted = !result.history.empty() && plot_history(folder_ / "plot.png", result.history);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
-  write_json(folder / "fit.json", to_json(result));
-  write_page(folder / "index.html", result, !stages.empty(), is_plotted);
+  write_json(folder_ / "fit.json", to_json(result));
+
+  Page page(source);
+  page.add_heading("Images, and the shape from there");
+  page.add_player({}, compare_views(result.mesh));
+  page.add_heading("From the start to the end");
+  page.add_player({write_picture(folder_ / "target.png", views_.views.front().image, "image 0")},
+                  one_by_one(frames(result)));
+  page.add_heading("All around");
+  page.add_player({}, one_by_one(write_strip(folder_ / "turntable.png", render(result.mesh, around), sides)));
+  page.add_heading("Result");
+  page.add_facts(facts(result));
+  if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration");
+  page.write(folder_ / "index.html");
 }
 
 }  // namespace dpr::cli

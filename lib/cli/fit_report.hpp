@@ -2,36 +2,54 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "cli/json.hpp"
+#include "cli/page.hpp"
 #include "dpr/shape.hpp"
 
 namespace dpr::cli {
 
-/// Watches a solver: shows how far it is, and keeps the mesh at a few iterations for the report.
+/// Watches a solver: shows how far it is, and hands on the mesh at a few iterations.
 class FitObserver {
  public:
-  FitObserver(unsigned iterations, bool quiet, bool keeps_meshes);
+  FitObserver(unsigned iterations, bool quiet, ShapeSolver::Callback keep = {});
 
   /// For ShapeSolver::solve(). Must not outlive the observer.
   ShapeSolver::Callback callback();
-  const std::vector<Mesh>& kept() const { return kept_; }
 
  private:
   unsigned iterations_;
-  bool quiet_, keeps_meshes_;
-  std::vector<Mesh> kept_;
+  bool quiet_;
+  ShapeSolver::Callback keep_;
 };
 
 /// A mesh as the rigid renderer shows it.
 std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const std::vector<Camera>& cameras,
                                   int width, int height, glm::vec3 background = glm::vec3(0));
 
-/// Writes targets, results, turntable, iterations and plot (all PNG), fit.json with the history, and
-/// index.html that shows them, into a folder, which is made if need be. All is rendered rigidly. Throws
-/// IoError.
-void write_fit_report(const std::filesystem::path& folder, const Device& device, const ShapeViews& views,
-                      const ShapeResult& result, const std::vector<Mesh>& kept, bool quiet);
+/// The report's folder. The pictures of iterations are written while the solver works: an interrupted run
+/// leaves them, and a run that goes on from its checkpoint shows them too.
+class FitReport {
+ public:
+  /// Makes the folder if need be. Throws IoError.
+  FitReport(std::filesystem::path folder, Device device, const ShapeViews& views);
+
+  /// Writes iterations/N.png: the mesh as the first camera sees it. Throws IoError.
+  void keep(unsigned iteration, const Mesh& mesh) const;
+  /// Writes targets, results, differences, turntable and plot (all PNG), fit.json with the history, and
+  /// index.html that shows them. All meshes are rendered rigidly. Throws IoError.
+  void write(const PageSource& source, const ShapeResult& result, bool quiet) const;
+
+ private:
+  std::vector<Image> render(const Mesh& mesh, const std::vector<Camera>& cameras) const;
+  std::vector<Picture> frames(const ShapeResult& result) const;
+  std::vector<std::vector<Picture>> compare_views(const Mesh& mesh) const;
+
+  std::filesystem::path folder_;
+  Device device_;
+  const ShapeViews& views_;
+};
 
 }  // namespace dpr::cli

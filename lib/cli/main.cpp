@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   application.require_subcommand(1);
   application.footer("Every command explains itself: dpr COMMAND --help\nExample: dpr demo -o demo-output");
   dpr::cli::add_devices_command(application, common);
+  dpr::cli::add_info_command(application, common);
   dpr::cli::add_render_command(application, common);
   dpr::cli::add_gradient_command(application, common);
   dpr::cli::add_pose_command(application, common);
@@ -18,5 +19,6 @@ int main(int argc, char** argv) {
   dpr::cli::add_learn_command(application);
   dpr::cli::add_bench_command(application);
   dpr::cli::add_demo_command(application, common);
+  dpr::cli::add_completion_command(application);
   return dpr::cli::run_application(application, common, argc, argv);
 }

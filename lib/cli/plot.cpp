@@ -33,6 +33,9 @@ void write_panel(std::ostream& script, const Panel& panel, const std::vector<dou
     ++index;
   }
   script << (panel.log_scale ? "set" : "unset") << " logscale y\n"
+         << (panel.curves.size() > 1 ? "set key tmargin center horizontal Left reverse samplen 2 width 2\n"
+                                     : "unset key\n")
+         << "set title " << gnuplot_quote(panel.title) << "\n"
          << "set ylabel " << gnuplot_quote(panel.y_label) << "\n"
          << command << "\n";
 }
@@ -63,11 +66,12 @@ std::string gnuplot_quote(const std::string& text) {
   return quoted + "'";
 }
 
-bool draw(const std::filesystem::path& file, int width, int height, const std::string& script) {
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& script, double scale) {
   const TemporaryFile script_file(std::filesystem::path(file).replace_extension(".gp"));
   TemporaryFile picture(file);
   std::ofstream stream(script_file.path());
-  stream << "set terminal pngcairo noenhanced size " << width << ',' << height << "\n"
+  stream << "set terminal pngcairo noenhanced size " << width << ',' << height << " fontscale " << scale
+         << " linewidth " << scale << "\n"
          << "set output " << gnuplot_quote(picture.path().string()) << "\n"
          << script;
   stream.close();
@@ -82,15 +86,17 @@ bool draw(const std::filesystem::path& file, int width, int height, const std::s
 
 bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
           const std::vector<Panel>& panels) {
-  constexpr int k_width = 900, k_panel_height = 260;
+  constexpr int k_width = 960, k_panel_height = 500;  // twice as many pixels as a page shows
+  constexpr double k_scale = 2;
   std::ostringstream script;
   script.precision(std::numeric_limits<double>::max_digits10);
   script << "set multiplot layout " << panels.size() << ",1\n"
-         << "set grid\nset lmargin 12\nset format y '%g'\nset xlabel " << gnuplot_quote(x_label) << "\n";
+         << "set grid\nset lmargin 11\nset rmargin 3\nset format y '%g'\nset xlabel "
+         << gnuplot_quote(x_label) << "\n";
   std::size_t index = 0;
   for (const Panel& panel : panels) write_panel(script, panel, x, index);
   script << "unset multiplot\n";
-  return draw(file, k_width, k_panel_height * static_cast<int>(panels.size()), script.str());
+  return draw(file, k_width, k_panel_height * static_cast<int>(panels.size()), script.str(), k_scale);
 }
 
 }  // namespace dpr::cli

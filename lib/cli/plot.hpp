@@ -14,6 +14,7 @@ struct Curve {
 
 /// Curves that share an axis.
 struct Panel {
+  std::string title;
   std::string y_label;
   bool log_scale = false;  ///< then values must be positive
   std::vector<Curve> curves;
@@ -24,7 +25,9 @@ std::string gnuplot_quote(const std::string& text);
 
 /// Runs a script that draws into a PNG file of that many pixels: terminal and output are set before it.
 /// Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot fails.
-bool draw(const std::filesystem::path& file, int width, int height, const std::string& script);
+/// `scale` enlarges text and lines.
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& script,
+          double scale = 1);
 
 /// Draws the panels below each other over a common x into a PNG file; else as draw().
 bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,

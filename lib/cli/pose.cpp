@@ -6,7 +6,9 @@
 #include "base/temporary_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/folder.hpp"
+#include "cli/option_names.hpp"
 #include "cli/pose_report.hpp"
+#include "cli/provenance.hpp"
 #include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
@@ -106,11 +108,17 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const Scene scene = read_scene(options.scene, common);
   const Image target = read_target(options.target, options.descent.loss);
   const Device device = open_device(common);
-  const PoseSolver solver(device, scene, target, options.solver);
+  const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
+    return PoseSolver(device, scene, target, options.solver);
+  });
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   write_json(options.output, pose_to_json(scene, result));
-  if (!options.report.empty()) write_pose_report(options.report, device, scene, target, result, common.quiet);
+  if (!options.report.empty()) {
+    const std::string title = "The pose of " + std::filesystem::path(options.scene).filename().string();
+    write_pose_report(options.report, page_source(title, common, device), device, scene, target, result,
+                      common.quiet);
+  }
   if (!common.quiet) print(options.output, result);
 }
 

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 
+#include "cli/difference.hpp"
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
@@ -18,7 +19,7 @@
 namespace dpr::cli {
 namespace {
 
-constexpr std::size_t k_strip_length = 8;
+constexpr std::size_t k_strip_length = 12;  // the start among them
 
 /// What the scene's transform holds beside rotation and translation: its scale.
 glm::dmat3 stretch_of(const Scene& scene) {
@@ -52,25 +53,29 @@ class PoseCamera {
   View view_;
 };
 
-Image difference(const Image& a, const Image& b) {
-  Image result = a;
-  for (std::size_t i = 0; i < a.pixels.size(); ++i) result.pixels[i] = glm::abs(a.pixels[i] - b.pixels[i]);
-  return result;
+/// ", 3.20 degrees from the truth" where that is known.
+std::string angle_text(const Pose& pose, const std::optional<glm::dmat3>& truth) {
+  return truth ? format(", %.2f degrees from the truth", angle_degrees(pose.rotation, *truth)) : "";
 }
 
-/// Iterations of the descent that found the pose, at equal distances, first and last among them.
-Image strip(PoseCamera& camera, const PoseResult& result) {
+/// The start, then iterations of the descent that found the pose, at equal distances, first and last among
+/// them.
+std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera& camera,
+                                  const PoseResult& result, const std::optional<glm::dmat3>& truth) {
   std::vector<PoseIteration> history;
   std::ranges::copy_if(result.history, std::back_inserter(history),
                        [&](const PoseIteration& step) { return step.descent == result.descent; });
-  std::vector<Image> images;
-  const std::size_t count = std::min(k_strip_length, history.size());
+  std::vector<Image> images{camera.render(result.start, 1, rigid_smoothing())};
+  std::vector<std::string> captions{"start" + angle_text(result.start, truth)};
+  const std::size_t count = std::min(k_strip_length - 1, history.size());
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t last = history.size() - 1;
     const PoseIteration& step = history[count > 1 ? i * last / (count - 1) : last];
-    images.push_back(opaque(camera.render(step.pose, step.focal_scale, step.smoothing)));
+    images.push_back(camera.render(step.pose, step.focal_scale, step.smoothing));
+    captions.push_back(format("iteration %u, %dx%d", step.iteration, step.width, step.height) +
+                       angle_text(step.pose, truth));
   }
-  return hstack(images);
+  return write_strip(file, images, captions);
 }
 
 bool plot_history(const std::filesystem::path& file, const std::vector<PoseIteration>& history,
@@ -86,9 +91,11 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
     angle.y.push_back(truth ? angle_degrees(step.pose.rotation, *truth)
                             : angle_degrees(step.pose.rotation, start));
   }
-  const char* const angle_label = truth ? "degrees from the truth" : "degrees from the start";
+  const char* const angle_title = truth ? "Rotation from the truth" : "Rotation from the start";
   return plot(file, "iteration", x,
-              {{"loss", true, {loss}}, {angle_label, false, {angle}}, {"smoothing", true, {sigma, gamma}}});
+              {{"Loss at the level's resolution", "loss", true, {loss}},
+               {angle_title, "degrees", false, {angle}},
+               {"Smoothing", "scale", true, {sigma, gamma}}});
 }
 
 Json to_json(const PoseHypothesis& hypothesis, const glm::dmat3& stretch) {
@@ -159,20 +166,25 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   return json;
 }
 
-void write_pose_report(const std::filesystem::path& folder, const Device& device, const Scene& scene,
-                       const Image& target, const PoseResult& result, bool quiet,
+void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
+                       const Scene& scene, const Image& target, const PoseResult& result, bool quiet,
                        const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
   PoseCamera camera(device, scene);
+  const Image start = camera.render(result.start, 1, rigid_smoothing());
   const Image end = camera.render(result.pose, result.focal_scale, rigid_smoothing());
-  write_image(folder / "target.png", opaque(target));
-  write_image(folder / "start.png", opaque(camera.render(result.start, 1, rigid_smoothing())));
-  write_image(folder / "end.png", opaque(end));
-  write_image(folder / "difference.png", opaque(difference(end, target)));
-  write_image(folder / "iterations.png", strip(camera, result));
-  const bool is_plotted = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
-  if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
-  write_pose_page(folder / "index.html", result, is_plotted, truth);
+  const Differences difference = differences({end}, {target});
+  PosePictures pictures{
+      write_picture(folder / "target.png", target, "target"),
+      write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
+      write_picture(folder / "end.png", end,
+                    format("end, after %u iterations", result.iterations) + angle_text(result.pose, truth)),
+      write_picture(folder / "difference.png", difference.images.front(),
+                    difference.caption() + ": end and target"),
+      write_frames(folder / "iterations.png", camera, result, truth)};
+  pictures.has_plot = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
+  if (!pictures.has_plot && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
+  write_pose_page(folder / "index.html", source, result, pictures, truth);
 }
 
 }  // namespace dpr::cli

@@ -6,6 +6,7 @@
 
 #include "cli/common_options.hpp"
 #include "cli/json.hpp"
+#include "cli/page.hpp"
 #include "dpr/pose.hpp"
 
 namespace dpr::cli {
@@ -20,8 +21,8 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
 /// them. Throws IoError.
-void write_pose_report(const std::filesystem::path& folder, const Device& device, const Scene& scene,
-                       const Image& target, const PoseResult& result, bool quiet,
+void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
+                       const Scene& scene, const Image& target, const PoseResult& result, bool quiet,
                        const std::optional<glm::dmat3>& truth = {});
 
 }  // namespace dpr::cli

@@ -1,8 +1,11 @@
 // Commands that are programs of their own beside this one, for what they load: dpr learn loads libtorch, and
 // dpr bench, which tells how much memory the library takes, does without the libraries for image files.
+#include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -11,6 +14,7 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "cli/completion.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -22,9 +26,12 @@ struct Program {
   std::vector<std::pair<std::string, std::string>> environment = {};  // where the user's says nothing else
 };
 
+std::filesystem::path file_of(const std::string& command) {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("dpr-" + command);
+}
+
 [[noreturn]] void run(const Program& program, const std::vector<std::string>& arguments) {
-  const std::filesystem::path file =
-      std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("dpr-" + program.command);
+  const std::filesystem::path file = file_of(program.command);
   if (!std::filesystem::exists(file)) {
     throw InvalidArgument(program.command + " (dpr)", program.missing, program.remedy);
   }
@@ -62,6 +69,18 @@ void add_learn_command(CLI::App& application) {
 void add_bench_command(CLI::App& application) {
   add(application, {"bench", "Measures forward and backward passes, compares results, draws them",
                     "an installation without the program dpr-bench", "one with dpr-bench beside dpr"});
+}
+
+void print_entries_of_programs() {
+  std::fflush(stdout);
+  for (const char* const command : {"learn", "bench"}) {
+    std::string name = file_of(command).string(), request = k_completion_request;
+    if (!std::filesystem::exists(name)) continue;
+    char* const arguments[] = {name.data(), request.data(), nullptr};
+    pid_t child = 0;
+    if (posix_spawn(&child, name.c_str(), nullptr, nullptr, arguments, environ) == 0)
+      waitpid(child, nullptr, 0);
+  }
 }
 
 }  // namespace dpr::cli

@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace dpr::cli {
@@ -15,21 +16,50 @@ Progress::~Progress() {
 }
 
 void Progress::update(unsigned done, const std::string& text) {
-  if (quiet_ || total_ == 0) return;
+  if (total_ > 0) update(done, static_cast<double>(done) / total_, text);
+}
+
+void Progress::update(unsigned done, double share, const std::string& text) {
+  if (quiet_) return;
   if (is_terminal_) {
-    constexpr unsigned k_width = 30;
-    const std::string bar(k_width * done / total_, '#');
+    constexpr std::size_t k_width = 30;
+    const std::string bar(static_cast<std::size_t>(k_width * std::clamp(share, 0.0, 1.0)), '#');
     constexpr const char* k_erase_line = "\r\033[K";
-    std::printf("%s[%-30s] %u/%u  %s", k_erase_line, bar.c_str(), done, total_, text.c_str());
+    if (share < last_share_ || !line_is_open_) {
+      first_share_ = share;
+      first_time_ = Clock::now();
+    }
+    last_share_ = share;
+    std::printf("%s[%-30s] %u/%u  %s%s", k_erase_line, bar.c_str(), done, total_, time_left(share).c_str(),
+                text.c_str());
     line_is_open_ = true;
     std::fflush(stdout);
     return;
   }
-  const unsigned tenths = 10 * done / total_;
+  const auto tenths = static_cast<unsigned>(10 * share);
   if (tenths == printed_tenths_) return;
   printed_tenths_ = tenths;
   std::printf("%u/%u  %s\n", done, total_, text.c_str());
   std::fflush(stdout);
+}
+
+std::string Progress::time_left(double share) const {
+  const double seconds = std::chrono::duration<double>(Clock::now() - first_time_).count();
+  const double since = share - first_share_;
+  return since > 0 ? duration_text(seconds * (1 - share) / since) + " left  " : "";
+}
+
+std::string duration_text(double seconds) {
+  constexpr double k_minute = 60, k_hour = 3600, k_few = 1.5;  // up to 90 of the smaller unit
+  char text[32];
+  if (seconds < k_few * k_minute) {
+    std::snprintf(text, sizeof text, "%.0f s", seconds);
+  } else if (seconds < k_few * k_hour) {
+    std::snprintf(text, sizeof text, "%.0f min", seconds / k_minute);
+  } else {
+    std::snprintf(text, sizeof text, "%.1f h", seconds / k_hour);
+  }
+  return text;
 }
 
 }  // namespace dpr::cli

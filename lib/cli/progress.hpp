@@ -1,13 +1,14 @@
 // How far long work has come: a bar on a terminal, plain lines elsewhere.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 namespace dpr::cli {
 
 class Progress {
  public:
-  /// Prints nothing at all if `quiet`.
+  /// `total` units of work. Prints nothing at all if `quiet`.
   Progress(unsigned total, bool quiet);
   /// Ends the bar's line.
   ~Progress();
@@ -16,11 +17,26 @@ class Progress {
 
   /// To be called after each unit of work, with what there is to say about it.
   void update(unsigned done, const std::string& text);
+  /// The same where something else than the number of units may end the work, such as a time limit: `share`,
+  /// in [0, 1], is how near the end is.
+  void update(unsigned done, double share, const std::string& text);
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  /// "12 s left", or nothing while there is nothing to tell it from.
+  std::string time_left(double share) const;
+
   unsigned total_;
   bool quiet_, is_terminal_, line_is_open_ = false;
   unsigned printed_tenths_ = 0;
+  /// Of the update that time is counted from: earlier runs may have done much of the work, and a further
+  /// attempt begins anew.
+  double first_share_ = 0, last_share_ = 0;
+  Clock::time_point first_time_;
 };
+
+/// "45 s", "12 min", "3.5 h".
+std::string duration_text(double seconds);
 
 }  // namespace dpr::cli

@@ -20,4 +20,9 @@ Json provenance(const Device& device) {
           {"build_options", build_options(device.impl())}};
 }
 
+PageSource page_source(const std::string& title, const CommonOptions& common, const Device& device) {
+  const DeviceInfo& info = device.info();
+  return {title, common.command_line, info.name + " (" + info.platform + ", " + info.version + ")"};
+}
+
 }  // namespace dpr::cli

@@ -1,7 +1,9 @@
-// What a file of results says about where they come from.
+// What a file of results, or a page, says about where they come from.
 #pragma once
 
+#include "cli/common_options.hpp"
 #include "cli/json.hpp"
+#include "cli/page.hpp"
 #include "dpr/device.hpp"
 
 namespace dpr::cli {
@@ -11,5 +13,7 @@ const char* commit();
 
 /// {"commit", "device": {...}, "build_options"}.
 Json provenance(const Device& device);
+/// The command as it was typed, and the device it ran on.
+PageSource page_source(const std::string& title, const CommonOptions& common, const Device& device);
 
 }  // namespace dpr::cli

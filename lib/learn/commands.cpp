@@ -132,33 +132,33 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
     steps.push_back(static_cast<double>(first + window));
     means.push_back(sum / static_cast<double>(window));
   }
-  if (steps.size() > 1) plot(file, "step", steps, {{"loss", true, {{"mean", means}}}});
+  if (steps.size() > 1)
+    plot(file, "step", steps,
+         {{"Training loss, means of consecutive steps", "loss", true, {{"mean", means}}}});
 }
 
 void run_train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
   learn::training_smoothing(command.training);  // a wrong method leaves no folder behind
   make_folder(command.output);
-  constexpr unsigned k_parts = 1000;
+  const learn::TrainingOptions& o = command.training;
   learn::TrainingResult result;
   {
-    Progress bar(k_parts, common.quiet);
-    const learn::TrainingOptions& o = command.training;
+    Progress bar(static_cast<unsigned>(o.steps), common.quiet);
     result = learn::train(
         open_device(common), training, validation, o, command.output, [&](const learn::TrainingProgress& p) {
           const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
           const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
           char text[128];
-          std::snprintf(text, sizeof text, "step %zu, loss %.4f, validation IoU %.3f", p.step, p.loss,
-                        p.validation_iou);
-          bar.update(static_cast<unsigned>(k_parts * std::min(1.0, std::max(steps, time))), text);
+          std::snprintf(text, sizeof text, "loss %.4f, validation IoU %.3f", p.loss, p.validation_iou);
+          bar.update(static_cast<unsigned>(p.step), std::max(steps, time), text);
         });
   }
   const std::filesystem::path folder(command.output);
   plot_losses(folder / "losses.png", result.losses);
   if (result.validation_steps.size() > 1) {
     plot(folder / "validation.png", "step", result.validation_steps,
-         {{"mean IoU of unseen shapes", false, {{"validation", result.validation_iou}}}});
+         {{"Validation on unseen shapes", "mean IoU", false, {{"validation", result.validation_iou}}}});
   }
   if (!common.quiet) {
     std::printf("%s: %zu steps, validation IoU %.3f; %.0f s in this run, %.0f%% of them in the renderer\n",

@@ -221,6 +221,29 @@ std::string settings_of(const TrainingOptions& options, const Dataset& training)
   return text.str();
 }
 
+std::vector<std::string> parts_of(const std::string& settings) {
+  std::vector<std::string> parts;
+  std::istringstream text(settings);
+  for (std::string part; std::getline(text, part, ',');)
+    parts.push_back(part.substr(part.find_first_not_of(' ')));
+  return parts;
+}
+
+/// Throws InvalidArgument unless the settings are the same, with those parts that are not.
+void require_same(const std::filesystem::path& file, const std::string& found, const std::string& asked) {
+  if (found == asked) return;
+  const std::vector<std::string> there = parts_of(found), here = parts_of(asked);
+  std::string got, expected;
+  for (std::size_t i = 0; i < std::max(there.size(), here.size()); ++i) {
+    const std::string a = i < there.size() ? there[i] : "", b = i < here.size() ? here[i] : "";
+    if (a == b) continue;
+    got += (got.empty() ? "" : ", ") + a;
+    expected += (expected.empty() ? "" : ", ") + b;
+  }
+  throw InvalidArgument("checkpoint (" + file.string() + ")", got,
+                        expected + " as asked for, or another folder");
+}
+
 /// The checkpoint to go on from, or a fresh start. Throws InvalidArgument if it belongs to another training.
 LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions& options,
                         const std::string& settings) {
@@ -237,9 +260,7 @@ LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions
                           "a network of " + std::to_string(c.architecture.palette) + " palette colours",
                           std::to_string(wanted.palette) + ", as asked for");
   }
-  if (c.settings != settings) {
-    throw InvalidArgument("checkpoint (" + file.string() + ")", c.settings, settings + ", or another folder");
-  }
+  require_same(file, c.settings, settings);
   return loaded;
 }
 

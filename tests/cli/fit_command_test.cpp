@@ -64,7 +64,8 @@ TEST_SUITE("pipeline") {
     const dpr::Mesh mesh = dpr::read_mesh(folder / "mesh.obj");
     CHECK(mesh.vertex_colors.size() == mesh.positions.size());
     const std::string page = folder.read("report/index.html");
-    for (const char* picture : {"targets.png", "results.png", "turntable.png", "iterations.png"}) {
+    for (const char* picture : {"targets.png", "results.png", "differences.png", "turntable.png",
+                                "target.png", "start.png", "iterations/00000.png", "iterations/00005.png"}) {
       CHECK(std::filesystem::is_regular_file(folder / ("report/" + std::string(picture))));
       CHECK(contains(page, "src=\"" + std::string(picture) + "\""));
     }
@@ -73,6 +74,8 @@ TEST_SUITE("pipeline") {
     CHECK(data["history"].size() == 6);
     CHECK(data["history"][0]["mesh_loss"].get<double>() > 0);
     CHECK(data["vertices"] == mesh.positions.size());
+    CHECK(contains(page, "image 2"));
+    CHECK(contains(page, "iteration 5, level 1"));
     // Nothing is left to do, so the same mesh comes out.
     const std::string before = folder.read("mesh.obj");
     REQUIRE(run_command(folder, with(k_short, {"--checkpoint", "state", "--laplacian", "3e-3"})).status == 0);
@@ -139,7 +142,9 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--checkpoint", "garbage"}), "garbage");
     fails(good, with(k_short, {"--steps", "small"}), "small");
     fails(good, with(k_short, {"--schedule", "sometimes"}), "sometimes");
-    fails(good, with(k_short, {"--blur", "0"}), "blur");
+    fails(good, with(k_short, {"--blur", "0"}), "--blur (command line)");
+    fails(good, with(k_short, {"--edge", "-1"}), "--edge (command line)");
+    fails(good, with(k_short, {"--blur-end", "0"}), "--blur-end (command line)");
     fails(good, with(k_short, {"--laplacian", "-1"}), "weight");
     fails(good, {"fit", "--views", "views.json", "-o", "mesh.stl"}, "mesh.stl");
     fails(good, {"fit", "--views", "views.json", "-o", "nowhere/mesh.obj"}, "nowhere");

@@ -1,0 +1,278 @@
+// dpr info: what is in a mesh file or a scene file, and what dpr does with it.
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/input_file.hpp"
+#include "cli/commands.hpp"
+#include "cli/json.hpp"
+#include "cli/mesh_materials.hpp"
+#include "mesh/bounding_box.hpp"
+#include "mesh/mesh_facts.hpp"
+
+namespace dpr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+Json to_json(const std::vector<NamedFile>& files) {
+  Json list = Json::array();
+  for (const NamedFile& file : files) list.push_back({{"file", file.name}, {"exists", file.exists}});
+  return list;
+}
+
+Json vector_to_json(const glm::vec3& v) { return Json::array({number(v.x), number(v.y), number(v.z)}); }
+
+const char* colors_of(const Mesh& mesh) {
+  return !mesh.vertex_colors.empty() ? "vertex" : !mesh.face_colors.empty() ? "face" : "none";
+}
+
+std::string counted(std::size_t count, const char* what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+/// What dpr does with a mesh that its user may not expect.
+Json mesh_notes(const Mesh& mesh, const MeshFacts& facts, const MeshMaterials& materials) {
+  Json notes = Json::array();
+  if (facts.faces_without_area > 0)
+    notes.push_back(counted(facts.faces_without_area, "triangle") + " without area: dropped when rendered");
+  if (facts.unused_vertices > 0)
+    notes.push_back("vertices without a face: " + std::to_string(facts.unused_vertices) + ", not seen");
+  if (colors_of(mesh) == std::string("none")) notes.push_back("no colours: white");
+  for (const NamedFile& library : materials.libraries) {
+    if (!library.exists)
+      notes.push_back("material file " + library.name + " is missing: its colours are not read");
+  }
+  for (const NamedFile& texture : materials.textures)
+    notes.push_back("texture " + texture.name + ": not read by this version");
+  if (!mesh.face_texcoords.empty()) notes.push_back("texture coordinates: rendered by --aov uv");
+  if (!facts.is_closed()) notes.push_back("not closed: both sides of its triangles are seen");
+  if (facts.is_closed() && !facts.is_oriented())
+    notes.push_back("triangles wound in opposite senses: no matter to rendering, volumes need one sense");
+  return notes;
+}
+
+Json mesh_to_json(const Mesh& mesh, const MeshMaterials& materials) {
+  const MeshFacts facts = mesh_facts(mesh);
+  const Bounds box = bounding_box(mesh.positions);
+  return {{"vertices", mesh.positions.size()},
+          {"distinct_positions", facts.distinct_positions},
+          {"faces", mesh.faces.size()},
+          {"components", facts.components},
+          {"edges", facts.edges},
+          {"boundary_edges", facts.boundary_edges},
+          {"closed", facts.is_closed()},
+          {"manifold", facts.is_manifold()},
+          {"non_manifold_edges", facts.non_manifold_edges},
+          {"non_manifold_vertices", facts.non_manifold_vertices},
+          {"oriented", facts.is_oriented()},
+          {"faces_without_area", facts.faces_without_area},
+          {"bounds", {{"low", vector_to_json(box.low)}, {"high", vector_to_json(box.high)}}},
+          {"colors", colors_of(mesh)},
+          {"texture_coordinates", mesh.texcoords.size()},
+          {"materials", materials.materials},
+          {"material_files", to_json(materials.libraries)},
+          {"textures", to_json(materials.textures)},
+          {"notes", mesh_notes(mesh, facts, materials)}};
+}
+
+/// Triangles that the camera's clipping planes drop.
+void add_clipping_notes(const Scene& scene, const Instance& instance, Json& notes) {
+  std::vector<float> depths;
+  for (const glm::vec3& p : instance.mesh.positions)
+    depths.push_back(-(scene.camera.view * instance.transform * glm::vec4(p, 1)).z);
+  std::size_t near = 0, far = 0;
+  for (const glm::uvec3& face : instance.mesh.faces) {
+    const auto [low, high] = std::minmax({depths[face.x], depths[face.y], depths[face.z]});
+    if (low < scene.camera.znear) {
+      ++near;
+    } else if (low > scene.camera.zfar) {
+      ++far;
+    }
+  }
+  if (near > 0) notes.push_back(counted(near, "triangle") + " nearer than znear: dropped when rendered");
+  if (far > 0) notes.push_back(counted(far, "triangle") + " beyond zfar: dropped when rendered");
+}
+
+Json camera_to_json(const Camera& camera) {
+  Json json{{"znear", number(camera.znear)}, {"zfar", number(camera.zfar)}};
+  if (const auto& k = camera.intrinsics) {
+    json["intrinsics"] = {
+        {"fx", number(k->fx)}, {"fy", number(k->fy)}, {"cx", number(k->cx)}, {"cy", number(k->cy)}};
+  } else {
+    json["fov_y_degrees"] = number(camera.fov_y_degrees);
+  }
+  return json;
+}
+
+Json smoothing_to_json(const Smoothing& s) {
+  return {{"occupancy_prior", to_string(s.occupancy_prior)},
+          {"depth_prior", to_string(s.depth_prior)},
+          {"composition", to_string(s.composition)},
+          {"occupancy_estimator", to_string(s.occupancy_estimator)},
+          {"aggregation_estimator", to_string(s.aggregation_estimator)},
+          {"sigma", number(s.sigma)},
+          {"gamma", number(s.gamma)},
+          {"alpha", number(s.alpha)}};
+}
+
+Json gradients_to_json(const GradientRequest& request) {
+  Json names = Json::array();
+  const std::pair<const char*, bool> all[] = {
+      {"positions", request.positions},  {"colors", request.colors}, {"transform", request.transform},
+      {"camera", request.camera},        {"lights", request.lights}, {"smoothing", request.smoothing},
+      {"background", request.background}};
+  for (const auto& [name, wanted] : all) {
+    if (wanted) names.push_back(name);
+  }
+  return names;
+}
+
+Json scene_to_json(const fs::path& file) {
+  const Scene scene = dpr::read_scene(file);
+  const Json document = Json::parse(read_file(file));  // for the names, which the scene does not keep
+  Json meshes = Json::array();
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Json& entry = document.at("meshes").at(i);
+    const std::string name = entry.contains("file") ? entry["file"].get<std::string>() : "";
+    const MeshMaterials materials =
+        name.empty() ? MeshMaterials() : mesh_materials(file.parent_path() / name);
+    Json mesh{{"file", name.empty() ? Json() : Json(name)}};
+    mesh.update(mesh_to_json(scene.meshes[i].mesh, materials));
+    add_clipping_notes(scene, scene.meshes[i], mesh["notes"]);
+    meshes.push_back(mesh);
+  }
+  Json lights;
+  if (scene.lights) lights = {{"point", scene.lights->point.size()}};
+  return {{"file", file.string()},
+          {"kind", "scene"},
+          {"width", scene.width},
+          {"height", scene.height},
+          {"camera", camera_to_json(scene.camera)},
+          {"background", vector_to_json(scene.background)},
+          {"lights", lights},
+          {"smoothing", smoothing_to_json(scene.smoothing)},
+          {"gradients", gradients_to_json(scene.gradients)},
+          {"meshes", meshes}};
+}
+
+Json file_to_json(const fs::path& file) {
+  require_file(file);
+  if (lower_case_extension(file) == ".json") return scene_to_json(file);
+  Json json{{"file", file.string()}, {"kind", "mesh"}};
+  json.update(mesh_to_json(read_mesh(file), mesh_materials(file)));
+  return json;
+}
+
+// As text: names and values in two columns.
+
+void print_line(const std::string& name, const std::string& value) {
+  std::printf("  %-20s %s\n", name.c_str(), value.c_str());
+}
+
+/// Numbers separated by spaces, names by commas.
+std::string list_text(const Json& list) {
+  std::string text;
+  for (const Json& element : list) {
+    if (!text.empty()) text += element.is_number() ? " " : ", ";
+    text += element.is_string() ? element.get<std::string>() : element.dump();
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string files_text(const Json& files) {
+  Json names = Json::array();
+  for (const Json& file : files)
+    names.push_back(file["file"].get<std::string>() + (file["exists"].get<bool>() ? "" : " (missing)"));
+  return list_text(names);
+}
+
+std::string surface_text(const Json& mesh) {
+  const auto is = [&](const char* name) { return mesh[name].get<bool>(); };
+  const auto count = [&](const char* name) { return mesh[name].get<std::size_t>(); };
+  std::string text = is("closed") ? "closed" : "open, " + counted(count("boundary_edges"), "boundary edge");
+  text += is("manifold") ? ", manifold"
+                         : ", not manifold at " + counted(count("non_manifold_edges"), "edge") + " and " +
+                               std::to_string(count("non_manifold_vertices")) + " vertices";
+  return text + (is("oriented") ? ", wound in one sense" : ", wound in different senses");
+}
+
+void print_mesh(const Json& mesh) {
+  print_line("vertices",
+             mesh["vertices"].dump() + ", at " + mesh["distinct_positions"].dump() + " positions");
+  print_line("triangles", mesh["faces"].dump());
+  print_line("components", mesh["components"].dump());
+  print_line("surface", surface_text(mesh));
+  print_line("bounds", list_text(mesh["bounds"]["low"]) + " to " + list_text(mesh["bounds"]["high"]));
+  print_line("colours", mesh["colors"].get<std::string>());
+  print_line("texture coordinates", mesh["texture_coordinates"].dump());
+  if (!mesh["materials"].empty()) print_line("materials", list_text(mesh["materials"]));
+  if (!mesh["material_files"].empty()) print_line("material files", files_text(mesh["material_files"]));
+  if (!mesh["textures"].empty()) print_line("textures", files_text(mesh["textures"]));
+  for (const Json& note : mesh["notes"]) print_line("note", note.get<std::string>());
+}
+
+std::string camera_text(const Json& camera) {
+  const std::string lens = camera.contains("intrinsics") ? "fx " + camera["intrinsics"]["fx"].dump() +
+                                                               ", fy " + camera["intrinsics"]["fy"].dump()
+                                                         : camera["fov_y_degrees"].dump() + " degrees high";
+  return lens + ", depths from " + camera["znear"].dump() + " to " + camera["zfar"].dump();
+}
+
+void print_scene(const Json& scene) {
+  print_line("size", scene["width"].dump() + "x" + scene["height"].dump());
+  print_line("camera", camera_text(scene["camera"]));
+  print_line("background", list_text(scene["background"]));
+  print_line("lights", scene["lights"].is_null()
+                           ? "none: colours as they are"
+                           : "ambient and " + scene["lights"]["point"].dump() + " point");
+  std::string smoothing;
+  for (const auto& [name, value] : scene["smoothing"].items())
+    smoothing += (smoothing.empty() ? "" : ", ") + name + " " + list_text(Json::array({value}));
+  print_line("smoothing", smoothing);
+  print_line("gradients", list_text(scene["gradients"]));
+  for (const Json& mesh : scene["meshes"]) {
+    std::printf("%s: mesh\n",
+                mesh["file"].is_null() ? "(in the scene file)" : mesh["file"].get<std::string>().c_str());
+    print_mesh(mesh);
+  }
+}
+
+void run(const std::string& file, bool as_json) {
+  const Json info = file_to_json(file);
+  if (as_json) {
+    std::printf("%s", to_text(info).c_str());
+    return;
+  }
+  const bool is_scene = info["kind"] == "scene";
+  std::printf("%s: %s\n", file.c_str(), is_scene ? "scene" : "mesh");
+  is_scene ? print_scene(info) : print_mesh(info);
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& application, CommonOptions& common) {
+  CLI::App* command =
+      application.add_subcommand("info", "Says what is in a mesh or a scene, and what dpr does with it");
+  const auto file = std::make_shared<std::string>();
+  const auto as_json = std::make_shared<bool>(false);
+  command->add_option("FILE", *file, "Mesh (OBJ, PLY, OFF, STL) or scene (JSON)")->required()->type_name("");
+  command->add_flag("--json", *as_json, "Print JSON");
+  add_output_options(*command, common);
+  command->footer(
+      "The surface is looked at with vertices at equal positions taken for one.\n"
+      "JSON of a mesh: file, kind, vertices, distinct_positions, faces, components, edges, boundary_edges, "
+      "closed,\n"
+      "manifold, non_manifold_edges, non_manifold_vertices, oriented, faces_without_area, bounds {low, "
+      "high}, colors\n"
+      "(vertex, face, none), texture_coordinates, materials, material_files and textures [{file, exists}], "
+      "notes\n"
+      "(sentences). Of a scene: file, kind, width, height, camera, background, lights, smoothing, gradients, "
+      "meshes.\n"
+      "Example: dpr info bunny.obj");
+  command->callback([file, as_json] { run(*file, *as_json); });
+}
+
+}  // namespace dpr::cli

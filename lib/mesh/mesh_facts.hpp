@@ -1,0 +1,31 @@
+// What kind of surface a mesh is.
+#pragma once
+
+#include <cstddef>
+
+#include "dpr/mesh.hpp"
+
+namespace dpr {
+
+/// Of the surface, in which vertices at equal positions are one and triangles with two equal corners are left
+/// out: seams of colours, normals and texture coordinates do not cut it.
+struct MeshFacts {
+  std::size_t distinct_positions = 0;
+  std::size_t unused_vertices = 0;     ///< that no face refers to
+  std::size_t faces_without_area = 0;  ///< exactly zero, equal corners among them
+  std::size_t components = 0;          ///< parts of faces that share no position
+  std::size_t edges = 0;
+  std::size_t boundary_edges = 0;         ///< of one face
+  std::size_t non_manifold_edges = 0;     ///< of more than two faces
+  std::size_t non_manifold_vertices = 0;  ///< whose faces are more than one fan
+  std::size_t reversed_edges = 0;         ///< of two faces that are wound in opposite senses
+
+  bool is_manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
+  bool is_closed() const { return edges > 0 && boundary_edges == 0; }
+  bool is_oriented() const { return reversed_edges == 0; }
+};
+
+/// Of a valid mesh. O(n log n).
+MeshFacts mesh_facts(const Mesh& mesh);
+
+}  // namespace dpr

@@ -1,0 +1,85 @@
+// The parts of report pages: escaped texts, frames of strips, differences that show something.
+#include "cli/page.hpp"
+
+#include <doctest/doctest.h>
+
+#include "cli/difference.hpp"
+#include "cli/progress.hpp"
+#include "support/messages.hpp"
+#include "support/temp_dir.hpp"
+
+namespace {
+
+using dpr::Image;
+using dpr::test::contains;
+using dpr::test::TempDir;
+
+std::string written(const TempDir& folder, const dpr::cli::Page& page) {
+  page.write(folder / "page.html");
+  return folder.read("page.html");
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("page: what a user types is text, not HTML") {
+    const TempDir folder;
+    dpr::cli::Page page({"<b>", "dpr pose -o 'a&b'", "\"device\""});
+    page.add_facts({{"<i>", "1 < 2"}});
+    page.add_pictures({{"a\"b.png", "<u>", 4, 3}});
+    const std::string html = written(folder, page);
+    for (const char* part :
+         {"&lt;b&gt;", "a&amp;b", "&quot;device&quot;", "&lt;i&gt;", "1 &lt; 2", "a&quot;b.png"})
+      CHECK(contains(html, part));
+    for (const char* part : {"<b>", "<i>", "<u>", "a&b"}) CHECK_FALSE(contains(html, part));
+    CHECK(contains(html, "name=\"viewport\""));
+  }
+
+  TEST_CASE("page: frames of a strip lie at equal distances, large ones are made smaller") {
+    const TempDir folder;
+    const auto frames =
+        dpr::cli::write_strip(folder / "s.png", {Image(6, 4), Image(6, 4), Image(6, 4)}, {"a", "b", "c"});
+    REQUIRE(frames.size() == 3);
+    CHECK(frames[0].position == 0);
+    CHECK(frames[1].position == 0.5);
+    CHECK(frames[2].position == 1);
+    CHECK(frames[1].caption == "b");
+    CHECK(dpr::read_image(folder / "s.png").width == 6 + 2 + 6 + 2 + 6);
+    const auto large = dpr::cli::write_strip(folder / "l.png", {Image(960, 480)}, {""});
+    CHECK(large[0].width == 480);
+    CHECK(large[0].height == 240);
+    CHECK(dpr::cli::write_strip(folder / "none.png", {}, {}).empty());
+    CHECK_FALSE(std::filesystem::exists(folder / "none.png"));
+  }
+
+  TEST_CASE("page: a player without script shows every row") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    page.add_player({}, {{{"a.png", "first", 1, 1}}, {{"a.png", "second", 1, 1, 1}}});
+    page.add_player({}, {});
+    const std::string html = written(folder, page);
+    CHECK(contains(html, "<details open>"));
+    CHECK(contains(html, "first"));
+    CHECK(contains(html, "second"));
+    CHECK(contains(html, "max=\"1\""));
+  }
+
+  TEST_CASE("differences: the gain shows small ones, leaves large ones, and is said") {
+    const auto grey = [](float value) { return Image(10, 10, glm::vec4(value, value, value, 1)); };
+    const auto small = dpr::cli::differences({grey(0.5F)}, {grey(0.51F)});
+    CHECK(small.gain == 64);  // 0.64; twice that is above 1
+    CHECK(small.images[0].pixels[0].r == doctest::Approx(0.64));
+    CHECK(small.caption() == "difference, 64 times as bright");
+    CHECK(dpr::cli::differences({grey(0)}, {grey(1)}).gain == 1);
+    CHECK(dpr::cli::differences({grey(0.5F)}, {grey(0.5F)}).caption() == "difference");
+    Image spot = grey(0.5F);
+    spot.pixels[7].g = 0.625F;
+    CHECK(dpr::cli::differences({spot}, {grey(0.5F)}).gain == 4);
+  }
+
+  TEST_CASE("durations in a unit that suits them") {
+    CHECK(dpr::cli::duration_text(12.2) == "12 s");
+    CHECK(dpr::cli::duration_text(120) == "2 min");
+    CHECK(dpr::cli::duration_text(7200) == "2.0 h");
+  }
+}
