@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <string>
 
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -39,14 +40,24 @@ int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
       k_wrong_input);
 }
 
-}  // namespace
-
-int run_application(CLI::App& application, const CommonOptions& common, int argc, char** argv) {
+/// Runs the command; the exit status.
+int run(CLI::App& application, int argc, char** argv) {
   try {
     application.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
     return fail_to_parse(application, error);
+  }
+}
+
+}  // namespace
+
+int run_application(CLI::App& application, const CommonOptions& common, int argc, char** argv) {
+  prepare_process();
+  try {
+    const int status = run(application, argc, argv);
+    require_printed();
+    return status;
   } catch (const BuildError& error) {
     const int status = fail(error.what(), k_device_failed);
     if (common.verbose) std::fprintf(stderr, "%s\n", error.log().c_str());

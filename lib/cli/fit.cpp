@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "base/checks.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/folder.hpp"

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/folder.hpp"
 #include "cli/page.hpp"
 #include "cli/plot.hpp"

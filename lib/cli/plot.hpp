@@ -22,9 +22,10 @@ struct Panel {
 /// A string of gnuplot's: in single quotes, which are doubled inside.
 std::string gnuplot_quote(const std::string& text);
 
-/// Runs a script that draws into a PNG file of that many pixels: terminal and output are set before it.
-/// Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot fails.
-bool draw(const std::filesystem::path& file, int width, int height, const std::string& script);
+/// Runs gnuplot's commands, which draw into a PNG file of that many pixels: terminal and output are set
+/// before them. Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot
+/// fails.
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& commands);
 
 /// Draws the panels below each other over a common x into a PNG file; else as draw().
 bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/page.hpp"
 
 namespace dpr::cli {

@@ -2,6 +2,7 @@
 #include "dpr/renderer.hpp"
 
 #include "base/checks.hpp"
+#include "device/info.hpp"
 #include "dpr/opencl.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
@@ -221,7 +222,7 @@ SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
   Renderer::Impl& m = renderer.impl();
   m.require_forward("backward");
   const std::size_t count = m.aggregate.image.size();
-  const std::size_t bytes = grad_images.getInfo<CL_MEM_SIZE>();
+  const std::size_t bytes = cl_info<CL_MEM_SIZE>(grad_images, "clGetMemObjectInfo");
   if (bytes < count * sizeof(cl_float4)) {
     throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
                           std::to_string(count * sizeof(cl_float4)));
