@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/provenance.hpp"
 #include "dpr/error.hpp"
 #include "results_file.hpp"

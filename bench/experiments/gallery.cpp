@@ -1,8 +1,6 @@
 // The paper's Figure 2: what growing sigma and gamma do to an image, for each composition.
-#include <memory>
 #include <sstream>
 
-#include "base/temporary_file.hpp"
 #include "cli/plot.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -44,6 +42,17 @@ std::string tics(std::span<const float> values, int size, bool from_top) {
   return text.str() + ")";
 }
 
+/// A data block of gnuplot's: the colours in bytes, row by row from the top.
+std::string pixel_data(const std::string& name, const Image& image) {
+  std::ostringstream text;
+  text << "$" << name << " << EOD\n";
+  for (const glm::vec4& pixel : image.pixels) {
+    const glm::ivec3 bytes(glm::round(255.0F * glm::clamp(glm::vec3(pixel), 0.0F, 1.0F)));
+    text << bytes.r << ' ' << bytes.g << ' ' << bytes.b << '\n';
+  }
+  return text.str() + "EOD\n";
+}
+
 }  // namespace
 
 void run_gallery(const Settings& settings) {
@@ -58,15 +67,13 @@ void run_gallery(const Settings& settings) {
          << "\nset size ratio -1\nunset key\nset tics out nomirror\n"
          << "set xlabel 'sigma'\nset ylabel 'gamma'\nset xtics " << tics(k_sigmas, size, false)
          << "\nset ytics " << tics(k_gammas, size, true) << "\n";
-  std::vector<std::unique_ptr<TemporaryFile>> sheets;
   Json means = Json::object();
   for (const char* const preset : k_presets) {
     const Image sheet = contact_sheet(settings.device, scene, preset);
-    sheets.push_back(std::make_unique<TemporaryFile>(settings.folder / "sheet.png"));
-    write_image(sheets.back()->path(), sheet);
-    script << "set title " << cli::gnuplot_quote(preset) << "\nplot [0:" << sheet.width
-           << "][0:" << sheet.height << "] " << cli::gnuplot_quote(sheets.back()->path().string())
-           << " binary filetype=png with rgbimage\n";
+    script << pixel_data(preset, sheet) << "set title " << cli::gnuplot_quote(preset)
+           << "\nplot [0:" << sheet.width << "][0:" << sheet.height << "] $" << preset << " using (int($0) % "
+           << sheet.width << "):(" << sheet.height - 1 << " - int($0) / " << sheet.width
+           << "):1:2:3 with rgbimage\n";
     glm::dvec3 sum(0);
     for (const glm::vec4& pixel : sheet.pixels) sum += glm::dvec3(pixel);
     means[preset] = cli::to_json(sum / static_cast<double>(sheet.pixels.size()));

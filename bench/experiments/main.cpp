@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "cli/folder.hpp"
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
 
@@ -30,6 +31,7 @@ void add_command(CLI::App& application, const dpr::experiments::Experiment& expe
 }  // namespace
 
 int main(int argc, char** argv) {
+  dpr::cli::prepare_process();
   CLI::App application("The paper's figures and tables, each one command.", "dpr_experiments");
   application.require_subcommand(1);
   application.footer("Example: dpr_experiments operators -o figures");
@@ -38,6 +40,7 @@ int main(int argc, char** argv) {
     add_command(application, experiment, options);
   try {
     application.parse(argc, argv);
+    dpr::cli::require_printed();
     return 0;
   } catch (const CLI::ParseError& error) {
     return application.exit(error) == 0 ? 0 : 1;

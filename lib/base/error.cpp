@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 namespace dpr {
@@ -85,6 +86,21 @@ constexpr std::array k_error_names{
 
 #undef DPR_ERROR_NAME
 
+/// Files and their names may hold control characters; a message is one line, and ends where it ends.
+std::string printable(const std::string& text) {
+  constexpr std::string_view k_digits = "0123456789abcdef";
+  std::string line;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code >= 0x20 && code != 0x7f) {
+      line += c;
+    } else {
+      line.append("\\x").append({k_digits[code / 16], k_digits[code % 16]});
+    }
+  }
+  return line;
+}
+
 std::string place(const std::filesystem::path& file, std::optional<std::size_t> line) {
   return line ? file.string() + ":" + std::to_string(*line) : file.string();
 }
@@ -102,23 +118,24 @@ std::string first_complaint(const std::string& log) {
 }  // namespace
 
 InvalidArgument::InvalidArgument(std::string argument, std::string got, std::string expected)
-    : Error(argument + ": got " + got + ", expected " + expected),
+    : Error(printable(argument + ": got " + got + ", expected " + expected)),
       argument_(std::move(argument)),
       got_(std::move(got)),
       expected_(std::move(expected)) {}
 
 IoError::IoError(const std::filesystem::path& file, const std::string& reason,
                  std::optional<std::size_t> line)
-    : Error(place(file, line) + ": " + reason), file_(file), line_(line) {}
+    : Error(printable(place(file, line) + ": " + reason)), file_(file), line_(line) {}
 
 DeviceError::DeviceError(int code, std::string where)
-    : Error(where + ": got " + cl_error_name(code) + " (" + std::to_string(code) + "), expected CL_SUCCESS"),
+    : Error(printable(where + ": got " + cl_error_name(code) + " (" + std::to_string(code) +
+                      "), expected CL_SUCCESS")),
       code_(code),
       where_(std::move(where)) {}
 
 BuildError::BuildError(const std::string& program, std::string device, std::string options, std::string log)
-    : Error("program " + program + " (" + device + ", options \"" + options +
-            "\"): does not build: " + first_complaint(log)),
+    : Error(printable("program " + program + " (" + device + ", options \"" + options +
+                      "\"): does not build: " + first_complaint(log))),
       device_(std::move(device)),
       options_(std::move(options)),
       log_(std::move(log)) {}

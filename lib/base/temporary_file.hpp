@@ -1,37 +1,33 @@
-// Files that appear whole or not at all.
+// Hidden files that don't outlive their use: not by an error, a signal, or a process that was killed.
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <iosfwd>
 
 namespace dpr {
 
-/// A name beside `target`, with the same extension, for a file that becomes `target` by commit() and is
-/// removed otherwise. Owns the file, not a handle to it: close what is written before commit().
+/// An empty file of its own in a folder, open for writing, which the destructor removes. It is locked while
+/// it lives, so that other processes can tell it from one that a killed process left. The first one in a
+/// folder removes such stale ones.
 class TemporaryFile {
  public:
-  /// Throws IoError where the folder of `target` does not exist.
-  explicit TemporaryFile(std::filesystem::path target);
+  /// Throws std::system_error.
+  explicit TemporaryFile(const std::filesystem::path& folder);
   ~TemporaryFile();
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
-  const std::filesystem::path& path() const noexcept { return path_; }
+  int descriptor() const noexcept { return descriptor_; }
 
-  /// Renames the file to the target, which is replaced. Throws IoError.
-  void commit();
+  /// Becomes a file of that name in the same folder, in place of what has it. Throws std::system_error.
+  void rename_to(const std::filesystem::path& file);
 
  private:
-  std::filesystem::path target_, path_;
-  bool committed_ = false;
+  std::filesystem::path path_;
+  int descriptor_ = -1, slot_ = -1;
 };
 
-/// Throws IoError where a file cannot be written; leaves what is there. For work that would be lost without.
-void require_writable(const std::filesystem::path& file);
-
-/// Writes what `write` puts into the stream (binary) to a temporary file, which then becomes `file`. Throws
-/// IoError; what `write` throws passes through, and leaves nothing behind.
-void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write);
+/// Removes the temporary files of this process. Safe in a signal handler; the process should end then. The
+/// library handles no signals: a program that wants this calls it in its own handlers.
+void remove_temporary_files() noexcept;
 
 }  // namespace dpr

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "cli/completion.hpp"
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -53,19 +54,29 @@ std::string command_line(const CLI::App& application, int argc, char** argv) {
   return line;
 }
 
-}  // namespace
-
-int run_application(CLI::App& application, CommonOptions& common, int argc, char** argv) {
+/// Runs the command; the exit status.
+int run(CLI::App& application, int argc, char** argv) {
   if (argc == 2 && argv[1] == std::string_view(k_completion_request)) {
     std::printf("%s", completion_entries(application).c_str());
     return 0;
   }
-  common.command_line = command_line(application, argc, argv);
   try {
     application.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
     return fail_to_parse(application, error);
+  }
+}
+
+}  // namespace
+
+int run_application(CLI::App& application, CommonOptions& common, int argc, char** argv) {
+  prepare_process();
+  common.command_line = command_line(application, argc, argv);
+  try {
+    const int status = run(application, argc, argv);
+    require_printed();
+    return status;
   } catch (const BuildError& error) {
     const int status = fail(error.what(), k_device_failed);
     if (common.verbose) std::fprintf(stderr, "%s\n", error.log().c_str());

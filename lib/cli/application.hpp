@@ -8,7 +8,7 @@
 namespace dpr::cli {
 
 /// Parses the arguments, which runs the command they choose. What goes wrong becomes one line on stderr and
-/// the exit status: 1 for wrong input, 2 if the device failed.
+/// the exit status: 1 for wrong input or an output that cannot be written, 2 if the device failed.
 int run_application(CLI::App& application, CommonOptions& common, int argc, char** argv);
 
 }  // namespace dpr::cli

@@ -59,6 +59,14 @@ bool gives_any(const CLI::App& command, const std::string& group) {
   });
 }
 
+CLI::Option* add_seed_option(CLI::App& command, const std::function<void(std::uint64_t)>& set,
+                             const std::string& description) {
+  const auto read = [set](const std::string& text) {
+    set(parse_whole_number(text, "--seed (command line)"));
+  };
+  return command.add_option_function<std::string>("--seed", read, description)->type_name("N");
+}
+
 void add_output_options(CLI::App& command, CommonOptions& options) {
   auto* quiet = command.add_flag("--quiet", options.quiet, "Print errors only");
   command.add_flag("--verbose", options.verbose, "Print details; build logs in case of errors")
@@ -81,7 +89,8 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
   add_output_options(command, options);
   add_device_options(command, options);
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
-  command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N");
+  add_seed_option(
+      command, [&](std::uint64_t seed) { options.seed = seed; }, "Seed of everything random");
   add_smoothing_options(command, options.smoothing);
 }
 

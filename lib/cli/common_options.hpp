@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -28,6 +29,9 @@ inline constexpr const char* k_smoothing_group = "Smoothing (each replaces the s
 /// Whether the command line gave any option of a help group.
 bool gives_any(const CLI::App& command, const std::string& group);
 
+/// --seed, as scene files take it: the command line's library would read -1 as 2^64 - 1.
+CLI::Option* add_seed_option(CLI::App& command, const std::function<void(std::uint64_t)>& set,
+                             const std::string& description);
 /// --device and --memory-budget.
 void add_device_options(CLI::App& command, CommonOptions& options);
 /// --verbose and --quiet.

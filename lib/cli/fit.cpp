@@ -6,7 +6,7 @@
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/option_names.hpp"

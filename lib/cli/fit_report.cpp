@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "base/output_file.hpp"
 #include "cli/difference.hpp"
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"

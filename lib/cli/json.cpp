@@ -2,9 +2,8 @@
 #include "cli/json.hpp"
 
 #include <charconv>
-#include <ostream>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -74,7 +73,7 @@ std::string to_text(const Json& json) {
 }
 
 void write_json(const std::filesystem::path& file, const Json& json) {
-  write_whole_file(file, [&](std::ostream& out) { out << to_text(json); });
+  write_whole_file(file, to_text(json));
 }
 
 }  // namespace dpr::cli

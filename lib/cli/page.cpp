@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr::cli {

@@ -1,16 +1,21 @@
-// Writes a script for gnuplot and runs it. A script, not a pipe: writing to a program that has died is a
-// signal.
+// Writes a script for gnuplot and runs it. Both its script and its picture are files, not pipes: a pipe to a
+// program that has died is a signal, and two pipes to one program are a deadlock.
 #include "cli/plot.hpp"
 
+#include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <fstream>
+#include <cerrno>
+#include <cstdio>
 #include <limits>
+#include <memory>
 #include <sstream>
+#include <string_view>
+#include <system_error>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -40,22 +45,63 @@ void write_panel(std::ostream& script, const Panel& panel, const std::vector<dou
          << command << "\n";
 }
 
-/// Runs gnuplot on a script; the exit status, or -1 where it is not installed.
-int run_gnuplot(const std::string& script) {
+/// A file without a name, which goes when it is closed.
+class UnnamedFile {
+ public:
+  UnnamedFile() : stream_(std::tmpfile()) {
+    if (!stream_) throw std::system_error(errno, std::generic_category(), "a temporary file for gnuplot");
+  }
+  int descriptor() const { return fileno(stream_.get()); }
+
+  /// Writes the content and goes back to its beginning. False if that fails.
+  bool fill(const std::string& text) {
+    return std::fwrite(text.data(), 1, text.size(), stream_.get()) == text.size() &&
+           std::fflush(stream_.get()) == 0 && std::fseek(stream_.get(), 0, SEEK_SET) == 0;
+  }
+
+  /// The whole content, whoever wrote it.
+  std::string read() {
+    std::string text;
+    std::rewind(stream_.get());
+    char part[BUFSIZ];
+    while (const std::size_t count = std::fread(part, 1, sizeof part, stream_.get()))
+      text.append(part, count);
+    return text;
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* stream) const { std::fclose(stream); }
+  };
+  std::unique_ptr<std::FILE, Close> stream_;
+};
+
+/// Runs gnuplot from a script to what it draws; the exit status, or -1 where it is not installed.
+int run_gnuplot(const UnnamedFile& script, const UnnamedFile& picture) {
   constexpr int k_not_found = 127;  // what a child that could not execute leaves
-  std::string program = "gnuplot", argument = script;
-  char* const arguments[] = {program.data(), argument.data(), nullptr};
+  std::string program = "gnuplot";
+  char* const arguments[] = {program.data(), nullptr};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", 1,
-                                   0);  // its warnings; an error shows in the status
+  posix_spawn_file_actions_adddup2(&actions, script.descriptor(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, picture.descriptor(), STDOUT_FILENO);
+  // Its warnings; an error shows in the status.
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   pid_t child = 0;
   const int error = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) return -1;
   int status = 0;
-  if (waitpid(child, &status, 0) != child || !WIFEXITED(status)) return 1;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status)) return 1;
   return WEXITSTATUS(status) == k_not_found ? -1 : WEXITSTATUS(status);
+}
+
+/// Gnuplot does not look whether what it draws could be written.
+bool is_whole_png(std::string_view bytes) {
+  constexpr std::string_view k_begin = "\x89PNG\r\n\x1a\n", k_end = "IEND\xae\x42\x60\x82";
+  return bytes.starts_with(k_begin) && bytes.ends_with(k_end);
 }
 
 }  // namespace
@@ -66,21 +112,21 @@ std::string gnuplot_quote(const std::string& text) {
   return quoted + "'";
 }
 
-bool draw(const std::filesystem::path& file, int width, int height, const std::string& script, double scale) {
-  const TemporaryFile script_file(std::filesystem::path(file).replace_extension(".gp"));
-  TemporaryFile picture(file);
-  std::ofstream stream(script_file.path());
-  stream << "set terminal pngcairo noenhanced size " << width << ',' << height << " fontscale " << scale
-         << " linewidth " << scale << "\n"
-         << "set output " << gnuplot_quote(picture.path().string()) << "\n"
-         << script;
-  stream.close();
-  if (!stream) throw IoError(file, "the script for gnuplot cannot be written");
-
-  const int status = run_gnuplot(script_file.path().string());
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& commands,
+          double scale) {
+  require_writable(file);
+  UnnamedFile script, picture;
+  std::ostringstream head;
+  head << "set terminal pngcairo noenhanced size " << width << ',' << height << " fontscale " << scale
+       << " linewidth " << scale << "\n";
+  if (!script.fill(head.str() + commands)) throw IoError(file, "the script for gnuplot cannot be written");
+  const int status = run_gnuplot(script, picture);
   if (status < 0) return false;
   if (status > 0) throw IoError(file, "gnuplot failed with status " + std::to_string(status));
-  picture.commit();
+  const std::string bytes = picture.read();
+  if (!is_whole_png(bytes))
+    throw IoError(file, "gnuplot drew no whole picture; is there room for its output?");
+  write_whole_file(file, bytes);
   return true;
 }
 

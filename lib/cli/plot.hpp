@@ -23,10 +23,10 @@ struct Panel {
 /// A string of gnuplot's: in single quotes, which are doubled inside.
 std::string gnuplot_quote(const std::string& text);
 
-/// Runs a script that draws into a PNG file of that many pixels: terminal and output are set before it.
-/// Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot fails.
-/// `scale` enlarges text and lines.
-bool draw(const std::filesystem::path& file, int width, int height, const std::string& script,
+/// Runs gnuplot's commands, which draw into a PNG file of that many pixels: terminal and output are set
+/// before them. Returns false, having done nothing, where no gnuplot is installed. Throws IoError if gnuplot
+/// fails. `scale` enlarges text and lines.
+bool draw(const std::filesystem::path& file, int width, int height, const std::string& commands,
           double scale = 1);
 
 /// Draws the panels below each other over a common x into a PNG file; else as draw().

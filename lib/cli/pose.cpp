@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/folder.hpp"
 #include "cli/option_names.hpp"

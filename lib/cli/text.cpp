@@ -1,8 +1,9 @@
-// Sizes and vectors from text, independent of the locale.
+// Sizes, vectors and numbers from text, independent of the locale.
 #include "cli/text.hpp"
 
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "base/checks.hpp"
 #include "dpr/error.hpp"
@@ -41,6 +42,15 @@ glm::dvec3 parse_vector(const std::string& text, const std::string& argument) {
   if (complete && std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z)) return v;
   throw InvalidArgument(argument, "\"" + text + "\"",
                         "three finite numbers separated by commas, e.g. 0.1,0,-0.5");
+}
+
+std::uint64_t parse_whole_number(const std::string& text, const std::string& argument) {
+  const char *at = text.data(), *end = at + text.size();
+  std::uint64_t number = 0;
+  if (take(at, end, number, 0)) return number;
+  throw InvalidArgument(
+      argument, text,
+      "a whole number from 0 to " + std::to_string(std::numeric_limits<std::uint64_t>::max()));
 }
 
 bool is_adaptive_schedule(const std::string& word) {

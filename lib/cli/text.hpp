@@ -1,6 +1,7 @@
 // Values that are written as text on the command line.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
 
@@ -11,6 +12,9 @@ glm::ivec2 parse_size(const std::string& text);
 
 /// Three numbers separated by commas. Throws InvalidArgument; `argument` says which one in the message.
 glm::dvec3 parse_vector(const std::string& text, const std::string& argument);
+
+/// A whole number of 64 bits. Throws InvalidArgument; `argument` says which one in the message.
+std::uint64_t parse_whole_number(const std::string& text, const std::string& argument);
 
 /// The value of --schedule: true for "adaptive", false for "anneal". Throws InvalidArgument for another word.
 bool is_adaptive_schedule(const std::string& word);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "device/context.hpp"
+#include "device/info.hpp"
 #include "dpr/opencl.hpp"
 
 namespace dpr {
@@ -17,6 +18,16 @@ struct FoundDevice {
   cl::Device device;
   DeviceInfo info;
 };
+
+struct FoundDevices {
+  std::vector<FoundDevice> devices;
+  std::optional<DeviceError> failure;  ///< the first of a platform or device that does not answer
+};
+
+template <auto property>
+auto device_info(const cl::Device& device) {
+  return cl_info<property>(device, "clGetDeviceInfo");
+}
 
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -31,7 +42,7 @@ std::string type_name(cl_device_type type) {
 /// Vectors as wide as the device's registers pay on CPUs; a GPU's lanes are its work-items.
 unsigned choose_lanes(const DeviceInfo& info, const cl::Device& device) {
   if (info.type != "cpu") return 1;
-  return device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>() >= 16 ? 16 : 8;
+  return device_info<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>(device) >= 16 ? 16 : 8;
 }
 
 /// A CPU's memory is the whole machine's, and other programs' too.
@@ -40,27 +51,47 @@ std::size_t default_memory_budget(const DeviceInfo& info) {
   return info.type == "cpu" ? std::min(info.memory_bytes / 8, k_most_of_cpu) : info.memory_bytes / 4;
 }
 
-std::vector<FoundDevice> find_devices() {
-  std::vector<cl::Platform> platforms;
-  const int error = cl::Platform::get(&platforms);
-  if (error == CL_PLATFORM_NOT_FOUND_KHR) return {};
-  check_cl(error, "clGetPlatformIDs");
-  std::vector<FoundDevice> found;
-  for (const cl::Platform& platform : platforms) {
-    std::vector<cl::Device> devices;
-    platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);  // a platform without devices is not an error
-    for (const cl::Device& device : devices) {
-      FoundDevice entry{device, describe(platform, device)};
-      entry.info.index = found.size();
-      found.push_back(std::move(entry));
-    }
-  }
-  if (found.empty()) return found;
+std::vector<cl::Device> devices_of(const cl::Platform& platform) {
+  std::vector<cl::Device> devices;
+  const int error = platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+  if (error != CL_DEVICE_NOT_FOUND) check_cl(error, "clGetDeviceIDs");
+  return devices;
+}
+
+void mark_default(std::vector<FoundDevice>& found) {
   const auto cpu = std::ranges::find(found, "cpu", [](const FoundDevice& entry) { return entry.info.type; });
   FoundDevice& preferred = cpu != found.end() ? *cpu : found.front();
   preferred.info.is_default = true;
   preferred.info.default_reason = cpu != found.end() ? "the first CPU: the same result on every machine"
                                                      : "the first device: there is no CPU";
+}
+
+/// A platform or device that does not answer is passed over: the others can be used.
+FoundDevices find_devices() {
+  FoundDevices found;
+  std::vector<cl::Platform> platforms;
+  const int error = cl::Platform::get(&platforms);
+  if (error == CL_PLATFORM_NOT_FOUND_KHR) return found;
+  check_cl(error, "clGetPlatformIDs");
+  const auto ask = [&](const auto& question) {
+    try {
+      question();
+    } catch (const DeviceError& failure) {
+      if (!found.failure) found.failure = failure;
+    }
+  };
+  for (const cl::Platform& platform : platforms) {
+    std::vector<cl::Device> devices;
+    ask([&] { devices = devices_of(platform); });
+    for (const cl::Device& device : devices) {
+      ask([&] {
+        FoundDevice entry{device, describe(platform, device)};
+        entry.info.index = found.devices.size();
+        found.devices.push_back(std::move(entry));
+      });
+    }
+  }
+  if (!found.devices.empty()) mark_default(found.devices);
   return found;
 }
 
@@ -91,22 +122,24 @@ std::string names(const std::vector<FoundDevice>& found) {
 
 DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
   DeviceInfo info;
-  info.platform = platform.getInfo<CL_PLATFORM_NAME>();
-  info.name = device.getInfo<CL_DEVICE_NAME>();
-  info.vendor = device.getInfo<CL_DEVICE_VENDOR>();
-  info.version = device.getInfo<CL_DEVICE_VERSION>();
-  info.driver = device.getInfo<CL_DRIVER_VERSION>();
-  info.type = type_name(device.getInfo<CL_DEVICE_TYPE>());
-  info.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
-  info.memory_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
-  info.max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  info.platform = cl_info<CL_PLATFORM_NAME>(platform, "clGetPlatformInfo");
+  info.name = device_info<CL_DEVICE_NAME>(device);
+  info.vendor = device_info<CL_DEVICE_VENDOR>(device);
+  info.version = device_info<CL_DEVICE_VERSION>(device);
+  info.driver = device_info<CL_DRIVER_VERSION>(device);
+  info.type = type_name(device_info<CL_DEVICE_TYPE>(device));
+  info.compute_units = device_info<CL_DEVICE_MAX_COMPUTE_UNITS>(device);
+  info.memory_bytes = device_info<CL_DEVICE_GLOBAL_MEM_SIZE>(device);
+  info.max_allocation_bytes = device_info<CL_DEVICE_MAX_MEM_ALLOC_SIZE>(device);
   info.lanes = choose_lanes(info, device);
   return info;
 }
 
 std::vector<DeviceInfo> list_devices() {
+  FoundDevices found = find_devices();
+  if (found.devices.empty() && found.failure) throw DeviceError(*found.failure);
   std::vector<DeviceInfo> infos;
-  for (FoundDevice& entry : find_devices()) infos.push_back(std::move(entry.info));
+  for (FoundDevice& entry : found.devices) infos.push_back(std::move(entry.info));
   return infos;
 }
 
@@ -115,7 +148,7 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   impl->device = device;
   impl->context = context;
   impl->queue = queue;
-  impl->info = describe(cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()), device);
+  impl->info = describe(cl::Platform(device_info<CL_DEVICE_PLATFORM>(device)), device);
   impl->memory_budget = default_memory_budget(impl->info);
   return Device(std::move(impl));
 }
@@ -123,11 +156,14 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
 Device open_device(const std::string& selector) {
   const char* environment = std::getenv("DPR_DEVICE");
   const std::string wanted = selector.empty() && environment != nullptr ? environment : selector;
-  const std::vector<FoundDevice> found = find_devices();
-  if (found.empty())
-    throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
+  const auto [found, failure] = find_devices();
   const auto chosen =
       std::ranges::find_if(found, [&](const FoundDevice& entry) { return matches(entry.info, wanted); });
+  // What does not answer may be what is asked for; and no GPU takes the place of a default CPU in silence.
+  const bool is_certain = chosen != found.end() && (!wanted.empty() || chosen->info.type == "cpu");
+  if (failure && !is_certain) throw DeviceError(*failure);
+  if (found.empty())
+    throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
   if (chosen == found.end()) throw InvalidArgument("device", "'" + wanted + "'", "one of " + names(found));
 
   int error = CL_SUCCESS;
@@ -141,15 +177,11 @@ Device open_device(const std::string& selector) {
 }
 
 Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
-  cl::Device device;
-  cl::Context queue_context;
-  cl_command_queue_properties properties = 0;
-  check_cl(queue.getInfo(CL_QUEUE_DEVICE, &device), "clGetCommandQueueInfo");
-  check_cl(queue.getInfo(CL_QUEUE_CONTEXT, &queue_context), "clGetCommandQueueInfo");
-  check_cl(queue.getInfo(CL_QUEUE_PROPERTIES, &properties), "clGetCommandQueueInfo");
-  if (queue_context() != context()) {
+  const auto device = cl_info<CL_QUEUE_DEVICE>(queue, "clGetCommandQueueInfo");
+  if (cl_info<CL_QUEUE_CONTEXT>(queue, "clGetCommandQueueInfo")() != context()) {
     throw InvalidArgument("queue (adopt_device)", "a queue of another context", "one of the context");
   }
+  const auto properties = cl_info<CL_QUEUE_PROPERTIES>(queue, "clGetCommandQueueInfo");
   if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) != 0) {
     throw InvalidArgument("queue (adopt_device)", "an out-of-order queue", "an in-order one");
   }

@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "device/info.hpp"
+
 namespace dpr {
 
 namespace {
@@ -52,8 +54,7 @@ ArgumentType argument_in_source(const cl::Kernel& kernel, unsigned index) {
 
 void check_signature(const cl::Kernel& kernel, const std::string& name,
                      std::span<const ArgumentType> expected) {
-  cl_uint count = 0;
-  check_cl(kernel.getInfo(CL_KERNEL_NUM_ARGS, &count), "clGetKernelInfo");
+  const auto count = cl_info<CL_KERNEL_NUM_ARGS>(kernel, "clGetKernelInfo");
   if (count != expected.size()) {
     throw std::logic_error("kernel " + name + " has " + std::to_string(count) + " arguments, its signature " +
                            std::to_string(expected.size()));

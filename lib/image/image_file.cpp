@@ -1,6 +1,7 @@
 // Images on disk, by way of OpenImageIO.
 #include "dpr/image.hpp"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr {
@@ -88,6 +89,35 @@ std::array<int, 4> channels_of(const OIIO::ImageSpec& spec) {
   return {0, 1, 2, spec.alpha_channel > 2 ? spec.alpha_channel : -1};
 }
 
+/// The values of the channels that the format has.
+std::vector<float> values_of(const Image& image, const Format& format) {
+  std::vector<float> values;
+  values.reserve(image.pixels.size() * static_cast<std::size_t>(format.channels));
+  const bool clamps = format.type == OIIO::TypeDesc::UINT8;
+  for (const glm::vec4& pixel : image.pixels) {
+    const glm::vec4 value = clamps ? glm::clamp(pixel, 0.0F, 1.0F) : pixel;
+    for (int c = 0; c < format.channels; ++c) values.push_back(value[c]);
+  }
+  return values;
+}
+
+/// The image as a file's bytes, in memory: OpenImageIO takes some writes to a full disk for successes, and
+/// libjpeg ends the process at one.
+std::vector<unsigned char> encode(const std::filesystem::path& file, const Image& image,
+                                  const Format& format) {
+  const auto output = OIIO::ImageOutput::create(std::string(format.extension.substr(1)));
+  if (!output) throw IoError(file, "cannot be written: " + one_line(OIIO::geterror()));
+  OIIO::ImageSpec spec(image.width, image.height, format.channels, OIIO::TypeDesc(format.type));
+  spec.attribute(k_unassociated_alpha, 1);
+  spec.attribute("DateTime", "");  // none: equal images are equal files
+  OIIO::Filesystem::IOVecOutput bytes;
+  if (!output->set_ioproxy(&bytes) || !output->open(file.string(), spec) ||
+      !output->write_image(OIIO::TypeDesc::FLOAT, values_of(image, format).data()) || !output->close()) {
+    throw IoError(file, "cannot be written: " + one_line(output->geterror()));
+  }
+  return std::move(bytes.buffer());
+}
+
 }  // namespace
 
 Image read_image(const std::filesystem::path& file, bool* has_alpha) {
@@ -129,23 +159,8 @@ void write_image(const std::filesystem::path& file, const Image& image) {
         "at least 1x1, and width times height pixels");
   }
   require_finite(file, image);
-  std::vector<float> values;
-  values.reserve(image.pixels.size() * static_cast<std::size_t>(format.channels));
-  const bool clamps = format.type == OIIO::TypeDesc::UINT8;
-  for (const glm::vec4& pixel : image.pixels) {
-    const glm::vec4 value = clamps ? glm::clamp(pixel, 0.0F, 1.0F) : pixel;
-    for (int c = 0; c < format.channels; ++c) values.push_back(value[c]);
-  }
-  TemporaryFile temporary(file);
-  const auto output = OIIO::ImageOutput::create(temporary.path().string());
-  if (!output) throw IoError(file, "cannot be written: " + one_line(OIIO::geterror()));
-  OIIO::ImageSpec spec(image.width, image.height, format.channels, OIIO::TypeDesc(format.type));
-  spec.attribute(k_unassociated_alpha, 1);
-  if (!output->open(temporary.path().string(), spec) ||
-      !output->write_image(OIIO::TypeDesc::FLOAT, values.data()) || !output->close()) {
-    throw IoError(file, "cannot be written: " + one_line(output->geterror()));
-  }
-  temporary.commit();
+  const std::vector<unsigned char> bytes = encode(file, image, format);
+  write_whole_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace dpr

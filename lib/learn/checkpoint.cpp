@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::learn {
@@ -107,13 +107,13 @@ void save_checkpoint(const std::filesystem::path& file, const Checkpoint& checkp
   archive.write("network", part);
   optimizer.save(moments);
   archive.write("optimizer", moments);
-  write_whole_file(file, [&](std::ostream& out) {
-    // Torch's writer terminates the process where writing fails, so it is not told: the stream knows.
-    archive.save_to([&](const void* bytes, std::size_t count) {
-      out.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
-      return count;
-    });
+  OutputFile output(file);
+  // Torch's writer terminates the process where writing fails, so it is not told: commit() knows.
+  archive.save_to([&](const void* bytes, std::size_t count) {
+    output.write(bytes, count);
+    return count;
   });
+  output.commit();
 }
 
 LoadedCheckpoint start(const NetworkOptions& architecture, const std::string& method, std::uint64_t seed,

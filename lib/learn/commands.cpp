@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "cli/folder.hpp"
 #include "cli/json.hpp"
 #include "cli/plot.hpp"
@@ -103,10 +103,10 @@ void add_data_command(CLI::App& application, CommonOptions& common) {
   count("--train", Split::train, "Objects of a class to train with");
   count("--val", Split::val, "Objects of a class to validate with");
   count("--test", Split::test, "Objects of a class to test with");
-  command->add_option("--seed", options->generate.seed, "Seed of the shapes")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str()
-      ->type_name("N");
+  std::uint64_t& seed = options->generate.seed;
+  add_seed_option(
+      *command, [&seed](std::uint64_t given) { seed = given; }, "Seed of the shapes")
+      ->default_str(std::to_string(seed));
   add_output_options(*command, common);
   add_device_options(*command, common);
   command->footer("Example: dpr learn data -o data");
@@ -187,10 +187,9 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");
-  command->add_option("--seed", o.seed, "Seed of the weights, the batches and the noise")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str()
-      ->type_name("N");
+  add_seed_option(
+      *command, [&o](std::uint64_t seed) { o.seed = seed; }, "Seed of the weights, the batches and the noise")
+      ->default_str(std::to_string(o.seed));
   command->add_option("--batch", o.batch, "Images a step")->capture_default_str()->type_name("N");
   command->add_option("--learning-rate", o.learning_rate, "Of Adam")
       ->capture_default_str()

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <ostream>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::learn {

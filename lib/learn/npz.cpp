@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::learn {
@@ -120,6 +120,37 @@ std::string read_header(const std::filesystem::path& file, Member& member) {
   return header;
 }
 
+struct FreeSource {
+  void operator()(zip_source_t* source) const { zip_source_free(source); }
+};
+
+/// An archive with one member, in memory: libzip would make temporary files of its own beside its output.
+std::string zipped(const std::filesystem::path& file, const std::string& content) {
+  const auto fail = [&](const char* reason) {
+    throw IoError(file, std::string("cannot be written: ") + reason);
+  };
+  const std::unique_ptr<zip_source_t, FreeSource> bytes(zip_source_buffer_create(nullptr, 0, 0, nullptr));
+  if (!bytes) fail("no memory");
+  zip_source_keep(bytes.get());  // the archive's own reference, which it gives up when it is closed
+  std::unique_ptr<zip_t, CloseArchive> archive(zip_open_from_source(bytes.get(), ZIP_TRUNCATE, nullptr));
+  if (!archive) fail("no memory");
+  zip_source_t* member = zip_source_buffer(archive.get(), content.data(), content.size(), 0);
+  // A date of its own would make two equal arrays two different files.
+  constexpr zip_uint16_t k_first_dos_date = (1 << 5) | 1;  // 1 January 1980
+  if (zip_file_add(archive.get(), "arr_0.npy", member, ZIP_FL_ENC_UTF_8) < 0 ||
+      zip_file_set_dostime(archive.get(), 0, 0, k_first_dos_date, 0) != 0 || zip_close(archive.get()) != 0) {
+    fail(zip_strerror(archive.get()));
+  }
+  archive.release();  // closed
+  zip_stat_t stat;
+  if (zip_source_stat(bytes.get(), &stat) != 0 || zip_source_open(bytes.get()) != 0) fail("no memory");
+  std::string text(stat.size, '\0');
+  if (zip_source_read(bytes.get(), text.data(), text.size()) != static_cast<zip_int64_t>(text.size())) {
+    fail("no memory");
+  }
+  return text;
+}
+
 }  // namespace
 
 ByteArray read_npz(const std::filesystem::path& file) {
@@ -160,21 +191,7 @@ void write_npz(const std::filesystem::path& file, std::span<const std::size_t> s
   content += header;
   content.append(reinterpret_cast<const char*>(values.data()), values.size());
 
-  TemporaryFile temporary(file);
-  int code = 0;
-  std::unique_ptr<zip_t, CloseArchive> archive(
-      zip_open(temporary.path().c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code));
-  if (!archive) throw IoError(file, "cannot be written");
-  zip_source_t* source = zip_source_buffer(archive.get(), content.data(), content.size(), 0);
-  const zip_int64_t index = zip_file_add(archive.get(), "arr_0.npy", source, ZIP_FL_ENC_UTF_8);
-  // A date of its own would make two equal arrays two different files.
-  constexpr zip_uint16_t k_first_dos_date = (1 << 5) | 1;  // 1 January 1980
-  if (index < 0 || zip_file_set_dostime(archive.get(), 0, 0, k_first_dos_date, 0) != 0 ||
-      zip_close(archive.get()) != 0) {
-    throw IoError(file, std::string("cannot be written: ") + zip_strerror(archive.get()));
-  }
-  archive.release();  // closed
-  temporary.commit();
+  write_whole_file(file, zipped(file, content));
 }
 
 }  // namespace dpr::learn

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "base/checks.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/smoothing_options.hpp"
 #include "learn/checkpoint.hpp"
@@ -322,8 +322,9 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
         std::accumulate(found.begin(), found.end(), 0.0) / static_cast<double>(found.size());
     run.checkpoint.validations.push_back(
         {static_cast<double>(run.checkpoint.steps.size()), state.validation_iou});
-    save_checkpoint(file, run.checkpoint, run.network, *run.optimizer);
+    // In this order: interrupted between the two, a training that is complete would not write its losses.
     write_losses(folder / "losses.csv", run.checkpoint.steps);
+    save_checkpoint(file, run.checkpoint, run.network, *run.optimizer);
   };
 
   const Clock::time_point begin = Clock::now();

@@ -1,7 +1,7 @@
 // Mesh files: their content goes to the reader of its format. Writing needs no library.
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/notes.hpp"
 #include "mesh/mesh_reader.hpp"
@@ -105,7 +105,7 @@ void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
   }
   validate(mesh, "mesh for " + file.string());
   const std::string text = extension == ".obj" ? obj_text(file, mesh) : ply_text(mesh);
-  write_whole_file(file, [&](std::ostream& out) { out << text; });
+  write_whole_file(file, text);
 }
 
 }  // namespace dpr

@@ -2,6 +2,7 @@
 #include "dpr/renderer.hpp"
 
 #include "base/checks.hpp"
+#include "device/info.hpp"
 #include "dpr/opencl.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
@@ -191,13 +192,10 @@ SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
   Renderer::Impl& m = renderer.impl();
   m.require_forward("backward");
   const std::size_t count = m.aggregate.image.size();
-  cl::Context context;
-  std::size_t bytes = 0;
-  check_cl(grad_images.getInfo(CL_MEM_CONTEXT, &context), "clGetMemObjectInfo");
-  check_cl(grad_images.getInfo(CL_MEM_SIZE, &bytes), "clGetMemObjectInfo");
-  if (context() != m.device.impl().context()) {
+  if (cl_info<CL_MEM_CONTEXT>(grad_images, "clGetMemObjectInfo")() != m.device.impl().context()) {
     throw InvalidArgument("grad_images", "a buffer of another context", "one of the device's own");
   }
+  const std::size_t bytes = cl_info<CL_MEM_SIZE>(grad_images, "clGetMemObjectInfo");
   if (bytes < count * sizeof(cl_float4)) {
     throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
                           std::to_string(count * sizeof(cl_float4)));

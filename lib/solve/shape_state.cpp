@@ -1,15 +1,17 @@
-// Checkpoints: CBOR by nlohmann's library, which keeps every bit of a double, and a checksum of the content.
+// Checkpoints: a head with a checksum, and the content as CBOR by nlohmann's library, which keeps every bit
+// of a double.
 #include "solve/shape_state.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
-#include <ostream>
 #include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 
 #include "base/input_file.hpp"
-#include "base/temporary_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr {
@@ -17,8 +19,9 @@ namespace {
 
 using nlohmann::json;
 
-/// What a file begins with.
-constexpr std::string_view k_magic = "dpr shape checkpoint 3\n";
+/// What a file begins with. The fingerprint and the checksum follow, and then the content.
+constexpr std::string_view k_magic = "dpr shape checkpoint 4\n";
+constexpr std::size_t k_number_size = 8, k_head_size = k_magic.size() + 2 * k_number_size;
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo 1991).
 class Hash {
@@ -138,6 +141,27 @@ json to_json(const ShapeState& state) {
           {"history", history}};
 }
 
+/// What the solver relies on: a checksum keeps damage out, but not a file that was made up.
+bool is_consistent(const ShapeState& state) {
+  const std::size_t vertices = state.positions.size() / 3;
+  const auto is_finite = [](const std::vector<double>& values) {
+    return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+  };
+  const auto fits = [&](const OptimizerState& steps) {
+    const std::size_t size = steps.first_moment.size();
+    return (size == 0 || size == state.positions.size()) && steps.second_moment.size() == size &&
+           is_finite(steps.first_moment) && is_finite(steps.second_moment);
+  };
+  return vertices > 0 && state.positions.size() == 3 * vertices && state.colors.size() == 3 * vertices &&
+         is_finite(state.positions) && is_finite(state.colors) && !state.faces.empty() &&
+         std::ranges::all_of(state.faces,
+                             [&](const glm::uvec3& f) {
+                               return std::max({f.x, f.y, f.z}) < vertices;
+                             }) &&
+         fits(state.position_steps) && fits(state.color_steps) && state.history.size() == state.iteration;
+}
+
+/// Throws json's exceptions where the content is another.
 ShapeState state_of(const json& node, const Smoothing& finest) {
   ShapeState state;
   state.iteration = node.at("iteration");
@@ -152,11 +176,51 @@ ShapeState state_of(const json& node, const Smoothing& finest) {
   return state;
 }
 
-std::uint64_t hash_of(const std::vector<std::uint8_t>& bytes, std::uint64_t fingerprint) {
+/// Lists and objects within each other, counted while CBOR is read: nlohmann's reader calls itself for each,
+/// and would use up the stack.
+class Depth : public nlohmann::json_sax<json> {
+ public:
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override { return ++depth_ <= k_most; }
+  bool key(string_t&) override { return true; }
+  bool end_object() override { return --depth_ >= 0; }
+  bool start_array(std::size_t) override { return ++depth_ <= k_most; }
+  bool end_array() override { return --depth_ >= 0; }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+
+ private:
+  static constexpr int k_most = 4;  // a list of moments in the list of a state in the content
+  int depth_ = 0;
+};
+
+std::uint64_t hash_of(std::string_view content, std::uint64_t fingerprint) {
   Hash hash;
-  hash.add_bytes(std::as_bytes(std::span(bytes)));
+  hash.add_bytes(std::as_bytes(std::span(content)));
   hash.add(fingerprint);
   return hash.value();
+}
+
+/// The lowest byte first.
+std::string to_bytes(std::uint64_t number) {
+  std::string bytes;
+  for (std::size_t i = 0; i < k_number_size; ++i) bytes += static_cast<char>(number >> (8 * i) & 0xffU);
+  return bytes;
+}
+
+std::uint64_t number_of(std::string_view bytes) {
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < k_number_size; ++i) {
+    number |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
+  }
+  return number;
 }
 
 }  // namespace
@@ -189,34 +253,42 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
   return hash.value();
 }
 
+std::string checkpoint_bytes(std::string_view content, std::uint64_t fingerprint) {
+  std::string bytes(k_magic);
+  bytes.append(to_bytes(fingerprint)).append(to_bytes(hash_of(content, fingerprint))).append(content);
+  return bytes;
+}
+
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint) {
-  const std::vector<std::uint8_t> content = json::to_cbor(to_json(state));
-  const std::vector<std::uint8_t> bytes = json::to_cbor({{"fingerprint", fingerprint},
-                                                         {"checksum", hash_of(content, fingerprint)},
-                                                         {"content", json::binary(content)}});
-  write_whole_file(file, [&](std::ostream& out) {
-    out << k_magic;
-    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  });
+  std::string content;
+  json::to_cbor(to_json(state), content);
+  write_whole_file(file, checkpoint_bytes(content, fingerprint));
 }
 
 ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
                            const Smoothing& finest) {
   const std::string bytes = read_file(file);
   if (!bytes.starts_with(k_magic)) throw IoError(file, "is no checkpoint of a shape, or of another version");
-  try {
-    const json document = json::from_cbor(bytes.substr(k_magic.size()));
-    const std::vector<std::uint8_t>& content = document.at("content").get_binary();
-    const auto mark = document.at("fingerprint").get<std::uint64_t>();
-    if (document.at("checksum") != hash_of(content, mark)) throw IoError(file, "the checkpoint is damaged");
-    if (mark != fingerprint) {
-      throw InvalidArgument("checkpoint (" + file.string() + ")", "one of other views or options",
-                            "one of this run; remove it to begin anew");
-    }
-    return state_of(json::from_cbor(content), finest);
-  } catch (const json::exception&) {
-    throw IoError(file, "the checkpoint is damaged");
+  const auto fail = [&] { throw IoError(file, "the checkpoint is damaged"); };
+  if (bytes.size() < k_head_size) fail();
+  const std::string_view numbers = std::string_view(bytes).substr(k_magic.size());
+  const std::string_view content = std::string_view(bytes).substr(k_head_size);
+  const std::uint64_t mark = number_of(numbers);
+  if (number_of(numbers.substr(k_number_size)) != hash_of(content, mark)) fail();
+  if (mark != fingerprint) {
+    throw InvalidArgument("checkpoint (" + file.string() + ")", "one of other views or options",
+                          "one of this run; remove it to begin anew");
   }
+  Depth depth;
+  if (!json::sax_parse(content, &depth, json::input_format_t::cbor)) fail();
+  ShapeState state;
+  try {
+    state = state_of(json::from_cbor(content), finest);
+  } catch (const json::exception&) {
+    fail();
+  }
+  if (!is_consistent(state)) fail();
+  return state;
 }
 
 }  // namespace dpr

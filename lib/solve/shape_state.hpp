@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "dpr/optimizer.hpp"
@@ -32,7 +34,10 @@ struct ShapeState {
 /// A number that differs, with all likelihood, where views or options do.
 std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const ShapeOptions& options);
 
-/// All or nothing, as CBOR. Throws IoError.
+/// A file of that content, CBOR, with what makes damage show.
+std::string checkpoint_bytes(std::string_view content, std::uint64_t fingerprint);
+
+/// All or nothing. Throws IoError.
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint);
 
 /// A file keeps of the history's smoothings what changes; `finest` is the rest. Throws IoError where the file

@@ -155,4 +155,24 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--edge", "1e-6"}), "edge length");
     CHECK(folder.read("garbage") == "no checkpoint");
   }
+
+  TEST_CASE("dpr fit: an output that finds no room is an error that names it") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    std::filesystem::create_directories(folder / "report");
+    for (const std::string name : {"mesh.ply", "mesh.obj", "report/targets.png", "report/plot.png",
+                                   "report/fit.json", "report/index.html"}) {
+      std::filesystem::create_symlink("/dev/full", folder / name);
+      const bool is_mesh = name.starts_with("mesh");
+      const auto outcome =
+          run_command(folder, {"fit", "--views", "views.json", "-o", is_mesh ? name : "good.obj", "--levels",
+                               "1", "--iterations", "2", "--report", "report"});
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, name + ": cannot be written: No space left on device"));
+      std::filesystem::remove(folder / name);
+    }
+  }
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "device/context.hpp"
 #include "dpr/dpr.hpp"
 #include "dpr/opencl.hpp"
 #include "pipeline/comparison.hpp"
@@ -246,5 +247,13 @@ TEST_SUITE("pipeline") {
     const cl::Buffer foreign(stranger.context, CL_MEM_READ_ONLY, bytes);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, foreign), "another context");
     CHECK(flat_values(backward(renderer, buffer)) == from_host);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("an object that does not say what it is, is an error") {
+    DPR_CHECK_MESSAGE_HAS(DeviceError, adopt_device(cl::Context(), cl::CommandQueue()),
+                          "clGetCommandQueueInfo");
+    DPR_CHECK_MESSAGE_HAS(DeviceError, describe(cl::Platform::getDefault(), cl::Device()), "clGetDeviceInfo");
   }
 }

@@ -3,8 +3,14 @@
 
 #include <doctest/doctest.h>
 
+#include <chrono>
 #include <limits>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
 
+#include "support/file_size_limit.hpp"
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
@@ -168,6 +174,42 @@ TEST_SUITE("robustness") {
     not_finite.at(2, 1).b = std::numeric_limits<float>::quiet_NaN();
     DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / "a.exr", not_finite), "the pixel in column 2, row 1");
     CHECK(folder.entries() == 0);
+  }
+
+  TEST_CASE("an image that finds no room is an error in every format, and leaves what was there") {
+    const TempDir folder;
+    Image noise(32, 32);
+    std::mt19937 generator(1);
+    for (glm::vec4& pixel : noise.pixels) {
+      for (int c = 0; c < 4; ++c) pixel[c] = static_cast<float>(generator() % 256) / 255;
+    }
+    for (const std::string name :
+         {"a.exr", "a.png", "a.tif", "a.tiff", "a.tga", "a.bmp", "a.jpg", "a.jpeg", "a.ppm"}) {
+      CAPTURE(name);
+      write_image(folder / name, Image(4, 4, glm::vec4(0.5F)));
+      const std::string before = folder.read(name);
+      const std::size_t entries = folder.entries();
+      {
+        const dpr::test::FileSizeLimit limit(1000);
+        DPR_CHECK_MESSAGE_HAS(IoError, write_image(folder / name, noise),
+                              "cannot be written: File too large");
+      }
+      CHECK(folder.read(name) == before);
+      CHECK(folder.entries() == entries);
+      write_image(folder / name, noise);
+      CHECK(read_image(folder / name).width == 32);
+    }
+  }
+
+  TEST_CASE("equal images are equal files, whenever they are written") {
+    const TempDir folder;
+    const std::vector<std::string> formats{".exr", ".png", ".tif", ".tga", ".bmp", ".jpg", ".ppm"};
+    for (const std::string& format : formats) write_image(folder / ("a" + format), sample());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // dates in files are in seconds
+    for (const std::string& format : formats) {
+      write_image(folder / ("b" + format), sample());
+      CHECK_MESSAGE(folder.read("a" + format) == folder.read("b" + format), format);
+    }
   }
 
   TEST_CASE("a float file with a pixel that is not finite") {

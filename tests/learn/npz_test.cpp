@@ -5,6 +5,7 @@
 
 #include <numeric>
 
+#include "support/file_size_limit.hpp"
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
@@ -142,6 +143,12 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, write_npz(folder / "x.npz", wrong, numbers(2)), "values");
     DPR_CHECK_MESSAGE_HAS(IoError, write_npz(folder / "no" / "x.npz", shape, numbers(4000)),
                           "does not exist");
+    {
+      const FileSizeLimit full_disk(100);
+      DPR_CHECK_MESSAGE_HAS(IoError, write_npz(folder / "good.npz", shape, numbers(4000)), "File too large");
+    }
+    CHECK(folder.read("good.npz") == good);
+    CHECK(folder.entries() == 3);
   }
 }
 

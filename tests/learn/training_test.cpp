@@ -1,16 +1,15 @@
 // Training learns, goes on where it stopped, and says what is wrong with what it is given.
 #include <doctest/doctest.h>
-#include <sys/resource.h>
 #include <torch/torch.h>
 
 #include <cmath>
-#include <csignal>
 
 #include "dpr/error.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
+#include "support/file_size_limit.hpp"
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
@@ -53,27 +52,6 @@ TrainingResult run(const TrainingOptions& options, const TempDir& folder) {
 std::string message(const TrainingOptions& options, const TempDir& folder) {
   return message_of<Error>([&] { run(options, folder); });
 }
-
-/// For its life no file grows beyond a megabyte: writing more fails, as on a full disk.
-class SmallFiles {
- public:
-  SmallFiles() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit small = before_;
-    small.rlim_cur = 1 << 20;
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallFiles() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  SmallFiles(const SmallFiles&) = delete;
-  SmallFiles& operator=(const SmallFiles&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 }  // namespace
 
@@ -221,7 +199,7 @@ TEST_SUITE("robustness") {
     save_checkpoint(folder / "nan.pt", bad.checkpoint, bad.network, *bad.optimizer);
     CHECK(contains(read_message(folder / "nan.pt"), "damaged"));
     {
-      const SmallFiles full_disk;
+      const FileSizeLimit full_disk(1 << 20);
       CHECK_THROWS_AS(save_checkpoint(folder / "full.pt", bad.checkpoint, bad.network, *bad.optimizer),
                       IoError);
     }

@@ -13,6 +13,8 @@
 #include "dpr/voxels.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/shape_space.hpp"
+#include "solve/shape_state.hpp"
+#include "support/file_size_limit.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
@@ -276,5 +278,50 @@ TEST_SUITE("robustness") {
     views.views[0].image.pixels[0].x += 0.5F;
     CHECK_THROWS_AS(solve(good, options), dpr::InvalidArgument);
     CHECK(folder.read("checkpoint") == good);
+  }
+
+  TEST_CASE("checkpoints that were made up, with right checksums, are refused too") {
+    const TempDir folder;
+    dpr::ShapeState state;
+    state.iteration = 1;
+    state.faces = {{0, 1, 2}};
+    state.positions = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    state.colors.assign(9, 0.5);
+    state.history.resize(1);
+    const auto read = [&](const auto& change) {
+      dpr::ShapeState changed = state;
+      change(changed);
+      dpr::write_checkpoint(folder / "checkpoint", changed, 7);
+      return dpr::read_checkpoint(folder / "checkpoint", 7, {});
+    };
+    CHECK(read([](dpr::ShapeState&) {}).positions == state.positions);
+    const auto refuses = [&](const auto& change) {
+      DPR_CHECK_MESSAGE_HAS(dpr::IoError, read(change), "the checkpoint is damaged");
+    };
+    refuses([](dpr::ShapeState& s) { s.faces[0].y = 3; });
+    refuses([](dpr::ShapeState& s) { s.faces.clear(); });
+    refuses([](dpr::ShapeState& s) { s.positions.pop_back(); });
+    refuses([](dpr::ShapeState& s) { s.positions[4] = std::numeric_limits<double>::infinity(); });
+    refuses([](dpr::ShapeState& s) { s.colors.clear(); });
+    refuses([](dpr::ShapeState& s) { s.color_steps.second_moment.assign(9, 0); });
+    refuses([](dpr::ShapeState& s) { s.position_steps.first_moment = s.position_steps.second_moment = {1}; });
+    refuses([](dpr::ShapeState& s) { s.history.clear(); });
+
+    // A million lists in each other, each of one element.
+    const std::string nested(1'000'000, '\x81');
+    folder.write("checkpoint", dpr::checkpoint_bytes(nested, 7));
+    DPR_CHECK_MESSAGE_HAS(dpr::IoError, dpr::read_checkpoint(folder / "checkpoint", 7, {}), "is damaged");
+  }
+
+  TEST_CASE("a checkpoint that finds no room leaves the one before") {
+    const TempDir folder;
+    folder.write("checkpoint", "before");
+    dpr::ShapeState state;
+    state.positions.assign(999, 0.5);
+    const dpr::test::FileSizeLimit full_disk(100);
+    DPR_CHECK_MESSAGE_HAS(dpr::IoError, dpr::write_checkpoint(folder / "checkpoint", state, 7),
+                          "File too large");
+    CHECK(folder.read("checkpoint") == "before");
+    CHECK(folder.entries() == 1);
   }
 }

@@ -6,6 +6,7 @@
 
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"
+#include "cli/process.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
 #include "experiments/pose/figures.hpp"
@@ -136,6 +137,7 @@ const Figure* figure_of(const CLI::App& application, const char* set_group) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  dpr::cli::prepare_process();
   constexpr const char* k_set_group = "Runs (without a figure)";
   CLI::App application(
       "Pose experiments: methods on problems from seeds, or a figure of the paper. An interrupted run goes "
@@ -162,6 +164,7 @@ int main(int argc, char** argv) {
     } else {
       dpr::bench::run(options);
     }
+    dpr::cli::require_printed();
   } catch (const dpr::DeviceError& error) {
     std::fprintf(stderr, "dpr_pose_table: error: %s\n", error.what());
     return 2;
