@@ -14,10 +14,10 @@
 #include "pixel.h"
 
 #ifndef DPR_OCCUPANCY_PRIOR
-#define DPR_OCCUPANCY_PRIOR DPR_GAUSSIAN
+#define DPR_OCCUPANCY_PRIOR gaussian
 #endif
 #ifndef DPR_DEPTH_PRIOR
-#define DPR_DEPTH_PRIOR DPR_GAUSSIAN
+#define DPR_DEPTH_PRIOR gaussian
 #endif
 
 /// Fragments by way of the pixels' lists, and whose noise they take.
@@ -227,12 +227,12 @@ DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, cons
   if (!always_covers(c)) {
     const intn wins_if_it_covers = c.beta + z >= lead.largest;
     const float2 scores =
-        add_scores(DPR_OCCUPANCY_PRIOR, x, counts && wins_if_it_covers, grouped, &sums->sigma);
+        add_scores(x, noise_score(DPR_OCCUPANCY_PRIOR, x), counts && wins_if_it_covers, grouped, &sums->sigma);
     out.by_distance[k] += scores.x;
     out.distance_scores[k] += scores.y;
   }
   const float2 scores =
-      add_scores(DPR_DEPTH_PRIOR, z, counts && covers && could_win(lead, c), grouped, &sums->gamma);
+      add_scores(z, noise_score(DPR_DEPTH_PRIOR, z), counts && covers && could_win(lead, c), grouped, &sums->gamma);
   out.by_depth[k] += scores.x;
   out.depth_scores[k] += scores.y;
 }

@@ -167,7 +167,8 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
       const realn noise = slot + 1 < DPR_NOISE_CACHE
                               ? cache[slot + 1]
                               : draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
-      const float2 scores = add_scores(DPR_PRIOR, noise, sample_counts(p.sampling, block), grouped, gamma);
+      const realn noise_scores = noise_score(DPR_PRIOR, noise);
+      const float2 scores = add_scores(noise, noise_scores, sample_counts(p.sampling, block), grouped, gamma);
       if (slot < 0) continue;
       by_score[fragment_of(q, f, slot)] += scores.x;
       score_sum[fragment_of(q, f, slot)] += scores.y;

@@ -114,9 +114,8 @@ DPR_ALWAYS_INLINE realn draw_uniform(const Sampling s, const NoiseName name, uin
   return s.draws == DPR_STRATIFIED ? stratify(s, name, block, u) : u;
 }
 
-DPR_ALWAYS_INLINE realn draw_noise(const Sampling s, int prior, const NoiseName name, uint block) {
-  return noise_quantile(prior, draw_uniform(s, name, block));
-}
+/// The noise of a prior, by its name, for a block of samples.
+#define draw_noise(s, prior, name, block) noise_quantile(prior, draw_uniform(s, name, block))
 
 /// y_m + G_m / (M - g), or y_m where there is no leave-one-out baseline. `y` is 0 in lanes without a sample.
 static inline realn add_group(const Sampling s, realn y) {
@@ -130,9 +129,9 @@ typedef struct {
 } ScaleSums;
 
 /// Adds a block's scores of one variable, where `counts`: those of the scale to `scale`; returns the variable's own,
-/// sum (y + G / (M - g)) nu'(Z) and sum nu'(Z). `grouped` is add_group of y.
-static inline float2 add_scores(int prior, realn noise, intn counts, realn grouped, ScaleSums* scale) {
-  const realn score = choose(counts, noise_score(prior, noise), (realn)(0.0f));
+/// sum (y + G / (M - g)) nu'(Z) and sum nu'(Z). `scores` is nu' of the noise, `grouped` add_group of y.
+static inline float2 add_scores(realn noise, realn scores, intn counts, realn grouped, ScaleSums* scale) {
+  const realn score = choose(counts, scores, (realn)(0.0f));
   const realn scale_score = choose(counts, mad(score, noise, -1.0f), (realn)(0.0f));
   scale->by_score += grouped * scale_score;
   scale->scores += scale_score;

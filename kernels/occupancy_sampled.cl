@@ -72,7 +72,7 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
     const intn counts = sample_counts(p.sampling, block);
     const realn y = choose(counts, heaviside(p, x, noise, block) - rigid, (realn)(0.0f));
     y_sum += sum_lanes(y);
-    distance += add_scores(DPR_PRIOR, noise, counts, add_group(p.sampling, y), &sigma);
+    distance += add_scores(noise, noise_score(DPR_PRIOR, noise), counts, add_group(p.sampling, y), &sigma);
   }
   return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum), scale_estimate(p.sampling, sigma, y_sum));
 }

@@ -5,8 +5,8 @@
 #include "lanes.h"
 
 /// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
-#define DPR_CAUCHY_LOWEST (-5.35e6f)
-#define DPR_CAUCHY_HIGHEST 5.35e6f
+#define DPR_LOWEST_cauchy (-5.35e6f)
+#define DPR_HIGHEST_cauchy 5.35e6f
 
 /// -cot(pi u), by way of the Taylor polynomials of sine and cosine on [0, pi / 4]: relative error 5e-8 before rounding.
 static inline realn cauchy_quantile(realn u) {
@@ -30,7 +30,8 @@ static inline realn cauchy_quantile(realn u) {
 
 static inline realn cauchy_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
 
-#if DPR_PRIOR == DPR_CAUCHY
+#define DPR_CAUCHY_IS_cauchy 1
+#if DPR_CONCAT(DPR_CAUCHY_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_TAILS
 #define DPR_BARRIER_REACH INFINITY

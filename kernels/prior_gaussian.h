@@ -5,8 +5,8 @@
 #include "lanes.h"
 
 /// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
-#define DPR_GAUSSIAN_LOWEST (-5.3f)
-#define DPR_GAUSSIAN_HIGHEST 5.3f
+#define DPR_LOWEST_gaussian (-5.3f)
+#define DPR_HIGHEST_gaussian 5.3f
 
 /// Giles, "Approximating the erfinv function" (GPU Computing Gems Jade Edition, 2011): sqrt(2) erfinv(2 u - 1), a
 /// polynomial in w = -ln(4 u (1 - u)), and one in sqrt(w) for the 0.34% in the tails.
@@ -41,7 +41,8 @@ static inline realn gaussian_quantile(realn u) {
 
 static inline realn gaussian_score(realn z) { return z; }
 
-#if DPR_PRIOR == DPR_GAUSSIAN
+#define DPR_GAUSSIAN_IS_gaussian 1
+#if DPR_CONCAT(DPR_GAUSSIAN_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_SMOOTH
 /// Barrier composition: where a slot's mass ends above it, 1 - F = 1e-7, and how much further a slot more moves that.

@@ -5,14 +5,15 @@
 #include "lanes.h"
 
 /// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
-#define DPR_GUMBEL_LOWEST (-2.82f)
-#define DPR_GUMBEL_HIGHEST 16.7f
+#define DPR_LOWEST_gumbel (-2.82f)
+#define DPR_HIGHEST_gumbel 16.7f
 
 static inline realn gumbel_quantile(realn u) { return -log_n(-log_n(u)); }
 
 static inline realn gumbel_score(realn z) { return 1.0f - exp_n(-z); }
 
-#if DPR_PRIOR == DPR_GUMBEL
+#define DPR_GUMBEL_IS_gumbel 1
+#if DPR_CONCAT(DPR_GUMBEL_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_SMOOTH
 #define DPR_SOFTMAX 1

@@ -5,8 +5,8 @@
 #include "lanes.h"
 
 /// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
-#define DPR_LOGISTIC_LOWEST (-16.7f)
-#define DPR_LOGISTIC_HIGHEST 16.7f
+#define DPR_LOWEST_logistic (-16.7f)
+#define DPR_HIGHEST_logistic 16.7f
 
 static inline realn logistic_quantile(realn u) { return log_n(u) - log_n(1.0f - u); }
 
@@ -16,7 +16,8 @@ static inline realn logistic_score(realn z) {
   return copysign((1.0f - e) / (1.0f + e), z);
 }
 
-#if DPR_PRIOR == DPR_LOGISTIC
+#define DPR_LOGISTIC_IS_logistic 1
+#if DPR_CONCAT(DPR_LOGISTIC_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_SMOOTH
 /// As in prior_gaussian.h; 1 - F = 5e-7 at the upper end.

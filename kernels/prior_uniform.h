@@ -4,7 +4,8 @@
 
 #include "lanes.h"
 
-#if DPR_PRIOR == DPR_UNIFORM
+#define DPR_UNIFORM_IS_uniform 1
+#if DPR_CONCAT(DPR_UNIFORM_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_PIECEWISE
 /// Where the density ends.

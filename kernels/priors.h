@@ -1,15 +1,18 @@
-// The noise's distribution, chosen at build time by DPR_PRIOR. Each prior is one file, kernels/prior_<name>.h:
+// The noise's distribution, which the host names at build time: -DDPR_PRIOR=gaussian. Each prior is one file,
+// kernels/prior_<name>.h. All of them define, under their names, for sampling:
+//
+//   <name>_quantile(u)                    inverse CDF of u in (0, 1)
+//   <name>_score(z)                       nu'(z) of the density exp(-nu)
+//   DPR_LOWEST_<name>, DPR_HIGHEST_<name> bounds of what is drawn
+//
+// but for the uniform prior, which has no score and is not sampled. The one that DPR_PRIOR names also defines
 //
 //   prior_cdf_density(x, &cdf, &density)  F(x) and f(x), both with their relative precision into the tails
 //   occupancy_log(x, &log_p, &hazard)     ln p and d ln p / dx of p = 1 - F(-x): the perturbed Heaviside (8)
 //   DPR_RULE, DPR_JOINT_..., DPR_...      where aggregation's integrals are evaluated: see quadrature.h
 //
-// For sampling, with the prior as an argument, a constant, because the joint composition samples two of them; the
-// uniform prior has no score and is not sampled:
-//
-//   noise_quantile(prior, u)              inverse CDF of u in (0, 1)
-//   noise_score(prior, z)                 nu'(z) of the density exp(-nu)
-//   lowest_noise(prior), highest_noise(prior)  bounds of what is drawn
+// after a test that compares words, which #if cannot: DPR_GAUSSIAN_IS_gaussian is 1, DPR_GAUSSIAN_IS_cauchy is not
+// defined and so 0. Sampling takes a prior's name as an argument, because the joint composition samples two of them.
 //
 // Everything is written for vectors of lanes (lanes.h), without branches, and holds far into the tails: an occupancy
 // of 1e-20 has a logarithm, and a gradient, as good as one of 0.5. Errors: tests/stages/priors_test.cpp.
@@ -20,7 +23,7 @@
 #include "shared_types.h"
 
 #ifndef DPR_PRIOR
-#define DPR_PRIOR DPR_GAUSSIAN
+#define DPR_PRIOR gaussian
 #endif
 
 /// How a prior's integrals over the line are evaluated (quadrature.h).
@@ -44,32 +47,10 @@ static inline realn uniform_from_bits(uintn bits) {
   return as_realn(bits >> 9 | 0x3f800000u) - (1.0f - DPR_LOWEST_UNIFORM);
 }
 
-static inline realn noise_quantile(int prior, realn u) {
-  if (prior == DPR_CAUCHY) return cauchy_quantile(u);
-  if (prior == DPR_LOGISTIC) return logistic_quantile(u);
-  if (prior == DPR_GUMBEL) return gumbel_quantile(u);
-  return gaussian_quantile(u);
-}
-
-static inline realn noise_score(int prior, realn z) {
-  if (prior == DPR_CAUCHY) return cauchy_score(z);
-  if (prior == DPR_LOGISTIC) return logistic_score(z);
-  if (prior == DPR_GUMBEL) return gumbel_score(z);
-  return gaussian_score(z);
-}
-
-static inline float lowest_noise(int prior) {
-  if (prior == DPR_CAUCHY) return DPR_CAUCHY_LOWEST;
-  if (prior == DPR_LOGISTIC) return DPR_LOGISTIC_LOWEST;
-  if (prior == DPR_GUMBEL) return DPR_GUMBEL_LOWEST;
-  return DPR_GAUSSIAN_LOWEST;
-}
-
-static inline float highest_noise(int prior) {
-  if (prior == DPR_CAUCHY) return DPR_CAUCHY_HIGHEST;
-  if (prior == DPR_LOGISTIC) return DPR_LOGISTIC_HIGHEST;
-  if (prior == DPR_GUMBEL) return DPR_GUMBEL_HIGHEST;
-  return DPR_GAUSSIAN_HIGHEST;
-}
+/// Of a prior by its name.
+#define noise_quantile(prior, u) DPR_CONCAT(prior, _quantile)(u)
+#define noise_score(prior, z) DPR_CONCAT(prior, _score)(z)
+#define lowest_noise(prior) DPR_CONCAT(DPR_LOWEST_, prior)
+#define highest_noise(prior) DPR_CONCAT(DPR_HIGHEST_, prior)
 
 #endif

@@ -38,13 +38,6 @@ using float4 = cl_float4;
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu
 
-/// Priors, in the order of dpr::Prior.
-#define DPR_GAUSSIAN 0
-#define DPR_CAUCHY 1
-#define DPR_LOGISTIC 2
-#define DPR_GUMBEL 3
-#define DPR_UNIFORM 4
-
 /// How noise is drawn, in the order of dpr::Draws.
 #define DPR_INDEPENDENT 0
 #define DPR_ANTITHETIC 1

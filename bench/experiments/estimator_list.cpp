@@ -9,9 +9,7 @@ std::optional<Smoothing> smoothing_of(const Json& base, const Estimate& estimate
   nlohmann::json words(base);
   words.update(nlohmann::json::parse(estimate.words));
   try {
-    const Smoothing smoothing = parse_smoothing(JsonNode(words, estimate.name));
-    validate(smoothing);
-    return smoothing;
+    return resolve_smoothing(parse_smoothing(JsonNode(words, estimate.name)));
   } catch (const InvalidArgument& error) {
     if (reason != nullptr) *reason = error.what();
     return std::nullopt;

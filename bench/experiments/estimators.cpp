@@ -135,7 +135,7 @@ Json base_words(const Smoothing& scene, const Member& member) {
 }
 
 Smoothing exact_member(Smoothing scene, const Member& member) {
-  scene.composition = parse_composition(member.name, "member");
+  scene.composition = parse_choice<Composition>(member.name, "member");
   return scene;
 }
 

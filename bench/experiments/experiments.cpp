@@ -4,8 +4,8 @@
 #include "cli/plot.hpp"
 #include "cli/provenance.hpp"
 #include "dpr/error.hpp"
+#include "dpr/smoothing_options.hpp"
 #include "experiment.hpp"
-#include "smoothing/set_sigma.hpp"
 
 namespace dpr::experiments {
 
@@ -31,10 +31,7 @@ std::span<const Experiment> experiments() {
 }
 
 Smoothing scaled_smoothing(const std::string& preset, float sigma, float gamma) {
-  Smoothing smoothing = smoothing_preset(preset);
-  set_sigma(smoothing, sigma);
-  smoothing.gamma = gamma;
-  return smoothing;
+  return resolve_smoothing({.preset = preset, .sigma = sigma, .gamma = gamma});
 }
 
 void announce(const Settings& settings, const std::string& file) {

@@ -9,7 +9,6 @@
 namespace dpr::experiments {
 namespace {
 
-constexpr Prior k_priors[] = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel, Prior::uniform};
 constexpr double k_reach = 6;
 
 struct Curve {
@@ -29,7 +28,7 @@ bool is_valid(const Smoothing& smoothing) {
 
 std::vector<Curve> heaviside_curves(const Device& device, std::span<const double> x) {
   std::vector<Curve> curves;
-  for (const Prior prior : k_priors) {
+  for (const Prior prior : choices<Prior>()) {
     Smoothing smoothing;
     smoothing.occupancy_prior = prior;
     if (is_valid(smoothing))
@@ -40,7 +39,7 @@ std::vector<Curve> heaviside_curves(const Device& device, std::span<const double
 
 std::vector<Curve> arg_max_curves(const Device& device, std::span<const double> x) {
   std::vector<Curve> curves;
-  for (const Prior prior : k_priors) {
+  for (const Prior prior : choices<Prior>()) {
     Smoothing smoothing;
     smoothing.depth_prior = prior;
     if (is_valid(smoothing)) curves.push_back({std::string(to_string(prior)), arg_max(device, smoothing, x)});

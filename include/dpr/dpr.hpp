@@ -22,4 +22,5 @@
 #include "dpr/scene.hpp"
 #include "dpr/shape.hpp"
 #include "dpr/smoothing.hpp"
+#include "dpr/smoothing_options.hpp"
 #include "dpr/voxels.hpp"

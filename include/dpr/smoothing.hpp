@@ -1,13 +1,15 @@
 // What is random in the perturbed renderer, how strongly, and how its expectation is computed.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 namespace dpr {
 
-/// Distribution of the noise. The values are shared with the kernels (kernels/shared_types.h).
+/// Distribution of the noise. What the library knows of each is a row of lib/smoothing/priors.cpp.
 enum class Prior { gaussian, cauchy, logistic, gumbel, uniform };
 
 /// How occupancy and depth combine. barrier: the paper's b = zeta + (gamma / alpha) ln p, eq. (7), (10).
@@ -55,6 +57,8 @@ struct Smoothing {
   float background_depth = 1e-10F;  ///< normalised depth of the background slot (barrier only)
   DistanceMetric distance = DistanceMetric::squared;
   OccupancyWidth occupancy_width = OccupancyWidth::fixed;
+
+  bool operator==(const Smoothing&) const = default;
 };
 
 /// Throws InvalidArgument for a value out of range, and for what has no estimator: sampling with the uniform
@@ -75,6 +79,13 @@ void validate(const Smoothing& smoothing);
 /// heavy that its radius is capped at 100 sigma, where p = 1/2 - atan(100)/pi = 3.18e-3: a threshold below
 /// that has no effect there.
 float blur_radius(const Smoothing& smoothing);
+
+/// Sets sigma; a blur radius, where there is one, stays the same number of sigmas. With a variable width it
+/// stays as it is: there sigma is no width, but what keeps the derivative at an edge finite.
+void set_sigma(Smoothing& smoothing, float sigma);
+
+/// Whether either stage draws samples.
+bool is_sampled(const Smoothing& smoothing);
 
 /// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins.
 Smoothing rigid_smoothing();
@@ -102,21 +113,25 @@ Smoothing rigid_smoothing();
 /// - "rigid": rigid_smoothing()
 Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
 
-std::string_view to_string(Prior);
-std::string_view to_string(Composition);
-std::string_view to_string(Estimator);
-std::string_view to_string(VarianceReduction);
-std::string_view to_string(Draws);
-std::string_view to_string(DistanceMetric);
-std::string_view to_string(OccupancyWidth);
+/// The presets' names, in the order above.
+std::vector<std::string_view> smoothing_preset_names();
 
-/// The inverse of to_string; `where` names the argument in the InvalidArgument thrown for an unknown word.
-Prior parse_prior(std::string_view word, std::string_view where);
-Composition parse_composition(std::string_view word, std::string_view where);
-Estimator parse_estimator(std::string_view word, std::string_view where);
-VarianceReduction parse_variance_reduction(std::string_view word, std::string_view where);
-Draws parse_draws(std::string_view word, std::string_view where);
-DistanceMetric parse_distance_metric(std::string_view word, std::string_view where);
-OccupancyWidth parse_occupancy_width(std::string_view word, std::string_view where);
+/// The enumerations whose values have names in files, on the command line and in messages.
+template <typename Type>
+concept SmoothingChoice = std::same_as<Type, Prior> || std::same_as<Type, Composition> ||
+    std::same_as<Type, Estimator> || std::same_as<Type, VarianceReduction> || std::same_as<Type, Draws> ||
+    std::same_as<Type, DistanceMetric> || std::same_as<Type, OccupancyWidth>;
+
+/// "gaussian", "leave_one_out" and so on; empty for what is no value of the enumeration.
+template <SmoothingChoice Choice>
+std::string_view to_string(Choice value);
+
+/// The inverse; `where` names the argument in the InvalidArgument thrown for an unknown word.
+template <SmoothingChoice Choice>
+Choice parse_choice(std::string_view word, std::string_view where);
+
+/// All values, in the order of their declaration.
+template <SmoothingChoice Choice>
+std::vector<Choice> choices();
 
 }  // namespace dpr

@@ -95,7 +95,7 @@ std::string JsonNode::member_path(std::string_view key) const {
   return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
 }
 
-void JsonNode::require_keys(std::initializer_list<std::string_view> known) const {
+void JsonNode::require_keys(std::span<const std::string_view> known) const {
   if (!value_->is_object()) fail_type("an object");
   for (const auto& item : value_->items()) {
     if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;

@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,7 +30,10 @@ class JsonNode {
       : value_(&document), file_(file.string()) {}
 
   /// Throws unless this is an object without keys other than these.
-  void require_keys(std::initializer_list<std::string_view> known) const;
+  void require_keys(std::initializer_list<std::string_view> known) const {
+    require_keys(std::span(known.begin(), known.size()));
+  }
+  void require_keys(std::span<const std::string_view> known) const;
   /// A member, if there is one; this must be an object.
   std::optional<JsonNode> find(std::string_view key) const;
   /// A member that must be there.

@@ -6,7 +6,6 @@
 
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
-#include "smoothing/is_sampled.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -4,90 +4,51 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "base/input_file.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "scene/scene_json.hpp"
+#include "smoothing/option_fields.hpp"
+#include "smoothing/presets.hpp"
 
 namespace dpr::cli {
 namespace {
 
-void add_smoothing_options(CLI::App& command, SmoothingOptions& s) {
-  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
-    command.add_option(name, value, description)->group(k_smoothing_group)->type_name(type);
-  };
-  const char* const priors = "gaussian|cauchy|logistic|gumbel|uniform";
-  const char* const estimators = "exact|monte_carlo";
-  add("--preset", s.preset, "Take all values from a named member of the family",
-      "softras|opendr|nmr|paper_gaussian|paper_cauchy|gaussian|joint_gaussian|rigid");
-  add("--occupancy-prior", s.occupancy_prior, "Noise of the distance", priors);
-  add("--depth-prior", s.depth_prior, "Noise of the depth", priors);
-  add("--sigma", s.sigma, "Scale of the distance noise, in the unit of the distance", "FLOAT");
-  add("--gamma", s.gamma, "Scale of the depth noise; depth is 1 at znear, 0 at zfar", "FLOAT");
-  add("--alpha", s.alpha, "Weight of the barrier", "FLOAT");
-  add("--composition", s.composition, "How occupancy and depth combine", "barrier|joint");
-  add("--estimator", s.estimator, "How both expectations are computed", estimators);
-  add("--occupancy-estimator", s.occupancy_estimator, "Overrides --estimator for the occupancy", estimators);
-  add("--aggregation-estimator", s.aggregation_estimator, "Overrides --estimator for the aggregation",
-      estimators);
-  add("--samples", s.samples, "Draws of Monte Carlo", "N");
-  add("--variance-reduction", s.variance_reduction, "Control variate of sampled gradients",
-      "none|rigid|leave_one_out");
-  add("--draws", s.draws, "How the samples' noise is drawn", "independent|antithetic|stratified");
-  add("--occupancy-threshold", s.occupancy_threshold, "Sets the blur radius where none is given", "FLOAT");
-  add("--blur-radius", s.blur_radius, "Triangles further from a pixel are not there", "FLOAT");
-  add("--background-depth", s.background_depth, "Normalised depth of the background", "FLOAT");
-  add("--distance", s.distance, "Unit of the distance: NDC^2 or NDC", "squared|euclidean");
-  add("--occupancy-width", s.occupancy_width, "Width of uniform noise: sigma, or up to the pixel",
-      "fixed|variable");
-}
-
+/// An option whose value is a word of the library's.
 template <typename Value, typename Parse>
-void apply_word(const std::optional<std::string>& word, Value& value, Parse parse, const char* flag) {
-  if (word) value = parse(*word, flag);
+CLI::Option* add_word(CLI::App& command, const std::string& flag, std::optional<Value>& option, Parse parse) {
+  return command.add_option_function<std::string>(
+      flag, [&option, parse, flag](const std::string& word) { option = parse(word, flag); });
 }
 
-template <typename Value>
-void apply_value(const std::optional<Value>& given, Value& value) {
-  if (given) value = *given;
+template <SmoothingChoice Choice>
+CLI::Option* add_option(CLI::App& command, const std::string& flag, std::optional<Choice>& option) {
+  return add_word(command, flag, option, parse_choice<Choice>);
 }
 
-void apply(const SmoothingOptions& options, Scene& scene) {
-  Smoothing& smoothing = scene.smoothing;
-  if (options.preset) {
-    const std::uint64_t seed = smoothing.seed;
-    smoothing = smoothing_preset(*options.preset, scene.width, scene.height);
-    smoothing.seed = seed;
-  }
-  apply_word(options.occupancy_prior, smoothing.occupancy_prior, parse_prior, "--occupancy-prior");
-  apply_word(options.depth_prior, smoothing.depth_prior, parse_prior, "--depth-prior");
-  apply_word(options.composition, smoothing.composition, parse_composition, "--composition");
-  apply_word(options.estimator, smoothing.occupancy_estimator, parse_estimator, "--estimator");
-  apply_word(options.estimator, smoothing.aggregation_estimator, parse_estimator, "--estimator");
-  apply_word(options.occupancy_estimator, smoothing.occupancy_estimator, parse_estimator,
-             "--occupancy-estimator");
-  apply_word(options.aggregation_estimator, smoothing.aggregation_estimator, parse_estimator,
-             "--aggregation-estimator");
-  apply_word(options.variance_reduction, smoothing.variance_reduction, parse_variance_reduction,
-             "--variance-reduction");
-  apply_word(options.draws, smoothing.draws, parse_draws, "--draws");
-  apply_word(options.distance, smoothing.distance, parse_distance_metric, "--distance");
-  apply_word(options.occupancy_width, smoothing.occupancy_width, parse_occupancy_width, "--occupancy-width");
-  apply_value(options.sigma, smoothing.sigma);
-  apply_value(options.gamma, smoothing.gamma);
-  apply_value(options.alpha, smoothing.alpha);
-  apply_value(options.samples, smoothing.samples);
-  apply_value(options.occupancy_threshold, smoothing.occupancy_threshold);
-  apply_value(options.background_depth, smoothing.background_depth);
-  if (options.blur_radius) smoothing.blur_radius = options.blur_radius;
+CLI::Option* add_option(CLI::App& command, const std::string& flag, std::optional<std::string>& preset) {
+  return add_word(command, flag, preset, [](const std::string& word, const std::string& where) {
+    require_preset(word, where);
+    return word;
+  });
 }
 
-/// The same picture with other pixels: intrinsics, which are in pixels, follow.
-void resize(Scene& scene, glm::ivec2 size) {
-  if (auto& k = scene.camera.intrinsics) {
-    const glm::vec2 factor = glm::vec2(size) / glm::vec2(scene.width, scene.height);
-    *k = {k->fx * factor.x, k->fy * factor.y, k->cx * factor.x, k->cy * factor.y};
-  }
-  scene.width = size.x;
-  scene.height = size.y;
+template <typename Number>
+CLI::Option* add_option(CLI::App& command, const std::string& flag, std::optional<Number>& option) {
+  return command.add_option(flag, option);
+}
+
+void add_smoothing_options(CLI::App& command, SmoothingOptions& options) {
+  for_each_option([&](std::string_view key, const char* description, auto member) {
+    if (key == "seed") return;  // of everything random, not of the smoothing alone: an option of its own
+    std::string flag = "--" + std::string(key);
+    std::ranges::replace(flag, '_', '-');
+    auto& option = options.*member;
+    add_option(command, flag, option)
+        ->description(description)
+        ->group(k_smoothing_group)
+        ->type_name(option_type(option));
+  });
 }
 
 }  // namespace
@@ -136,10 +97,15 @@ Device open_device(const CommonOptions& options) {
   return device;
 }
 
+SmoothingOptions smoothing_options(const CommonOptions& options) {
+  SmoothingOptions smoothing = options.smoothing;
+  if (options.seed) smoothing.seed = options.seed;
+  return smoothing;
+}
+
 void apply(const CommonOptions& options, Scene& scene) {
   if (options.size) resize(scene, parse_size(*options.size));
-  apply(options.smoothing, scene);
-  apply_value(options.seed, scene.smoothing.seed);
+  scene.smoothing = resolve_smoothing(smoothing_options(options), scene.width, scene.height, scene.smoothing);
 }
 
 void print_notes(const Notes& notes, const CommonOptions& options) {
@@ -148,10 +114,11 @@ void print_notes(const Notes& notes, const CommonOptions& options) {
 }
 
 Scene read_scene(const std::string& file, const CommonOptions& options) {
+  SceneOverrides overrides{.size = {}, .smoothing = smoothing_options(options)};
+  if (options.size) overrides.size = parse_size(*options.size);
   Notes notes;
-  Scene scene = dpr::read_scene(file, notes);
+  Scene scene = parse_scene(file, read_file(file), notes, overrides);
   print_notes(notes, options);
-  apply(options, scene);
   return scene;
 }
 

@@ -9,16 +9,9 @@
 #include "dpr/device.hpp"
 #include "dpr/notes.hpp"
 #include "dpr/scene.hpp"
+#include "dpr/smoothing_options.hpp"
 
 namespace dpr::cli {
-
-/// What the command line says of a Smoothing; what it does not mention stays as the scene has it.
-struct SmoothingOptions {
-  std::optional<std::string> preset, occupancy_prior, depth_prior, composition, estimator,
-      occupancy_estimator, aggregation_estimator, variance_reduction, draws, distance, occupancy_width;
-  std::optional<float> sigma, gamma, alpha, occupancy_threshold, blur_radius, background_depth;
-  std::optional<std::uint32_t> samples;
-};
 
 struct CommonOptions {
   std::string device;
@@ -43,12 +36,15 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// The device of --device. Says which one it is if asked to be verbose.
 Device open_device(const CommonOptions& options);
-/// Puts --size, --seed and the smoothing flags into the scene. Throws InvalidArgument.
+/// The smoothing flags and --seed.
+SmoothingOptions smoothing_options(const CommonOptions& options);
+/// Puts --size, --seed and the smoothing flags into a scene that no file describes: what they leave open is
+/// the scene's. Throws InvalidArgument.
 void apply(const CommonOptions& options, Scene& scene);
 /// What a file asked for and the program leaves out, one line each on stderr; with --quiet nothing.
 void print_notes(const Notes& notes, const CommonOptions& options);
 
-/// read_scene(), print_notes() and apply().
+/// The scene that the file describes, with these in the place of its values; and print_notes().
 Scene read_scene(const std::string& file, const CommonOptions& options);
 
 }  // namespace dpr::cli

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "base/checks.hpp"
+#include "base/input_file.hpp"
 #include "base/temporary_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
@@ -11,6 +12,7 @@
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "solve/resample.hpp"
+#include "solve/shape_views.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -43,19 +45,23 @@ void resize(ShapeViews& views, glm::ivec2 size) {
   views.height = size.y;
 }
 
-/// Puts --size, --seed and the smoothing flags into the views.
-void apply(const CLI::App& command, const CommonOptions& common, const ShapeOptions& options,
-           ShapeViews& views) {
+/// The views that the file describes, with --size, --seed and the smoothing flags in the place of its values.
+/// Where none of them says anything of the smoothing, it is the solver's.
+ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
+                      const CommonOptions& common) {
+  Notes notes;
+  ViewsFile file = parse_views_file(options.views, read_file(options.views), notes);
+  print_notes(notes, common);
+  ShapeViews& views = file.views;
   if (common.size) resize(views, parse_size(*common.size));
-  if (!common.seed && !gives_any(command, k_smoothing_group)) return;
-  CommonOptions smoothing = common;
-  smoothing.size.reset();
-  Scene scene;
-  scene.width = views.width;
-  scene.height = views.height;
-  scene.smoothing = finest_smoothing(views, options);
-  cli::apply(smoothing, scene);
-  views.smoothing = scene.smoothing;
+  const SmoothingOptions flags = smoothing_options(common);
+  if (file.smoothing) {
+    views.smoothing = resolve_smoothing(overlay(*file.smoothing, flags), views.width, views.height);
+  } else if (common.seed || gives_any(command, k_smoothing_group)) {
+    views.smoothing =
+        resolve_smoothing(flags, views.width, views.height, finest_smoothing(views, options.solver));
+  }
+  return std::move(views);
 }
 
 /// What can be wrong about the output is found out before the work, not after it.
@@ -72,10 +78,7 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
-  Notes notes;
-  ShapeViews views = read_views(options.views, notes);
-  print_notes(notes, common);
-  apply(command, common, options.solver, views);
+  const ShapeViews views = read_views(command, options, common);
   const Device device = open_device(common);
   const ShapeSolver solver(device, views, options.solver);
   if (!options.report.empty()) make_folder(options.report);

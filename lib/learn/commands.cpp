@@ -14,6 +14,7 @@
 #include "cli/provenance.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
+#include "smoothing/choice_names.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -178,7 +179,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR");
   command->add_option("--method", o.method, "How it renders: a preset of the smoothing")
       ->capture_default_str()
-      ->type_name("softras|gaussian|joint_gaussian|paper_gaussian|paper_cauchy|opendr|nmr");
+      ->type_name(joined(learn::training_methods()));
   command->add_option("--minutes", o.minutes, "Time for this run, 0 for as long as it takes")
       ->capture_default_str()
       ->type_name("FLOAT");

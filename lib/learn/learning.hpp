@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dpr/device.hpp"
@@ -50,6 +51,8 @@ struct TrainingResult {
   std::vector<double> validation_steps, validation_iou;
 };
 
+/// The presets that can be trained with: those that have gradients.
+std::vector<std::string_view> training_methods();
 /// The smoothing of a method, as training uses it. Throws InvalidArgument.
 Smoothing training_smoothing(const TrainingOptions& options);
 

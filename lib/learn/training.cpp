@@ -11,11 +11,12 @@
 #include "base/checks.hpp"
 #include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
+#include "dpr/smoothing_options.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
 #include "mesh/adjacency.hpp"
-#include "smoothing/prior_functions.hpp"
-#include "smoothing/set_sigma.hpp"
+#include "smoothing/choice_names.hpp"
+#include "smoothing/priors.hpp"
 #include "torch/errors.hpp"
 #include "torch/render.hpp"
 
@@ -23,6 +24,8 @@ namespace dpr::learn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+constexpr std::string_view k_without_gradients = "rigid";
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -261,18 +264,22 @@ float published_scale(Prior prior, Prior of_softras) {
 
 }  // namespace
 
+std::vector<std::string_view> training_methods() {
+  std::vector<std::string_view> names = smoothing_preset_names();
+  std::erase(names, k_without_gradients);
+  return names;
+}
+
 Smoothing training_smoothing(const TrainingOptions& options) {
-  if (options.method == "rigid")
-    throw InvalidArgument("method (dpr learn)", "rigid", "one that has gradients");
-  Smoothing smoothing = smoothing_preset(options.method, k_image_size, k_image_size);
-  if (smoothing.occupancy_prior != Prior::uniform) {  // else pixels and rigid depths are the scales
-    set_sigma(smoothing, published_scale(smoothing.occupancy_prior, Prior::logistic));
-    smoothing.gamma = published_scale(smoothing.depth_prior, Prior::gumbel);
+  if (options.method == k_without_gradients)
+    throw InvalidArgument("method (dpr learn)", options.method, one_of(training_methods()));
+  SmoothingOptions given{.preset = options.method, .sigma = options.sigma, .gamma = options.gamma};
+  const Smoothing preset = smoothing_preset(options.method, k_image_size, k_image_size);
+  if (preset.occupancy_prior != Prior::uniform) {  // else pixels and rigid depths are the scales
+    if (!given.sigma) given.sigma = published_scale(preset.occupancy_prior, Prior::logistic);
+    if (!given.gamma) given.gamma = published_scale(preset.depth_prior, Prior::gumbel);
   }
-  if (options.sigma) set_sigma(smoothing, *options.sigma);
-  if (options.gamma) smoothing.gamma = *options.gamma;
-  validate(smoothing);
-  return smoothing;
+  return resolve_smoothing(given, k_image_size, k_image_size);
 }
 
 TrainingResult train(const Device& device, const Dataset& training, const Dataset& validation,

@@ -6,7 +6,6 @@
 #include <functional>
 
 #include "renderer/renderer_impl.hpp"
-#include "smoothing/is_sampled.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {

@@ -9,7 +9,8 @@
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "dpr/scene.hpp"
-#include "smoothing/set_sigma.hpp"
+#include "smoothing/option_fields.hpp"
+#include "smoothing/presets.hpp"
 
 namespace dpr {
 namespace {
@@ -30,13 +31,6 @@ void take_vec3(const JsonNode& node, std::string_view key, glm::vec3& value) {
 void take_size(const JsonNode& node, std::string_view key, int& value) {
   constexpr std::uint64_t k_most = std::numeric_limits<int>::max();
   take(node, key, value, [](const JsonNode& n) { return static_cast<int>(n.whole_number(k_most)); });
-}
-
-// A word of an enumeration: `parse` is one of the parse_... functions of smoothing.hpp.
-template <typename Enum>
-void take_word(const JsonNode& node, std::string_view key, Enum& value,
-               Enum (*parse)(std::string_view, std::string_view)) {
-  take(node, key, value, [parse](const JsonNode& n) { return parse(n.string(), n.name()); });
 }
 
 std::vector<glm::vec3> vec3_list(const JsonNode& node) {
@@ -144,24 +138,24 @@ GradientRequest parse_gradients(const JsonNode& node) {
   return request;
 }
 
-// The estimator of both stages, then that of one.
-void take_estimators(const JsonNode& node, Smoothing& smoothing) {
-  if (node.find("estimator")) {
-    take_word(node, "estimator", smoothing.occupancy_estimator, parse_estimator);
-    smoothing.aggregation_estimator = smoothing.occupancy_estimator;
-  }
-  take_word(node, "occupancy_estimator", smoothing.occupancy_estimator, parse_estimator);
-  take_word(node, "aggregation_estimator", smoothing.aggregation_estimator, parse_estimator);
+template <SmoothingChoice Choice>
+void read_option(const JsonNode& node, std::optional<Choice>& option) {
+  option = parse_choice<Choice>(node.string(), node.name());
 }
 
-// A preset's blur radius is a number of sigmas, so it follows a sigma that is given without a radius.
-void take_reach(const JsonNode& node, Smoothing& smoothing) {
-  float sigma = smoothing.sigma;
-  take_number(node, "sigma", sigma);
-  set_sigma(smoothing, sigma);
-  take(node, "blur_radius", smoothing.blur_radius, [](const JsonNode& n) { return n.number(); });
+void read_option(const JsonNode& node, std::optional<std::string>& preset) {
+  require_preset(node.string(), node.name());
+  preset = node.string();
 }
 
+void read_option(const JsonNode& node, std::optional<float>& option) { option = node.number(); }
+
+template <std::unsigned_integral Number>
+void read_option(const JsonNode& node, std::optional<Number>& option) {
+  option = static_cast<Number>(node.whole_number(std::numeric_limits<Number>::max()));
+}
+
+/// All but the smoothing.
 Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   node.require_keys({"width", "height", "camera", "background", "meshes", "lights", "smoothing",
                      "perspective_correct", "gradients"});
@@ -173,8 +167,6 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Not
   for (const JsonNode& mesh : node.at("meshes").elements())
     scene.meshes.push_back(parse_instance(mesh, folder, notes));
   take(node, "lights", scene.lights, parse_lights);
-  take(node, "smoothing", scene.smoothing,
-       [&](const JsonNode& n) { return parse_smoothing(n, scene.width, scene.height); });
   take(node, "perspective_correct", scene.perspective_correct, [](const JsonNode& n) { return n.boolean(); });
   take(node, "gradients", scene.gradients, parse_gradients);
   return scene;
@@ -204,33 +196,13 @@ Camera parse_camera(const JsonNode& node) {
   return camera;
 }
 
-Smoothing parse_smoothing(const JsonNode& node, int width, int height) {
-  node.require_keys({"preset", "occupancy_prior", "depth_prior", "sigma", "gamma", "alpha", "composition",
-                     "estimator", "occupancy_estimator", "aggregation_estimator", "samples",
-                     "variance_reduction", "draws", "seed", "occupancy_threshold", "blur_radius",
-                     "background_depth", "distance", "occupancy_width"});
-  Smoothing smoothing;
-  take(node, "preset", smoothing,
-       [=](const JsonNode& n) { return smoothing_preset(n.string(), width, height); });
-  take_word(node, "occupancy_prior", smoothing.occupancy_prior, parse_prior);
-  take_word(node, "depth_prior", smoothing.depth_prior, parse_prior);
-  take_reach(node, smoothing);
-  take_number(node, "gamma", smoothing.gamma);
-  take_number(node, "alpha", smoothing.alpha);
-  take_word(node, "composition", smoothing.composition, parse_composition);
-  take_estimators(node, smoothing);
-  constexpr std::uint64_t k_most_samples = std::numeric_limits<std::uint32_t>::max();
-  take(node, "samples", smoothing.samples,
-       [](const JsonNode& n) { return static_cast<std::uint32_t>(n.whole_number(k_most_samples)); });
-  take_word(node, "variance_reduction", smoothing.variance_reduction, parse_variance_reduction);
-  take_word(node, "draws", smoothing.draws, parse_draws);
-  constexpr std::uint64_t k_most_seed = std::numeric_limits<std::uint64_t>::max();
-  take(node, "seed", smoothing.seed, [](const JsonNode& n) { return n.whole_number(k_most_seed); });
-  take_number(node, "occupancy_threshold", smoothing.occupancy_threshold);
-  take_number(node, "background_depth", smoothing.background_depth);
-  take_word(node, "distance", smoothing.distance, parse_distance_metric);
-  take_word(node, "occupancy_width", smoothing.occupancy_width, parse_occupancy_width);
-  return smoothing;
+SmoothingOptions parse_smoothing(const JsonNode& node) {
+  node.require_keys(option_keys());
+  SmoothingOptions options;
+  for_each_option([&](std::string_view key, auto, auto member) {
+    if (const auto value = node.find(key)) read_option(*value, options.*member);
+  });
+  return options;
 }
 
 void validate(const Scene& scene) {
@@ -248,9 +220,24 @@ void validate(const Scene& scene) {
   validate(scene.smoothing);
 }
 
-Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+void resize(Scene& scene, glm::ivec2 size) {
+  if (auto& k = scene.camera.intrinsics) {
+    const glm::vec2 factor = glm::vec2(size) / glm::vec2(scene.width, scene.height);
+    *k = {k->fx * factor.x, k->fy * factor.y, k->cx * factor.x, k->cy * factor.y};
+  }
+  scene.width = size.x;
+  scene.height = size.y;
+}
+
+Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes,
+                  const SceneOverrides& overrides) {
   const nlohmann::json document = parse_json(file, text);
-  Scene scene = parse_scene(JsonNode(document, file), file.parent_path(), notes);
+  const JsonNode node(document, file);
+  Scene scene = parse_scene(node, file.parent_path(), notes);
+  if (overrides.size) resize(scene, *overrides.size);
+  SmoothingOptions smoothing;
+  take(node, "smoothing", smoothing, parse_smoothing);
+  scene.smoothing = resolve_smoothing(overlay(smoothing, overrides.smoothing), scene.width, scene.height);
   validate(scene);
   return scene;
 }

@@ -1,22 +1,34 @@
-// The parts of the scene format that other files share with it.
+// The parts of the scene format that other files share with it, and what a command line replaces of a scene.
 #pragma once
+
+#include <optional>
 
 #include "base/json_node.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/notes.hpp"
-#include "dpr/smoothing.hpp"
+#include "dpr/scene.hpp"
+#include "dpr/smoothing_options.hpp"
 
 namespace dpr {
 
 /// The "camera" object of a scene. What is not given takes its default. Not validated.
 Camera parse_camera(const JsonNode& node);
 
-/// The "smoothing" object of a scene: the preset first, if there is one, for images of that size, then what
-/// is given. Not validated.
-Smoothing parse_smoothing(const JsonNode& node, int width = 128, int height = 128);
+/// The "smoothing" object of a scene.
+SmoothingOptions parse_smoothing(const JsonNode& node);
+
+/// What takes the place of a scene file's values.
+struct SceneOverrides {
+  std::optional<glm::ivec2> size;  ///< pixels
+  SmoothingOptions smoothing;
+};
+
+/// The same picture with other pixels: intrinsics, which are in pixels, follow.
+void resize(Scene& scene, glm::ivec2 size);
 
 /// What a scene file holds; `file` is what messages call it, and beside it the scene's meshes are looked for.
-/// Throws as read_scene() does.
-Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes);
+/// The smoothing is resolved with the overrides, for their size. Throws as read_scene() does.
+Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes,
+                  const SceneOverrides& overrides = {});
 
 }  // namespace dpr

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "smoothing/is_sampled.hpp"
-#include "smoothing/set_sigma.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "smoothing/set_sigma.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {

@@ -11,7 +11,6 @@
 #include <variant>
 
 #include "dpr/renderer.hpp"
-#include "smoothing/is_sampled.hpp"
 #include "solve/polar.hpp"
 #include "solve/require.hpp"
 

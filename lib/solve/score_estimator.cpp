@@ -6,7 +6,8 @@
 #include <utility>
 
 #include "dpr/error.hpp"
-#include "smoothing/prior_functions.hpp"
+#include "smoothing/choice_names.hpp"
+#include "smoothing/priors.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {
@@ -93,15 +94,18 @@ std::array<std::uint32_t, 4> philox4x32_10(std::array<std::uint32_t, 4> counter,
 void validate(const NoiseOptions& options) {
   require(options.samples >= 1 && options.samples <= k_most_samples, "samples (perturbed pose)",
           options.samples, "1 to 4096");
-  if (options.prior == Prior::uniform) {
-    throw InvalidArgument("prior (perturbed pose)", "uniform",
-                          "gaussian, cauchy, logistic or gumbel: the uniform density has no score");
+  const PriorRow& prior = row_of(options.prior);
+  if (!prior.has_score()) {
+    const std::string name(prior.name);
+    throw InvalidArgument("prior (perturbed pose)", name,
+                          one_of(scored_priors()) + ": the " + name + " density has no score");
   }
   if (options.draws == Draws::antithetic) {
     require(options.samples % 2 == 0, "samples (perturbed pose)", options.samples,
             "an even number, for antithetic pairs");
-    if (options.prior == Prior::gumbel) {
-      throw InvalidArgument("draws (perturbed pose)", "antithetic with the gumbel prior",
+    if (!prior.is_symmetric()) {
+      throw InvalidArgument("draws (perturbed pose)",
+                            "antithetic with the " + std::string(prior.name) + " prior",
                             "a symmetric prior, or independent or stratified draws");
     }
   }
@@ -135,13 +139,14 @@ ScoreEstimate estimate(const NoiseOptions& options, std::span<const double> valu
   const std::size_t samples = values.size(), dimensions = noise.size() / samples;
   const std::size_t size = group_size(options.draws);
   const std::vector<double> excess = excesses(options, values, rigid);
+  const auto score = row_of(options.prior).score;
 
   ScoreEstimate result;
   result.value = mean_of_groups(values, size);
   std::vector<double> terms(samples);
   for (std::size_t k = 0; k < dimensions; ++k) {
     for (std::size_t m = 0; m < samples; ++m) {
-      terms[m] = excess[m] * score(options.prior, noise[m * dimensions + k]);
+      terms[m] = excess[m] * score(noise[m * dimensions + k]);
     }
     result.gradient.push_back(mean_of_groups(terms, size));
   }
@@ -150,7 +155,7 @@ ScoreEstimate estimate(const NoiseOptions& options, std::span<const double> valu
     double sum = 0;
     for (std::size_t k = 0; k < dimensions; ++k) {
       const double z = noise[m * dimensions + k];
-      sum += score(options.prior, z) * z - 1;
+      sum += score(z) * z - 1;
     }
     terms[m] = excess[m] * sum;
   }

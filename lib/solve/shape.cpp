@@ -12,7 +12,6 @@
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/remesh.hpp"
-#include "smoothing/set_sigma.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/require.hpp"
 #include "solve/resample.hpp"

@@ -11,7 +11,6 @@
 #include "base/input_file.hpp"
 #include "base/temporary_file.hpp"
 #include "dpr/error.hpp"
-#include "smoothing/set_sigma.hpp"
 
 namespace dpr {
 namespace {

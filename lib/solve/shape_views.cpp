@@ -1,10 +1,10 @@
 // The views format: images with their cameras.
 #include <string>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "dpr/error.hpp"
-#include "dpr/shape.hpp"
 #include "scene/scene_json.hpp"
 #include "solve/shape_views.hpp"
 
@@ -44,10 +44,18 @@ ShapeViews read_views(const std::filesystem::path& file) {
 }
 
 ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+  ViewsFile parsed = parse_views_file(file, text, notes);
+  ShapeViews& views = parsed.views;
+  if (parsed.smoothing) views.smoothing = resolve_smoothing(*parsed.smoothing, views.width, views.height);
+  return std::move(views);
+}
+
+ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes) {
   const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
   node.require_keys({"width", "height", "background", "views", "initial", "smoothing"});
-  ShapeViews views;
+  ViewsFile result;
+  ShapeViews& views = result.views;
   views.width = parse_side(node.at("width"));
   views.height = parse_side(node.at("height"));
   if (const auto background = node.find("background")) views.background = background->vec3();
@@ -56,11 +64,8 @@ ShapeViews parse_views(const std::filesystem::path& file, std::string_view text,
     views.views.push_back(parse_view(view, folder, views));
   if (views.views.empty()) node.at("views").fail("none", "at least one");
   if (const auto initial = node.find("initial")) views.initial = read_mesh(folder / initial->string(), notes);
-  if (const auto smoothing = node.find("smoothing")) {
-    views.smoothing = parse_smoothing(*smoothing, views.width, views.height);
-    validate(*views.smoothing);
-  }
-  return views;
+  if (const auto smoothing = node.find("smoothing")) result.smoothing = parse_smoothing(*smoothing);
+  return result;
 }
 
 }  // namespace dpr

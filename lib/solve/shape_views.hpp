@@ -2,14 +2,25 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 #include "dpr/notes.hpp"
+#include "dpr/shape.hpp"
+#include "dpr/smoothing_options.hpp"
 
 namespace dpr {
 
+/// A file of views before its smoothing is resolved: a command line may have more to say of it.
+struct ViewsFile {
+  ShapeViews views;  ///< without the smoothing
+  std::optional<SmoothingOptions> smoothing;
+};
+
 /// What a file of views holds; `file` is what messages call it, and beside it the images are looked for.
 /// Throws as read_views() does.
+ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes);
+/// The same, resolved.
 ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes);
 
 }  // namespace dpr

@@ -10,8 +10,8 @@ const char* file_of(Composition composition) {
 /// The build options that choose the priors: the sampled joint composition draws from both.
 std::string prior_options(const Smoothing& smoothing) {
   if (!samples_jointly(smoothing)) return prior_option(smoothing.depth_prior);
-  return " -DDPR_OCCUPANCY_PRIOR=" + std::to_string(static_cast<int>(smoothing.occupancy_prior)) +
-         " -DDPR_DEPTH_PRIOR=" + std::to_string(static_cast<int>(smoothing.depth_prior));
+  return " -DDPR_OCCUPANCY_PRIOR=" + std::string(to_string(smoothing.occupancy_prior)) +
+         " -DDPR_DEPTH_PRIOR=" + std::string(to_string(smoothing.depth_prior));
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 namespace dpr {
 
-std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior)); }
+std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::string(to_string(prior)); }
 
 bool samples_jointly(const Smoothing& smoothing) {
   return smoothing.composition == Composition::joint &&

@@ -1,12 +1,11 @@
 // Faces, size, smoothing and device from Python's values, and renderers to lend to graphs.
 #include "torch/batch_renderer.hpp"
 
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "base/checks.hpp"
-#include "smoothing/set_sigma.hpp"
+#include "smoothing/option_fields.hpp"
 #include "torch/errors.hpp"
 
 namespace dpr::torch_op {
@@ -45,12 +44,31 @@ int image_side(std::int64_t value, const char* name) {
                         "1 to " + std::to_string(checks::k_largest_side));
 }
 
-/// A count or a seed that came as a double.
-std::uint32_t whole_number(const std::string& name, double value) {
-  if (value >= 0 && value <= std::numeric_limits<std::uint32_t>::max() && value == std::floor(value)) {
-    return static_cast<std::uint32_t>(value);
+OptionValue option_value(const at::IValue& value, const std::string& name) {
+  if (value.isDouble()) return value.toDouble();
+  if (value.isInt()) return value.toInt();
+  if (value.isString()) return value.toStringRef();
+  throw InvalidArgument(name + " (dpr::Renderer)", value.tagKind(), "a number or a word");
+}
+
+/// Sets one of the camera's planes; false for another name.
+bool set_clipping(Camera& camera, const std::string& name, const OptionValue& value) {
+  float* const plane = name == "znear" ? &camera.znear : name == "zfar" ? &camera.zfar : nullptr;
+  if (plane == nullptr) return false;
+  if (const auto* const whole = std::get_if<std::int64_t>(&value)) {
+    *plane = static_cast<float>(*whole);
+  } else if (const auto* const number = std::get_if<double>(&value)) {
+    *plane = static_cast<float>(*number);
+  } else {
+    throw InvalidArgument(name + " (dpr::Renderer)", "\"" + std::get<std::string>(value) + "\"", "a number");
   }
-  throw InvalidArgument(name + " (dpr::Renderer)", std::to_string(value), "a whole number");
+  return true;
+}
+
+[[noreturn]] void fail_name(const std::string& name) {
+  std::vector<std::string_view> names = option_keys();
+  names.insert(names.end(), {"znear", "zfar"});
+  throw InvalidArgument("name (dpr::Renderer.set)", "\"" + name + "\"", one_of(names));
 }
 
 }  // namespace
@@ -60,46 +78,30 @@ BatchRenderer::BatchRenderer(const at::Tensor& faces, std::int64_t width, std::i
     : faces_(with_torch_errors([&] { return read_faces(faces); })),
       width_(with_torch_errors([&] { return image_side(width, "width"); })),
       height_(with_torch_errors([&] { return image_side(height, "height"); })),
-      smoothing_(with_torch_errors([&] { return smoothing_preset(preset, width_, height_); })),
+      options_{.preset = preset},
+      smoothing_(with_torch_errors([&] { return resolve_smoothing(options_, width_, height_); })),
       device_(with_torch_errors([&] { return open_device(device); })) {}
 
 void BatchRenderer::set_smoothing(const Smoothing& smoothing) {
   validate(smoothing);
-  smoothing_ = smoothing;
+  smoothing_ = otherwise_ = smoothing;
+  options_ = {};
 }
 
-void BatchRenderer::set(const std::string& name, double value) {
+void BatchRenderer::set(const std::string& name, const at::IValue& value) {
   with_torch_errors([&] {
-    Smoothing s = smoothing_;
+    const OptionValue given = option_value(value, name);
+    SmoothingOptions options = options_;
     Camera clipping;
     clipping.znear = znear_;
     clipping.zfar = zfar_;
-    const auto number = static_cast<float>(value);
-    if (name == "sigma") {
-      set_sigma(s, number);
-    } else if (name == "gamma") {
-      s.gamma = number;
-    } else if (name == "alpha") {
-      s.alpha = number;
-    } else if (name == "occupancy_threshold") {
-      s.occupancy_threshold = number;
-    } else if (name == "blur_radius") {
-      s.blur_radius = number;
-    } else if (name == "samples") {
-      s.samples = whole_number(name, value);
-    } else if (name == "seed") {
-      s.seed = whole_number(name, value);
-    } else if (name == "znear") {
-      clipping.znear = number;
-    } else if (name == "zfar") {
-      clipping.zfar = number;
-    } else {
-      throw InvalidArgument(
-          "name (dpr::Renderer.set)", "\"" + name + "\"",
-          "sigma, gamma, alpha, occupancy_threshold, blur_radius, samples, seed, znear or zfar");
+    if (set_clipping(clipping, name, given)) {
+      validate(clipping);
+    } else if (!set_option(options, name, given, name + " (dpr::Renderer)")) {
+      fail_name(name);
     }
-    validate(clipping);
-    set_smoothing(s);
+    smoothing_ = resolve_smoothing(options, width_, height_, otherwise_);
+    options_ = std::move(options);
     znear_ = clipping.znear;
     zfar_ = clipping.zfar;
   });

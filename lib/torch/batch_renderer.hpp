@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
+#include "dpr/smoothing_options.hpp"
 
 namespace dpr::torch_op {
 
@@ -23,10 +24,11 @@ class BatchRenderer : public torch::CustomClassHolder {
   BatchRenderer(const at::Tensor& faces, std::int64_t width, std::int64_t height, const std::string& preset,
                 const std::string& device);
 
-  /// From the next render() on: "sigma", "gamma", "alpha", "occupancy_threshold", "blur_radius", "samples" or
-  /// "seed" of the smoothing; "znear" or "zfar", which are 1 and 100 unless set. A preset's blur radius
-  /// follows sigma, so the radius is set after it. Errors are torch's.
-  void set(const std::string& name, double value);
+  /// From the next render() on: any key of a scene's "smoothing", with a number or a word, and "znear" or
+  /// "zfar", which are 1 and 100 unless set. The smoothing is resolved from all that was set, in whatever
+  /// order (dpr/smoothing_options.hpp). Errors are torch's.
+  void set(const std::string& name, const at::IValue& value);
+  /// Instead of the preset and what was set until now.
   void set_smoothing(const Smoothing& smoothing);
 
   /// Spent in render() and its backward passes until now.
@@ -47,7 +49,9 @@ class BatchRenderer : public torch::CustomClassHolder {
 
   std::vector<glm::uvec3> faces_;
   int width_, height_;
-  Smoothing smoothing_;
+  SmoothingOptions options_;  // what was set
+  Smoothing otherwise_;       // what they leave open
+  Smoothing smoothing_;       // what they come to
   float znear_ = 1.0F, zfar_ = 100.0F;
   Device device_;
   Topology topology_;           // of the free renderers

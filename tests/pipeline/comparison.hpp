@@ -39,21 +39,8 @@ inline reference::Image to_reference(const Image& image) {
   return result;
 }
 
-inline reference::Prior to_reference(Prior prior) {
-  switch (prior) {
-    case Prior::cauchy:
-      return reference::Prior::cauchy;
-    case Prior::logistic:
-      return reference::Prior::logistic;
-    case Prior::gumbel:
-      return reference::Prior::gumbel;
-    case Prior::uniform:
-      return reference::Prior::uniform;
-    case Prior::gaussian:
-      break;
-  }
-  return reference::Prior::gaussian;
-}
+/// The reference's are in the same order.
+inline reference::Prior to_reference(Prior prior) { return static_cast<reference::Prior>(prior); }
 
 inline reference::Camera to_reference(const Camera& camera) {
   reference::Camera result{to_reference(camera.view), camera.fov_y_degrees, {}, camera.znear, camera.zfar};

@@ -83,7 +83,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("determinism: sampled inside sampled is finite for every prior and both variance reductions") {
     const Device device = open_device();
-    for (const Prior prior : k_noisy_priors) {
+    for (const Prior prior : dpr::test::k_sampled_priors) {
       for (const VarianceReduction reduction : {VarianceReduction::none, VarianceReduction::rigid}) {
         if (reduced(1, 0) == 0 && prior != Prior::cauchy) continue;
         Scene scene = sampled_scene();

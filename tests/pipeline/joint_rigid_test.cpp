@@ -221,11 +221,9 @@ TEST_SUITE("statistical") {
 
 TEST_SUITE("pipeline") {
   TEST_CASE("joint, rigid: colour and alpha agree for every prior, w_0 = 1 - alpha") {
-    constexpr Prior k_priors[] = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel,
-                                  Prior::uniform};
     constexpr float k_sigmas[] = {1e-4F, 2e-3F, 5e-2F}, k_gammas[] = {1e-4F, 3e-2F, 1.0F};
     Renderer renderer(open_device());
-    for (const Prior prior : k_priors) {
+    for (const Prior prior : choices<Prior>()) {
       if (is_reduced() && prior != Prior::gaussian) continue;
       Worst worst;
       double barrier = 0;
@@ -235,7 +233,7 @@ TEST_SUITE("pipeline") {
           Scene scene =
               two_tone(is_cube ? make_cube() : random_soup(20, 8), is_white ? 1 : 0, is_white ? 0 : 1);
           renderer.set_scene(scene);
-          for (const Prior occupancy : k_priors) {
+          for (const Prior occupancy : choices<Prior>()) {
             if (is_reduced() && occupancy != prior) continue;
             for (const float sigma : k_sigmas) {
               for (const float gamma : k_gammas) {

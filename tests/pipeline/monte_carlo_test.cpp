@@ -137,7 +137,7 @@ struct Case {
 std::vector<Case> cases() {
   std::vector<Case> list;
   for (const Composition composition : {Composition::barrier, Composition::joint}) {
-    for (const Prior prior : k_noisy_priors) {
+    for (const Prior prior : dpr::test::k_sampled_priors) {
       for (const dpr::test::SamplingMode& mode : dpr::test::sampling_modes(prior)) {
         const bool is_default =
             mode.reduction == VarianceReduction::rigid && mode.draws == Draws::independent;

@@ -212,9 +212,8 @@ TEST_SUITE("pipeline") {
   TEST_CASE("reference: every occupancy prior with every depth prior in both compositions") {
     const int size = reduced(16, 6);
     std::vector<NamedScene> scenes;
-    for (const Prior occupancy :
-         {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel, Prior::uniform}) {
-      for (const Prior depth : k_noisy_priors) {
+    for (const Prior occupancy : choices<Prior>()) {
+      for (const Prior depth : dpr::test::k_sampled_priors) {
         if (reduced(1, 0) == 0 && occupancy != depth) continue;
         for (const Composition composition : {Composition::barrier, Composition::joint}) {
           Scene scene = scene_of(random_soup(14, 6), size, size);

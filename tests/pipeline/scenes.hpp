@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dpr/scene.hpp"
+#include "support/priors.hpp"
 
 namespace dpr::test::pipeline {
 
@@ -109,7 +110,5 @@ inline Lights two_lights(Shading shading) {
   lights.shading = shading;
   return lights;
 }
-
-inline constexpr Prior k_noisy_priors[] = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel};
 
 }  // namespace dpr::test::pipeline

@@ -23,32 +23,6 @@ struct Node {
   double weight = 0.0;
 };
 
-/// What the panels of a prior look like, in units of gamma.
-struct PanelRule {
-  double lower;   ///< F(lower) and the mass below it are negligible
-  double upper;   ///< 1 - F(upper) is negligible
-  double width;   ///< of the widest panel near a slot
-  double growth;  ///< panels at distance d from the nearest slot may be growth * d wide
-};
-
-/// Neglected mass: Gaussian 1e-19, Cauchy 3e-15 a slot, logistic and Gumbel 4e-18. Widths hold 16 nodes to
-/// 1e-13 and better even for 300 coincident slots, where the uniform product is a polynomial of degree 299.
-inline PanelRule panel_rule(Prior prior) {
-  switch (prior) {
-    case Prior::gaussian:
-      return {-9.0, 9.0, 1.5, 0.0};
-    case Prior::cauchy:
-      return {-1e14, 1e14, 1.5, 1.0};
-    case Prior::logistic:
-      return {-40.0, 40.0, 2.0, 0.0};
-    case Prior::gumbel:
-      return {-4.0, 40.0, 1.0, 0.0};
-    case Prior::uniform:
-      return {-0.5, 0.5, 0.0625, 0.0};
-  }
-  throw std::invalid_argument("panel_rule: unknown prior");
-}
-
 struct GaussLegendre {
   std::vector<double> node;  ///< in (-1, 1)
   std::vector<double> weight;

@@ -14,8 +14,6 @@
 
 namespace dpr::reference {
 
-inline constexpr std::array k_priors = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel,
-                                        Prior::uniform};
 inline constexpr std::array k_compositions = {Composition::barrier, Composition::joint};
 
 /// Uniform numbers that are the same with every standard library.

@@ -488,7 +488,7 @@ TEST_SUITE("robustness") {
         }
       }
     };
-    for (const Prior prior : k_noisy_priors) {
+    for (const Prior prior : dpr::test::k_sampled_priors) {
       if (reduced(1, 0) == 0 && prior != Prior::gaussian) continue;
       Smoothing smoothing;
       smoothing.occupancy_prior = smoothing.depth_prior = prior;

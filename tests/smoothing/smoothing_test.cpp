@@ -44,8 +44,7 @@ double reach(Prior prior, float threshold) {
 
 TEST_SUITE("unit") {
   TEST_CASE("the blur radius is where the occupancy falls to the threshold") {
-    for (const Prior prior :
-         {Prior::gaussian, Prior::logistic, Prior::gumbel, Prior::uniform, Prior::cauchy}) {
+    for (const Prior prior : choices<Prior>()) {
       for (const float threshold : {0.49F, 0.1F, 4e-3F, 1e-4F, 1e-12F, 1e-38F}) {
         if (prior == Prior::cauchy && threshold < 4e-3F) continue;  // capped, see below
         const double p = occupancy_outside(prior, reach(prior, threshold));
@@ -77,10 +76,9 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("presets") {
-    for (const char* name : {"softras", "opendr", "nmr", "paper_gaussian", "paper_cauchy", "gaussian",
-                             "joint_gaussian", "rigid"}) {
+    CHECK(smoothing_preset_names().size() == 8);
+    for (const std::string_view name : smoothing_preset_names())
       CHECK_NOTHROW(validate(smoothing_preset(name)));
-    }
     const Smoothing softras = smoothing_preset("softras");
     CHECK(softras.occupancy_prior == Prior::logistic);
     CHECK(softras.depth_prior == Prior::gumbel);
@@ -127,30 +125,25 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("words are read as they are written") {
-    for (const Prior value :
-         {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel, Prior::uniform}) {
-      CHECK(parse_prior(to_string(value), "x") == value);
-    }
-    for (const Composition value : {Composition::barrier, Composition::joint}) {
-      CHECK(parse_composition(to_string(value), "x") == value);
-    }
-    for (const Estimator value : {Estimator::exact, Estimator::monte_carlo}) {
-      CHECK(parse_estimator(to_string(value), "x") == value);
-    }
-    for (const VarianceReduction value :
-         {VarianceReduction::none, VarianceReduction::rigid, VarianceReduction::leave_one_out}) {
-      CHECK(parse_variance_reduction(to_string(value), "x") == value);
-    }
-    for (const Draws value : {Draws::independent, Draws::antithetic, Draws::stratified}) {
-      CHECK(parse_draws(to_string(value), "x") == value);
-    }
-    for (const DistanceMetric value : {DistanceMetric::squared, DistanceMetric::euclidean}) {
-      CHECK(parse_distance_metric(to_string(value), "x") == value);
-    }
-    for (const OccupancyWidth value : {OccupancyWidth::fixed, OccupancyWidth::variable}) {
-      CHECK(parse_occupancy_width(to_string(value), "x") == value);
-    }
+    const auto check = []<typename Choice>(Choice first, std::size_t count) {
+      const std::vector<Choice> all = choices<Choice>();
+      CHECK(all.size() == count);
+      CHECK(all.front() == first);
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        CHECK(static_cast<std::size_t>(all[i]) == i);
+        CHECK_FALSE(to_string(all[i]).empty());
+        CHECK(parse_choice<Choice>(to_string(all[i]), "x") == all[i]);
+      }
+    };
+    check(Prior::gaussian, 5);
+    check(Composition::barrier, 2);
+    check(Estimator::exact, 2);
+    check(VarianceReduction::none, 3);
+    check(Draws::independent, 3);
+    check(DistanceMetric::squared, 2);
+    check(OccupancyWidth::fixed, 2);
     CHECK(to_string(Estimator::monte_carlo) == "monte_carlo");
+    CHECK(to_string(static_cast<Prior>(99)).empty());
   }
 }
 
@@ -275,9 +268,9 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("unknown words") {
     DPR_CHECK_MESSAGE_HAS(
-        InvalidArgument, parse_prior("normal", "depth_prior (S.json)"),
+        InvalidArgument, parse_choice<Prior>("normal", "depth_prior (S.json)"),
         "depth_prior (S.json): got \"normal\", expected gaussian, cauchy, logistic, gumbel or");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, parse_estimator("", "x"), "expected exact or monte_carlo");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, parse_choice<Estimator>("", "x"), "expected exact or monte_carlo");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, smoothing_preset("SoftRas"),
                           "preset (smoothing): got \"SoftRas\"");
   }

@@ -16,9 +16,10 @@
 #include "dpr/optimizer.hpp"
 #include "dpr/pose.hpp"
 #include "reference/priors.hpp"
-#include "smoothing/prior_functions.hpp"
+#include "smoothing/priors.hpp"
 #include "solve/score_estimator.hpp"
 #include "support/messages.hpp"
+#include "support/priors.hpp"
 #include "support/reduced.hpp"
 
 using namespace dpr;
@@ -26,11 +27,10 @@ using dpr::test::reduced;
 
 namespace {
 
-constexpr Prior k_priors[] = {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::gumbel};
 /// How many standard errors a mean may be away: for a right estimator once in 16,000 figures.
 constexpr double k_standard_errors = 4;
 
-reference::Prior to_reference(Prior prior) { return static_cast<reference::Prior>(static_cast<int>(prior)); }
+reference::Prior to_reference(Prior prior) { return static_cast<reference::Prior>(prior); }
 
 /// E[g(Z)] by the trapezoidal rule in t with z = sinh(t), which heavy tails do not spoil.
 double expectation(Prior prior, const std::function<double(double)>& g) {
@@ -210,12 +210,13 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("quantiles and scores of the priors, in double precision") {
-    for (const Prior prior : k_priors) {
+    for (const Prior prior : dpr::test::k_sampled_priors) {
       CAPTURE(to_string(prior));
       for (const double u : {1e-15, 1e-6, 0.01, 0.3, 0.5, 0.6, 0.999, 1 - 1e-9}) {
         const double x = quantile(prior, u);
         CHECK(std::exp(reference::log_cdf(to_reference(prior), x)) == doctest::Approx(u).epsilon(1e-12));
-        CHECK(score(prior, x) == doctest::Approx(reference::score(to_reference(prior), x)).epsilon(1e-14));
+        CHECK(row_of(prior).score(x) ==
+              doctest::Approx(reference::score(to_reference(prior), x)).epsilon(1e-14));
       }
     }
   }
@@ -272,7 +273,7 @@ TEST_SUITE("statistical") {
     const Product f;
     const int runs = 4000;
     double worst = 0;
-    for (const Prior prior : k_priors) {
+    for (const Prior prior : dpr::test::k_sampled_priors) {
       const std::vector<double> exact = exact_figures(f, prior).all();
       for (const VarianceReduction baseline :
            {VarianceReduction::none, VarianceReduction::rigid, VarianceReduction::leave_one_out}) {

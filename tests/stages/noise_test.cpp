@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "smoothing/priors.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
@@ -14,10 +17,10 @@ using dpr::test::device_impl;
 using dpr::test::reduced;
 
 /// The samples of faces 0, 1, ... in pixel 3 of view 1: uniform numbers, or the noise of a prior.
-std::vector<std::vector<float>> draw(cl_uint draws, cl_uint samples, std::size_t faces, int prior = -1,
-                                     cl_uint seed = 7) {
-  const std::string function = prior < 0 ? "draw_uniform(s, name, block)"
-                                         : "draw_noise(s, " + std::to_string(prior) + ", name, block)";
+std::vector<std::vector<float>> draw(cl_uint draws, cl_uint samples, std::size_t faces,
+                                     std::optional<dpr::Prior> prior = {}, cl_uint seed = 7) {
+  const std::string function = prior ? "draw_noise(s, " + std::string(to_string(*prior)) + ", name, block)"
+                                     : "draw_uniform(s, name, block)";
   dpr::test::Probe probe({"shared_types.h", "philox.h", "lanes.h", "priors.h", "noise.h"}, R"(
 kernel void probe(const uint samples, const uint draws, const uint seed, global float* restrict out) {
   const uint face = (uint)get_global_id(0);
@@ -76,8 +79,9 @@ TEST_SUITE("unit") {
         for (std::size_t j = 0; j < i; ++j) CHECK(us[i] != us[j]);
       }
     }
-    for (const int prior : {DPR_GAUSSIAN, DPR_CAUCHY, DPR_LOGISTIC}) {
-      for (const auto& zs : draw(DPR_ANTITHETIC, 8, 4, prior)) {
+    for (const dpr::PriorRow& row : dpr::priors()) {
+      if (!row.has_score() || !row.is_symmetric()) continue;
+      for (const auto& zs : draw(DPR_ANTITHETIC, 8, 4, row.prior)) {
         for (std::size_t i = 0; i < zs.size(); i += 2) CHECK(zs[i] == -zs[i + 1]);
       }
     }
@@ -97,21 +101,22 @@ TEST_SUITE("unit") {
   TEST_CASE("noise stays within the bounds that skip work") {
     // The uniform numbers furthest out, whatever the draws.
     const std::vector<float> ends{0x1p-24F, 1.0F - 0x1p-24F};
-    for (const int prior : {DPR_GAUSSIAN, DPR_CAUCHY, DPR_LOGISTIC, DPR_GUMBEL}) {
+    for (const std::string_view name : dpr::scored_priors()) {
+      const std::string prior(name);
       CAPTURE(prior);
       dpr::test::Probe probe({"shared_types.h", "philox.h", "lanes.h", "priors.h", "noise.h"}, R"(
-kernel void probe(const int prior, global const float* restrict u, global float* restrict out) {
-  out[0] = noise_quantile(prior, (realn)(u[0])).s0 - lowest_noise(prior);
-  out[1] = highest_noise(prior) - noise_quantile(prior, (realn)(u[1])).s0;
+kernel void probe(global const float* restrict u, global float* restrict out) {
+  out[0] = noise_quantile(DPR_PRIOR, (realn)(u[0])).s0 - lowest_noise(DPR_PRIOR);
+  out[1] = highest_noise(DPR_PRIOR) - noise_quantile(DPR_PRIOR, (realn)(u[1])).s0;
 })",
-                             " -DDPR_WIDTH=8");
+                             " -DDPR_WIDTH=8 -DDPR_PRIOR=" + prior);
       const dpr::Buffer<float> in(device_impl(), std::span<const float>(ends));
       dpr::Buffer<float> out;
       dpr::test::poison(out, 2);
-      probe(1, cl_int{prior}, in, out);
+      probe(1, in, out);
       for (const float margin : out.download()) {
         CHECK(margin > 0.0F);
-        CHECK(margin < (prior == DPR_CAUCHY ? 1e5F : 0.1F));
+        CHECK(margin < (prior == "cauchy" ? 1e5F : 0.1F));
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "dpr/smoothing.hpp"
 #include "reference/priors.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
@@ -48,7 +49,7 @@ Words philox(const Words& counter, cl_uint key0, cl_uint key1) {
 }
 
 std::string prior_option(RefPrior prior) {
-  return " -DDPR_WIDTH=4 -DDPR_PRIOR=" + std::to_string(static_cast<int>(prior));
+  return " -DDPR_WIDTH=4 -DDPR_PRIOR=" + std::string(dpr::to_string(static_cast<dpr::Prior>(prior)));
 }
 
 /// Applies `function`, a float4 to float4 of priors.h, to a list whose length is a multiple of four.

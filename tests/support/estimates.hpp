@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dpr/smoothing.hpp"
+#include "support/priors.hpp"
 #include "support/reduced.hpp"
 
 namespace dpr::test {
@@ -51,8 +52,6 @@ inline Estimate estimate_over(std::size_t count, const std::function<double(std:
   } while (false)
 
 /// The priors with a score.
-inline constexpr std::array<Prior, 4> k_sampled_priors{Prior::gaussian, Prior::cauchy, Prior::logistic,
-                                                       Prior::gumbel};
 
 /// A baseline and a way of drawing.
 struct SamplingMode {

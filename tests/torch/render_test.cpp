@@ -262,6 +262,25 @@ TEST_SUITE("pipeline") {
     CHECK(render(renderer, in).allclose(render(make_renderer(wide), in), 1e-5, 1e-6));
   }
 
+  TEST_CASE("operator: any value of the smoothing, in any order, as a scene file has it") {
+    const auto make = [&](const std::vector<std::pair<std::string, at::IValue>>& values) {
+      const auto renderer = make_renderer(smoothing_preset("gaussian"));
+      for (const auto& [name, value] : values) renderer->set(name, value);
+      return render(renderer, make_inputs());
+    };
+    const Smoothing expected = resolve_smoothing({.preset = "softras",
+                                                  .depth_prior = Prior::gaussian,
+                                                  .sigma = 5e-3F,
+                                                  .blur_radius = 0.02F},
+                                                 k_width, k_height);
+    const at::Tensor image = render(make_renderer(expected), make_inputs());
+    const std::vector<std::pair<std::string, at::IValue>> values{
+        {"blur_radius", 0.02}, {"sigma", 5e-3}, {"depth_prior", "gaussian"}, {"preset", "softras"}};
+    CHECK(make(values).equal(image));
+    CHECK(make({values.rbegin(), values.rend()}).equal(image));
+    CHECK_FALSE(make({{"preset", "softras"}}).equal(image));
+  }
+
   TEST_CASE("operator: what is not contiguous, and what needs no gradient") {
     const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
     const Inputs in = make_inputs();
@@ -310,6 +329,8 @@ TEST_SUITE("robustness") {
     CHECK(has(message_of([&] { renderer->set("sigma", -1); }), "sigma"));
     CHECK(has(message_of([&] { renderer->set("samples", 2.5); }), "a whole number"));
     CHECK(has(message_of([&] { renderer->set("nothing", 1); }), "name (dpr::Renderer.set)"));
+    CHECK(has(message_of([&] { renderer->set("depth_prior", "normal"); }), "gaussian, cauchy, logistic"));
+    CHECK(has(message_of([&] { renderer->set("znear", "close"); }), "a number"));
     const at::Tensor faces = torch::tensor({{0, 1, 2}});
     const auto make = [&](const at::Tensor& f, std::int64_t size, const char* preset) {
       return message_of([&] { torch_op::BatchRenderer(f, size, size, preset, ""); });

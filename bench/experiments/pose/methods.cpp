@@ -7,7 +7,6 @@
 
 #include "dpr/error.hpp"
 #include "experiments/pose/protocol.hpp"
-#include "smoothing/set_sigma.hpp"
 
 namespace dpr::bench {
 namespace {

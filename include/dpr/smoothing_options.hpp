@@ -1,0 +1,45 @@
+// A smoothing as people describe it: some of its values, by name, and the rest to follow from them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "dpr/smoothing.hpp"
+
+namespace dpr {
+
+/// What a file, a command line or a caller says of a smoothing; resolve_smoothing() finds the rest.
+struct SmoothingOptions {
+  std::optional<std::string> preset = {};
+  std::optional<Prior> occupancy_prior = {}, depth_prior = {};
+  std::optional<float> sigma = {}, gamma = {}, alpha = {};
+  std::optional<Composition> composition = {};
+  std::optional<Estimator> estimator = {};  ///< of both stages; the next two override it for one
+  std::optional<Estimator> occupancy_estimator = {}, aggregation_estimator = {};
+  std::optional<std::uint32_t> samples = {};
+  std::optional<VarianceReduction> variance_reduction = {};
+  std::optional<Draws> draws = {};
+  std::optional<std::uint64_t> seed = {};
+  std::optional<float> occupancy_threshold = {}, blur_radius = {}, background_depth = {};
+  std::optional<DistanceMetric> distance = {};
+  std::optional<OccupancyWidth> occupancy_width = {};
+};
+
+/// The smoothing that the options describe, for images of `width` x `height`. Throws InvalidArgument where
+/// they describe none. Command line, scene and views files, and the torch operator all end here:
+/// 1. The preset says everything but the seed; what it does not say, or all without one, is `otherwise`.
+/// 2. What is given replaces that.
+/// 3. The blur radius that is given decides alone. Else, where an occupancy_threshold is given, the radius
+///    follows from it (blur_radius()). Else that of step 1 stays the same number of sigmas, as set_sigma()
+///    has it: 9.21 of them in "softras", "paper_gaussian" and "paper_cauchy", none in "rigid". A variable
+///    width keeps the radius of step 1 in NDC: 0.5 in "nmr". The other presets have no radius of their own,
+///    so that theirs follows from sigma, prior and threshold.
+Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
+                            const Smoothing& otherwise = {});
+
+/// What `over`, such as a command line, leaves of `under`, such as a file, and adds to it: each option given
+/// replaces its like. A preset replaces all but the seed, an estimator those of both stages.
+SmoothingOptions overlay(const SmoothingOptions& under, const SmoothingOptions& over);
+
+}  // namespace dpr

@@ -1,0 +1,34 @@
+// The names of the smoothing's enumerations: one table for files, command line, operator and messages.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "dpr/smoothing.hpp"
+
+namespace dpr {
+
+template <SmoothingChoice Choice>
+struct NamedChoice {
+  Choice value;
+  std::string_view name;
+};
+
+/// All values of an enumeration with their names, in the order of their declaration.
+template <SmoothingChoice Choice>
+std::span<const NamedChoice<Choice>> choice_names();
+
+/// "a, b or c", as messages have it.
+std::string one_of(std::span<const std::string_view> names);
+/// "a|b|c", as --help has it.
+std::string joined(std::span<const std::string_view> names);
+
+template <SmoothingChoice Choice>
+std::vector<std::string_view> names_of_choices() {
+  std::vector<std::string_view> names;
+  for (const auto& row : choice_names<Choice>()) names.push_back(row.name);
+  return names;
+}
+
+}  // namespace dpr

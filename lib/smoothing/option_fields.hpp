@@ -1,0 +1,64 @@
+// The table of the smoothing's options: every reader of them and --help walk it.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "dpr/smoothing_options.hpp"
+#include "smoothing/choice_names.hpp"
+
+namespace dpr {
+
+/// Calls visit(key, description, member) for every member of SmoothingOptions, with a pointer to the member.
+/// The key is the scene file's; with dashes it is the flag's.
+template <typename Visit>
+void for_each_option(Visit&& visit) {
+  using O = SmoothingOptions;
+  visit("preset", "Take all values from a named member of the family", &O::preset);
+  visit("occupancy_prior", "Noise of the distance", &O::occupancy_prior);
+  visit("depth_prior", "Noise of the depth", &O::depth_prior);
+  visit("sigma", "Scale of the distance noise, in the unit of the distance", &O::sigma);
+  visit("gamma", "Scale of the depth noise; depth is 1 at znear, 0 at zfar", &O::gamma);
+  visit("alpha", "Weight of the barrier", &O::alpha);
+  visit("composition", "How occupancy and depth combine", &O::composition);
+  visit("estimator", "How both expectations are computed", &O::estimator);
+  visit("occupancy_estimator", "Overrides the estimator for the occupancy", &O::occupancy_estimator);
+  visit("aggregation_estimator", "Overrides the estimator for the aggregation", &O::aggregation_estimator);
+  visit("samples", "Draws of Monte Carlo", &O::samples);
+  visit("variance_reduction", "Control variate of sampled gradients", &O::variance_reduction);
+  visit("draws", "How the samples' noise is drawn", &O::draws);
+  visit("seed", "Seed of everything random", &O::seed);
+  visit("occupancy_threshold", "Sets the blur radius where none is given", &O::occupancy_threshold);
+  visit("blur_radius", "Triangles further from a pixel are not there", &O::blur_radius);
+  visit("background_depth", "Normalised depth of the background", &O::background_depth);
+  visit("distance", "Unit of the distance: NDC^2 or NDC", &O::distance);
+  visit("occupancy_width", "Width of uniform noise: sigma, or up to the pixel", &O::occupancy_width);
+}
+
+/// The keys, in that order.
+std::vector<std::string_view> option_keys();
+
+/// What an option takes, as --help has it: "gaussian|cauchy|...", "FLOAT", "N".
+template <SmoothingChoice Choice>
+std::string option_type(const std::optional<Choice>&) {
+  return joined(names_of_choices<Choice>());
+}
+std::string option_type(const std::optional<std::string>& preset);
+inline std::string option_type(const std::optional<float>&) { return "FLOAT"; }
+inline std::string option_type(const std::optional<std::uint32_t>&) { return "N"; }
+inline std::string option_type(const std::optional<std::uint64_t>&) { return "N"; }
+
+/// A value from a language that has numbers and words.
+using OptionValue = std::variant<double, std::int64_t, std::string>;
+
+/// Sets an option by its key; false for an unknown one. Throws InvalidArgument, which calls the option
+/// `where`, for a value of the wrong kind.
+bool set_option(SmoothingOptions& options, std::string_view key, const OptionValue& value,
+                std::string_view where);
+
+}  // namespace dpr

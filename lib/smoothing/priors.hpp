@@ -1,0 +1,43 @@
+// What the library knows of each prior, in double precision: a row of one table. Their kernels are
+// kernels/prior_<name>.h.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "dpr/smoothing.hpp"
+
+namespace dpr {
+
+struct PriorRow {
+  Prior prior;
+  std::string_view name;  ///< in files and messages, and of the kernel's functions
+  /// x with P(X > x) = tail, for tail in (0, 1/2].
+  double (*upper_quantile)(double tail);
+  /// nu'(z) of the density exp(-nu); null where there is none, so that gradients cannot be sampled.
+  double (*score)(double z);
+  /// The inverse CDF of u in (0, 1); null where the density is symmetric about 0 and upper_quantile says it.
+  double (*asymmetric_quantile)(double u) = nullptr;
+  /// Where the blur radius ends, in sigmas, whatever the occupancy there.
+  double longest_reach = std::numeric_limits<double>::infinity();
+
+  bool has_score() const { return score != nullptr; }
+  bool is_symmetric() const { return asymmetric_quantile == nullptr; }
+};
+
+/// In the order of the enumeration.
+std::span<const PriorRow> priors();
+const PriorRow& row_of(Prior prior);
+
+/// The names of those with a score, which can be sampled.
+std::vector<std::string_view> scored_priors();
+
+/// The inverse CDF of u in (0, 1).
+double quantile(Prior prior, double u);
+
+/// x in sigmas at which the occupancy outside has fallen to `tail`, at most the prior's longest reach.
+double reach(Prior prior, double tail);
+
+}  // namespace dpr

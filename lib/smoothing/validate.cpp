@@ -1,0 +1,126 @@
+// Which smoothings there are estimators for, and in what range their numbers must be.
+#include <cmath>
+#include <string>
+
+#include "base/checks.hpp"
+#include "smoothing/choice_names.hpp"
+#include "smoothing/priors.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::uint32_t k_most_samples = 1U << 20U;
+
+template <SmoothingChoice Choice>
+void require_known(Choice value, const std::string& argument) {
+  if (to_string(value).empty()) {
+    throw InvalidArgument(argument, std::to_string(static_cast<int>(value)),
+                          one_of(names_of_choices<Choice>()));
+  }
+}
+
+void validate_choices(const Smoothing& s) {
+  require_known(s.occupancy_prior, "occupancy_prior (smoothing)");
+  require_known(s.depth_prior, "depth_prior (smoothing)");
+  require_known(s.composition, "composition (smoothing)");
+  require_known(s.occupancy_estimator, "occupancy_estimator (smoothing)");
+  require_known(s.aggregation_estimator, "aggregation_estimator (smoothing)");
+  require_known(s.variance_reduction, "variance_reduction (smoothing)");
+  require_known(s.draws, "draws (smoothing)");
+  require_known(s.distance, "distance (smoothing)");
+  require_known(s.occupancy_width, "occupancy_width (smoothing)");
+}
+
+/// What a sampled stage asks of its prior.
+void validate_sampled_prior(Prior prior, Draws draws, const std::string& stage) {
+  const PriorRow& row = row_of(prior);
+  const std::string name(row.name);
+  if (!row.has_score()) {
+    throw InvalidArgument(stage + "_estimator (smoothing)", "monte_carlo with the " + name + " prior",
+                          "exact: the " + name + " density has no score, so its gradient cannot be sampled");
+  }
+  if (!row.is_symmetric() && draws == Draws::antithetic) {
+    throw InvalidArgument("draws (smoothing)", "antithetic with the " + name + " prior of the " + stage,
+                          "independent or stratified: the " + name + " density is not symmetric");
+  }
+}
+
+/// Which baselines, draws and numbers of samples make an unbiased estimator.
+void validate_sampling(const Smoothing& s) {
+  const bool paired = s.draws == Draws::antithetic;
+  if (paired && s.samples % 2 != 0) {
+    throw InvalidArgument("samples (smoothing)", checks::text(s.samples) + " with antithetic draws",
+                          "an even number: antithetic draws come in pairs");
+  }
+  if (s.variance_reduction != VarianceReduction::leave_one_out) return;
+  if (s.draws == Draws::stratified) {
+    throw InvalidArgument("variance_reduction (smoothing)",
+                          "leave_one_out (the default) with stratified draws",
+                          "none or rigid: stratified samples are not independent of each other");
+  }
+  const std::uint32_t least = paired ? 4 : 2;
+  if (s.samples < least) {
+    throw InvalidArgument("samples (smoothing)", checks::text(s.samples) + " with leave_one_out",
+                          "at least " + checks::text(least) + ", so that samples are left" +
+                              (paired ? " beside an antithetic pair" : ""));
+  }
+}
+
+void validate_estimators(const Smoothing& s) {
+  const bool occupancy = s.occupancy_estimator == Estimator::monte_carlo;
+  const bool aggregation = s.aggregation_estimator == Estimator::monte_carlo;
+  if (s.composition == Composition::joint && occupancy != aggregation) {
+    throw InvalidArgument(std::string(occupancy ? "occupancy" : "aggregation") + "_estimator (smoothing)",
+                          "monte_carlo beside an exact stage in the joint composition",
+                          "the same for both: a sample perturbs distances and depths together");
+  }
+  if (occupancy) validate_sampled_prior(s.occupancy_prior, s.draws, "occupancy");
+  if (aggregation) validate_sampled_prior(s.depth_prior, s.draws, "aggregation");
+  if (occupancy || aggregation) validate_sampling(s);
+}
+
+void validate_width(const Smoothing& s) {
+  if (s.occupancy_width == OccupancyWidth::fixed) return;
+  const auto require_with = [](bool ok, const char* with, const char* expected) {
+    if (!ok) {
+      throw InvalidArgument("occupancy_width (smoothing)", std::string("variable with ") + with,
+                            std::string("variable with ") + expected + ", or fixed");
+    }
+  };
+  require_with(s.occupancy_prior == Prior::uniform, "another prior", "the uniform occupancy_prior");
+  require_with(s.occupancy_estimator == Estimator::exact, "monte_carlo", "the exact occupancy_estimator");
+  require_with(s.distance == DistanceMetric::euclidean, "squared distances", "euclidean distances");
+  require_with(s.composition == Composition::joint, "the barrier", "the joint composition");
+  require_with(s.blur_radius.has_value(), "no blur_radius", "a blur_radius");
+}
+
+}  // namespace
+
+bool is_sampled(const Smoothing& smoothing) {
+  return smoothing.occupancy_estimator == Estimator::monte_carlo ||
+         smoothing.aggregation_estimator == Estimator::monte_carlo;
+}
+
+void validate(const Smoothing& smoothing) {
+  validate_choices(smoothing);
+  checks::require_positive(smoothing.sigma, "sigma (smoothing)");
+  checks::require_positive(smoothing.gamma, "gamma (smoothing)");
+  checks::require_positive(smoothing.alpha, "alpha (smoothing)");
+  if (smoothing.samples < 1 || smoothing.samples > k_most_samples) {
+    throw InvalidArgument("samples (smoothing)", checks::text(smoothing.samples),
+                          "a whole number from 1 to " + checks::text(k_most_samples));
+  }
+  if (!(smoothing.occupancy_threshold > 0 && smoothing.occupancy_threshold < 0.5F)) {
+    throw InvalidArgument("occupancy_threshold (smoothing)", checks::text(smoothing.occupancy_threshold),
+                          "a number between 0 and 0.5, both excluded");
+  }
+  if (smoothing.blur_radius && !(*smoothing.blur_radius >= 0 && std::isfinite(*smoothing.blur_radius))) {
+    throw InvalidArgument("blur_radius (smoothing)", checks::text(*smoothing.blur_radius),
+                          "a finite number >= 0");
+  }
+  checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
+  validate_width(smoothing);
+  validate_estimators(smoothing);
+}
+
+}  // namespace dpr
