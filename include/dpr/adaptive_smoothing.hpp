@@ -7,7 +7,7 @@
 
 namespace dpr {
 
-/// The published schedule by default (MATHS of the paper's experiments).
+/// The published schedule by default, that of the paper's pose experiments.
 struct AdaptiveSchedule {
   unsigned start = 100;                ///< first iteration at which the smoothing may change
   unsigned interval = 50;              ///< iterations between two checks

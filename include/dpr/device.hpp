@@ -53,11 +53,11 @@ class Device {
   std::shared_ptr<Impl> impl_;
 };
 
-/// Opens a device: "" takes the environment variable DPR_DEVICE, or else the default (the first CPU, or
-/// else the first device: every machine has a CPU, so a program gives the same result everywhere unless told
-/// to differ); "cpu" and "gpu" the first of that type; a number the index in list_devices(); anything else
-/// the first whose platform or name contains it, ignoring case. Throws InvalidArgument if none matches,
-/// DeviceError if none exists.
+/// Opens a device: "" takes the environment variable DPR_DEVICE, or else the default: the first CPU, or else
+/// the first device; "cpu" and "gpu" the first of that type; a number the index in list_devices(); anything
+/// else the first whose platform or name contains it, ignoring case. Results are bitwise the same on one
+/// device only: others round differently. Throws InvalidArgument if none matches, DeviceError if none
+/// exists.
 Device open_device(const std::string& selector = "");
 
 }  // namespace dpr

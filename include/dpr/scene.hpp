@@ -47,8 +47,8 @@ struct Scene {
 /// smoothing.
 void validate(const Scene& scene);
 
-/// Reads the scene format of the README. Mesh files are relative to the scene file. An unknown key is an
-/// error that names it. Throws IoError where the file cannot be read or is not JSON (with the line),
+/// Reads the scene format of lib/cli/README.md. Mesh files are relative to the scene file. An unknown key is
+/// an error that names it. Throws IoError where the file cannot be read or is not JSON (with the line),
 /// InvalidArgument else.
 Scene read_scene(const std::filesystem::path& file);
 

@@ -33,8 +33,9 @@ struct ShapeViews {
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
 };
 
-/// Reads the views format of the README; images and the initial mesh are relative to the file. Throws IoError
-/// where a file cannot be read, InvalidArgument for an unknown key, no views, or an image of another size.
+/// Reads the views format of lib/cli/README.md; images and the initial mesh are relative to the file. Throws
+/// IoError where a file cannot be read, InvalidArgument for an unknown key, no views, or an image of another
+/// size.
 ShapeViews read_views(const std::filesystem::path& file);
 
 /// How the mesh moves. large_steps: in the variables u = (I + lambda L) v, L the Laplacian of the mesh's

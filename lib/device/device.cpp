@@ -62,7 +62,7 @@ void mark_default(std::vector<FoundDevice>& found) {
   const auto cpu = std::ranges::find(found, "cpu", [](const FoundDevice& entry) { return entry.info.type; });
   FoundDevice& preferred = cpu != found.end() ? *cpu : found.front();
   preferred.info.is_default = true;
-  preferred.info.default_reason = cpu != found.end() ? "the first CPU: the same result on every machine"
+  preferred.info.default_reason = cpu != found.end() ? "the first CPU: every machine has one"
                                                      : "the first device: there is no CPU";
 }
 

@@ -5,8 +5,8 @@
 
 namespace dpr::torch_op {
 
-/// Renders a batch in one set of launches. All tensors are float32 on the CPU; nothing is copied that is
-/// contiguous.
+/// Renders a batch in one set of launches. All tensors are float32 on the CPU and are copied to the
+/// device; those that are not contiguous are copied once more before.
 /// @param vertices    [view or 1, vertex, 3] world space
 /// @param colors      [view or 1, vertex, 3] linear RGB; or [view or 1, face, 3], if there are not as many
 /// faces as

@@ -1,0 +1,135 @@
+#!/usr/bin/env python3
+"""The code in the documents, tried: C++ becomes a program, commands and Python are run, JSON is parsed.
+
+blocks.py cpp DOCUMENT OUTPUT.cpp   the C++ blocks of a document, one after the other, as one main()
+blocks.py run DOCUMENT --source DIR --build DIR --work DIR [--program FILE] [--python FILE]
+                                    everything else, in an empty folder that looks like the repository's root
+
+Blocks of other languages (console, text) are not tried. A block after a line <!-- file: NAME --> is written to that file.
+"""
+import argparse
+import json
+import os
+import pathlib
+import re
+import shutil
+import stat
+import subprocess
+import sys
+
+# What makes a command of a document short enough for a test.
+REDUCED = {
+    "dpr fit": "--iterations 4",
+    "dpr learn data": "--train 2 --val 1 --test 1 --classes sofa",
+    "dpr learn train": "--steps 2 --classes sofa",
+    "dpr learn eval": "--classes sofa",
+    "dpr learn show": "--classes sofa",
+    "dpr_experiments": "--smoke",
+    "dpr_pose_table": "--smoke",
+}
+
+
+def blocks(document):
+    """(language, first line, file or None, text) of every fenced block."""
+    found, language, name = [], None, None
+    for number, line in enumerate(document.read_text().splitlines(), 1):
+        fence = re.match(r"\s*```(\S*)", line)
+        if language is None and fence:
+            language, first, text = fence.group(1), number + 1, []
+        elif language is not None and fence:
+            found.append((language, first, name, "\n".join(text) + "\n"))
+            language, name = None, None
+        elif language is not None:
+            text.append(line)
+        elif marker := re.match(r"<!-- file: (\S+) -->", line):
+            name = marker.group(1)
+    if language is not None:
+        sys.exit(f"{document}: a block is not closed")
+    return found
+
+
+def write_cpp(document, output):
+    includes, body = [], []
+    for language, first, _, text in blocks(document):
+        if language != "cpp":
+            continue
+        lines = text.splitlines()
+        includes += [line for line in lines if line.startswith("#include")]
+        body.append(f'#line {first} "{document}"')
+        body += ["" if line.startswith("#include") else line for line in lines]
+    source = "\n".join(includes + ["int main() {"] + body + ["}", ""])
+    output.write_text(source)
+
+
+def make_programs(folder, build):
+    """The programs under their names, with what reduces them."""
+    folder.mkdir()
+    for program in ("dpr", "dpr_experiments", "dpr_pose_table"):
+        cases = []
+        for command, options in REDUCED.items():
+            words = command.split()
+            if words[0] != program:
+                continue
+            pattern = " ".join(words[1:]) + (" *" if words[1:] else "*")
+            cases.append(f'  "{pattern}") set -- "$@" {options} ;;'.replace('*"', '"*'))
+        script = folder / program
+        script.write_text("#!/bin/sh\ncase \"$*\" in\n" + "\n".join(cases) + f'\nesac\nexec {build}/bin/{program} "$@"\n')
+        script.chmod(script.stat().st_mode | stat.S_IXUSR)
+
+
+def run(arguments):
+    work, build = arguments.work, arguments.build.resolve()
+    shutil.rmtree(work, ignore_errors=True)
+    (work / "build").mkdir(parents=True)
+    (work / "build/release").symlink_to(build)
+    for folder in ("bench", "tests"):
+        (work / folder).symlink_to(arguments.source.resolve() / folder)
+    make_programs(work / "programs", build)
+    environment = {**os.environ, "PATH": f"{(work / 'programs').resolve()}:{os.environ['PATH']}"}
+
+    def call(what, *command):
+        print(f"== {what}", flush=True)
+        if subprocess.run(command, cwd=work, env=environment, check=False).returncode:
+            sys.exit(f"{what} failed")
+
+    call("dpr demo", "dpr", "demo", "-o", "demo-output", "--quiet")
+    tried, python = 0, ""
+    for language, first, name, text in blocks(arguments.document):
+        where = f"{arguments.document}:{first}"
+        if name:
+            (work / name).write_text(text)
+        if language == "json":
+            try:
+                json.loads(text)
+            except ValueError as error:
+                sys.exit(f"{where}: {error}")
+        elif language == "sh":
+            call(where, "bash", "-euo", "pipefail", "-c", text)
+        elif language == "python":
+            python += "\n" * (first - 1 - python.count("\n")) + text
+        tried += language in ("json", "sh", "python")
+    if python and arguments.python:
+        (work / "document.py").write_text(python)
+        call(f"{arguments.document}, Python", arguments.python, "document.py")
+    if arguments.program:
+        call(f"{arguments.document}, C++", str(arguments.program.resolve()))
+        tried += 1
+    if tried == 0:
+        sys.exit(f"{arguments.document} has nothing to try")
+
+
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+modes = parser.add_subparsers(required=True)
+cpp = modes.add_parser("cpp")
+cpp.add_argument("document", type=pathlib.Path)
+cpp.add_argument("output", type=pathlib.Path)
+cpp.set_defaults(action=lambda a: write_cpp(a.document, a.output))
+try_all = modes.add_parser("run")
+try_all.add_argument("document", type=pathlib.Path)
+for option in ("--source", "--build", "--work"):
+    try_all.add_argument(option, type=pathlib.Path, required=True)
+try_all.add_argument("--program", type=pathlib.Path)
+try_all.add_argument("--python")
+try_all.set_defaults(action=run)
+chosen = parser.parse_args()
+chosen.action(chosen)
