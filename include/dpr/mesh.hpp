@@ -26,14 +26,14 @@ struct Mesh {
 /// mesh it is. O(vertices + faces).
 void validate(const Mesh& mesh, const std::string& name = "mesh");
 
-/// Reads OBJ, PLY, OFF or STL by way of OpenMesh, the vertices in the order of the file. Polygons become
-/// triangle fans; non-manifold, duplicate and degenerate faces are kept. Vertex and face colours are kept, in
-/// a file with both those of the vertices; what has none beside others that have one is white. The diffuse
-/// colours of OBJ materials are face colours, in eight bits, if the material files are there. STL has no
-/// shared vertices: equal positions become one, and facets with two equal corners are left out. The texture
-/// coordinates of an OBJ (u, v; v up) are kept if every corner has some. Throws
-/// IoError where the file is missing, malformed, truncated or loses a face on the way, and InvalidArgument
-/// where its content cannot be rendered. One thread at a time reads.
+/// Reads OBJ, PLY, OFF or STL, once from front to back; the vertices are in the order of the file. Polygons
+/// become triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices,
+/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, if the
+/// libraries are regular files beside it; dpr/notes.hpp tells what is left out. STL has no shared vertices:
+/// equal positions become one, and facets with two equal corners are left out. The texture coordinates of an
+/// OBJ (u, v; v up) are kept if every corner has some. Throws IoError where the file is missing, malformed,
+/// truncated, goes on after its end or, being a pipe or a device, does not end; and InvalidArgument where its
+/// content cannot be rendered.
 Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face

@@ -118,6 +118,32 @@ std::vector<unsigned char> encode(const std::filesystem::path& file, const Image
   return std::move(bytes.buffer());
 }
 
+/// The rows from `begin` to `end`, all channels.
+bool read_rows(OIIO::ImageInput& input, int begin, int end, std::vector<float>& values) {
+  const OIIO::ImageSpec& spec = input.spec();
+  values.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec.width) *
+                static_cast<std::size_t>(spec.nchannels));
+  const int top = spec.y + begin, bottom = spec.y + end;
+  if (spec.tile_height == 0) {
+    return input.read_scanlines(0, 0, top, bottom, spec.z, 0, spec.nchannels, OIIO::TypeDesc::FLOAT,
+                                values.data());
+  }
+  return input.read_tiles(0, 0, spec.x, spec.x + spec.width, top, bottom, spec.z, spec.z + 1, 0,
+                          spec.nchannels, OIIO::TypeDesc::FLOAT, values.data());
+}
+
+/// Appends the pixels of some rows; what their file does not have is one.
+void append_pixels(const std::vector<float>& values, std::size_t channels, const std::array<int, 4>& source,
+                   std::vector<glm::vec4>& pixels) {
+  for (std::size_t i = 0; i < values.size(); i += channels) {
+    glm::vec4& pixel = pixels.emplace_back(1);
+    for (int c = 0; c < 4; ++c) {
+      const int from = source[static_cast<std::size_t>(c)];
+      if (from >= 0) pixel[c] = values[i + static_cast<std::size_t>(from)];
+    }
+  }
+}
+
 }  // namespace
 
 Image read_image(const std::filesystem::path& file, bool* has_alpha) {
@@ -130,18 +156,18 @@ Image read_image(const std::filesystem::path& file, bool* has_alpha) {
                             std::to_string(checks::k_largest_side) +
                             " pixels on a side in one channel or more");
   }
-  const auto channels = static_cast<std::size_t>(spec.nchannels);
   const std::array<int, 4> source = channels_of(spec);
-  Image image(spec.width, spec.height, glm::vec4(1));
-  std::vector<float> values(image.pixels.size() * channels);
-  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, values.data())) {
-    throw IoError(file, "cannot be read: " + one_line(input->geterror()));
-  }
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    for (int c = 0; c < 4; ++c) {
-      const int from = source[static_cast<std::size_t>(c)];
-      if (from >= 0) image.pixels[i][c] = values[i * channels + static_cast<std::size_t>(from)];
-    }
+  Image image;
+  image.width = spec.width;
+  image.height = spec.height;
+  // In bands, so that a few bytes that claim to be a large image do not take the memory of one.
+  constexpr int k_rows = 64;
+  const int rows = spec.tile_height > 0 ? spec.tile_height : k_rows;
+  std::vector<float> values;
+  for (int row = 0; row < spec.height; row += rows) {
+    if (!read_rows(*input, row, std::min(row + rows, spec.height), values))
+      throw IoError(file, "cannot be read: " + one_line(input->geterror()));
+    append_pixels(values, static_cast<std::size_t>(spec.nchannels), source, image.pixels);
   }
   require_finite(file, image);
   if (has_alpha) *has_alpha = source[3] >= 0;

@@ -51,8 +51,7 @@ class ObjReader {
     const bool is_read = keyword == "v" || keyword == "vt" || keyword == "f";
     // A comment may follow numbers, but names may have a # in them.
     if (is_read) scan::split(lines_.line().substr(0, lines_.line().find('#')), words_);
-    if (words_.back().back() == '\\')
-      fail("a line continued by a backslash: expected the whole on one line");
+    if (words_.back().back() == '\\') fail("a line continued by a backslash: expected the whole on one line");
     if (keyword == "v") vertex();
     if (keyword == "vt") texture_coordinate();
     if (keyword == "f") face();

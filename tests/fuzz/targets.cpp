@@ -65,17 +65,26 @@ void read_views_text(std::string_view content) {
   parse_views(folder() / "views.json", content, notes);
 }
 
+/// A whole file, or the content of one with the right checksum.
+void read_shape_checkpoint(std::string_view content) {
+  constexpr std::uint64_t k_fingerprint = 7;
+  const bool is_whole = content.starts_with("dpr shape checkpoint");
+  const std::string bytes = is_whole ? std::string(content) : checkpoint_bytes(content, k_fingerprint);
+  read_checkpoint(folder().write("checkpoint", bytes), k_fingerprint, {});
+}
+
 void read_npz_bytes(std::string_view content) { learn::read_npz(folder().write("a.npz", content)); }
 
-constexpr std::array<Target, 9> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
-                                           {"mesh_ply", read_mesh_bytes<k_ply>},
-                                           {"mesh_off", read_mesh_bytes<k_off>},
-                                           {"mesh_stl", read_mesh_bytes<k_stl>},
-                                           {"materials", read_materials},
-                                           {"image", read_image_bytes},
-                                           {"scene", read_scene_text},
-                                           {"views", read_views_text},
-                                           {"npz", read_npz_bytes}}};
+constexpr std::array<Target, 10> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
+                                            {"mesh_ply", read_mesh_bytes<k_ply>},
+                                            {"mesh_off", read_mesh_bytes<k_off>},
+                                            {"mesh_stl", read_mesh_bytes<k_stl>},
+                                            {"materials", read_materials},
+                                            {"image", read_image_bytes},
+                                            {"scene", read_scene_text},
+                                            {"views", read_views_text},
+                                            {"npz", read_npz_bytes},
+                                            {"shape_checkpoint", read_shape_checkpoint}}};
 
 }  // namespace
 
