@@ -17,9 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Json to_json(const std::vector<NamedFile>& files) {
+Json to_json(const std::vector<MeshMaterial>& materials) {
   Json list = Json::array();
-  for (const NamedFile& file : files) list.push_back({{"file", file.name}, {"exists", file.exists}});
+  for (const auto& [name, texture] : materials)
+    list.push_back({{"name", name}, {"texture", texture.empty() ? Json() : Json(texture)}});
   return list;
 }
 
@@ -34,19 +35,13 @@ std::string counted(std::size_t count, const char* what) {
 }
 
 /// What dpr does with a mesh that its user may not expect.
-Json mesh_notes(const Mesh& mesh, const MeshFacts& facts, const MeshMaterials& materials) {
+Json mesh_notes(const Mesh& mesh, const MeshFacts& facts) {
   Json notes = Json::array();
   if (facts.faces_without_area > 0)
     notes.push_back(counted(facts.faces_without_area, "triangle") + " without area: dropped when rendered");
   if (facts.unused_vertices > 0)
     notes.push_back("vertices without a face: " + std::to_string(facts.unused_vertices) + ", not seen");
   if (colors_of(mesh) == std::string("none")) notes.push_back("no colours: white");
-  for (const NamedFile& library : materials.libraries) {
-    if (!library.exists)
-      notes.push_back("material file " + library.name + " is missing: its colours are not read");
-  }
-  for (const NamedFile& texture : materials.textures)
-    notes.push_back("texture " + texture.name + ": not read by this version");
   if (!mesh.face_texcoords.empty()) notes.push_back("texture coordinates: rendered by --aov uv");
   if (!facts.is_closed()) notes.push_back("not closed: both sides of its triangles are seen");
   if (facts.is_closed() && !facts.is_oriented())
@@ -54,7 +49,7 @@ Json mesh_notes(const Mesh& mesh, const MeshFacts& facts, const MeshMaterials& m
   return notes;
 }
 
-Json mesh_to_json(const Mesh& mesh, const MeshMaterials& materials) {
+Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) {
   const MeshFacts facts = mesh_facts(mesh);
   const Bounds box = bounding_box(mesh.positions);
   return {{"vertices", mesh.positions.size()},
@@ -72,10 +67,8 @@ Json mesh_to_json(const Mesh& mesh, const MeshMaterials& materials) {
           {"bounds", {{"low", vector_to_json(box.low)}, {"high", vector_to_json(box.high)}}},
           {"colors", colors_of(mesh)},
           {"texture_coordinates", mesh.texcoords.size()},
-          {"materials", materials.materials},
-          {"material_files", to_json(materials.libraries)},
-          {"textures", to_json(materials.textures)},
-          {"notes", mesh_notes(mesh, facts, materials)}};
+          {"materials", to_json(materials)},
+          {"notes", mesh_notes(mesh, facts)}};
 }
 
 /// Triangles that the camera's clipping planes drop.
@@ -131,14 +124,15 @@ Json gradients_to_json(const GradientRequest& request) {
 }
 
 Json scene_to_json(const fs::path& file) {
-  const Scene scene = dpr::read_scene(file);
+  Notes notes;
+  const Scene scene = dpr::read_scene(file, notes);
   const Json document = Json::parse(read_file(file));  // for the names, which the scene does not keep
   Json meshes = Json::array();
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     const Json& entry = document.at("meshes").at(i);
     const std::string name = entry.contains("file") ? entry["file"].get<std::string>() : "";
-    const MeshMaterials materials =
-        name.empty() ? MeshMaterials() : mesh_materials(file.parent_path() / name);
+    const auto materials =
+        name.empty() ? std::vector<MeshMaterial>() : mesh_materials(file.parent_path() / name);
     Json mesh{{"file", name.empty() ? Json() : Json(name)}};
     mesh.update(mesh_to_json(scene.meshes[i].mesh, materials));
     add_clipping_notes(scene, scene.meshes[i], mesh["notes"]);
@@ -155,14 +149,18 @@ Json scene_to_json(const fs::path& file) {
           {"lights", lights},
           {"smoothing", smoothing_to_json(scene.smoothing)},
           {"gradients", gradients_to_json(scene.gradients)},
-          {"meshes", meshes}};
+          {"meshes", meshes},
+          {"notes", notes}};
 }
 
 Json file_to_json(const fs::path& file) {
   require_file(file);
   if (lower_case_extension(file) == ".json") return scene_to_json(file);
   Json json{{"file", file.string()}, {"kind", "mesh"}};
-  json.update(mesh_to_json(read_mesh(file), mesh_materials(file)));
+  Notes notes;
+  const Mesh mesh = read_mesh(file, notes);
+  json.update(mesh_to_json(mesh, mesh_materials(file)));
+  for (const std::string& note : notes) json["notes"].push_back(note);
   return json;
 }
 
@@ -182,11 +180,18 @@ std::string list_text(const Json& list) {
   return text.empty() ? "none" : text;
 }
 
-std::string files_text(const Json& files) {
-  Json names = Json::array();
-  for (const Json& file : files)
-    names.push_back(file["file"].get<std::string>() + (file["exists"].get<bool>() ? "" : " (missing)"));
-  return list_text(names);
+std::string materials_text(const Json& materials) {
+  Json texts = Json::array();
+  for (const Json& material : materials) {
+    const std::string name = material["name"].get<std::string>();
+    texts.push_back(
+        material["texture"].is_null() ? name : name + " (" + material["texture"].get<std::string>() + ")");
+  }
+  return list_text(texts);
+}
+
+void print_notes(const Json& notes) {
+  for (const Json& note : notes) print_line("note", note.get<std::string>());
 }
 
 std::string surface_text(const Json& mesh) {
@@ -208,10 +213,8 @@ void print_mesh(const Json& mesh) {
   print_line("bounds", list_text(mesh["bounds"]["low"]) + " to " + list_text(mesh["bounds"]["high"]));
   print_line("colours", mesh["colors"].get<std::string>());
   print_line("texture coordinates", mesh["texture_coordinates"].dump());
-  if (!mesh["materials"].empty()) print_line("materials", list_text(mesh["materials"]));
-  if (!mesh["material_files"].empty()) print_line("material files", files_text(mesh["material_files"]));
-  if (!mesh["textures"].empty()) print_line("textures", files_text(mesh["textures"]));
-  for (const Json& note : mesh["notes"]) print_line("note", note.get<std::string>());
+  print_line("materials", materials_text(mesh["materials"]));
+  print_notes(mesh["notes"]);
 }
 
 std::string camera_text(const Json& camera) {
@@ -233,6 +236,7 @@ void print_scene(const Json& scene) {
     smoothing += (smoothing.empty() ? "" : ", ") + name + " " + list_text(Json::array({value}));
   print_line("smoothing", smoothing);
   print_line("gradients", list_text(scene["gradients"]));
+  print_notes(scene["notes"]);
   for (const Json& mesh : scene["meshes"]) {
     std::printf("%s: mesh\n",
                 mesh["file"].is_null() ? "(in the scene file)" : mesh["file"].get<std::string>().c_str());
@@ -267,10 +271,9 @@ void add_info_command(CLI::App& application, CommonOptions& common) {
       "closed,\n"
       "manifold, non_manifold_edges, non_manifold_vertices, oriented, faces_without_area, bounds {low, "
       "high}, colors\n"
-      "(vertex, face, none), texture_coordinates, materials, material_files and textures [{file, exists}], "
-      "notes\n"
-      "(sentences). Of a scene: file, kind, width, height, camera, background, lights, smoothing, gradients, "
-      "meshes.\n"
+      "(vertex, face, none), texture_coordinates, materials [{name, texture}], notes (sentences). Of a "
+      "scene: file,\n"
+      "kind, width, height, camera, background, lights, smoothing, gradients, meshes, notes.\n"
       "Example: dpr info bunny.obj");
   command->callback([file, as_json] { run(*file, *as_json); });
 }

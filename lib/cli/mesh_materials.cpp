@@ -1,57 +1,43 @@
 #include "cli/mesh_materials.hpp"
 
 #include <algorithm>
-#include <functional>
-#include <sstream>
 
 #include "base/input_file.hpp"
+#include "mesh/mesh_reader.hpp"
+#include "mesh/scan_text.hpp"
 
 namespace dpr::cli {
 namespace {
 
-/// Calls `found` with what follows the keyword on every line that begins with it.
-void for_each_line(const std::string& text, const std::string& keyword,
-                   const std::function<void(const std::string&)>& found) {
-  constexpr const char* k_blank = " \t\r";
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    line.erase(0, std::min(line.find_first_not_of(k_blank), line.size()));
-    if (!line.starts_with(keyword)) continue;
-    line.erase(0, keyword.size());
-    const std::size_t begin = line.find_first_not_of(k_blank);
-    if (begin == 0 || begin == std::string::npos) continue;
-    found(line.substr(begin, line.find_last_not_of(k_blank) + 1 - begin));
-  }
-}
-
-void add(std::vector<NamedFile>& files, const std::filesystem::path& folder, const std::string& name) {
-  if (std::ranges::any_of(files, [&](const NamedFile& file) { return file.name == name; })) return;
+/// A library that is not there has no materials; the reader of meshes says so.
+void read_library(const std::filesystem::path& file, Materials& materials) {
   std::error_code error;
-  files.push_back({name, std::filesystem::is_regular_file(folder / name, error)});
+  if (std::filesystem::is_regular_file(file, error)) read_mtl(file, read_file(file), materials);
 }
 
 }  // namespace
 
-MeshMaterials mesh_materials(const std::filesystem::path& file) {
-  MeshMaterials result;
-  if (lower_case_extension(file) != ".obj") return result;
-  const std::filesystem::path folder = file.parent_path();
+std::vector<MeshMaterial> mesh_materials(const std::filesystem::path& file) {
+  std::vector<MeshMaterial> used;
+  if (lower_case_extension(file) != ".obj") return used;
   const std::string text = read_file(file);
-  for_each_line(text, "mtllib", [&](const std::string& name) { add(result.libraries, folder, name); });
-  for_each_line(text, "usemtl", [&](const std::string& name) {
-    if (std::ranges::find(result.materials, name) == result.materials.end()) result.materials.push_back(name);
-  });
-  for (const NamedFile& library : result.libraries) {
-    if (!library.exists) continue;
-    const std::string materials = read_file(folder / library.name);
-    for_each_line(materials, "map_Kd", [&](const std::string& words) {
-      // Options come before the name.
-      const bool has_options = words.starts_with('-');
-      add(result.textures, (folder / library.name).parent_path(),
-          has_options ? words.substr(words.find_last_of(" \t") + 1) : words);
-    });
+  Materials materials;
+  scan::Lines lines(scan::without_byte_order_mark(text));
+  std::vector<std::string_view> words;
+  while (lines.next()) {
+    scan::split(lines.line(), words);
+    if (words.size() < 2) continue;
+    const std::string_view rest = scan::behind(lines.line(), words[0]);
+    if (words[0] == "mtllib") {  // one name, which may have spaces, or several
+      read_library(file.parent_path() / rest, materials);
+      for (std::size_t i = 1; words.size() > 2 && i < words.size(); ++i)
+        read_library(file.parent_path() / words[i], materials);
+    }
+    if (words[0] != "usemtl" || std::ranges::find(used, rest, &MeshMaterial::name) != used.end()) continue;
+    const auto found = materials.find(rest);
+    used.push_back({std::string(rest), found == materials.end() ? "" : found->second.texture});
   }
-  return result;
+  return used;
 }
 
 }  // namespace dpr::cli

@@ -7,19 +7,12 @@
 
 namespace dpr::cli {
 
-/// A file that another one names.
-struct NamedFile {
-  std::string name;
-  bool exists = false;
+struct MeshMaterial {
+  std::string name;     ///< usemtl
+  std::string texture;  ///< map_Kd of its library; empty if there is none
 };
 
-struct MeshMaterials {
-  std::vector<NamedFile> libraries;    ///< mtllib
-  std::vector<std::string> materials;  ///< usemtl
-  std::vector<NamedFile> textures;     ///< map_Kd of the libraries
-};
-
-/// Each once, in the order of the files; nothing for other files than OBJ. Throws IoError.
-MeshMaterials mesh_materials(const std::filesystem::path& file);
+/// Those that faces use, each once, in the order of the file; none of other files than OBJ. Throws IoError.
+std::vector<MeshMaterial> mesh_materials(const std::filesystem::path& file);
 
 }  // namespace dpr::cli
