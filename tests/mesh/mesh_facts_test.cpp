@@ -13,10 +13,11 @@ using dpr::MeshFacts;
 
 /// Triangles of the corners of a square, of its middle, and of points above and below that.
 MeshFacts facts_of(std::initializer_list<glm::uvec3> faces) {
-  return mesh_facts(
-      {.positions =
-           {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5F, 0.5F, 0}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, -1}},
-       .faces = faces});
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0},       {1, 0, 0},       {1, 1, 0},       {0, 1, 0},
+                    {0.5F, 0.5F, 0}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, -1}};
+  mesh.faces = faces;
+  return mesh_facts(mesh);
 }
 
 }  // namespace
