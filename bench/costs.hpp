@@ -4,8 +4,8 @@
 //
 // Operations: +, -, *, /, sqrt and rsqrt count 1, a mad 2, on every lane that holds a pixel, a fragment or a
 // node. Comparisons, selections, min, max, abs, conversions, integers and indices count nothing, nor does
-// what is uniform to a triangle. exp_n is 19 operations (9 mads, 1 difference), log_n 21 (1 difference, 9 mads,
-// 2 products), log1p_n 4 more; a library exp is taken for as many.
+// what is uniform to a triangle. exp_n is 19 operations (9 mads, 1 difference), log_n 21 (1 difference, 9
+// mads, 2 products), log1p_n 4 more; a library exp is taken for as many.
 //
 // Bytes: every element of a buffer that a kernel needs, once, even where a cache or a second pass would have
 // it come twice or not at all.
@@ -31,8 +31,9 @@ inline constexpr double k_exp = 19, k_log = 21, k_log1p = k_log + 4;
 inline constexpr double k_normal_density = k_exp + 3;  // -0.5 x x, the constant
 inline constexpr double k_mills_ratio = 22;            // 1 mad, 1 quotient, 9 mads, 1 product
 inline constexpr double k_tail = k_normal_density + k_mills_ratio + 1;
-inline constexpr double k_cdf_density = k_tail + 1;               // 1 - tail
-inline constexpr double k_gaussian_log = k_tail + k_log + k_log1p + 7;  // occupancy_log: both branches, the hazard
+inline constexpr double k_cdf_density = k_tail + 1;  // 1 - tail
+inline constexpr double k_gaussian_log =
+    k_tail + k_log + k_log1p + 7;  // occupancy_log: both branches, the hazard
 inline constexpr double k_logistic_log = k_exp + k_log1p + 5;
 /// AS 241: both branches; 2 operations make the uniform number.
 inline constexpr double k_normal_sample = 2 + 3 + 14 + (k_log + 14);
@@ -41,7 +42,7 @@ inline constexpr double k_normal_sample = 2 + 3 + 14 + (k_log + 14);
 inline constexpr double k_view = 6 + 15;  // pixel centre; three edges of 5
 inline constexpr double k_inside = 3;
 inline constexpr double k_distance = 3 * (4 + 7 + 3);  // along the edge, offset, square
-inline constexpr double k_barycentrics = 11;
+inline constexpr double k_barycentrics = 8;
 /// All 64 pixels of the tile are tested.
 inline constexpr Cost k_cover_per_pair{64 * (3 + 15 + k_inside + k_distance), 4 + 4 + 48 + 8 + 4};
 inline constexpr Cost k_list_per_pair{0, 12 + 16};  // rasterize_count, rasterize_list
@@ -51,10 +52,10 @@ inline constexpr Cost k_rasterize_per_pair{0, 4 + 4 + 48 + 8 + 4};
 inline constexpr Cost k_rasterize_per_fragment{k_view + k_inside + k_distance + k_barycentrics + 9, 0};
 inline constexpr Cost k_rasterize_per_padded{0, 24};
 inline constexpr Cost k_rasterize_backward_per_pair{0, 4 + 8 + 4 + 48 + 36};
-/// Distance: the closest edge (45), factor (2), three corners of 5. Barycentrics: those (12), clipped (12),
-/// their gradients (9), three edges of 16.
-inline constexpr Cost k_rasterize_backward_per_fragment{k_view + k_inside + 62 + 81, 0};
-inline constexpr Cost k_rasterize_backward_per_padded{0, 4 + 16};
+/// Distance: the closest edge (45), factor (2), three corners of 5. Barycentrics: those (8), clipped (12),
+/// their gradients (9), three edges of 14.
+inline constexpr Cost k_rasterize_backward_per_fragment{k_view + 62 + 71, 0};
+inline constexpr Cost k_rasterize_backward_per_padded{0, 8 + 16};
 
 // shade.cl, unlit
 inline constexpr Cost k_shade_per_pair{0, 4 + 4 + 16 + 48};

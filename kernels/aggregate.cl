@@ -27,7 +27,7 @@ static inline Slots gather_slots(const BarrierPixel q, const Fragments f, global
     const Slot s = {barrier_beta(q, f.depth[k], log_p), 1.0f, 0.0f, k};
     slots[appended] = s;
     appended += log_p > DPR_LOG_ZERO && s.beta > largest - DPR_BARRIER_REACH;
-    largest = log_p > DPR_LOG_ZERO ? max(largest, s.beta) : largest;
+    largest = log_p > DPR_LOG_ZERO && s.beta > largest ? s.beta : largest;
   }
   Slots run = {slots, 0, 0.0f};
   uint front = 0;

@@ -149,7 +149,7 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
 /// The cluster whose last slot is before `end`; `in_front` is set to the transparency in front of it.
 static inline Slots cluster_before(global Slot* slots, uint end, float* in_front) {
   uint first = end - 1;
-  while (slots[first].grad < 0.0f) --first;
+  while (first > 0 && slots[first].grad < 0.0f) --first;
   *in_front = slots[first].grad;
   Slots run = {slots + first, end - first, 0.0f};
   return run;

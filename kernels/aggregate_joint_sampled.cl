@@ -67,8 +67,8 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   float nearest_inside = INFINITY;
   for (int place = 0; place < (int)(q.last - q.first); ++place) {
     const uint k = fragment_of(q, f, place);
-    q.nearest = min(q.nearest, f.depth[k]);
-    if (f.distance[k] <= 0.0f || f.depth[k] >= nearest_inside) continue;
+    q.nearest = f.depth[k] < q.nearest ? f.depth[k] : q.nearest;
+    if (signbit(f.distance[k]) || f.depth[k] >= nearest_inside) continue;
     nearest_inside = f.depth[k];
     q.rigid = place;
   }

@@ -91,7 +91,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
     if (slot + 1 < DPR_NOISE_CACHE) cache[slot + 1] = noise;
     const realn value = beta + noise;
     lead.winner = select(lead.winner, (intn)(slot), value > lead.largest);
-    lead.largest = max(lead.largest, value);
+    lead.largest = greater(value, lead.largest);
   }
   return lead;
 }

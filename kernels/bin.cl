@@ -4,8 +4,10 @@
 // they do not fit there are none, and the host, which learns it later, starts over.
 #include "shared_types.h"
 
-/// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge.
+/// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it can besides,
+/// of the largest coordinate.
 #define DPR_BIN_SLACK 1e-5f
+#define DPR_BIN_RELATIVE_SLACK 2e-6f
 
 /// False only if no pixel centre of the tile is within the blur distance of the triangle. Either one of the edges, pushed
 /// out by the blur, has the whole tile outside; or a vertex v is the triangle's nearest point: with n from v to the
@@ -19,7 +21,8 @@ static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile
   const float4 ex = ax.yzxw - ax, ey = ay.yzxw - ay;
   const float4 inside = (ex * (cy - ay) - ey * (cx - ax)) * t.orientation;
   const float4 reach = half_extent * (fabs(ex) + fabs(ey));
-  const float blur = p.blur_distance + DPR_BIN_SLACK;
+  const float4 far = fmax(fmax(fabs(ax), fabs(ay)), fmax(fabs(cx), fabs(cy)));
+  const float blur = p.blur_distance + DPR_BIN_SLACK + DPR_BIN_RELATIVE_SLACK * fmax(fmax(far.x, far.y), far.z);
   if (any((inside + reach < -blur * sqrt(ex * ex + ey * ey)).xyz)) return 0;
   const float4 nx = clamp(ax, cx - half_extent, cx + half_extent) - ax;
   const float4 ny = clamp(ay, cy - half_extent, cy + half_extent) - ay;

@@ -3,15 +3,24 @@
 #ifndef DPR_GEOMETRY_H
 #define DPR_GEOMETRY_H
 
+#include "ownership.h"
 #include "shared_types.h"
 #include "tile_lanes.h"
 
-/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up.
+/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up. Not contracted into what uses it, so
+/// that a pixel has one centre for all triangles.
 static inline realn pixel_x(const FrameParams p, realn column) {
+#pragma OPENCL FP_CONTRACT OFF
   return (column + 0.5f - 0.5f * (float)p.width) * p.pixel_size;
 }
 static inline realn pixel_y(const FrameParams p, realn row) {
+#pragma OPENCL FP_CONTRACT OFF
   return (0.5f * (float)p.height - 0.5f - row) * p.pixel_size;
+}
+static inline float2 pixel_centre(const FrameParams p, uint column, uint row) {
+#pragma OPENCL FP_CONTRACT OFF
+  return (float2)((float)column + 0.5f - 0.5f * (float)p.width, 0.5f * (float)p.height - 0.5f - (float)row) *
+         p.pixel_size;
 }
 
 /// One edge a -> b seen from pixels: the pixel relative to a, and the edge function cross(b - a, pixel - a).
@@ -46,9 +55,20 @@ static inline View3 view_triangle(const Triangle t, realn x, realn y) {
   return v;
 }
 
-static inline intn inside_triangle(const View3 v, float orientation) {
-  return v.edge[0].side * orientation > 0.0f && v.edge[1].side * orientation > 0.0f &&
-         v.edge[2].side * orientation > 0.0f;
+/// The least of the edge functions, positive inside. Where it is not further from zero than `side_error` its sign is not
+/// certain: owns_sample() knows.
+static inline realn least_side(const View3 v, float orientation) {
+  return lesser(lesser(v.edge[0].side * orientation, v.edge[1].side * orientation), v.edge[2].side * orientation);
+}
+
+/// A bound of the rounding error of a triangle's edge functions at the pixels of the image: five roundings of 2^-24, and
+/// some room.
+static inline float side_error(const FrameParams p, const Triangle t) {
+  const float reach_x = 0.5f * (float)p.width * p.pixel_size + fmax(fmax(fabs(t.x0), fabs(t.x1)), fabs(t.x2));
+  const float reach_y = 0.5f * (float)p.height * p.pixel_size + fmax(fmax(fabs(t.y0), fabs(t.y1)), fabs(t.y2));
+  const float along_x = fmax(fmax(fabs(t.x1 - t.x0), fabs(t.x2 - t.x1)), fabs(t.x0 - t.x2));
+  const float along_y = fmax(fmax(fabs(t.y1 - t.y0), fabs(t.y2 - t.y1)), fabs(t.y0 - t.y2));
+  return 0x1p-21f * (along_x * reach_y + along_y * reach_x) + DPR_EDGE_FLOOR;
 }
 
 /// Where along the edge its closest point lies, in [0, 1].
@@ -72,25 +92,45 @@ static inline realn edge_distance2(const Edge e) {
 }
 
 static inline realn triangle_distance2(const View3 v) {
-  return min(min(edge_distance2(v.edge[0]), edge_distance2(v.edge[1])), edge_distance2(v.edge[2]));
+  return lesser(lesser(edge_distance2(v.edge[0]), edge_distance2(v.edge[1])), edge_distance2(v.edge[2]));
 }
 
-/// The unnormalised barycentrics n_i: edge functions, times the other two depths if perspective correct (a common
-/// factor drops out later). Beyond the triangle's horizon, where its plane passes the camera, their sum is negative and
-/// all signs turn. Returns the factor of the edge functions, +-`scale`; `scale` is 1 / doubled area, signed, which keeps
-/// the numbers in range.
-static inline realn raw_barycentrics(const View3 v, const Triangle t, float scale, uint perspective, realn n[3]) {
-  n[0] = v.edge[0].side * scale * (perspective ? t.z1 * t.z2 : 1.0f);
-  n[1] = v.edge[1].side * scale * (perspective ? t.z2 * t.z0 : 1.0f);
-  n[2] = v.edge[2].side * scale * (perspective ? t.z0 * t.z1 : 1.0f);
+/// What turns a triangle's edge functions into barycentrics: 1 / doubled area, signed, and 1 / depth of each vertex if
+/// perspective correct. Common factors drop out later: they keep the numbers in range, whatever the unit of length and
+/// however thin the triangle.
+typedef struct {
+  float factor[3], inverse_depth[3];
+} BarycentricScale;
+
+static inline BarycentricScale barycentric_scale(const Triangle t, uint perspective) {
+  const float area = (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
+  const float scale = t.orientation / fmax(fabs(area), DPR_MIN_AREA);
+  const float z[3] = {t.z0, t.z1, t.z2};
+  const float nearest = fmin(fmin(t.z0, t.z1), t.z2);
+  BarycentricScale s;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    s.inverse_depth[k] = perspective ? 1.0f / z[k] : 0.0f;
+    s.factor[k] = perspective ? scale * (nearest / z[k]) : scale;
+  }
+  return s;
+}
+
+/// The unnormalised barycentrics n_i. Beyond the triangle's horizon, where its plane passes the camera, their sum is
+/// negative and all signs turn. Returns that sign.
+static inline realn raw_barycentrics(const View3 v, const BarycentricScale s, realn n[3]) {
+#pragma unroll
+  for (int k = 0; k < 3; ++k) n[k] = v.edge[k].side * s.factor[k];
   const realn turn = choose(n[0] + n[1] + n[2] < 0.0f, (realn)(-1.0f), (realn)(1.0f));
 #pragma unroll
   for (int k = 0; k < 3; ++k) n[k] *= turn;
-  return turn * scale;
+  return turn;
 }
 
-static inline float inverse_area(const Triangle t) {
-  return 1.0f / ((t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0));
+/// 1 / sum max(n_i, 0), or 0 where the sum is: then all weight is vertex 0's.
+static inline realn inverse_of_clipped(const realn n[3]) {
+  const realn sum = greater(n[0], 0.0f) + greater(n[1], 0.0f) + greater(n[2], 0.0f);
+  return choose(sum > 0.0f, 1.0f / sum, (realn)(0.0f));
 }
 
 #endif

@@ -99,6 +99,10 @@ static inline realn square(realn x) { return x * x; }
 /// `a` where the comparison holds, else `b`: select() with its arguments in the order of the ?: operator.
 static inline realn choose(intn condition, realn a, realn b) { return select(b, a, condition); }
 
+/// min and max for infinities too, where OpenCL leaves its own undefined; b where a is not a number.
+static inline realn lesser(realn a, realn b) { return choose(a < b, a, b); }
+static inline realn greater(realn a, realn b) { return choose(a > b, a, b); }
+
 #if DPR_WIDTH != 1
 /// 1.5 * 2^23: added to a number below 2^22 in magnitude it leaves the nearest integer in the low bits. PoCL's rint() and
 /// the conversion to int are a dozen instructions.
@@ -134,9 +138,9 @@ static inline realn exp_n(realn x) {
 /// The same for x <= 0, and not below exp(-87) = 1.6e-38.
 static inline realn exp_of_negative(realn x) {
 #if DPR_WIDTH == 1
-  return exp(max(x, -87.0f));
+  return exp(greater(x, -87.0f));
 #else
-  return exp_in_range(max(x, -87.0f));
+  return exp_in_range(greater(x, -87.0f));
 #endif
 }
 

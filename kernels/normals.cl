@@ -1,7 +1,7 @@
 // Vertex normals in world space: the faces' area-weighted normals, summed in order and normalised; and back.
 #include "shared_types.h"
 
-/// Normal sums shorter than this have no direction, squared world units.
+/// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
 #define DPR_MIN_NORMAL 1e-20f
 
 static inline float3 face_normal(global const float4* world, uint4 face) {
@@ -23,8 +23,9 @@ kernel void normals_forward(const FrameParams p, global const uint4* restrict fa
     sum += face_normal(world + view * p.vertices, faces[corners[k] / 3]);
   }
   const float size = length(sum);
-  const float inverse = size > DPR_MIN_NORMAL ? 1.0f / size : 0.0f;
-  normals[i] = (float4)(sum * inverse, inverse);
+  const int has_direction = size > DPR_MIN_NORMAL && size < INFINITY;
+  const float inverse = has_direction ? 1.0f / size : 0.0f;
+  normals[i] = has_direction ? (float4)(sum * inverse, inverse) : (float4)(0.0f);
 }
 
 /// From the unit normals' gradients to those of the sums. One work-item per (view, vertex).
@@ -58,7 +59,8 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
     const uint previous = corner == 0 ? face.z : corner == 1 ? face.x : face.y;
     // cross(b - a, c - a) . g has the gradient cross(b - c, g) for a, and so on around the face.
     const float3 g = sums[face.x].xyz + sums[face.y].xyz + sums[face.z].xyz;
-    sum += cross(positions[next].xyz - positions[previous].xyz, g);
+    // Where nothing is seen of the face it may lie anywhere, at infinity too.
+    if (any(g != 0.0f)) sum += cross(positions[next].xyz - positions[previous].xyz, g);
   }
   grad_world[i] += (float4)(sum, 0.0f);
 }

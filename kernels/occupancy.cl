@@ -6,12 +6,23 @@
 #endif
 #include "priors.h"
 
+#ifndef DPR_OCCUPANCY_WIDTH
+#define DPR_OCCUPANCY_WIDTH DPR_FIXED_WIDTH
+#endif
+
 /// What a fragment's distance becomes: p, ln p, d ln p / ds, and x with d / dsigma = -x d / ds.
 typedef struct {
   realn p, log_p, slope, ratio;
 } Perturbed;
 
-#ifdef DPR_VARIABLE_WIDTH
+#if DPR_OCCUPANCY_WIDTH != DPR_FIXED_WIDTH
+
+/// H(s), which at distance 0 says who owns the sample.
+static inline intn is_inside(realn distance) { return as_intn(distance) >= 0; }
+
+#endif
+
+#if DPR_OCCUPANCY_WIDTH == DPR_VARIABLE_WIDTH
 
 /// How far occupancies stay from 0 and 1, where the chain through ln p and the colour behind an opaque triangle would be
 /// lost.
@@ -21,11 +32,25 @@ typedef struct {
 /// |s|: over that distance p changes by 1 (Kato, Ushiku & Harada, "Neural 3D Mesh Renderer", CVPR 2018, section 3.2).
 /// Sigma keeps the slope finite at the edge; the image does not depend on it.
 static inline Perturbed perturb(realn distance, float sigma) {
-  const intn inside = distance > 0.0f;
+  const intn inside = is_inside(distance);
   Perturbed v;
   v.p = choose(inside, (realn)(1.0f - DPR_RIGID_MARGIN), (realn)(DPR_RIGID_MARGIN));
   v.log_p = choose(inside, (realn)(log1p(-DPR_RIGID_MARGIN)), (realn)(log(DPR_RIGID_MARGIN)));
   v.slope = 1.0f / ((fabs(distance) + sigma) * v.p);
+  v.ratio = 0.0f;
+  return v;
+}
+
+#elif DPR_OCCUPANCY_WIDTH == DPR_ZERO_WIDTH
+
+/// The rigid image's occupancy (1): no noise, no slope.
+static inline Perturbed perturb(realn distance, float sigma) {
+  (void)sigma;
+  const intn inside = is_inside(distance);
+  Perturbed v;
+  v.p = choose(inside, (realn)(1.0f), (realn)(0.0f));
+  v.log_p = choose(inside, (realn)(0.0f), (realn)(DPR_LOG_ZERO));
+  v.slope = 0.0f;
   v.ratio = 0.0f;
   return v;
 }
@@ -40,7 +65,7 @@ static inline Perturbed perturb(realn distance, float sigma) {
   realn hazard;
   v.ratio = clamp(distance / sigma, -DPR_MAX_RATIO, DPR_MAX_RATIO);
   occupancy_log(v.ratio, &v.log_p, &hazard);
-  v.p = exp_n(min(v.log_p, 0.0f));
+  v.p = exp_n(lesser(v.log_p, 0.0f));
   v.slope = hazard / sigma;
   return v;
 }
@@ -58,7 +83,7 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
   if (i >= fragment_starts[last_pair]) return;
   const Perturbed v = perturb(load_n(i, distance), p.sigma);
-  store_n(max(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
+  store_n(greater(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
   store_n(v.p, i, occupancy);
 }
 

@@ -63,7 +63,7 @@ kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
 
 /// Score estimates of sigma dp/ds, with nu'(X), and of sigma dp/dsigma, with nu'(X) X - 1: d = 1 here.
 static inline float2 score_estimates(const OccupancyParams p, const NoiseName name, float x) {
-  const float rigid = x > 0.0f ? p.sampling.baseline : 0.0f;
+  const float rigid = signbit(x) ? 0.0f : p.sampling.baseline;
   float y_sum = 0.0f;
   float2 distance = 0.0f;
   ScaleSums sigma = {(realn)(0.0f), (realn)(0.0f)};
@@ -99,7 +99,7 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
     // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
-    const int agrees = always_covers(x) || (x > 0.0f && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
+    const int agrees = always_covers(x) || (!signbit(x) && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
     if (i >= last || occupancy[i] <= 0.0f || agrees) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p

@@ -8,6 +8,9 @@
 /// 1 - p is kept above this, so that products without one factor are quotients.
 #define DPR_MIN_TRANSPARENCY 1e-12f
 
+/// The background's beta is kept within this: differences of betas are still numbers.
+#define DPR_MAX_BETA 1e30f
+
 /// Fragments by way of the pixels' lists.
 typedef struct {
   global const uint* list;  // uint[...]        fragments, by pixel
@@ -71,12 +74,14 @@ static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixe
   q.nearest = INFINITY;
   q.transparency = 1.0f;
   for (uint i = q.first; i < q.last; ++i) {
-    q.nearest = min(q.nearest, f.depth[f.list[i]]);
+    const float depth = f.depth[f.list[i]];
+    q.nearest = depth < q.nearest ? depth : q.nearest;
     q.transparency *= fragment_transparency(f, f.list[i]);
   }
   q.depth_scale = view->inverse_range / p.gamma;
   q.inverse_alpha = 1.0f / p.alpha;
-  q.background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
+  const float background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
+  q.background = clamp(background, -DPR_MAX_BETA, DPR_MAX_BETA);
   return q;
 }
 

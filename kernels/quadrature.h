@@ -55,7 +55,9 @@ static inline Stretch first_stretch(const Slots run) {
   const float reach = crowded ? DPR_JOINT_CROWD_REACH : 1.0f;
   s.low = run.slot[run.count - 1].beta - reach * DPR_JOINT_BELOW;
   s.high = reach * DPR_JOINT_ABOVE;
-  s.blocks = (uint)ceil((s.high - s.low) / ((crowded ? DPR_JOINT_CROWD_STEP : DPR_JOINT_STEP) * DPR_WIDTH));
+  // No neighbours in a cluster are further apart than their noise reaches, which bounds its span.
+  const float span = fmin(s.high - s.low, (float)run.count * reach * (DPR_JOINT_BELOW + DPR_JOINT_ABOVE));
+  s.blocks = (uint)ceil(span / ((crowded ? DPR_JOINT_CROWD_STEP : DPR_JOINT_STEP) * DPR_WIDTH));
   return s;
 }
 
@@ -145,7 +147,7 @@ static inline float next_head(const Slots run, float limit) {
   float head = -INFINITY;
   for (uint i = 0; i < run.count; ++i) {
     const float beta = run.slot[i].beta;
-    if (beta < limit) head = max(head, beta);
+    if (beta < limit && beta > head) head = beta;
   }
   return head;
 }
@@ -161,9 +163,10 @@ static inline Stretch first_stretch(const Slots run) {
   return s;
 }
 
-/// The lower half of a cluster's stretch, then the upper half of the next; false after the last.
+/// The lower half of a cluster's stretch, then the upper half of the next; false after the last. Each cluster's head lies
+/// below the last one's, so there are no more than two stretches a slot.
 static inline int next_stretch(const Slots run, Stretch* s) {
-  const float half_way = s->next > -INFINITY ? 0.5f * (s->head - s->next) : DPR_TAIL_REACH;
+  const float half_way = fmin(0.5f * (s->head - s->next), DPR_TAIL_REACH);
   if (s->is_upper) {
     s->low = -asinh(half_way);
     s->high = 0.0f;
@@ -198,15 +201,16 @@ static inline float lowest_kink(const Slots run) {
 #endif
 }
 
-/// The piece below the last one; false where the integrand begins.
+/// The piece below the last one; false where the integrand begins. Every piece ends at a lower kink, so there are no more
+/// than two a slot.
 static inline int next_stretch(const Slots run, Stretch* s) {
   s->high = s->low;
   s->low = lowest_kink(run);
-  if (s->high <= s->low) return 0;
+  if (!(s->high > s->low)) return 0;
   for (uint i = 0; i < run.count; ++i) {
     const float upper = run.slot[i].beta + DPR_HALF_WIDTH, lower = run.slot[i].beta - DPR_HALF_WIDTH;
-    if (upper < s->high) s->low = max(s->low, upper);
-    if (lower < s->high) s->low = max(s->low, lower);
+    if (upper < s->high && upper > s->low) s->low = upper;
+    if (lower < s->high && lower > s->low) s->low = lower;
   }
   return 1;
 }

@@ -26,7 +26,7 @@ static inline uint lane_bits(intn condition) {
 /// The rows [x, y) of a tile that the triangle's blurred bounds may touch. Rounding outwards to whole rows is a slack far
 /// above the arithmetic's error.
 static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint first_row) {
-  const float high = max(max(t.y0, t.y1), t.y2) + p.blur_distance, low = min(min(t.y0, t.y1), t.y2) - p.blur_distance;
+  const float high = fmax(fmax(t.y0, t.y1), t.y2) + p.blur_distance, low = fmin(fmin(t.y0, t.y1), t.y2) - p.blur_distance;
   const float centre = 0.5f * (float)p.height - 0.5f - (float)first_row;
   const float end = min((float)DPR_TILE, (float)(p.height - first_row));
   const float first = clamp(floor(centre - high / p.pixel_size), 0.0f, end);
@@ -34,7 +34,16 @@ static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint fir
   return (uint2)((uint)first, (uint)last);
 }
 
-/// Which pixels of its tile a triangle's blurred area covers: centre inside, or closer than the blur distance.
+/// The pixels of a tile's row that a triangle owns, as bits.
+static uint owned_in_row(const FrameParams p, const Triangle t, uint first_column, uint row) {
+  uint bits = 0;
+  for (uint k = 0; k < DPR_TILE && first_column + k < p.width; ++k) {
+    bits |= owns_sample(t, pixel_centre(p, first_column + k, row)) ? 1u << k : 0u;
+  }
+  return bits;
+}
+
+/// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur distance.
 /// One work-item for every pair there is room for; where there is no pair, nothing is covered.
 /// in   pairs   uint[1]      how many there are
 /// out  masks   uint2[room]  bit 8 * row + column
@@ -55,14 +64,25 @@ kernel void rasterize_cover(const FrameParams p, const uint room, global const u
   const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
   const float limit = p.blur_distance * p.blur_distance;
   const uint2 rows = blurred_rows(p, t, first_row);
+  const float error = side_error(p, t);
+  intn doubtful = 0;
   uint halves[2] = {0, 0};
   for (uint row = rows.x; row < rows.y; ++row) {
     const realn y = pixel_y(p, (realn)((float)(first_row + row)));
     for (uint part = 0; part < DPR_TILE; part += DPR_WIDTH) {
       const intn column = (int)(first_column + part) + DPR_LANE_INDEX;
       const View3 v = view_triangle(t, pixel_x(p, convert_realn(column)), y);
-      const intn covered = inside_triangle(v, t.orientation) || triangle_distance2(v) < limit;
+      const realn side = least_side(v, t.orientation);
+      doubtful |= !(fabs(side) > error);
+      const intn covered = side > 0.0f || triangle_distance2(v) < limit;
       halves[row / 4] |= lane_bits(covered && column < (int)p.width) << (8 * (row & 3) + part);
+    }
+  }
+  if (any_lane(doubtful)) {
+    // What rounding has let in besides lies within any blur.
+    if (limit == 0.0f) halves[0] = halves[1] = 0;
+    for (uint row = rows.x; row < rows.y; ++row) {
+      halves[row / 4] |= owned_in_row(p, t, first_column, first_row + row) << (8 * (row & 3));
     }
   }
   masks[pair] = (uint2)(halves[0], halves[1]);
@@ -183,7 +203,8 @@ static inline void list_pixels(uint2 mask, uint first_column, uint first_row, ui
 /// What a fragment is: distance, depth, barycentrics. One work-item per pair, up to `last_pair`.
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
-/// out  distance  float[fragment]  signed, positive inside; NDC^2, or NDC if the metric is Euclidean
+/// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the triangle
+///                                 owns the sample, at distance 0 too
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
 kernel void rasterize_forward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
@@ -200,7 +221,9 @@ kernel void rasterize_forward(const FrameParams p, const uint last_pair, global 
   const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
   list_pixels(masks[pair], tile % p.tiles_x * DPR_TILE, tile / p.tiles_x * DPR_TILE, first, last, pixels);
 
-  const float scale = inverse_area(t);
+  const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
+  const float error = side_error(p, t);
+  intn doubtful = 0;
   for (uint i = first; i < last; i += DPR_WIDTH) {
     store_n((uintn)(pair), i, fragment_pair);
     const uintn packed = load_n(i, pixels);
@@ -208,17 +231,23 @@ kernel void rasterize_forward(const FrameParams p, const uint last_pair, global 
     const View3 v = view_triangle(t, x, y);
     const realn distance2 = triangle_distance2(v);
     const realn s = p.euclidean ? sqrt(distance2) : distance2;
-    store_n(choose(inside_triangle(v, t.orientation), s, -s), i, distance);
+    const realn side = least_side(v, t.orientation);
+    doubtful |= !(fabs(side) > error);
+    store_n(choose(side > 0.0f, s, -s), i, distance);
 
     realn n[3];
-    raw_barycentrics(v, t, scale, p.perspective_correct, n);
-    const realn m0 = max(n[0], 0.0f), m1 = max(n[1], 0.0f), m2 = max(n[2], 0.0f);
-    const realn inverse_sum = 1.0f / (m0 + m1 + m2);
-    const realn c1 = m1 * inverse_sum, c2 = m2 * inverse_sum;
+    raw_barycentrics(v, scale, n);
+    const realn inverse_sum = inverse_of_clipped(n);
+    const realn c1 = greater(n[1], 0.0f) * inverse_sum, c2 = greater(n[2], 0.0f) * inverse_sum;
     store_n(c1, i, bary1);
     store_n(c2, i, bary2);
     // Around z0, so that the difference of the depths keeps its digits.
     store_n(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, depth);
+  }
+  if (!any_lane(doubtful)) return;
+  for (uint i = first; i < last; ++i) {
+    const int is_owned = owns_sample(t, pixel_centre(p, pixels[i] & 0xffffu, pixels[i] >> 16));
+    distance[i] = copysign(distance[i], is_owned ? 1.0f : -1.0f);
   }
 }
 
@@ -260,31 +289,27 @@ static inline void add_distance_gradient(const View3 v, intn inside, uint euclid
 
 /// Adds the gradients that come by the clipped barycentrics c_i = max(n_i, 0) / sum_j max(n_j, 0): those of depth and
 /// of the shaded colour. `grad_bary` are relative to vertex 0's, which changes nothing since the c_i sum to 1.
-static inline void add_barycentric_gradient(const View3 v, const Triangle t, float scale, uint perspective,
+static inline void add_barycentric_gradient(const View3 v, const Triangle t, const BarycentricScale scale,
                                             realn grad_depth, realn grad_bary1, realn grad_bary2, CornerGradients* g) {
   realn n[3], c[3];
-  const realn side_scale = raw_barycentrics(v, t, scale, perspective, n);
-  const realn inverse_sum = 1.0f / (max(n[0], 0.0f) + max(n[1], 0.0f) + max(n[2], 0.0f));
+  const realn turn = raw_barycentrics(v, scale, n);
+  const realn inverse_sum = inverse_of_clipped(n);
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    c[k] = max(n[k], 0.0f) * inverse_sum;
+    c[k] = greater(n[k], 0.0f) * inverse_sum;
     g->z[k] += grad_depth * c[k];
   }
   const realn h1 = grad_depth * (t.z1 - t.z0) + grad_bary1, h2 = grad_depth * (t.z2 - t.z0) + grad_bary2;
   const realn mean = c[1] * h1 + c[2] * h2;
   const realn h[3] = {-mean, h1 - mean, h2 - mean};
-  const float z[3] = {t.z0, t.z1, t.z2};
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;  // the ends of the edge opposite to vertex k
-    const realn grad_n = choose(n[k] > 0.0f, h[k] * inverse_sum, (realn)(0.0f)) * side_scale;
-    const realn side = v.edge[k].side;
-    if (perspective) {
-      g->z[i] += grad_n * side * z[j];
-      g->z[j] += grad_n * side * z[i];
-    }
+    const realn grad_n = choose(n[k] > 0.0f, h[k] * inverse_sum, (realn)(0.0f));
+    // n_k is proportional to 1 / z_k.
+    g->z[k] -= grad_n * n[k] * scale.inverse_depth[k];
     // The edge function is cross(a, b) of the edge's ends a, b relative to the pixel.
-    const realn grad_side = grad_n * (perspective ? z[i] * z[j] : 1.0f);
+    const realn grad_side = grad_n * turn * scale.factor[k];
     const Edge from_i = v.edge[k], from_j = v.edge[i];  // edge i begins at vertex j
     g->x[i] -= grad_side * from_j.dy;
     g->y[i] += grad_side * from_j.dx;
@@ -295,21 +320,22 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, flo
 
 /// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
 /// in   masks          uint2[pair]      says which fragments are padding
+/// in   distance       float[fragment]  whose sign says on which side the sample lies
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
 kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
                                global const uint* restrict pair_face, global const uint2* restrict masks,
                                global const uint* restrict fragment_starts, global const uint* restrict pixels,
-                               global const float* restrict grad_distance, global const float* restrict grad_depth,
-                               global const float* restrict grad_bary1, global const float* restrict grad_bary2,
-                               global float* restrict grad_corners) {
+                               global const float* restrict distance, global const float* restrict grad_distance,
+                               global const float* restrict grad_depth, global const float* restrict grad_bary1,
+                               global const float* restrict grad_bary2, global float* restrict grad_corners) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
   CornerGradients g;
 #pragma unroll
   for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
   const Triangle t = triangles[pair_face[pair]];
-  const float scale = inverse_area(t);
+  const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
   const uint first = fragment_starts[pair];
   const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
   for (uint i = first; i < last; i += DPR_WIDTH) {
@@ -318,9 +344,9 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
     const uintn packed = load_n(i, pixels);
     const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
     const View3 v = view_triangle(t, x, y);
-    add_distance_gradient(v, inside_triangle(v, t.orientation), p.euclidean,
+    add_distance_gradient(v, as_intn(load_n(i, distance)) >= 0, p.euclidean,
                           choose(real_fragment, load_n(i, grad_distance), zero), &g);
-    add_barycentric_gradient(v, t, scale, p.perspective_correct, choose(real_fragment, load_n(i, grad_depth), zero),
+    add_barycentric_gradient(v, t, scale, choose(real_fragment, load_n(i, grad_depth), zero),
                              choose(real_fragment, load_n(i, grad_bary1), zero),
                              choose(real_fragment, load_n(i, grad_bary2), zero), &g);
   }

@@ -31,9 +31,8 @@ using float4 = cl_float4;
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 
-/// Triangles whose doubled projected area is at most this, NDC^2, have no usable barycentrics and are dropped: a few
-/// millionths of a pixel at 4096x4096.
-#define DPR_MIN_AREA 1e-12f
+/// Doubled projected areas, NDC^2, count as at least this where they are divided by: the quotient stays a number.
+#define DPR_MIN_AREA 1e-30f
 
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu
@@ -42,6 +41,11 @@ using float4 = cl_float4;
 #define DPR_INDEPENDENT 0
 #define DPR_ANTITHETIC 1
 #define DPR_STRATIFIED 2
+
+/// Widths of the distance noise, in the order of dpr::OccupancyWidth.
+#define DPR_FIXED_WIDTH 0
+#define DPR_VARIABLE_WIDTH 1
+#define DPR_ZERO_WIDTH 2
 
 /// Shading models, in the order of dpr::Shading after the unlit one.
 #define DPR_UNLIT 0

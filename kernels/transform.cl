@@ -35,7 +35,7 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
 }
 
 /// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that no kept
-/// triangle uses has zero gradient, whatever its projection. One work-item per (view, vertex).
+/// triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
@@ -56,7 +56,7 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   const float3 g = grad_ndc[i].xyz;
   const int used = any(g != 0.0f);
   const float inverse_depth = used ? -1.0f / c.z : 0.0f;
-  const float2 tangent = c.xy * inverse_depth;
+  const float2 tangent = used ? c.xy * inverse_depth : (float2)(0.0f);
   const float2 g_tangent = g.xy * camera->projection.xy;
   const float g_depth = g.z - dot(g_tangent, tangent) * inverse_depth;
   const float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
@@ -66,8 +66,8 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
 
   const float3 turned_in_world = w - (float3)(model[0].w, model[1].w, model[2].w);
   const float3 turned_in_camera = c - (float3)(camera->row[0].w, camera->row[1].w, camera->row[2].w);
-  const float3 model_rotation = cross(turned_in_world, g_world);
-  const float3 view_rotation = cross(turned_in_camera, g_camera);
+  const float3 model_rotation = any(g_world != 0.0f) ? cross(turned_in_world, g_world) : (float3)(0.0f);
+  const float3 view_rotation = used ? cross(turned_in_camera, g_camera) : (float3)(0.0f);
   const float values[DPR_POSE_CHANNELS] = {model_rotation.x, model_rotation.y, model_rotation.z,
                                            g_world.x,        g_world.y,        g_world.z,
                                            view_rotation.x,  view_rotation.y,  view_rotation.z,

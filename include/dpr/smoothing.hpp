@@ -35,8 +35,10 @@ enum class DistanceMetric { squared, euclidean };
 /// Width of the distance noise. fixed: sigma. variable, for the uniform prior: for every pixel the distance
 /// between it and the edge, so that the noise just reaches the pixel. The image is the rigid one (to 1e-6 a
 /// fragment: an occupancy of 0 would have no gradient), dp/ds = 1 / (|s| + sigma), and sigma only keeps that
-/// finite.
-enum class OccupancyWidth { fixed, variable };
+/// finite. zero: no distance noise, p = H(s), eq. (1); sigma has no part in it. A sample on an edge belongs
+/// to the triangle whose left or upper edge it is. The values are shared with the kernels
+/// (kernels/shared_types.h).
+enum class OccupancyWidth { fixed, variable, zero };
 
 struct Smoothing {
   Prior occupancy_prior = Prior::gaussian;
@@ -67,7 +69,7 @@ struct Smoothing {
 /// - A variable width needs the uniform prior, the exact estimator, Euclidean distances, the joint
 /// composition
 ///   (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy says where
-///   such noise ends).
+///   such noise ends). A width of zero needs the exact estimator.
 /// - Antithetic draws need symmetric priors, so not Gumbel's, and an even number of samples.
 /// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
 ///   half's value is correlated with the score. With stratified draws it is refused: every other sample's
@@ -87,7 +89,8 @@ void set_sigma(Smoothing& smoothing, float sigma);
 /// Whether either stage draws samples.
 bool is_sampled(const Smoothing& smoothing);
 
-/// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins.
+/// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins, and of
+/// triangles that share an edge exactly one covers a sample on it.
 Smoothing rigid_smoothing();
 
 /// A named member of the family; throws InvalidArgument for another name and for a size below 1x1. What is

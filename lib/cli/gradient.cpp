@@ -1,7 +1,9 @@
 // dpr gradient: the loss against a target, and every gradient the scene asks for.
+#include <cmath>
 #include <cstdio>
 #include <memory>
 
+#include "base/checks.hpp"
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
 #include "cli/target.hpp"
@@ -81,6 +83,10 @@ void run(const GradientOptions& options, const CommonOptions& common) {
   renderer.set_scene(scene);
   renderer.forward();
   const double loss = image_loss.evaluate(renderer);
+  if (!std::isfinite(loss)) {
+    throw InvalidArgument("loss (dpr gradient)", checks::text(loss),
+                          "a finite number; the image's or the target's colours are beyond single precision");
+  }
   write_json(options.output, gradient_to_json(scene, loss, renderer.backward(image_loss)));
   if (!common.quiet) std::printf("%s: %s loss %.6g\n", options.output.c_str(), options.loss.c_str(), loss);
 }

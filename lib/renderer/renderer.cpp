@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "dpr/error.hpp"
+#include "renderer/finite.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
@@ -132,6 +133,7 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
   read_summed_gradients(gradient);
   read_mesh_gradients(gradient, add_to_positions);
+  require_finite(gradient);
   return gradient;
 }
 

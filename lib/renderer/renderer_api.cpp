@@ -6,6 +6,7 @@
 #include "dpr/opencl.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
+#include "renderer/finite.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 
@@ -30,6 +31,9 @@ void Renderer::set_views(std::span<const View> views, std::size_t first_view) {
 void Renderer::set_smoothing(const Smoothing& smoothing) {
   impl_->require_scene("Renderer::set_smoothing");
   validate(smoothing);
+  for (const View& view : impl_->views) {
+    require_scales(view.camera, smoothing, impl_->scene.lights.has_value());
+  }
   impl_->set(impl_->prepare(smoothing));
 }
 

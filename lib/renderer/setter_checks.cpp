@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/checks.hpp"
+#include "renderer/finite.hpp"
 #include "shared_types.h"
 
 namespace dpr {
@@ -18,6 +19,7 @@ void check_views(const Scene& scene, std::span<const View> views) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const View& view = views[v];
     validate(view.camera);
+    require_scales(view.camera, scene.smoothing, scene.lights.has_value());
     const std::string name = checks::element("views", v) + ".transforms";
     if (view.transforms.size() != scene.meshes.size()) {
       throw InvalidArgument(name, std::to_string(view.transforms.size()),

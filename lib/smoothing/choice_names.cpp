@@ -25,8 +25,9 @@ constexpr Names<Draws, 3> k_draws{{{Draws::independent, "independent"},
                                    {Draws::stratified, "stratified"}}};
 constexpr Names<DistanceMetric, 2> k_distance_metrics{
     {{DistanceMetric::squared, "squared"}, {DistanceMetric::euclidean, "euclidean"}}};
-constexpr Names<OccupancyWidth, 2> k_occupancy_widths{
-    {{OccupancyWidth::fixed, "fixed"}, {OccupancyWidth::variable, "variable"}}};
+constexpr Names<OccupancyWidth, 3> k_occupancy_widths{{{OccupancyWidth::fixed, "fixed"},
+                                                       {OccupancyWidth::variable, "variable"},
+                                                       {OccupancyWidth::zero, "zero"}}};
 
 }  // namespace
 

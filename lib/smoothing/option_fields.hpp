@@ -37,7 +37,8 @@ void for_each_option(Visit&& visit) {
   visit("blur_radius", "Triangles further from a pixel are not there", &O::blur_radius);
   visit("background_depth", "Normalised depth of the background", &O::background_depth);
   visit("distance", "Unit of the distance: NDC^2 or NDC", &O::distance);
-  visit("occupancy_width", "Width of uniform noise: sigma, or up to the pixel", &O::occupancy_width);
+  visit("occupancy_width", "Width of the distance noise: sigma, up to the pixel, or none",
+        &O::occupancy_width);
 }
 
 /// The keys, in that order.

@@ -45,6 +45,7 @@ Smoothing uniform_edges(float sigma) {
   Smoothing smoothing = rigid_smoothing();
   smoothing.occupancy_prior = Prior::uniform;
   smoothing.distance = DistanceMetric::euclidean;
+  smoothing.occupancy_width = OccupancyWidth::fixed;
   smoothing.sigma = sigma;
   smoothing.blur_radius.reset();
   return smoothing;
@@ -89,7 +90,8 @@ const Preset& find_preset(std::string_view name, std::string_view where) {
 Smoothing rigid_smoothing() {
   Smoothing smoothing;
   smoothing.composition = Composition::joint;
-  smoothing.sigma = 1e-12F;  // far below the square of a pixel's width: p is 0 or 1
+  smoothing.occupancy_width = OccupancyWidth::zero;
+  smoothing.sigma = 1e-12F;  // has no part in it
   smoothing.gamma = 1e-9F;   // far below the spacing of single-precision depths: the nearest triangle wins
   smoothing.blur_radius = 0.0F;
   return smoothing;

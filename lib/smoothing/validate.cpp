@@ -80,7 +80,11 @@ void validate_estimators(const Smoothing& s) {
 }
 
 void validate_width(const Smoothing& s) {
-  if (s.occupancy_width == OccupancyWidth::fixed) return;
+  if (s.occupancy_width == OccupancyWidth::zero && s.occupancy_estimator != Estimator::exact) {
+    throw InvalidArgument("occupancy_width (smoothing)", "zero with monte_carlo",
+                          "zero with the exact occupancy_estimator, or fixed");
+  }
+  if (s.occupancy_width != OccupancyWidth::variable) return;
   const auto require_with = [](bool ok, const char* with, const char* expected) {
     if (!ok) {
       throw InvalidArgument("occupancy_width (smoothing)", std::string("variable with ") + with,
@@ -94,6 +98,14 @@ void validate_width(const Smoothing& s) {
   require_with(s.blur_radius.has_value(), "no blur_radius", "a blur_radius");
 }
 
+/// Single precision holds the inverses of these, and what they multiply.
+void require_scale(float value, const std::string& argument) {
+  checks::require_positive(value, argument);
+  if (value >= 1e-36F && value <= 1e36F) return;
+  throw InvalidArgument(argument, checks::text(value),
+                        "a number from 1e-36 to 1e36, whose inverse single precision holds");
+}
+
 }  // namespace
 
 bool is_sampled(const Smoothing& smoothing) {
@@ -103,9 +115,9 @@ bool is_sampled(const Smoothing& smoothing) {
 
 void validate(const Smoothing& smoothing) {
   validate_choices(smoothing);
-  checks::require_positive(smoothing.sigma, "sigma (smoothing)");
-  checks::require_positive(smoothing.gamma, "gamma (smoothing)");
-  checks::require_positive(smoothing.alpha, "alpha (smoothing)");
+  require_scale(smoothing.sigma, "sigma (smoothing)");
+  require_scale(smoothing.gamma, "gamma (smoothing)");
+  require_scale(smoothing.alpha, "alpha (smoothing)");
   if (smoothing.samples < 1 || smoothing.samples > k_most_samples) {
     throw InvalidArgument("samples (smoothing)", checks::text(smoothing.samples),
                           "a whole number from 1 to " + checks::text(k_most_samples));

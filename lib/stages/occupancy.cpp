@@ -35,9 +35,8 @@ Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
   Setting prepared{smoothing, now_.kernels};
   if (samples_jointly(smoothing)) return prepared;
   const bool exact = smoothing.occupancy_estimator == Estimator::exact;
-  const bool variable = smoothing.occupancy_width == OccupancyWidth::variable;
-  const std::string options =
-      prior_option(smoothing.occupancy_prior) + (variable ? " -DDPR_VARIABLE_WIDTH" : "");
+  const std::string options = prior_option(smoothing.occupancy_prior) + " -DDPR_OCCUPANCY_WIDTH=" +
+                              std::to_string(static_cast<int>(smoothing.occupancy_width));
   const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
   if (prepared.kernels && prepared.kernels->built == wanted) return prepared;
   prepared.kernels = std::make_shared<Kernels>();

@@ -189,7 +189,7 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
   const Range range = pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
   backward_(range, p, range.last(), triangles, bin.pair_face, masks, fragment_starts, fragment_pixel,
-            grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
+            distance, grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
 }
 
 std::size_t Rasterize::bytes() const {

@@ -111,7 +111,7 @@ class Rasterize {
          In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
       forward_;
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint2>, In<cl_uint>,
-         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, Out<float>>
+         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
       backward_;
   Scan scan_;
   Buffer<cl_uint> counts_;

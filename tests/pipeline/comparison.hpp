@@ -209,8 +209,7 @@ struct Delicate {
 inline void find_delicate(const reference::NdcTriangle& t, const reference::Vec2d& point, double reach,
                           double margin, std::vector<bool>::reference jump,
                           std::vector<bool>::reference kink) {
-  const reference::Vec3d b = reference::screen_barycentric(t, point);
-  const bool inside = reference::is_inside(b);
+  const bool inside = reference::is_inside(t, point);
   const double distance = std::sqrt(reference::nearest_edge(t, point).squared_distance);
   if (!inside && std::fabs(distance - reach) < margin) jump = kink = true;
   if (!inside && distance > reach) return;

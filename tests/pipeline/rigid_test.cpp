@@ -1,18 +1,24 @@
 // The rigid member of the family against a z-buffer, and what approaches it.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
 
 #include "dpr/dpr.hpp"
+#include "pipeline/fragments.hpp"
 #include "pipeline/scenes.hpp"
+#include "support/integer_rasterizer.hpp"
 #include "support/reduced.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
+using dpr::test::GridPoint;
+using dpr::test::GridTriangle;
 using dpr::test::reduced;
 
 namespace {
@@ -106,6 +112,90 @@ Comparison compare(const Image& found, const std::vector<ZPixel>& expected) {
   return result;
 }
 
+/// A scene whose projection is exact, with its triangles on the image's grid. Depths are eighths between 2
+/// and 8.
+struct GridScene {
+  Scene scene;
+  std::vector<GridTriangle> triangles;
+};
+
+GridScene grid_scene(const std::vector<GridPoint>& points, const std::vector<glm::uvec3>& faces, int size,
+                     Random& random) {
+  GridScene result;
+  Scene& scene = result.scene;
+  scene.width = scene.height = size;
+  scene.camera.view = glm::mat4(1.0F);
+  scene.camera.fov_y_degrees = 90;
+  scene.smoothing = smoothing_preset("rigid");
+  Mesh mesh;
+  mesh.faces = faces;
+  const float unit = 2.0F / static_cast<float>(dpr::test::k_subpixels * size);
+  for (const GridPoint& p : points) {
+    const float depth = std::round(random(16, 64)) / 8;
+    mesh.positions.emplace_back(static_cast<float>(p.x) * unit * depth,
+                                static_cast<float>(p.y) * unit * depth, -depth);
+  }
+  scene.meshes.push_back({std::move(mesh), glm::mat4(1.0F)});
+  for (const glm::uvec3& f : faces) result.triangles.push_back({points[f.x], points[f.y], points[f.z]});
+  return result;
+}
+
+/// Samples of a rigid image against the integer rasterizer.
+struct Coverage {
+  std::size_t differing = 0;   ///< other triangles than it says, or another alpha than 0 or 1
+  std::size_t unbalanced = 0;  ///< not owned by as many triangles from the front as from the back
+  std::size_t owned = 0, owned_once = 0, on_edges = 0;
+};
+
+Coverage compare_coverage(Renderer& renderer, const GridScene& grid) {
+  const int size = grid.scene.width;
+  const auto count = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  std::vector<std::size_t> owners(count, 0);
+  std::vector<int> sides(count, 0);
+  std::vector<bool> on_edge(count, false);
+  for (const GridTriangle& t : grid.triangles) {
+    const std::int64_t area = dpr::test::cross(t[0], t[1], t[2]);
+    // The samples of its bounding box, and a pixel more.
+    const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
+    const auto [bottom, top] = std::minmax({t[0].y, t[1].y, t[2].y});
+    const auto pixel_of = [&](std::int64_t at) {
+      return static_cast<int>(std::clamp<std::int64_t>(at / dpr::test::k_subpixels + size / 2, 0, size));
+    };
+    for (int row = pixel_of(-top - 16); row < pixel_of(-bottom + 32); ++row) {
+      for (int column = pixel_of(left - 16); column < pixel_of(right + 32); ++column) {
+        const GridPoint sample = dpr::test::sample_of(column, row, size, size);
+        if (!dpr::test::owns(t, sample)) continue;
+        const auto pixel = static_cast<std::size_t>(row * size + column);
+        ++owners[pixel];
+        sides[pixel] += area > 0 ? 1 : -1;
+        for (std::size_t k = 0; k < 3; ++k) {
+          if (dpr::test::cross(t[k], t[(k + 1) % 3], sample) == 0) on_edge[pixel] = true;
+        }
+      }
+    }
+  }
+  renderer.set_scene(grid.scene);
+  renderer.forward();
+  const Image image = renderer.image();
+  const std::vector<Pixel> found = pixels_of(renderer);
+  Coverage result;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool differs = found[i].size() != owners[i] || image.pixels[i].a != (owners[i] > 0 ? 1.0F : 0.0F);
+    result.differing += differs ? 1 : 0;
+    result.unbalanced += sides[i] != 0 ? 1 : 0;
+    result.owned += owners[i] > 0 ? 1 : 0;
+    result.owned_once += owners[i] == 1 ? 1 : 0;
+    result.on_edges += on_edge[i] ? 1 : 0;
+  }
+  return result;
+}
+
+/// Dents and bumps all over, as an animal has.
+Mesh bumpy(Mesh mesh, Random& random) {
+  for (glm::vec3& p : mesh.positions) p *= random(0.55F, 1.1F);
+  return mesh;
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
@@ -164,5 +254,95 @@ TEST_SUITE("pipeline") {
       last = mean;
     }
     CHECK(last < 0.02);
+  }
+
+  TEST_CASE("rigid: no crack along a diagonal, in a grid aligned with the pixels, nor in a frontal cube") {
+    const int size = reduced(256, 32);
+    Renderer renderer(open_device());
+    Random random(40);
+    // Vertices at the samples, or at the pixels' corners.
+    for (const int shift : {0, 8}) {
+      std::vector<GridPoint> points;
+      std::vector<glm::uvec3> faces;
+      const int cells = size / 2 + 2;
+      const auto side = static_cast<unsigned>(cells + 1);
+      for (int i = 0; i <= cells; ++i) {
+        for (int j = 0; j <= cells; ++j)
+          points.push_back({32 * j - 16 * cells + shift, 32 * i - 16 * cells + shift});
+      }
+      for (unsigned i = 0; i < side - 1; ++i) {
+        for (unsigned j = 0; j < side - 1; ++j) {
+          const unsigned a = i * side + j;
+          faces.insert(faces.end(), {{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}});
+        }
+      }
+      const Coverage grid = compare_coverage(renderer, grid_scene(points, faces, size, random));
+      CHECK(grid.differing == 0);
+      CHECK(grid.owned == static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+      CHECK(grid.owned == grid.owned_once);
+    }
+    const std::int64_t half = 8 * size / 2;
+    const std::vector<GridPoint> corners{{-half, -half}, {half, -half}, {half, half}, {-half, half}};
+    const Coverage quad =
+        compare_coverage(renderer, grid_scene(corners, {{0, 1, 2}, {0, 2, 3}}, size, random));
+    CHECK(quad.differing == 0);
+    CHECK(quad.owned == static_cast<std::size_t>(size) * static_cast<std::size_t>(size) / 4);
+
+    Scene scene = scene_of(make_cube(), size, size);
+    scene.meshes[0].transform = glm::mat4(1.0F);
+    scene.camera = orbit_camera(3.0F, 0.0F, 0.0F);
+    Mesh& cube = scene.meshes[0].mesh;
+    cube.vertex_colors.clear();
+    cube.face_colors.clear();
+    for (const glm::uvec3& f : cube.faces) {
+      const float front = std::min({cube.positions[f.x].z, cube.positions[f.y].z, cube.positions[f.z].z});
+      cube.face_colors.push_back(front > 0 ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0));
+    }
+    for (const char* preset : {"rigid", "nmr"}) {
+      CAPTURE(preset);
+      scene.smoothing = smoothing_preset(preset);
+      renderer.set_scene(scene);
+      renderer.forward();
+      const Image image = renderer.image();
+      std::size_t seen = 0, back = 0;
+      for (const glm::vec4& pixel : image.pixels) {
+        seen += pixel.a > 0.5F ? 1 : 0;
+        back += pixel.r > scene.background.r + 1e-4F ? 1 : 0;
+      }
+      CHECK(seen > image.pixels.size() / 8);
+      CHECK(back == 0);
+    }
+  }
+
+  TEST_CASE("rigid: closed meshes on the pixel grid cover what an integer rasterizer says") {
+    const int size = 64, renders = reduced(1000, 3);
+    Renderer renderer(open_device());
+    Random random(41);
+    const std::array<Mesh, 4> shapes{make_icosphere(2), make_cube(), make_torus(0.8F, 0.4F, 20, 12),
+                                     bumpy(make_icosphere(3), random)};
+    Coverage all;
+    for (int render = 0; render < renders; ++render) {
+      const Mesh& shape = shapes[static_cast<std::size_t>(render) % shapes.size()];
+      const glm::mat4 pose = placed(random(0, 360), random(0.2F, 1.6F), random.vector(-0.4F, 0.4F));
+      const std::int64_t step = render % 3 == 0 ? 1 : 8;  // sixteenths of a pixel, or halves: the samples
+      std::vector<GridPoint> points;
+      for (const glm::vec3& position : shape.positions) {
+        const glm::vec3 p(pose * glm::vec4(position, 1));
+        const auto snapped = [&](float x) {
+          return step * std::lround(x * static_cast<float>(dpr::test::k_subpixels * size / 2 / step));
+        };
+        points.push_back({snapped(p.x), snapped(p.y)});
+      }
+      const Coverage found = compare_coverage(renderer, grid_scene(points, shape.faces, size, random));
+      all.differing += found.differing;
+      all.unbalanced += found.unbalanced;
+      all.owned += found.owned;
+      all.on_edges += found.on_edges;
+    }
+    CHECK(all.differing == 0);
+    CHECK(all.unbalanced == 0);
+    CHECK(all.on_edges > all.owned / 20);
+    MESSAGE(renders << " renders: " << all.owned << " samples covered, " << all.on_edges
+                    << " of them on edges");
   }
 }

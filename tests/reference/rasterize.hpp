@@ -31,13 +31,10 @@ struct RasterizeParameters {
 
 struct Fragment {
   std::size_t face = 0;
-  double distance = 0.0;  ///< signed, positive inside
+  double distance = 0.0;  ///< signed, positive inside; at 0 the sign bit says so
   double depth = 0.0;
   Vec3d barycentric;  ///< c_i: perspective corrected and clipped as asked
 };
-
-/// Twice the area in NDC^2 at which a triangle counts as degenerate.
-inline constexpr double k_degenerate_area = 1e-12;
 
 inline Vec2d screen(const Vec3d& vertex) { return {vertex.x, vertex.y}; }
 
@@ -46,12 +43,12 @@ inline double double_area(const NdcTriangle& t) {
   return cross(screen(t[1]) - screen(t[0]), screen(t[2]) - screen(t[0]));
 }
 
-/// Whole triangles are discarded: degenerate, any vertex before znear, or all behind zfar. Written so that
+/// Whole triangles are discarded: without area, any vertex before znear, or all behind zfar. Written so that
 /// NaN is discarded.
 inline bool is_discarded(const NdcTriangle& t, const RasterizeParameters& p) {
   const double nearest = std::min({t[0].z, t[1].z, t[2].z});
   if (!(nearest >= p.znear) || nearest > p.zfar) return true;
-  return !(std::fabs(double_area(t)) > k_degenerate_area);
+  return !(std::fabs(double_area(t)) > 0.0);
 }
 
 /// Screen barycentrics b_i of the point: sub-triangle opposite to vertex i over the whole.
@@ -88,8 +85,23 @@ inline NearestEdge nearest_edge(const NdcTriangle& t, const Vec2d& point) {
   return best;
 }
 
-inline bool is_inside(const Vec3d& screen_b) {
-  return screen_b.x > 0.0 && screen_b.y > 0.0 && screen_b.z > 0.0;
+/// +1 where the point belongs to the left of the edge a -> b, else -1. The ends are taken in one order, so
+/// that the triangles on both sides see one rounding. A point on the edge itself belongs to the left where
+/// the edge goes down, or level and to the left: of a counter-clockwise triangle these are the left and the
+/// upper edges.
+inline double side_of_edge(const Vec2d& a, const Vec2d& b, const Vec2d& point) {
+  const bool falls = b.y < a.y || (b.y == a.y && b.x < a.x);
+  const double side = falls ? cross(a - b, point - b) : cross(b - a, point - a);
+  return (falls ? side <= 0.0 : side > 0.0) ? 1.0 : -1.0;
+}
+
+/// Whether the triangle owns the sample: of triangles that share an edge, exactly one does.
+inline bool is_inside(const NdcTriangle& t, const Vec2d& point) {
+  const double orientation = double_area(t);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(side_of_edge(screen(t[i]), screen(t[(i + 1) % 3]), point) * orientation > 0.0)) return false;
+  }
+  return true;
 }
 
 /// Numerators n_i of the barycentrics before clipping: b_i, or b_i z_j z_k for perspective correct
@@ -116,7 +128,7 @@ inline Vec3d clipped(const Vec3d& n, const RasterizeParameters& p) {
 inline std::optional<Fragment> rasterize_forward(const NdcTriangle& t, std::size_t face, const Vec2d& point,
                                                  const RasterizeParameters& p) {
   const Vec3d b = screen_barycentric(t, point);
-  const bool inside = is_inside(b);
+  const bool inside = is_inside(t, point);
   const double squared = nearest_edge(t, point).squared_distance;
   const double magnitude = p.metric == DistanceMetric::squared ? squared : std::sqrt(squared);
   if (!inside && !(magnitude < p.blur_radius)) return std::nullopt;
@@ -141,7 +153,7 @@ struct FragmentGradient {
 inline void distance_backward(const NdcTriangle& t, const Vec2d& point, const RasterizeParameters& p,
                               double grad_distance, NdcTriangle& grad) {
   const NearestEdge edge = nearest_edge(t, point);
-  double scale = is_inside(screen_barycentric(t, point)) ? grad_distance : -grad_distance;
+  double scale = is_inside(t, point) ? grad_distance : -grad_distance;
   if (p.metric == DistanceMetric::euclidean) {
     // On the outline the Euclidean distance has no derivative: none is passed.
     scale = edge.squared_distance > 0.0 ? scale / (2.0 * std::sqrt(edge.squared_distance)) : 0.0;

@@ -213,7 +213,8 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"depth_prior": "normal"})"), "smoothing.depth_prior (");
     check(with(R"("smoothing": {"samples": 1e3})"), "smoothing.samples (");
     check(with(R"("smoothing": {"preset": "soft"})"), "got \"soft\", expected softras");
-    check(with(R"("smoothing": {"occupancy_width": "wide"})"), "got \"wide\", expected fixed or variable");
+    check(with(R"("smoothing": {"occupancy_width": "wide"})"),
+          "got \"wide\", expected fixed, variable or zero");
     check(with(R"("smoothing": {"occupancy_width": "variable"})"), "occupancy_width (smoothing)");
     check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong or gouraud");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");

@@ -119,7 +119,7 @@ TEST_SUITE("unit") {
     }
     const Smoothing rigid = smoothing_preset("rigid");
     CHECK(rigid.composition == Composition::joint);
-    CHECK(rigid.sigma == 1e-12F);
+    CHECK(rigid.occupancy_width == OccupancyWidth::zero);
     CHECK(rigid.gamma == 1e-9F);
     CHECK(blur_radius(rigid) == 0);
   }
@@ -141,7 +141,7 @@ TEST_SUITE("unit") {
     check(VarianceReduction::none, 3);
     check(Draws::independent, 3);
     check(DistanceMetric::squared, 2);
-    check(OccupancyWidth::fixed, 2);
+    check(OccupancyWidth::fixed, 3);
     CHECK(to_string(Estimator::monte_carlo) == "monte_carlo");
     CHECK(to_string(static_cast<Prior>(99)).empty());
   }
@@ -261,6 +261,10 @@ TEST_SUITE("robustness") {
     check([](Smoothing& s) { s.composition = Composition::barrier; }, "the barrier");
     check([](Smoothing& s) { s.blur_radius.reset(); }, "no blur_radius");
     Smoothing smoothing;
+    smoothing = smoothing_preset("rigid");
+    smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing),
+                          "occupancy_width (smoothing): got zero with monte_carlo");
     smoothing.occupancy_width = static_cast<OccupancyWidth>(7);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "occupancy_width (smoothing): got 7");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, smoothing_preset("opendr", 0, 5), "size (preset): got 0x5");

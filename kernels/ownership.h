@@ -1,0 +1,73 @@
+// Which side of an edge a point lies on, without a rounding error, and which triangle owns a sample. Triangles that
+// share an edge own every sample there exactly once: the sign is that of the exact edge function of the rounded
+// coordinates, and a sample on the edge itself belongs to the triangle whose left or upper edge it is. That is the
+// sample moved to the right by less than any number, and down by much less, so the rule holds at shared vertices too.
+#ifndef DPR_OWNERSHIP_H
+#define DPR_OWNERSHIP_H
+
+#include "shared_types.h"
+
+/// An edge function ex * dy - ey * dx whose factors are rounded differences is wrong by at most this times the sum of
+/// its products' sizes (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates",
+/// 1997: 3 + 16 u times u = 2^-24), and where these underflow by less than the floor.
+#define DPR_EDGE_ERROR 1.8e-7f
+#define DPR_EDGE_FLOOR 1e-30f
+
+/// The largest coordinate is scaled to about 2^60: the products' sum stays below 2^128, and the products of coordinates
+/// down to 2^-99 of the largest have all their bits.
+#define DPR_EXACT_EXPONENT 60
+
+/// a + b without error: the rounded sum, and what rounding took away (Knuth's two-sum).
+static inline float two_sum(float a, float b, float* error) {
+  const float sum = a + b, part = sum - a;
+  *error = (a - (sum - part)) + (b - part);
+  return sum;
+}
+
+/// The sign of cross(b - a, p - a), exactly: six products without error, added to a sum of parts that do not overlap
+/// (Shewchuk's grow-expansion), whose largest has the sign.
+static int exact_side(float2 a, float2 b, float2 p) {
+#pragma OPENCL FP_CONTRACT OFF
+  const float2 largest2 = fmax(fmax(fabs(a), fabs(b)), fabs(p));
+  const int exponent = DPR_EXACT_EXPONENT - ilogb(fmax(fmax(largest2.x, largest2.y), DPR_EDGE_FLOOR));
+  a = ldexp(a, exponent);
+  b = ldexp(b, exponent);
+  p = ldexp(p, exponent);
+  const float left[6] = {a.x, -a.y, b.x, -b.y, p.x, -p.y}, right[6] = {b.y, b.x, p.y, p.x, a.y, a.x};
+  float parts[12];
+  for (int k = 0; k < 6; ++k) {
+    const float product = left[k] * right[k];
+    float low = fma(left[k], right[k], -product), high = product;
+    for (int i = 0; i < 2 * k; ++i) low = two_sum(low, parts[i], &parts[i]);
+    parts[2 * k] = low;
+    for (int i = 0; i < 2 * k + 1; ++i) high = two_sum(high, parts[i], &parts[i]);
+    parts[2 * k + 1] = high;
+  }
+  float sign_of = 0.0f;
+  for (int i = 0; i < 12; ++i) sign_of = parts[i] != 0.0f ? parts[i] : sign_of;
+  return (sign_of > 0.0f) - (sign_of < 0.0f);
+}
+
+/// +1 where p lies to the left of a -> b, -1 to the right, 0 on the line.
+static inline int side_of_line(float2 a, float2 b, float2 p) {
+  const float u = (b.x - a.x) * (p.y - a.y), v = (b.y - a.y) * (p.x - a.x);
+  const float side = u - v;
+  // Written so that a NaN is looked at again.
+  if (fabs(side) > DPR_EDGE_ERROR * (fabs(u) + fabs(v)) + DPR_EDGE_FLOOR) return side > 0.0f ? 1 : -1;
+  return exact_side(a, b, p);
+}
+
+/// Whether a sample belongs to the triangle, so far as the edge a -> b says.
+static inline int is_owned_at(float2 a, float2 b, float2 p, float orientation) {
+  int side = side_of_line(a, b, p);
+  if (side == 0) side = b.y < a.y || (b.y == a.y && b.x < a.x) ? 1 : -1;
+  return (float)side * orientation > 0.0f;
+}
+
+static inline int owns_sample(const Triangle t, float2 p) {
+  const float2 a = (float2)(t.x0, t.y0), b = (float2)(t.x1, t.y1), c = (float2)(t.x2, t.y2);
+  return is_owned_at(a, b, p, t.orientation) && is_owned_at(b, c, p, t.orientation) &&
+         is_owned_at(c, a, p, t.orientation);
+}
+
+#endif
