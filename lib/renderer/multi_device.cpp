@@ -28,7 +28,7 @@ struct Chunk {
 
 /// The same whatever devices there are; none with more views than a frame may have.
 std::vector<Chunk> make_chunks(std::size_t views, std::size_t most) {
-  const std::size_t size = std::min((views + k_chunks - 1) / k_chunks, most);
+  const std::size_t size = std::min((views + k_chunks - 1) / k_chunks, std::max(most, std::size_t{1}));
   std::vector<Chunk> chunks;
   for (std::size_t first = 0; first < views; first += size)
     chunks.push_back({first, std::min(first + size, views)});
@@ -96,7 +96,6 @@ class GradientSum {
   std::vector<MeshSum> meshes_;
   SceneGradient sum_;
 };
-
 
 /// How often each part of the scene has been set.
 struct Versions {

@@ -175,7 +175,7 @@ TEST_SUITE("robustness") {
     for (const FaultKind& kind : {opencl_faults(), allocation_faults()}) {
       Renderer renderer(device);
       for (const Operation& operation : operations(device)) {
-        check_operation(operation, kind, renderer, static_cast<std::size_t>(reduced(120, 5)));
+        check_operation(operation, kind, renderer, static_cast<std::size_t>(reduced(60, 5)));
       }
     }
   }
@@ -186,7 +186,7 @@ TEST_SUITE("robustness") {
     renderer.set_scene(scene);
     const std::vector<double> wanted = seen(renderer);
     const std::size_t faults = sweep(
-        opencl_faults(), static_cast<std::size_t>(reduced(120, 5)),
+        opencl_faults(), static_cast<std::size_t>(reduced(60, 5)),
         [&] {
           renderer.set_scene(scene);
           renderer.set_positions(0, moved(scene.meshes[0].mesh.positions, 0.2F));
