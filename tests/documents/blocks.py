@@ -20,6 +20,7 @@ import sys
 # What makes a command of a document short enough for a test.
 REDUCED = {
     "dpr fit": "--iterations 4",
+    "dpr bench --workload": "--repetitions 1 --max-seconds 0.01",
     "dpr learn data": "--train 2 --val 1 --test 1 --classes sofa",
     "dpr learn train": "--steps 2 --classes sofa",
     "dpr learn eval": "--classes sofa",
