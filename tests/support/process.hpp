@@ -57,6 +57,12 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
+  bool has_ended() const {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(id_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == id_;
+  }
+
   void kill(int signal) const { ::kill(id_, signal); }
 
   /// How it ended: its exit status, or minus the signal that ended it.
