@@ -29,6 +29,14 @@ glm::dvec3 vector_from_rotation(const glm::dmat3& rotation);
 /// The angle between two rotations, degrees, in [0, 180].
 double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
 
+/// What may be different about the light of the target.
+enum class PoseLight {
+  fixed,     ///< nothing: it is the scene's
+  gain,      ///< a gain on the mesh's colours and an offset, by channel
+  harmonics  ///< distant light from everywhere: spherical harmonics to the second order, and an offset, by
+             ///< channel
+};
+
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with Jacobians from differences of images rendered in the same
 /// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
@@ -42,9 +50,16 @@ struct LeastSquares {
   unsigned iterations = 10;  ///< > 0: at most, a level; four times as many while the best still falls
   float blur = 0.25F;        ///< > 0: of the edges, in pixels of the level
   float blur_end = 0.1F;     ///< > 0: the same at the very end
-  /// Scale of a Geman-McClure loss r^2 / (1 + (r / scale)^2) of a pixel's colour difference r, for clutter
-  /// and occlusion: what differs by more hardly counts. 0: squares.
-  float robust = 0;
+  /// For clutter and occlusion: r^2 / (1 + (r / scale)^2) of a pixel's colour difference r instead of r^2
+  /// (Geman & McClure 1985), so that what differs by more than the scale hardly counts, and more hypotheses
+  /// on the way.
+  bool robust = false;
+  /// Of that: a colour difference; 0: four standard deviations of what the best hypotheses leave, from the
+  /// median of its size, but at least 0.1, anew at every level.
+  float robust_scale = 0;
+  /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
+  /// not explain the target.
+  PoseLight light = PoseLight::harmonics;
   /// Weight of every pixel, in [0, 1], in its first channel; of the target's size. Empty: 1.
   Image mask;
 };

@@ -25,13 +25,20 @@ constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
   std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal",
-                                                     output, report;
+                                                     light = "harmonics", output, report;
   std::optional<std::string> method;
   bool search = false;
   PoseOptions solver;
   LeastSquares least_squares;
   Descent descent;
 };
+
+PoseLight parse_light(const std::string& word) {
+  if (word == "fixed") return PoseLight::fixed;
+  if (word == "gain") return PoseLight::gain;
+  if (word == "harmonics") return PoseLight::harmonics;
+  throw InvalidArgument("--light (command line)", "\"" + word + "\"", "harmonics, gain or fixed");
+}
 
 OptimizerKind parse_optimizer(const std::string& word) {
   if (word == "adam") return OptimizerKind::adam;
@@ -56,6 +63,8 @@ bool wants_descent(const CLI::App& command, const std::optional<std::string>& me
 void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   if (!wants_descent(command, options.method)) {
     if (!options.mask.empty()) options.least_squares.mask = read_image(options.mask);
+    options.least_squares.robust = command.count("--robust") > 0;
+    options.least_squares.light = parse_light(options.light);
     options.solver.method = options.least_squares;
     return;
   }
@@ -134,11 +143,20 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "How many steps a level, more while the best pose still improves; 10 by default", "N");
   add("--blur", method.blur, "Of the edges, in pixels of the level; 0.25 by default", "FLOAT");
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
-  add("--robust", method.robust,
-      "For clutter and occlusion: colour difference beyond which a pixel hardly counts, such as 0.1; 0 "
-      "(default): all "
-      "count",
-      "FLOAT");
+  add("--robust", method.robust_scale,
+      "For clutter and occlusion: pixels of other colours hardly count; a number is the colour difference "
+      "from which "
+      "on, else the residuals tell",
+      "[FLOAT]")
+      ->expected(0, 1);
+  command
+      .add_option(
+          "--light", options.light,
+          "Of the target: harmonics, by default, finds any distant light, gain one that differs in colour "
+          "and brightness alone, where the scene's own light does not explain the target; fixed does not "
+          "look")
+      ->group(k_least_squares_group)
+      ->type_name("harmonics|gain|fixed");
   add("--mask", options.mask, "Image whose first channel is the weight of every pixel, in [0, 1]",
       "MASK.png");
   command

@@ -6,6 +6,7 @@
 
 #include "mesh/cluster_vertices.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "solve/polar.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr {
@@ -18,6 +19,11 @@ constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 // Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the
 // residual does not see; a shorter one would drown in rounding.
 constexpr double k_difference = 0.3;
+
+// Of the robust loss, in standard deviations of the residuals; and the least, a colour difference that blur
+// and rounding leave of anything.
+constexpr float k_scale = 4, k_least_scale = 0.02F;
+constexpr int k_scale_iterations = 3;  // the light of the robust fit leaves other residuals
 
 constexpr float k_channels = 3;
 
@@ -76,7 +82,7 @@ Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const Leas
 }
 
 Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares& options, int short_side,
-                  float blur) {
+                  float blur, PoseLight light) {
   const int full = std::min(scene.width, scene.height);
   Scene result = scene;
   result.width = scaled(scene.width, full, short_side);
@@ -85,7 +91,16 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   if (short_side < full) simplify(result, space);  // the answer comes from the mesh itself
   result.smoothing = level_smoothing(result, space, options, blur);
   result.gradients = {false, false, false, false, false, false, false};
+  if (light != PoseLight::fixed) {  // without light, over black: LightFit adds both
+    result.lights.reset();
+    result.background = glm::vec3(0);
+  }
   return result;
+}
+
+/// Of a pixel's squared colour difference (Geman & McClure 1985).
+double robust(float weight, float squared, float inverse_scale_squared) {
+  return static_cast<double>(weight * squared / (1 + squared * inverse_scale_squared));
 }
 
 /// What a pixel adds to gradient, and to the lower triangles of Hessian and scatter.
@@ -110,44 +125,101 @@ void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], 
 }  // namespace
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
-                     const LeastSquares& options, const PoseSpace& space, int short_side, float blur)
-    : space_(space), scene_(level_scene(scene, space, options, short_side, blur)), renderer_(device) {
+                     const LeastSquares& options, const PoseSpace& space, int short_side, float blur,
+                     PoseLight light)
+    : space_(space),
+      light_(light),
+      scene_(level_scene(scene, space, options, short_side, blur, light)),
+      renderer_(device) {
   renderer_.set_scene(scene_);
-  for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
-    target_.push_back({{p.x, p.y, p.z, p.w}});
+  if (light == PoseLight::harmonics) {
+    Scene normals = scene_;
+    Instance& object = normals.meshes.front();
+    object.mesh = colored_by_normals(object.mesh, polar_decomposition(glm::dmat3(object.transform)).stretch);
+    normal_renderer_.emplace(device).set_scene(normals);
   }
-  weights_.assign(target_.size(), 1.0F);
+  target_.background = scene.background;
+  for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
+    target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  target_.weights.assign(target_.colors.size(), 1.0F);
   if (!options.mask.pixels.empty()) {
     const Image mask = resample(options.mask, scene_.width, scene_.height);
-    std::ranges::transform(mask.pixels, weights_.begin(), [](const glm::vec4& p) { return p.x; });
+    std::ranges::transform(mask.pixels, target_.weights.begin(), [](const glm::vec4& p) { return p.x; });
   }
-  for (const float w : weights_) weight_ += static_cast<double>(w);
-  if (options.robust > 0) inverse_scale_squared_ = 1 / (options.robust * options.robust);
+  for (const float w : target_.weights) weight_ += static_cast<double>(w);
 }
 
 double PoseLevel::pixel_ndc() const { return 2.0 / std::min(scene_.width, scene_.height); }
 
 template <typename Visitor>
 void PoseLevel::render(std::span<const View> views, std::size_t images_together, const Visitor& visit) {
-  const std::size_t pixels = target_.size(), faces = scene_.meshes.front().mesh.faces.size();
+  const std::size_t pixels = target_.colors.size(), faces = scene_.meshes.front().mesh.faces.size();
   const std::size_t fitting = std::min(k_most_pixels / pixels, k_most_faces / faces);
   const std::size_t batch = std::max(fitting / images_together, std::size_t{1}) * images_together;
+  const auto render_batch = [&](Renderer& renderer, std::span<const View> part,
+                                std::vector<cl_float4>& images) {
+    renderer.set_views(part);
+    renderer.forward();
+    renderer.impl().require_forward("PoseLevel");
+    images.resize(part.size() * pixels);
+    renderer.impl().aggregate.image.download(images);
+  };
   for (std::size_t first = 0; first < views.size(); first += batch) {
     const auto part = views.subspan(first, std::min(batch, views.size() - first));
-    renderer_.set_views(part);
-    renderer_.forward();
-    renderer_.impl().require_forward("PoseLevel");
-    images_.resize(part.size() * pixels);
-    renderer_.impl().aggregate.image.download(images_);
-    for (std::size_t i = 0; i < part.size(); i += images_together) visit(first + i, &images_[i * pixels]);
+    render_batch(renderer_, part, images_);
+    if (normal_renderer_) render_batch(*normal_renderer_, part, normals_);
+    for (std::size_t i = 0; i < part.size(); i += images_together) visit(first + i, images_at(i * pixels));
   }
 }
 
-std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
+HypothesisImages PoseLevel::images_at(std::size_t pixel) const {
+  return {&images_[pixel], normal_renderer_ ? &normals_[pixel] : nullptr};
+}
+
+std::vector<View> PoseLevel::views_of(std::span<const Hypothesis> hypotheses) const {
   std::vector<View> views;
   for (const Hypothesis& hypothesis : hypotheses) views.push_back(space_.view(hypothesis, scene_.camera));
+  return views;
+}
+
+void PoseLevel::set_scale(float scale) {
+  scale_ = scale;
+  target_.inverse_scale_squared = scale > 0 ? 1 / (scale * scale) : 0;
+}
+
+void PoseLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
+  constexpr std::ptrdiff_t k_best = 16;  // one of so many: the very best may fit by luck
+  std::vector<float> scales;
+  render(views_of(hypotheses), 1, [&](std::size_t, const HypothesisImages& image) {
+    set_scale(0);
+    for (int i = 0; i < k_scale_iterations; ++i)
+      set_scale(std::max(k_scale * deviation(image), k_least_scale));
+    if (!shown_.empty()) scales.push_back(scale_);
+  });
+  set_scale(0);
+  if (scales.empty()) return;
+  const auto best = scales.begin() + std::ssize(scales) / k_best;
+  std::ranges::nth_element(scales, best);
+  set_scale(*best);
+}
+
+float PoseLevel::deviation(const HypothesisImages& image) {
+  find_shown(image, 1);
+  if (light_ != PoseLight::fixed) return LightFit(target_, shown_, image).deviation();
+  std::vector<float> sizes;
+  for (const std::size_t i : shown_) {
+    for (int c = 0; c < 3; ++c) sizes.push_back(std::abs(image.colors[i].s[c] - target_.colors[i].s[c]));
+  }
+  return robust_deviation(sizes);
+}
+
+std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
+  const std::vector<View> views = views_of(hypotheses);
   std::vector<double> result(views.size());
-  render(views, 1, [&](std::size_t i, const cl_float4* image) { result[i] = loss(image); });
+  render(views, 1, [&](std::size_t i, const HypothesisImages& image) {
+    result[i] = light_ == PoseLight::fixed ? loss(image) : loss_in_best_light(image);
+  });
   return result;
 }
 
@@ -165,35 +237,114 @@ std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hy
   }
   std::vector<NormalEquations> result(hypotheses.size());
   const std::size_t together = space_.size() + 1;
-  render(views, together,
-         [&](std::size_t i, const cl_float4* images) { accumulate(images, step, result[i / together]); });
+  render(views, together, [&](std::size_t i, const HypothesisImages& images) {
+    if (light_ == PoseLight::fixed) {
+      accumulate(images, step, result[i / together]);
+    } else {
+      accumulate_in_best_light(images, step, result[i / together]);
+    }
+  });
   return result;
 }
 
-double PoseLevel::loss(const cl_float4* image) const {
+double PoseLevel::loss(const HypothesisImages& image) const {
   double sum = 0;
-  for (std::size_t i = 0; i < target_.size(); ++i) {
+  for (std::size_t i = 0; i < target_.colors.size(); ++i) {
     float squared = 0;
     for (int c = 0; c < 3; ++c) {
-      const float r = image[i].s[c] - target_[i].s[c];
+      const float r = image.colors[i].s[c] - target_.colors[i].s[c];
       squared += r * r;
     }
-    sum += static_cast<double>(weights_[i] * squared / (1 + squared * inverse_scale_squared_));
+    sum += robust(target_.weights[i], squared, target_.inverse_scale_squared);
   }
   return sum / (static_cast<double>(k_channels) * weight_);
 }
 
-void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
+void PoseLevel::find_shown(const HypothesisImages& images, std::size_t count) {
+  const std::size_t pixels = target_.colors.size();
+  shown_.clear();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t k = 0; k < count; ++k) {
+      if (images.colors[k * pixels + i].s[3] <= 0) continue;
+      shown_.push_back(i);
+      break;
+    }
+  }
+}
+
+double PoseLevel::background_loss() const {
+  double sum = 0;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < target_.colors.size(); ++i) {
+    if (next < shown_.size() && shown_[next] == i) {
+      ++next;
+      continue;
+    }
+    float squared = 0;
+    for (int c = 0; c < 3; ++c) {
+      const float r = target_.background[c] - target_.colors[i].s[c];
+      squared += r * r;
+    }
+    sum += robust(target_.weights[i], squared, target_.inverse_scale_squared);
+  }
+  return sum;
+}
+
+double PoseLevel::loss_in_best_light(const HypothesisImages& image) {
+  find_shown(image, 1);
+  return (LightFit(target_, shown_, image).loss() + background_loss()) /
+         (static_cast<double>(k_channels) * weight_);
+}
+
+void PoseLevel::accumulate_in_best_light(const HypothesisImages& images, const PoseSpace::Step& step,
+                                         NormalEquations& result) {
+  const std::size_t n = space_.size(), pixels = target_.colors.size();
+  find_shown(images, n + 1);
+  const LightFit fit(target_, shown_, images);
+  const auto size = static_cast<Eigen::Index>(n);
+  const Eigen::VectorXf weights = fit.weights().matrix();
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
+  Eigen::MatrixXf jacobian(static_cast<Eigen::Index>(shown_.size()), size);
+  Eigen::MatrixXf score = Eigen::MatrixXf::Zero(jacobian.rows(), size);
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t k = 0; k < n; ++k) {
+      HypothesisImages moved = images;
+      moved.colors += (k + 1) * pixels;
+      if (moved.normals != nullptr) moved.normals += (k + 1) * pixels;
+      jacobian.col(static_cast<Eigen::Index>(k)) = fit.difference(moved, c) * static_cast<float>(1 / step[k]);
+    }
+    const Eigen::MatrixXf projected = fit.project(jacobian, c);
+    const Eigen::VectorXf residual = weights.cwiseProduct(fit.residuals().col(c));
+    hessian += (jacobian.transpose() * weights.asDiagonal() * projected).cast<double>();
+    gradient += (jacobian.transpose() * residual).cast<double>();
+    score += residual.asDiagonal() * projected;
+  }
+  const Eigen::MatrixXd scatter = (score.transpose() * score).cast<double>();
+  const double scale = 1 / (static_cast<double>(k_channels) * weight_);
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    result.gradient[k] = scale * gradient[row];
+    for (std::size_t l = 0; l < n; ++l) {
+      const auto column = static_cast<Eigen::Index>(l);
+      result.hessian[k * n + l] = scale * (hessian(row, column) + hessian(column, row)) / 2;
+      result.scatter[k * n + l] = scale * scale * scatter(row, column);
+    }
+  }
+  result.loss = scale * (fit.loss() + background_loss());
+}
+
+void PoseLevel::accumulate(const HypothesisImages& images, const PoseSpace::Step& step,
                            NormalEquations& result) const {
-  const std::size_t n = space_.size(), pixels = target_.size();
+  const std::size_t n = space_.size(), pixels = target_.colors.size();
   std::array<float, PoseSpace::k_most_parameters> inverse_step{};
   for (std::size_t k = 0; k < n; ++k) inverse_step[k] = static_cast<float>(1 / step[k]);
   std::array<cl_float4, PoseSpace::k_most_parameters> jacobian{};
   for (std::size_t i = 0; i < pixels; ++i) {
-    const cl_float4 image = images[i];
+    const cl_float4 image = images.colors[i];
     bool still = true;  // most pixels show no edge: nothing there depends on the pose
     for (std::size_t k = 0; k < n; ++k) {
-      const cl_float4 moved = images[(k + 1) * pixels + i];
+      const cl_float4 moved = images.colors[(k + 1) * pixels + i];
       for (int c = 0; c < 3; ++c) {
         jacobian[k].s[c] = (moved.s[c] - image.s[c]) * inverse_step[k];
         still = still && moved.s[c] == image.s[c];
@@ -202,13 +353,13 @@ void PoseLevel::accumulate(const cl_float4* images, const PoseSpace::Step& step,
     if (still) continue;
     float residual[3], squared = 0;
     for (int c = 0; c < 3; ++c) {
-      residual[c] = image.s[c] - target_[i].s[c];
+      residual[c] = image.s[c] - target_.colors[i].s[c];
       squared += residual[c] * residual[c];
     }
     // Iteratively reweighted: the derivative of the robust loss, and the part of its curvature that is
     // positive.
-    const float slope = 1 / (1 + squared * inverse_scale_squared_);
-    add_pixel(std::span(jacobian).first(n), residual, weights_[i] * slope * slope, result);
+    const float slope = 1 / (1 + squared * target_.inverse_scale_squared);
+    add_pixel(std::span(jacobian).first(n), residual, target_.weights[i] * slope * slope, result);
   }
   const double scale = 1 / (static_cast<double>(k_channels) * weight_);
   for (std::size_t k = 0; k < n; ++k) {

@@ -5,11 +5,13 @@
 #include <CL/opencl.hpp>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
+#include "solve/pose_light.hpp"
 #include "solve/pose_space.hpp"
 
 namespace dpr {
@@ -26,12 +28,20 @@ class PoseLevel {
  public:
   /// `short_side`: in pixels, of its images; `blur`: of the edges, in those pixels.
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
-            const PoseSpace& space, int short_side, float blur);
+            const PoseSpace& space, int short_side, float blur, PoseLight light);
 
   /// The mean squared error over colour channels and pixels, or its robust version, of every hypothesis.
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
   /// The same with derivatives, from forward differences of the images.
   std::vector<NormalEquations> linearize(std::span<const Hypothesis> hypotheses);
+
+  /// Makes the loss robust: Geman and McClure's with a scale from the residuals that the best of the
+  /// hypotheses leave at the object, beyond which a pixel hardly counts. Without any hypothesis that shows
+  /// the object, squares stay.
+  void estimate_scale(std::span<const Hypothesis> hypotheses);
+  /// Of the robust loss, a colour difference; 0: squares.
+  void set_scale(float scale);
+  float scale() const { return scale_; }
 
   int width() const { return scene_.width; }
   int height() const { return scene_.height; }
@@ -42,16 +52,30 @@ class PoseLevel {
   /// Renders views in batches that fit the device and hands every image to a visitor, in order.
   template <typename Visitor>
   void render(std::span<const View> views, std::size_t images_together, const Visitor& visit);
-  double loss(const cl_float4* image) const;
-  void accumulate(const cl_float4* images, const PoseSpace::Step& step, NormalEquations& result) const;
+  /// Some images of a batch, the normals beside them if the light needs them.
+  HypothesisImages images_at(std::size_t pixel) const;
+  /// Pixels that one of so many images from `images` on shows the object at.
+  void find_shown(const HypothesisImages& images, std::size_t count);
+  double background_loss() const;
+
+  std::vector<View> views_of(std::span<const Hypothesis> hypotheses) const;
+  float deviation(const HypothesisImages& image);
+  double loss(const HypothesisImages& image) const;
+  double loss_in_best_light(const HypothesisImages& image);
+  void accumulate(const HypothesisImages& images, const PoseSpace::Step& step, NormalEquations& result) const;
+  void accumulate_in_best_light(const HypothesisImages& images, const PoseSpace::Step& step,
+                                NormalEquations& result);
 
   const PoseSpace& space_;
+  PoseLight light_;
   Scene scene_;
   Renderer renderer_;
-  std::vector<cl_float4> target_, images_;
-  std::vector<float> weights_;  // [pixel], in [0, 1]
+  std::optional<Renderer> normal_renderer_;
+  std::vector<cl_float4> images_, normals_;
+  std::vector<std::size_t> shown_;
+  WeighedTarget target_;
   double weight_ = 0;
-  float inverse_scale_squared_ = 0;  // of the robust loss; 0: squares
+  float scale_ = 0;
 };
 
 }  // namespace dpr

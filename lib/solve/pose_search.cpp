@@ -57,7 +57,7 @@ class Fit {
         options_(options),
         method_(std::get<LeastSquares>(options.method)),
         callback_(callback),
-        beam_(method_.robust > 0 ? k_robust_beam : k_beam),
+        beam_(method_.robust ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
         space_(scene, initial.front(), options.solve_translation, options.solve_focal) {}
 
@@ -65,8 +65,15 @@ class Fit {
 
  private:
   void start(PoseLevel& level);
-  /// Refines all candidates at a level and keeps the best distinct ones. False if the callback stopped it.
-  bool work(PoseLevel& level, std::size_t keep, bool goes_on);
+  bool descend(const std::vector<LevelShape>& shapes, const std::vector<Candidate>& found);
+  PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
+  bool is_unexplained(std::size_t level) const;
+  bool light_differs(PoseLevel& level, const LevelShape& shape) const;
+  void make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses);
+  std::vector<Hypothesis> hypotheses() const;
+  std::vector<Hypothesis> grid(std::size_t rotations) const;
+  /// Refines all candidates at a level and keeps the best distinct ones.
+  void work(PoseLevel& level, std::size_t keep);
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void finish(PoseLevel& level, bool anywhere);
   void choose_equals(bool anywhere);
@@ -82,6 +89,8 @@ class Fit {
   const Beam& beam_;
   std::vector<Pose> initial_;
   PoseSpace space_;
+  PoseLight light_ = PoseLight::fixed;  // tried at present
+  bool goes_on_ = true;
   std::vector<Candidate> candidates_;
   double wrong_ = 0;  // loss of a pose that explains nothing, at the coarsest or the finest level
   PoseResult result_;
@@ -89,26 +98,93 @@ class Fit {
 
 PoseResult Fit::run(bool anywhere) {
   result_.start = initial_.front();
-  const std::vector<LevelShape> levels = level_shapes(scene_, method_);
-  bool goes_on = true;
-  for (std::size_t i = 0; i < levels.size(); ++i) {
-    const bool is_last = i + 1 == levels.size();
-    if (!goes_on && !is_last) continue;
-    PoseLevel level(device_, scene_, target_, method_, space_, levels[i].short_side, levels[i].blur);
-    if (i == 0) start(level);
-    goes_on = work(level, beam_[std::min(i + 1, beam_.size() - 1)], goes_on);
-    if (is_last) finish(level, anywhere);
+  const std::vector<LevelShape> shapes = level_shapes(scene_, method_);
+  if (!descend(shapes, {}) && method_.light != PoseLight::fixed && goes_on_) {
+    const std::vector<Candidate> found = std::move(candidates_);
+    light_ = method_.light;
+    descend(shapes, found);
   }
+  PoseLevel level = make_level(shapes.back(), light_);
+  make_robust(level, hypotheses());
+  work(level, beam_.back());
+  finish(level, anywhere);
   return result_;
+}
+
+/// Through all levels but the last, where `found` come in again. Returns false if another light should be
+/// tried.
+bool Fit::descend(const std::vector<LevelShape>& shapes, const std::vector<Candidate>& found) {
+  candidates_.clear();
+  for (std::size_t i = 0; i + 1 < shapes.size() && (goes_on_ || i == 0); ++i) {
+    const bool is_finest = i + 2 == shapes.size();
+    // Of a light's direction the coarsest images say so little that it would explain any pose.
+    const bool is_known = light_ == PoseLight::fixed || i > 0 || is_finest;
+    PoseLevel level = make_level(shapes[i], is_known ? light_ : PoseLight::gain);
+    if (i == 0) start(level);
+    if (is_finest) candidates_.insert(candidates_.end(), found.begin(), found.end());
+    if (i > 0) make_robust(level, hypotheses());
+    work(level, beam_[std::min(i + 1, beam_.size() - 1)]);
+    if (light_ != PoseLight::fixed) continue;
+    if (is_finest ? light_differs(level, shapes[i]) : is_unexplained(i)) return false;
+  }
+  return true;
+}
+
+PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
+  return PoseLevel(device_, scene_, target_, method_, space_, shape.short_side, shape.blur, light);
+}
+
+/// Whether a further look for the pose in the scene's own light is in vain. A robust loss can't tell.
+bool Fit::is_unexplained(std::size_t level) const {
+  constexpr double k_unexplained = 0.2;  // of what a wrong pose leaves
+  return level > 0 && !method_.robust && candidates_.front().equations.loss > k_unexplained * wrong_;
+}
+
+/// Whether most of the object looks so much better in a light of its own that it's not the scene's.
+bool Fit::light_differs(PoseLevel& level, const LevelShape& shape) const {
+  constexpr float k_better = 0.7F;
+  if (method_.light == PoseLight::fixed) return false;
+  PoseLevel lit = make_level(shape, method_.light);
+  level.estimate_scale(hypotheses());
+  lit.estimate_scale(hypotheses());
+  return lit.scale() < k_better * level.scale();
+}
+
+void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) {
+  if (!method_.robust) return;
+  if (method_.robust_scale > 0) {
+    level.set_scale(method_.robust_scale);
+  } else {
+    // Tighter, the loss would see nothing but what hypotheses on their way hit by chance.
+    constexpr float k_least_scale = 0.1F;
+    level.estimate_scale(hypotheses);
+    if (level.scale() > 0) level.set_scale(std::max(level.scale(), k_least_scale));
+  }
+}
+
+std::vector<Hypothesis> Fit::hypotheses() const {
+  std::vector<Hypothesis> result;
+  for (const Candidate& candidate : candidates_) result.push_back(candidate.hypothesis);
+  return result;
+}
+
+/// At the initial translation.
+std::vector<Hypothesis> Fit::grid(std::size_t rotations) const {
+  std::vector<Hypothesis> result;
+  for (const glm::dmat3& rotation : rotation_grid(rotations)) {
+    result.push_back({{rotation, initial_.front().translation}});
+  }
+  return result;
 }
 
 /// The initial poses, and the best of the grid.
 void Fit::start(PoseLevel& level) {
+  constexpr std::size_t k_enough = 144;  // to know the scale
+  std::vector<Hypothesis> some = grid(std::min<std::size_t>(method_.rotations, k_enough));
+  for (const Pose& pose : initial_) some.push_back({pose});
+  make_robust(level, some);
   wrong_ = wrong_loss(level);
-  std::vector<Hypothesis> grid;
-  for (const glm::dmat3& rotation : rotation_grid(method_.rotations)) {
-    grid.push_back({{rotation, initial_.front().translation}});
-  }
+  const std::vector<Hypothesis> grid = this->grid(method_.rotations);
   const std::vector<double> losses = level.losses(grid);
   for (std::size_t i = 0; i < grid.size(); ++i) {
     candidates_.push_back({grid[i]});
@@ -120,12 +196,11 @@ void Fit::start(PoseLevel& level) {
   candidates_[candidates_.size() - initial_.size()].is_initial = true;
 }
 
-bool Fit::work(PoseLevel& level, std::size_t keep, bool goes_on) {
-  const unsigned iterations = goes_on ? method_.iterations : 0;  // stopped: only judged at this level
-  goes_on = refine(level, space_, candidates_, iterations, [&] { return report(level); }) && goes_on;
+void Fit::work(PoseLevel& level, std::size_t keep) {
+  const unsigned iterations = goes_on_ ? method_.iterations : 0;  // stopped: only judged at this level
+  goes_on_ = refine(level, space_, candidates_, iterations, [&] { return report(level); }) && goes_on_;
   std::ranges::stable_sort(candidates_, by_loss);
   keep_distinct(level, keep);
-  return goes_on;
 }
 
 void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
@@ -181,11 +256,7 @@ void Fit::choose_equals(bool anywhere) {
 /// What a pose leaves that explains nothing: the median over rotations.
 double Fit::wrong_loss(PoseLevel& level) const {
   constexpr std::size_t k_enough = 15;  // the finest level's renders are dear
-  std::vector<Hypothesis> poses;
-  for (const glm::dmat3& rotation : rotation_grid(k_enough)) {
-    poses.push_back({{rotation, initial_.front().translation}});
-  }
-  std::vector<double> losses = level.losses(poses);
+  std::vector<double> losses = level.losses(grid(k_enough));
   std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
   return losses[losses.size() / 2];
 }
@@ -201,8 +272,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
           "a finite number above 0");
   require(options.blur_end > 0 && std::isfinite(options.blur_end), "blur_end (pose)", options.blur_end,
           "a finite number above 0");
-  require(options.robust >= 0 && std::isfinite(options.robust), "robust (pose)", options.robust,
-          "a finite number, at least 0");
+  require(options.robust_scale >= 0 && std::isfinite(options.robust_scale), "robust_scale (pose)",
+          options.robust_scale, "a finite number, at least 0");
   const Image& mask = options.mask;
   if (mask.pixels.empty()) return;
   if (mask.width != scene.width || mask.height != scene.height) {
@@ -218,7 +289,9 @@ void validate(const LeastSquares& options, const Scene& scene) {
 }
 
 unsigned most_iterations(const LeastSquares& options, const Scene& scene) {
-  return k_patience * options.iterations * static_cast<unsigned>(level_shapes(scene, options).size());
+  const auto levels = static_cast<unsigned>(level_shapes(scene, options).size());
+  const unsigned again = options.light == PoseLight::fixed ? 0 : levels - 1;  // in another light
+  return k_patience * options.iterations * (levels + again);
 }
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,

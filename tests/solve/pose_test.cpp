@@ -199,7 +199,7 @@ TEST_SUITE("pipeline") {
     };
     dpr::LeastSquares masked = least_squares(), robust = least_squares();
     masked.mask = mask;
-    robust.robust = 0.1F;
+    robust.robust = true;
     const std::array errors{error(least_squares()), error(masked), error(robust)};
     if (is_reduced()) return;
     CHECK(errors[0] > 5);
@@ -352,7 +352,7 @@ TEST_SUITE("robustness") {
     refuses_least_squares([](dpr::LeastSquares& m) { m.iterations = 0; });
     refuses_least_squares([](dpr::LeastSquares& m) { m.blur = 0; });
     refuses_least_squares([&](dpr::LeastSquares& m) { m.blur_end = nan; });
-    refuses_least_squares([](dpr::LeastSquares& m) { m.robust = -1; });
+    refuses_least_squares([](dpr::LeastSquares& m) { m.robust_scale = -1; });
     refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 17, glm::vec4(1)); });
     refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 16, glm::vec4(0)); });
     refuses_least_squares([](dpr::LeastSquares& m) { m.mask = dpr::Image(16, 16, glm::vec4(2)); });

@@ -20,9 +20,8 @@ using Solve = PoseResult (*)(const PoseMethod& method, const Device& device, con
 PoseResult solve_by_default(const PoseMethod&, const Device& device, const Scene& scene,
                             const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
                             bool) {
-  constexpr float k_outlier = 0.1F;  // colour difference
   LeastSquares method;
-  if (set.clutter || set.occluded > 0) method.robust = k_outlier;
+  method.robust = set.clutter || set.occluded > 0;
   const PoseSolver solver(device, scene, target,
                           {.method = method, .solve_translation = set.translation_error > 0});
   return set.initial_degrees > 0 || set.translation_error > 0 ? solver.solve(problem.initial)
