@@ -21,7 +21,7 @@ constexpr const char* k_bash_begin =
 declare -A _dpr_words
 )";
 constexpr const char* k_bash_end = R"(_dpr() {
-  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} key='' word i
+  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} key=dpr word i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     word=${COMP_WORDS[i]}
     [[ $word != -* && ${_dpr_words["$key $word"]+set} ]] && key+=" $word"
@@ -89,11 +89,8 @@ void run(const std::string& shell, const CLI::App& application) {
 }  // namespace
 
 std::string completion_entries(const CLI::App& application) {
-  // "dpr learn" is a program of its own.
-  const std::string& name = application.get_name();
-  const std::size_t space = name.find(' ');
   std::string entries;
-  append(entries, application, space == std::string::npos ? "" : name.substr(space));
+  append(entries, application, application.get_name());
   return entries;
 }
 

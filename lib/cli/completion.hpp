@@ -9,9 +9,8 @@ namespace dpr::cli {
 /// Asked alone of any program of run_application(), prints its completion_entries().
 inline constexpr const char* k_completion_request = "--completion-entries";
 
-/// Assignments to bash's associative array _dpr_words: "" and the commands, such as " pose", have the words
-/// that may follow them; options, such as " pose --loss", their values. FILES among them stands for names of
-/// files.
+/// Assignments to bash's associative array _dpr_words: commands, such as "dpr pose", have the words that may
+/// follow them; options, such as "dpr pose --loss", their values. FILES among them stands for names of files.
 std::string completion_entries(const CLI::App& application);
 
 }  // namespace dpr::cli
