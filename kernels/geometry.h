@@ -95,16 +95,23 @@ static inline realn triangle_distance2(const View3 v) {
   return lesser(lesser(edge_distance2(v.edge[0]), edge_distance2(v.edge[1])), edge_distance2(v.edge[2]));
 }
 
+static inline float doubled_area(const Triangle t) {
+  return (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
+}
+
+/// Whether rounding has left nothing of the area. A sliver covers the samples that it owns, so that its neighbours' meet;
+/// it is not blurred, and its barycentrics, all weight at vertex 0, have no gradient.
+static inline int is_sliver(const Triangle t) { return !(fabs(doubled_area(t)) > DPR_SLIVER_AREA); }
+
 /// What turns a triangle's edge functions into barycentrics: 1 / doubled area, signed, and 1 / depth of each vertex if
 /// perspective correct. Common factors drop out later: they keep the numbers in range, whatever the unit of length and
-/// however thin the triangle.
+/// however thin the triangle. All zero for a sliver.
 typedef struct {
   float factor[3], inverse_depth[3];
 } BarycentricScale;
 
 static inline BarycentricScale barycentric_scale(const Triangle t, uint perspective) {
-  const float area = (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
-  const float scale = t.orientation / fmax(fabs(area), DPR_MIN_AREA);
+  const float scale = is_sliver(t) ? 0.0f : t.orientation / fabs(doubled_area(t));
   const float z[3] = {t.z0, t.z1, t.z2};
   const float nearest = fmin(fmin(t.z0, t.z1), t.z2);
   BarycentricScale s;

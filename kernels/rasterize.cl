@@ -62,7 +62,7 @@ kernel void rasterize_cover(const FrameParams p, const uint room, global const u
   const Triangle t = triangles[pair_face[pair]];
   const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
   const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
-  const float limit = p.blur_distance * p.blur_distance;
+  const float limit = is_sliver(t) ? 0.0f : p.blur_distance * p.blur_distance;
   const uint2 rows = blurred_rows(p, t, first_row);
   const float error = side_error(p, t);
   intn doubtful = 0;

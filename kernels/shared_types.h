@@ -31,8 +31,9 @@ using float4 = cl_float4;
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 
-/// Doubled projected areas, NDC^2, count as at least this where they are divided by: the quotient stays a number.
-#define DPR_MIN_AREA 1e-30f
+/// Triangles whose doubled projected area is at most this, NDC^2, are slivers (is_sliver() in geometry.h): a few millionths
+/// of a pixel at 4096x4096.
+#define DPR_SLIVER_AREA 1e-12f
 
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu

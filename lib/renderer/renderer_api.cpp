@@ -19,6 +19,7 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 void Renderer::set_scene(const Scene& scene) {
   validate(scene);
+  require_scales(scene.camera, scene.smoothing, scene.lights.has_value());
   impl_->set_scene(scene);
 }
 

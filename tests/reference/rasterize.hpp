@@ -36,6 +36,10 @@ struct Fragment {
   Vec3d barycentric;  ///< c_i: perspective corrected and clipped as asked
 };
 
+/// Twice the area in NDC^2 at which a triangle covers the samples that it owns and is not blurred: rounding
+/// leaves nothing of its barycentrics.
+inline constexpr double k_sliver_area = 1e-12;
+
 inline Vec2d screen(const Vec3d& vertex) { return {vertex.x, vertex.y}; }
 
 /// Twice the signed area, positive when counter-clockwise with y up.
@@ -131,7 +135,8 @@ inline std::optional<Fragment> rasterize_forward(const NdcTriangle& t, std::size
   const bool inside = is_inside(t, point);
   const double squared = nearest_edge(t, point).squared_distance;
   const double magnitude = p.metric == DistanceMetric::squared ? squared : std::sqrt(squared);
-  if (!inside && !(magnitude < p.blur_radius)) return std::nullopt;
+  const bool is_sliver = std::fabs(double_area(t)) <= k_sliver_area;
+  if (!inside && (is_sliver || !(magnitude < p.blur_radius))) return std::nullopt;
 
   const Vec3d m = clipped(barycentric_numerators(t, b, p).n, p);
   Fragment fragment;
