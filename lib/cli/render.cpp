@@ -101,8 +101,8 @@ void run(const RenderOptions& options, CommonOptions& common) {
   renderer.forward();
   const Image image = renderer.image();
   const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
+  const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image));
-  const RenderStatistics statistics = renderer.statistics();
   aovs.write(renderer);
   if (!common.quiet) {
     std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,

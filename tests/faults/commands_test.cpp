@@ -119,8 +119,8 @@ TEST_SUITE("robustness") {
       const std::vector<Calls> calls = read_log(log.read("log"));
       REQUIRE(calls.size() > 10);
       for (const Calls& c : calls) {
-        // The first, the last and one between.
-        for (const std::size_t n : std::set<std::size_t>{1, (c.count + 1) / 2, c.count})
+        // The first and the last: what is set up, and what comes when much has been done.
+        for (const std::size_t n : std::set<std::size_t>{1, c.count})
           check_fault(folder, command, c.function, n, expected);
       }
     }
