@@ -50,7 +50,7 @@ TEST_SUITE("pipeline") {
     const std::string page = folder.read("demo/index.html");
     CHECK(contains(page, "dpr demo -o demo"));
     CHECK(contains(page, "start, 50.00 degrees from the truth"));
-    CHECK(covered_height(dpr::read_image(folder / "demo/target.exr")) > 0.8);
+    CHECK(covered_height(dpr::read_image(folder / "demo/target.exr")) > 0.7);
 
     run({"render", "--scene", "demo/truth.json", "--preset", "rigid", "-o", "truth.exr"});
     CHECK(dpr::read_image(folder / "truth.exr").pixels == dpr::read_image(folder / "demo/target.exr").pixels);
