@@ -158,12 +158,12 @@ TEST_SUITE("robustness") {
     other.method = "joint_gaussian";
     CHECK(contains(message(other, folder), "softras with seed 1"));
     other.method = "rigid";
-    CHECK(contains(message(other, TempDir()), "one that has gradients"));
+    CHECK(contains(message(other, TempDir()), "got rigid, expected "));
     other.method = "hard";
     CHECK(contains(message(other, TempDir()), "preset"));
     other = options;
     other.batch = 6;
-    CHECK(contains(message(other, folder), "batch 4, sigma"));
+    CHECK(contains(message(other, folder), "got batch 4, expected batch 6"));
     other = options;
     other.weights.laplacian = 3e-3;
     CHECK(contains(message(other, folder), "weights 1 1 0.3"));
