@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/output_file.hpp"
 #include "cli/difference.hpp"
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"
@@ -206,18 +205,23 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
   for (std::size_t i = 0; i < around.size(); ++i)
     sides.push_back(
         format("%.0f degrees", 360.0 * static_cast<double>(i) / static_cast<double>(around.size())));
+  // The page comes last: what it shows is there.
+  const std::vector<std::vector<Picture>> compared = compare_views(result.mesh);
+  const Picture target = write_picture(folder_ / "target.png", views_.views.front().image, "image 0");
+  const std::vector<Picture> iterations = frames(result);
+  const std::vector<Picture> turns =
+      write_strip(folder_ / "turntable.png", render(result.mesh, around), sides);
   const bool is_plotted = !result.history.empty() && plot_history(folder_ / "plot.png", result.history);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   write_json(folder_ / "fit.json", to_json(result));
 
   Page page(source);
   page.add_heading("Images, and the shape from there");
-  page.add_player({}, compare_views(result.mesh));
+  page.add_player({}, compared);
   page.add_heading("From the start to the end");
-  page.add_player({write_picture(folder_ / "target.png", views_.views.front().image, "image 0")},
-                  one_by_one(frames(result)));
+  page.add_player({target}, one_by_one(iterations));
   page.add_heading("All around");
-  page.add_player({}, one_by_one(write_strip(folder_ / "turntable.png", render(result.mesh, around), sides)));
+  page.add_player({}, one_by_one(turns));
   page.add_heading("Result");
   page.add_facts(facts(result));
   if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration");
