@@ -25,7 +25,7 @@ std::atomic<std::uint64_t> frames_rendered = 0;
 }  // namespace
 
 Renderer::Impl::Impl(Device device_)
-    : device(std::move(device_)),
+    : OnDevice{std::move(device_)},
       transform(device.impl()),
       setup(device.impl()),
       bin(device.impl()),

@@ -22,6 +22,11 @@
 
 namespace dpr {
 
+/// The device, a base before that of the views: whatever holds its buffers goes before it does.
+struct OnDevice {
+  Device device;
+};
+
 /// The views on the host and on the device, and what the kernels read of every frame of theirs.
 struct ViewSet {
   std::vector<View> views;
@@ -45,7 +50,7 @@ using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buf
 
 /// Setters come in two halves: the first prepares everything that can fail beside what is in force, the
 /// second swaps it in and cannot fail. What it replaced is freed or kept as room for the next.
-struct Renderer::Impl : ViewSet {
+struct Renderer::Impl : OnDevice, ViewSet {
   explicit Impl(Device device);
 
   /// What the setters are given is checked already.
@@ -71,7 +76,6 @@ struct Renderer::Impl : ViewSet {
   /// Held in buffers.
   std::size_t bytes() const;
 
-  Device device;
   Scene scene;
   bool rendered = false;            // the stages hold the frame of the current scene, or it is on the way
   std::optional<FrameCounts> room;  // that it was given, until it is known to fit

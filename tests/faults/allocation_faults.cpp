@@ -39,5 +39,10 @@ void* operator new(std::size_t size) {
   return memory;
 }
 
+/// Never fails on demand; it is here since what it returns ends in the operator delete below.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  return std::malloc(size == 0 ? 1 : size);
+}
+
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
