@@ -29,7 +29,7 @@ static inline float two_sum(float a, float b, float* error) {
 static int exact_side(float2 a, float2 b, float2 p) {
 #pragma OPENCL FP_CONTRACT OFF
   const float2 largest2 = fmax(fmax(fabs(a), fabs(b)), fabs(p));
-  const int exponent = DPR_EXACT_EXPONENT - ilogb(fmax(fmax(largest2.x, largest2.y), DPR_EDGE_FLOOR));
+  const int2 exponent = (int2)(DPR_EXACT_EXPONENT - ilogb(fmax(fmax(largest2.x, largest2.y), DPR_EDGE_FLOOR)));
   a = ldexp(a, exponent);
   b = ldexp(b, exponent);
   p = ldexp(p, exponent);

@@ -341,7 +341,7 @@ TEST_SUITE("pipeline") {
     }
     CHECK(all.differing == 0);
     CHECK(all.unbalanced == 0);
-    CHECK(all.on_edges > all.owned / 20);
+    CHECK(all.on_edges > all.owned / 50);
     MESSAGE(renders << " renders: " << all.owned << " samples covered, " << all.on_edges
                     << " of them on edges");
   }
