@@ -145,8 +145,8 @@ std::vector<Operation> operations(const Device& device) {
   };
 }
 
-/// The operation with every fault of a kind, on the old scene with room for more.
-void check_operation(const Operation& operation, const FaultKind& kind, Renderer& renderer,
+/// The operation with every fault of a kind, on the old scene with room for more. Returns how many there were.
+std::size_t check_operation(const Operation& operation, const FaultKind& kind, Renderer& renderer,
                      std::size_t most) {
   CAPTURE(operation.name);
   const auto prepare = [&] {
@@ -158,13 +158,14 @@ void check_operation(const Operation& operation, const FaultKind& kind, Renderer
   const std::vector<double> before = seen(renderer);
   operation.run(renderer);
   const std::vector<double> after = seen(renderer);
-  sweep(
+  const std::size_t faults = sweep(
       kind, most, prepare, [&] { operation.run(renderer); },
       [&](Ending ending, std::size_t) {
         CHECK(same(seen(renderer), ending == Ending::failed ? before : after));
       });
   prepare();
   CHECK(same(seen(renderer), before));
+  return faults;
 }
 
 }  // namespace
@@ -174,9 +175,11 @@ TEST_SUITE("robustness") {
     const Device device = open_device();
     for (const FaultKind& kind : {opencl_faults(), allocation_faults()}) {
       Renderer renderer(device);
+      std::size_t faults = 0;
       for (const Operation& operation : operations(device)) {
-        check_operation(operation, kind, renderer, static_cast<std::size_t>(reduced(60, 5)));
+        faults += check_operation(operation, kind, renderer, static_cast<std::size_t>(reduced(60, 5)));
       }
+      CHECK(faults > 0);
     }
   }
 
