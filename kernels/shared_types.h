@@ -189,6 +189,16 @@ typedef struct MeshLossParams {
   uint vertices, hinges;
 } MeshLossParams;
 
+/// A pass of the blur: out[a] = sum over b of weights[a * out_step - b * in_step + offset] * in[b], for taps that there
+/// are. With the steps exchanged and symmetric weights it is its own transpose.
+typedef struct BlurPass {
+  DPR_SHARED_NAME(BlurPass)
+  uint lines; /* along rows: rows of all images; along columns: images */
+  uint width; /* along columns: pixels of a row */
+  uint out_length, in_length; /* pixels along the pass */
+  int out_step, in_step, offset, taps;
+} BlurPass;
+
 #ifndef __OPENCL_C_VERSION__
 #undef DPR_SHARED_NAME
 }  // namespace dpr::shared

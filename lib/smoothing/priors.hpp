@@ -16,12 +16,19 @@ struct PriorRow {
   std::string_view name;  ///< in files and messages, and of the kernel's functions
   /// x with P(X > x) = tail, for tail in (0, 1/2].
   double (*upper_quantile)(double tail);
+  double (*density)(double x);
   /// nu'(z) of the density exp(-nu); null where there is none, so that gradients cannot be sampled.
   double (*score)(double z);
   /// The inverse CDF of u in (0, 1); null where the density is symmetric about 0 and upper_quantile says it.
   double (*asymmetric_quantile)(double u) = nullptr;
   /// Where the blur radius ends, in sigmas, whatever the occupancy there.
   double longest_reach = std::numeric_limits<double>::infinity();
+  double variance = std::numeric_limits<double>::infinity();
+  /// Noise of a pixel's position: where it ends, in scales, and how far before that its density, there below
+  /// 4e-4 of the peak, Cauchy's below 3e-2, starts to fall to zero.
+  double pixel_reach = 0, pixel_taper = 0.5;
+  /// Nodes of a coarse grid that a scale needs for an error below 1e-4 of the peak.
+  double pixel_nodes = 4.5;
 
   bool has_score() const { return score != nullptr; }
   bool is_symmetric() const { return asymmetric_quantile == nullptr; }

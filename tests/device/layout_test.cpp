@@ -116,7 +116,16 @@ std::vector<Entry> entries() {
           DPR_FIELD(MeshLossParams, edge_target),
           DPR_FIELD(MeshLossParams, first_vertex),
           DPR_FIELD(MeshLossParams, vertices),
-          DPR_FIELD(MeshLossParams, hinges)};
+          DPR_FIELD(MeshLossParams, hinges),
+          DPR_SIZE(BlurPass),
+          DPR_FIELD(BlurPass, lines),
+          DPR_FIELD(BlurPass, width),
+          DPR_FIELD(BlurPass, out_length),
+          DPR_FIELD(BlurPass, in_length),
+          DPR_FIELD(BlurPass, out_step),
+          DPR_FIELD(BlurPass, in_step),
+          DPR_FIELD(BlurPass, offset),
+          DPR_FIELD(BlurPass, taps)};
 }
 
 /// What the device says of every entry.

@@ -1,0 +1,171 @@
+#include "stages/blur.hpp"
+
+#include <utility>
+
+namespace dpr {
+namespace {
+
+cl_int to_int(std::size_t value) { return static_cast<cl_int>(value); }
+
+/// Without its lines and their width.
+shared::BlurPass pass_of(std::size_t out_length, std::size_t in_length, int out_step, int in_step, int offset,
+                         std::size_t taps) {
+  shared::BlurPass pass{};
+  pass.out_length = static_cast<cl_uint>(out_length);
+  pass.in_length = static_cast<cl_uint>(in_length);
+  pass.out_step = out_step;
+  pass.in_step = in_step;
+  pass.offset = offset;
+  pass.taps = to_int(taps);
+  return pass;
+}
+
+shared::BlurPass transposed(shared::BlurPass pass) {
+  std::swap(pass.out_length, pass.in_length);
+  std::swap(pass.out_step, pass.in_step);
+  pass.offset = pass.taps - 1 - pass.offset;
+  return pass;
+}
+
+}  // namespace
+
+Blur::Blur(Device::Impl& device)
+    : device_(device),
+      columns_(device, "blur.cl", "blur_columns"),
+      rows_(device, "blur.cl", "blur_rows"),
+      columns_scale_(device, "blur.cl", "blur_columns_scale"),
+      rows_scale_(device, "blur.cl", "blur_rows_scale"),
+      reduce_(device) {}
+
+Blur::Setting Blur::prepare(BlurKernel kernel) const {
+  Setting setting;
+  setting.weights.upload(device_, kernel.weights);
+  setting.weights_by_scale.upload(device_, kernel.weights_by_scale);
+  setting.reduce.upload(device_, kernel.reduce);
+  setting.expand.upload(device_, kernel.expand);
+  setting.kernel = std::move(kernel);
+  return setting;
+}
+
+Blur::Axis Blur::axis(std::size_t pixels) const {
+  const BlurKernel& k = now_.kernel;
+  const std::size_t in_frame = pixels * static_cast<std::size_t>(k.supersampling);
+  const std::size_t samples = in_frame + 2 * static_cast<std::size_t>(k.margin);
+  if (!is_coarse()) return {pixels, samples, samples, pixels};
+  // Nodes whose splines reach into the frame, from the one before it on.
+  const auto spacing = static_cast<std::size_t>(k.decimation);
+  const std::size_t out = (in_frame + 2 * spacing - 3) / spacing + 2;
+  return {pixels, samples, out + k.weights.size() - 1, out};
+}
+
+shared::BlurPass Blur::reduction(const Axis& axis) const {
+  const BlurKernel& k = now_.kernel;
+  const int radius = to_int(k.weights.size() / 2);
+  const int offset = k.margin + to_int(k.reduce.size() / 2) - (1 + radius) * k.decimation;
+  return pass_of(axis.in, axis.samples, k.decimation, 1, offset, k.reduce.size());
+}
+
+shared::BlurPass Blur::convolution(const Axis& axis) const {
+  const std::size_t taps = now_.kernel.weights.size();
+  const int step = is_coarse() ? 1 : now_.kernel.supersampling;
+  return pass_of(axis.out, axis.in, step, 1, to_int(taps) - 1, taps);
+}
+
+shared::BlurPass Blur::expansion(const Axis& axis) const {
+  const BlurKernel& k = now_.kernel;
+  // The middle of the spline of node 0, which has one before it, at sample 0.
+  const int offset = k.decimation + to_int(k.reduce.size() / 2) + k.supersampling - 1;
+  return pass_of(axis.pixels, axis.out, k.supersampling, k.decimation, offset, k.expand.size());
+}
+
+std::size_t Blur::vectors(std::size_t pixels) const {
+  const std::size_t in_vector = std::max<std::size_t>(1, device_.info.lanes / 4);
+  return (pixels + in_vector - 1) / in_vector;
+}
+
+void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                   const Buffer<cl_float4>& in, Buffer<cl_float4>& out) {
+  pass.lines = static_cast<cl_uint>(views);
+  pass.width = static_cast<cl_uint>(width);
+  out.resize(device_, views * pass.out_length * width);
+  columns_(views * pass.out_length * vectors(width), pass, weights, in, out);
+}
+
+void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
+                Buffer<cl_float4>& out) {
+  pass.lines = static_cast<cl_uint>(lines);
+  out.resize(device_, lines * pass.out_length);
+  rows_(lines * vectors(pass.out_length), pass, weights, in, out);
+}
+
+void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
+  const Axis x = axis(size.width), y = axis(size.height);
+  if (is_coarse()) {
+    columns(reduction(y), size.views, x.samples, now_.reduce, raster, scratch_);
+    rows(reduction(x), size.views * y.in, now_.reduce, scratch_, in_);
+  }
+  columns(convolution(y), size.views, x.in, now_.weights, is_coarse() ? in_ : raster, between_);
+  rows(convolution(x), size.views * y.out, now_.weights, between_, is_coarse() ? out_ : image);
+  if (is_coarse()) {
+    rows(expansion(x), size.views * y.out, now_.expand, out_, scratch_);
+    columns(expansion(y), size.views, x.pixels, now_.expand, scratch_, image);
+  }
+}
+
+void Blur::backward(const Size& size, const Buffer<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster) {
+  const Axis x = axis(size.width), y = axis(size.height);
+  if (is_coarse()) {
+    columns(transposed(expansion(y)), size.views, x.pixels, now_.expand, grad_image, scratch_);
+    rows(transposed(expansion(x)), size.views * y.out, now_.expand, scratch_, grad_out_);
+  }
+  rows(transposed(convolution(x)), size.views * y.out, now_.weights, is_coarse() ? grad_out_ : grad_image,
+       grad_between_);
+  columns(transposed(convolution(y)), size.views, x.in, now_.weights, grad_between_,
+          is_coarse() ? grad_in_ : grad_raster);
+  if (is_coarse()) {
+    rows(transposed(reduction(x)), size.views * y.in, now_.reduce, grad_in_, scratch_);
+    columns(transposed(reduction(y)), size.views, x.samples, now_.reduce, scratch_, grad_raster);
+  }
+}
+
+/// Nothing where they are there: an upload waits for the device.
+void Blur::upload_starts(std::size_t views, std::size_t stride) {
+  if (starts_stride_ == stride && starts_.size() == views + 1) return;
+  std::vector<cl_uint> starts;
+  for (std::size_t view = 0; view <= views; ++view) starts.push_back(static_cast<cl_uint>(view * stride));
+  starts_stride_ = 0;
+  starts_.upload(device_, starts);
+  starts_stride_ = stride;
+}
+
+void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
+                          const Buffer<cl_float4>& grad_image) {
+  const Axis x = axis(size.width), y = axis(size.height);
+  const std::size_t of_columns = y.out * vectors(x.in), of_rows = y.out * vectors(x.out);
+  const std::size_t stride = of_columns + of_rows;
+  products_.resize(device_, size.views * stride);
+  Pass along_columns = convolution(y), along_rows = convolution(x);
+  along_columns.lines = static_cast<cl_uint>(size.views);
+  along_columns.width = static_cast<cl_uint>(x.in);
+  along_rows.lines = static_cast<cl_uint>(size.views * y.out);
+  columns_scale_(size.views * of_columns, along_columns, static_cast<cl_uint>(stride), 0,
+                 now_.weights_by_scale, is_coarse() ? in_ : raster, grad_between_, products_);
+  rows_scale_(size.views * of_rows, along_rows, static_cast<cl_uint>(stride),
+              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), now_.weights_by_scale, between_,
+              is_coarse() ? grad_out_ : grad_image, products_);
+  upload_starts(size.views, stride);
+  reduce_({size.views * stride, 1, size.views, 1, starts_, products_}, grad_scale);
+}
+
+std::size_t Blur::bytes() const {
+  std::size_t bytes =
+      products_.capacity_bytes() + starts_.capacity_bytes() + grad_scale.capacity_bytes() + reduce_.bytes();
+  for (const Buffer<float>* buffer : {&now_.weights, &now_.weights_by_scale, &now_.reduce, &now_.expand})
+    bytes += buffer->capacity_bytes();
+  for (const Buffer<cl_float4>* buffer :
+       {&in_, &between_, &out_, &grad_in_, &grad_between_, &grad_out_, &scratch_})
+    bytes += buffer->capacity_bytes();
+  return bytes;
+}
+
+}  // namespace dpr

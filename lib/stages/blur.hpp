@@ -1,0 +1,79 @@
+// The blur of the rigid image by the noise of the pixel's position, its transpose and its derivative by the
+// scale.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "smoothing/blur_kernel.hpp"
+#include "stages/reduce.hpp"
+
+namespace dpr {
+
+/// Rasters are [view][height * supersampling + 2 * margin][width * supersampling + 2 * margin] samples,
+/// images [view][height][width] pixels; both RGBA.
+class Blur {
+ public:
+  explicit Blur(Device::Impl& device);
+
+  struct Size {
+    std::size_t views = 0, width = 0, height = 0;  ///< pixels of the image
+  };
+
+  /// A kernel on the device.
+  struct Setting {
+    BlurKernel kernel;
+    Buffer<float> weights, weights_by_scale, reduce, expand;
+  };
+  /// Everything about setting the kernel that can fail.
+  Setting prepare(BlurKernel kernel) const;
+  void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
+  void set_kernel(BlurKernel kernel) { set(prepare(std::move(kernel))); }
+  const BlurKernel& kernel() const { return now_.kernel; }
+
+  void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
+  /// The transpose of forward().
+  void backward(const Size& size, const Buffer<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster);
+  /// The derivative by the scale of sum grad_image . image, in `grad_scale`. After forward() and backward()
+  /// of the same raster and gradient.
+  void backward_scale(const Size& size, const Buffer<cl_float4>& raster, const Buffer<cl_float4>& grad_image);
+
+  Buffer<float> grad_scale;  ///< [view], by the scale in pixels
+
+  std::size_t bytes() const;
+
+ private:
+  /// Along one axis: samples of the raster, and what the convolution reads and writes: samples and pixels, or
+  /// nodes of the coarse grid.
+  struct Axis {
+    std::size_t pixels, samples, in, out;
+  };
+  Axis axis(std::size_t pixels) const;
+  bool is_coarse() const { return now_.kernel.decimation > 1; }
+
+  using Pass = shared::BlurPass;
+  Pass reduction(const Axis& axis) const;
+  Pass convolution(const Axis& axis) const;
+  Pass expansion(const Axis& axis) const;
+  void columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+               const Buffer<cl_float4>& in, Buffer<cl_float4>& out);
+  void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
+            Buffer<cl_float4>& out);
+  void upload_starts(std::size_t views, std::size_t stride);
+  std::size_t vectors(std::size_t pixels) const;
+
+  Device::Impl& device_;
+  Setting now_;
+  Kernel<Pass, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_;
+  Kernel<Pass, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> columns_scale_;
+  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> rows_scale_;
+  Reduce reduce_;
+  /// Input of the convolution, after its columns, after its rows; the first and the last of a coarse grid
+  /// only.
+  Buffer<cl_float4> in_, between_, out_;
+  Buffer<cl_float4> grad_in_, grad_between_, grad_out_;
+  Buffer<cl_float4> scratch_;
+  Buffer<float> products_;
+  Buffer<cl_uint> starts_;  ///< of the views' products
+  std::size_t starts_stride_ = 0;
+};
+
+}  // namespace dpr
