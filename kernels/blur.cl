@@ -3,6 +3,9 @@
 // fixed.
 #include "shared_types.h"
 
+/// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each other.
+#define DPR_BLUR_BLOCK 4
+
 #ifndef DPR_LANES
 #define DPR_LANES 8 /* the device's width; the host chooses it */
 #endif
@@ -12,173 +15,223 @@
 #define DPR_BLUR_PIXELS 4
 typedef float16 pixels_n;
 #define load_pixels(pointer) vload16(0, (global const float*)(pointer))
-#define load_lanes(lanes) vload16(0, (const float*)(lanes))
 #define store_pixels(value, pointer) vstore16(value, 0, (global float*)(pointer))
 #define store_lanes(value, lanes) vstore16(value, 0, (float*)(lanes))
 #elif DPR_LANES == 8
 #define DPR_BLUR_PIXELS 2
 typedef float8 pixels_n;
 #define load_pixels(pointer) vload8(0, (global const float*)(pointer))
-#define load_lanes(lanes) vload8(0, (const float*)(lanes))
 #define store_pixels(value, pointer) vstore8(value, 0, (global float*)(pointer))
 #define store_lanes(value, lanes) vstore8(value, 0, (float*)(lanes))
 #else
 #define DPR_BLUR_PIXELS 1
 typedef float4 pixels_n;
 #define load_pixels(pointer) (*(pointer))
-#define load_lanes(lanes) ((lanes)[0])
 #define store_pixels(value, pointer) (*(pointer) = (value))
 #define store_lanes(value, lanes) ((lanes)[0] = (value))
 #endif
 
-/// Where a work-item's pixels are.
+/// Where a work-item's outputs are.
 typedef struct {
-  size_t in, out; /* first element of the column's or row's input; first output pixel */
-  uint at, count; /* place of the first output along the pass; pixels, at most DPR_BLUR_PIXELS */
+  size_t in, out; /* first pixel of the column's or row's input; first output pixel */
+  int at;         /* place of the first output along the pass */
+  int steps;      /* outputs along the pass: at most DPR_BLUR_BLOCK along columns, that times DPR_BLUR_PIXELS along rows */
+  int count;      /* along columns: neighbours in a row, at most DPR_BLUR_PIXELS */
 } BlurPlace;
 
-/// Of the inputs [from, to) that count at an output; `last` is the tap of input 0.
+/// Inputs [from, to) that count for a block of outputs; `last` is the tap of input 0 for the first of them. Beyond its taps
+/// the table holds as many zeros as the block's other outputs are away.
 typedef struct {
   int from, to, last;
 } BlurTaps;
 
-static inline BlurTaps taps_at(const BlurPass p, uint at) {
+static inline int blur_padding(const BlurPass p) { return (DPR_BLUR_BLOCK - 1) * max(p.out_step, p.in_step); }
+
+static inline BlurTaps block_taps(const BlurPass p, int at) {
   BlurTaps t;
-  t.last = (int)at * p.out_step + p.offset;
-  const int before = t.last - p.taps + 1;
+  t.last = at * p.out_step + p.offset;
+  const int before = t.last - p.taps + 1, highest = t.last + (DPR_BLUR_BLOCK - 1) * p.out_step;
   t.from = before > 0 ? (before + p.in_step - 1) / p.in_step : 0;
-  t.to = t.last < 0 ? 0 : min(t.last / p.in_step + 1, (int)p.in_length);
+  t.to = highest < 0 ? 0 : min(highest / p.in_step + 1, (int)p.in_length);
+  t.last += blur_padding(p);
   return t;
 }
 
-static inline uint vectors_of(uint pixels) { return (pixels + DPR_BLUR_PIXELS - 1) / DPR_BLUR_PIXELS; }
+static inline uint groups_of(uint items, uint group) { return (items + group - 1) / group; }
 
-/// One work-item per (image, output row, vector of pixels).
+/// One work-item per (image, block of output rows, vector of pixels).
+static inline uint column_items_per_image(const BlurPass p) {
+  return groups_of(p.out_length, DPR_BLUR_BLOCK) * groups_of(p.width, DPR_BLUR_PIXELS);
+}
 static inline BlurPlace column_place(const BlurPass p, uint i) {
-  const uint vectors = vectors_of(p.width), x = i % vectors * DPR_BLUR_PIXELS, row = i / vectors;
+  const uint vectors = groups_of(p.width, DPR_BLUR_PIXELS), blocks = groups_of(p.out_length, DPR_BLUR_BLOCK);
+  const uint x = i % vectors * DPR_BLUR_PIXELS, image = i / vectors / blocks;
   BlurPlace place;
-  place.at = row % p.out_length;
-  place.in = (size_t)(row / p.out_length) * p.in_length * p.width + x;
-  place.out = (size_t)row * p.width + x;
-  place.count = min(p.width - x, (uint)DPR_BLUR_PIXELS);
+  place.at = (int)(i / vectors % blocks * DPR_BLUR_BLOCK);
+  place.in = (size_t)image * p.in_length * p.width + x;
+  place.out = ((size_t)image * p.out_length + (size_t)place.at) * p.width + x;
+  place.steps = min((int)p.out_length - place.at, DPR_BLUR_BLOCK);
+  place.count = min((int)(p.width - x), DPR_BLUR_PIXELS);
   return place;
 }
 
-/// One work-item per (row, vector of pixels).
+/// One work-item per (row, block of vectors of output pixels).
+#define DPR_BLUR_ROW (DPR_BLUR_BLOCK * DPR_BLUR_PIXELS)
+static inline uint row_items_per_line(const BlurPass p) { return groups_of(p.out_length, DPR_BLUR_ROW); }
 static inline BlurPlace row_place(const BlurPass p, uint i) {
-  const uint vectors = vectors_of(p.out_length), row = i / vectors;
+  const uint blocks = row_items_per_line(p), row = i / blocks;
   BlurPlace place;
-  place.at = i % vectors * DPR_BLUR_PIXELS;
+  place.at = (int)(i % blocks * DPR_BLUR_ROW);
   place.in = (size_t)row * p.in_length;
-  place.out = (size_t)row * p.out_length + place.at;
-  place.count = min(p.out_length - place.at, (uint)DPR_BLUR_PIXELS);
+  place.out = (size_t)row * p.out_length + (size_t)place.at;
+  place.steps = min((int)p.out_length - place.at, DPR_BLUR_ROW);
+  place.count = 1;
   return place;
 }
 
-static inline uint column_items(const BlurPass p) { return p.lines * p.out_length * vectors_of(p.width); }
-static inline uint row_items(const BlurPass p) { return p.lines * vectors_of(p.out_length); }
-
-/// Lanes from the place's count on hold nothing of use.
-static inline pixels_n column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
-                                   global const float4* restrict in) {
-  const BlurTaps t = taps_at(p, place.at);
-  pixels_n sum = 0.0f;
+/// Sums of a block of rows. Lanes from the place's count on hold nothing of use, as do rows from its steps on.
+static inline void column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
+                               global const float4* restrict in, pixels_n* sums) {
+  const BlurTaps t = block_taps(p, place.at);
+  pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
   for (int k = t.from; k < t.to; ++k) {
-    sum += weights[t.last - k * p.in_step] * load_pixels(in + place.in + (size_t)k * p.width);
+    const pixels_n value = load_pixels(in + place.in + (size_t)k * p.width);
+    global const float* w = weights + (t.last - k * p.in_step);
+    sum0 += w[0] * value;
+    sum1 += w[p.out_step] * value;
+    sum2 += w[2 * p.out_step] * value;
+    sum3 += w[3 * p.out_step] * value;
   }
+  sums[0] = sum0;
+  sums[1] = sum1;
+  sums[2] = sum2;
+  sums[3] = sum3;
+}
+
+/// Sums of DPR_BLUR_ROW pixels of a row, by blocks that share what they read. Those from the place's steps on hold nothing of
+/// use.
+static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place, global const float* restrict weights,
+                                     global const float4* restrict in, float4* sums) {
+  for (int first = 0; first < place.steps; first += DPR_BLUR_BLOCK) {
+    const BlurTaps t = block_taps(p, place.at + first);
+    float4 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
+    for (int k = t.from; k < t.to; ++k) {
+      const float4 value = in[place.in + (size_t)k];
+      global const float* w = weights + (t.last - k * p.in_step);
+      sum0 += w[0] * value;
+      sum1 += w[p.out_step] * value;
+      sum2 += w[2 * p.out_step] * value;
+      sum3 += w[3 * p.out_step] * value;
+    }
+    sums[first] = sum0;
+    sums[first + 1] = sum1;
+    sums[first + 2] = sum2;
+    sums[first + 3] = sum3;
+  }
+}
+
+/// The same where neighbouring outputs read neighbouring inputs, all of which are there: by vectors.
+static inline void row_sums_by_vector(const BlurPass p, const BlurPlace place, global const float* restrict weights,
+                                      global const float4* restrict in, float4* sums) {
+  global const float4* last = in + place.in + (place.at + p.offset);
+  global const float* w = weights + blur_padding(p);
+  pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
+  for (int k = 0; k < p.taps; ++k) {
+    sum0 += w[k] * load_pixels(last - k);
+    sum1 += w[k] * load_pixels(last - k + DPR_BLUR_PIXELS);
+    sum2 += w[k] * load_pixels(last - k + 2 * DPR_BLUR_PIXELS);
+    sum3 += w[k] * load_pixels(last - k + 3 * DPR_BLUR_PIXELS);
+  }
+  store_lanes(sum0, sums);
+  store_lanes(sum1, sums + DPR_BLUR_PIXELS);
+  store_lanes(sum2, sums + 2 * DPR_BLUR_PIXELS);
+  store_lanes(sum3, sums + 3 * DPR_BLUR_PIXELS);
+}
+
+static inline void row_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
+                            global const float4* restrict in, float4* sums) {
+  const int last = place.at + p.offset;
+  const int is_inside = last >= p.taps - 1 && last + DPR_BLUR_ROW <= (int)p.in_length;
+  if (p.in_step == 1 && p.out_step == 1 && is_inside) {
+    row_sums_by_vector(p, place, weights, in, sums);
+  } else {
+    row_sums_by_pixel(p, place, weights, in, sums);
+  }
+}
+
+static inline float dot_pixels(const float4* a, global const float4* restrict b, int count) {
+  float sum = 0.0f;
+  for (int k = 0; k < count; ++k) sum += dot(a[k], b[k]);
   return sum;
 }
 
-static inline float4 row_sum(const BlurPass p, uint at, global const float* restrict weights,
-                             global const float4* restrict in) {
-  const BlurTaps t = taps_at(p, at);
-  float4 sum = 0.0f;
-  for (int k = t.from; k < t.to; ++k) sum += weights[t.last - k * p.in_step] * in[k];
-  return sum;
-}
-
-/// The same along a row. Where neighbouring outputs read neighbouring inputs, and all of them are there, a vector is
-/// summed at once.
-static inline pixels_n row_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
-                                global const float4* restrict in) {
-  const int last = (int)place.at + p.offset;
-  if (p.in_step == 1 && p.out_step == 1 && last >= p.taps - 1 && last + DPR_BLUR_PIXELS <= (int)p.in_length) {
-    pixels_n sum = 0.0f;
-    for (int k = 0; k < p.taps; ++k) sum += weights[k] * load_pixels(in + place.in + (last - k));
-    return sum;
-  }
-  float4 lanes[DPR_BLUR_PIXELS];
-  for (uint lane = 0; lane < DPR_BLUR_PIXELS; ++lane) {
-    lanes[lane] = lane < place.count ? row_sum(p, place.at + lane, weights, in + place.in) : (float4)(0.0f);
-  }
-  return load_lanes(lanes);
-}
-
-static inline void store_sums(pixels_n sums, const BlurPlace place, global float4* restrict out) {
-  if (place.count == DPR_BLUR_PIXELS) {
-    store_pixels(sums, out + place.out);
-    return;
-  }
-  float4 lanes[DPR_BLUR_PIXELS];
-  store_lanes(sums, lanes);
-  for (uint lane = 0; lane < place.count; ++lane) out[place.out + lane] = lanes[lane];
-}
-
-static inline float dot_sums(pixels_n sums, const BlurPlace place, global const float4* restrict grad) {
-  float4 lanes[DPR_BLUR_PIXELS];
-  store_lanes(sums, lanes);
-  float total = 0.0f;
-  for (uint lane = 0; lane < place.count; ++lane) total += dot(lanes[lane], grad[place.out + lane]);
-  return total;
-}
-
-/// Along columns. NDRange: one work-item per (image, output row, vector of pixels).
-/// in   weights  float[tap]
+/// Along columns. NDRange: one work-item per (image, block of output rows, vector of pixels).
+/// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[image][in_length][width]
 /// out  out      float4[image][out_length][width]
 kernel void blur_columns(const BlurPass p, global const float* restrict weights, global const float4* restrict in,
                          global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
-  if (i >= column_items(p)) return;
+  if (i >= p.lines * column_items_per_image(p)) return;
   const BlurPlace place = column_place(p, i);
-  store_sums(column_sums(p, place, weights, in), place, out);
+  pixels_n sums[DPR_BLUR_BLOCK];
+  column_sums(p, place, weights, in, sums);
+  for (int row = 0; row < place.steps; ++row) {
+    global float4* to = out + place.out + (size_t)row * p.width;
+    if (place.count == DPR_BLUR_PIXELS) {
+      store_pixels(sums[row], to);
+    } else {
+      float4 lanes[DPR_BLUR_PIXELS];
+      store_lanes(sums[row], lanes);
+      for (int lane = 0; lane < place.count; ++lane) to[lane] = lanes[lane];
+    }
+  }
 }
 
-/// Along rows. NDRange: one work-item per (row, vector of output pixels).
-/// in   weights  float[tap]
+/// Along rows. NDRange: one work-item per (row, block of vectors of output pixels).
+/// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[row][in_length]
 /// out  out      float4[row][out_length]
 kernel void blur_rows(const BlurPass p, global const float* restrict weights, global const float4* restrict in,
                       global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
-  if (i >= row_items(p)) return;
+  if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
-  store_sums(row_sums(p, place, weights, in), place, out);
+  float4 sums[DPR_BLUR_ROW];
+  row_sums(p, place, weights, in, sums);
+  for (int k = 0; k < place.steps; ++k) out[place.out + (size_t)k] = sums[k];
 }
 
 /// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the gradient of the
 /// output. NDRange as blur_columns.
-/// in   weights  float[tap]  derivative
+/// in   weights  float[tap]  derivative, between zeros
 /// in   in, grad            as in and out of blur_columns
 /// out  products  float      that of work-item i of image v: [v * stride + first + i]
 kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint first,
                                global const float* restrict weights, global const float4* restrict in,
                                global const float4* restrict grad, global float* restrict products) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= column_items(p)) return;
-  const uint items = p.out_length * vectors_of(p.width);
+  const uint i = (uint)get_global_id(0), items = column_items_per_image(p);
+  if (i >= p.lines * items) return;
   const BlurPlace place = column_place(p, i);
-  products[i / items * stride + first + i % items] =
-      dot_sums(column_sums(p, place, weights, in), place, grad);
+  pixels_n sums[DPR_BLUR_BLOCK];
+  column_sums(p, place, weights, in, sums);
+  float product = 0.0f;
+  for (int row = 0; row < place.steps; ++row) {
+    float4 lanes[DPR_BLUR_PIXELS];
+    store_lanes(sums[row], lanes);
+    product += dot_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count);
+  }
+  products[i / items * stride + first + i % items] = product;
 }
 
 /// The same along rows, of which each image has `rows`.
 kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint first, const uint rows,
                             global const float* restrict weights, global const float4* restrict in,
                             global const float4* restrict grad, global float* restrict products) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= row_items(p)) return;
-  const uint items = rows * vectors_of(p.out_length);
+  const uint i = (uint)get_global_id(0), items = rows * row_items_per_line(p);
+  if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
-  products[i / items * stride + first + i % items] = dot_sums(row_sums(p, place, weights, in), place, grad);
+  float4 sums[DPR_BLUR_ROW];
+  row_sums(p, place, weights, in, sums);
+  products[i / items * stride + first + i % items] = dot_pixels(sums, grad + place.out, place.steps);
 }

@@ -28,7 +28,7 @@ struct PriorRow {
   /// 4e-4 of the peak, Cauchy's below 3e-2, starts to fall to zero.
   double pixel_reach = 0, pixel_taper = 0.5;
   /// Nodes of a coarse grid that a scale needs for an error below 1e-4 of the peak.
-  double pixel_nodes = 4.5;
+  double pixel_nodes = 4;
 
   bool has_score() const { return score != nullptr; }
   bool is_symmetric() const { return asymmetric_quantile == nullptr; }

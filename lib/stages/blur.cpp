@@ -1,9 +1,26 @@
 #include "stages/blur.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace dpr {
 namespace {
+
+/// As kernels/blur.cl has them: outputs of a work-item along its pass, pixels of a vector.
+constexpr std::size_t k_block = 4;
+std::size_t pixels_of_vector(const Device::Impl& device) {
+  return std::max<std::size_t>(1, device.info.lanes / 4);
+}
+
+std::size_t groups(std::size_t items, std::size_t group) { return (items + group - 1) / group; }
+
+/// Zeros beyond the taps, for the block's other outputs; the steps are at most `step`.
+std::vector<float> padded(const std::vector<float>& weights, int step) {
+  const std::size_t padding = (k_block - 1) * static_cast<std::size_t>(step);
+  std::vector<float> result(weights.size() + 2 * padding);
+  std::copy(weights.begin(), weights.end(), result.begin() + static_cast<std::ptrdiff_t>(padding));
+  return result;
+}
 
 cl_int to_int(std::size_t value) { return static_cast<cl_int>(value); }
 
@@ -39,10 +56,11 @@ Blur::Blur(Device::Impl& device)
 
 Blur::Setting Blur::prepare(BlurKernel kernel) const {
   Setting setting;
-  setting.weights.upload(device_, kernel.weights);
-  setting.weights_by_scale.upload(device_, kernel.weights_by_scale);
-  setting.reduce.upload(device_, kernel.reduce);
-  setting.expand.upload(device_, kernel.expand);
+  const int step = kernel.decimation > 1 ? 1 : kernel.supersampling;
+  setting.weights.upload(device_, padded(kernel.weights, step));
+  setting.weights_by_scale.upload(device_, padded(kernel.weights_by_scale, step));
+  setting.reduce.upload(device_, padded(kernel.reduce, kernel.decimation));
+  setting.expand.upload(device_, padded(kernel.expand, std::max(kernel.decimation, kernel.supersampling)));
   setting.kernel = std::move(kernel);
   return setting;
 }
@@ -78,9 +96,12 @@ shared::BlurPass Blur::expansion(const Axis& axis) const {
   return pass_of(axis.pixels, axis.out, k.supersampling, k.decimation, offset, k.expand.size());
 }
 
-std::size_t Blur::vectors(std::size_t pixels) const {
-  const std::size_t in_vector = std::max<std::size_t>(1, device_.info.lanes / 4);
-  return (pixels + in_vector - 1) / in_vector;
+std::size_t Blur::column_items(const Pass& pass, std::size_t width) const {
+  return groups(pass.out_length, k_block) * groups(width, pixels_of_vector(device_));
+}
+
+std::size_t Blur::row_items(const Pass& pass) const {
+  return groups(pass.out_length, k_block * pixels_of_vector(device_));
 }
 
 void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
@@ -88,14 +109,14 @@ void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer
   pass.lines = static_cast<cl_uint>(views);
   pass.width = static_cast<cl_uint>(width);
   out.resize(device_, views * pass.out_length * width);
-  columns_(views * pass.out_length * vectors(width), pass, weights, in, out);
+  columns_(views * column_items(pass, width), pass, weights, in, out);
 }
 
 void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
                 Buffer<cl_float4>& out) {
   pass.lines = static_cast<cl_uint>(lines);
   out.resize(device_, lines * pass.out_length);
-  rows_(lines * vectors(pass.out_length), pass, weights, in, out);
+  rows_(lines * row_items(pass), pass, weights, in, out);
 }
 
 void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
@@ -141,10 +162,10 @@ void Blur::upload_starts(std::size_t views, std::size_t stride) {
 void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                           const Buffer<cl_float4>& grad_image) {
   const Axis x = axis(size.width), y = axis(size.height);
-  const std::size_t of_columns = y.out * vectors(x.in), of_rows = y.out * vectors(x.out);
+  Pass along_columns = convolution(y), along_rows = convolution(x);
+  const std::size_t of_columns = column_items(along_columns, x.in), of_rows = y.out * row_items(along_rows);
   const std::size_t stride = of_columns + of_rows;
   products_.resize(device_, size.views * stride);
-  Pass along_columns = convolution(y), along_rows = convolution(x);
   along_columns.lines = static_cast<cl_uint>(size.views);
   along_columns.width = static_cast<cl_uint>(x.in);
   along_rows.lines = static_cast<cl_uint>(size.views * y.out);

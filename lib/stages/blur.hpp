@@ -58,7 +58,9 @@ class Blur {
   void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
             Buffer<cl_float4>& out);
   void upload_starts(std::size_t views, std::size_t stride);
-  std::size_t vectors(std::size_t pixels) const;
+  /// Work-items of a pass of one image's columns, and of one row.
+  std::size_t column_items(const Pass& pass, std::size_t width) const;
+  std::size_t row_items(const Pass& pass) const;
 
   Device::Impl& device_;
   Setting now_;
