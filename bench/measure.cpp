@@ -9,7 +9,7 @@
 
 #include "costs.hpp"
 #include "device/context.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "resident_memory.hpp"
 #include "stages.hpp"
 

@@ -10,8 +10,7 @@
 //
 // y depends on X_k, given all the other noise, only where k would win, and on Z_k only where k covers: the rest has
 // mean zero. A fragment so far inside or outside that no noise changes its sign draws no X.
-#include "noise.h"
-#include "pixel.h"
+#include "sampled_pixel.h"
 
 #ifndef DPR_OCCUPANCY_PRIOR
 #define DPR_OCCUPANCY_PRIOR gaussian
@@ -20,57 +19,45 @@
 #define DPR_DEPTH_PRIOR gaussian
 #endif
 
-/// Fragments by way of the pixels' lists, and whose noise they take.
+/// Fragments by way of the pixels' lists, without occupancies; their distances, and whose noise they take.
 typedef struct {
-  global const uint* list;
-  global const float *distance, *depth, *red, *green, *blue;
-  global const uint *fragment_pair, *pair_face;
+  Fragments fragments;
+  global const float* distance;  // float[fragment]
+  FaceOf face;
 } Layers;
 
 /// What a pixel's fragments have in common.
 typedef struct {
-  uint first, last;    // the pixel's run of the fragment lists
-  uint view, in_view;  // the pixel's view, and its number in it
-  float nearest;       // view depth of the nearest fragment
-  float depth_scale;   // d beta / d (nearest - depth)
-  int rigid;           // the winner without noise
+  SampledRun run;
+  float nearest;      // view depth of the nearest fragment
+  float depth_scale;  // d beta / d (nearest - depth)
 } Pixel;
-
-/// A fragment by its place in the pixel's run; where a winner is meant, -1 is the background.
-static inline uint fragment_of(const Pixel q, const Layers f, int place) { return f.list[q.first + (uint)place]; }
 
 static inline Layers make_layers(global const uint* list, global const float* distance, global const float* depth,
                                  global const float* red, global const float* green, global const float* blue,
                                  global const uint* fragment_pair, global const uint* pair_face) {
   Layers f;
-  f.list = list;
+  f.fragments = make_fragments(list, depth, 0, 0, red, green, blue);
   f.distance = distance;
-  f.depth = depth;
-  f.red = red;
-  f.green = green;
-  f.blue = blue;
-  f.fragment_pair = fragment_pair;
-  f.pair_face = pair_face;
+  f.face.fragment_pair = fragment_pair;
+  f.face.pair_face = pair_face;
   return f;
 }
 
 static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                global const uint* restrict starts, const Layers f) {
   Pixel q;
-  q.view = pixel / p.pixels_per_view;
-  q.in_view = pixel - q.view * p.pixels_per_view;
-  q.first = starts[pixel];
-  q.last = starts[pixel + 1];
-  q.depth_scale = views[q.view].inverse_range / p.gamma;
+  q.run = locate_run(p, pixel, starts);
+  q.depth_scale = views[q.run.view].inverse_range / p.gamma;
   q.nearest = INFINITY;
-  q.rigid = -1;
   float nearest_inside = INFINITY;
-  for (int place = 0; place < (int)(q.last - q.first); ++place) {
-    const uint k = fragment_of(q, f, place);
-    q.nearest = f.depth[k] < q.nearest ? f.depth[k] : q.nearest;
-    if (signbit(f.distance[k]) || f.depth[k] >= nearest_inside) continue;
-    nearest_inside = f.depth[k];
-    q.rigid = place;
+  for (int place = 0; place < run_length(q.run); ++place) {
+    const uint k = fragment_at(q.run, f.fragments, place);
+    const float depth = f.fragments.depth[k];
+    q.nearest = depth < q.nearest ? depth : q.nearest;
+    if (signbit(f.distance[k]) || depth >= nearest_inside) continue;
+    nearest_inside = depth;
+    q.run.rigid = place;
   }
   return q;
 }
@@ -84,8 +71,8 @@ typedef struct {
 static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, const Layers f, uint k) {
   Coordinates c;
   c.x = f.distance[k] / p.sigma;
-  c.beta = (q.nearest - f.depth[k]) * q.depth_scale;
-  c.face = f.pair_face[f.fragment_pair[k]] - q.view * p.faces;
+  c.beta = (q.nearest - f.fragments.depth[k]) * q.depth_scale;
+  c.face = face_of_fragment(p, q.run, f.face, k);
   return c;
 }
 
@@ -93,12 +80,12 @@ static inline int never_covers(const Coordinates c) { return c.x + highest_noise
 static inline int always_covers(const Coordinates c) { return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f; }
 
 DPR_ALWAYS_INLINE realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
-  const NoiseName name = name_noise(p.first_view + q.view, q.in_view, c.face, DPR_STAGE_OCCUPANCY);
+  const NoiseName name = name_of_noise(p, q.run, c.face, DPR_STAGE_OCCUPANCY);
   return draw_noise(p.sampling, DPR_OCCUPANCY_PRIOR, name, block);
 }
 
 DPR_ALWAYS_INLINE realn draw_depth(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
-  const NoiseName name = name_noise(p.first_view + q.view, q.in_view, c.face, DPR_STAGE_AGGREGATE);
+  const NoiseName name = name_of_noise(p, q.run, c.face, DPR_STAGE_AGGREGATE);
   return draw_noise(p.sampling, DPR_DEPTH_PRIOR, name, block);
 }
 
@@ -124,10 +111,10 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
   Lead lead;
   lead.winner = (intn)(-1);
   lead.largest = (realn)(-INFINITY);
-  for (int turn = q.rigid < 0 ? 0 : -1; turn < (int)(q.last - q.first); ++turn) {
-    if (turn == q.rigid) continue;
-    const int place = turn < 0 ? q.rigid : turn;
-    const Coordinates c = load_fragment(p, q, f, fragment_of(q, f, place));
+  for (int turn = q.run.rigid < 0 ? 0 : -1; turn < run_length(q.run); ++turn) {
+    if (turn == q.run.rigid) continue;
+    const int place = turn < 0 ? q.run.rigid : turn;
+    const Coordinates c = load_fragment(p, q, f, fragment_at(q.run, f.fragments, place));
     if (never_covers(c) || !any_lane(could_win(lead, c))) continue;
     intn covers = (intn)(-1);
     if (!always_covers(c)) {
@@ -143,12 +130,6 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
     lead.largest = choose(wins, c.beta + z, lead.largest);
   }
   return lead;
-}
-
-static inline float4 seen_color(const AggregateParams p, const Pixel q, const Layers f, int winner) {
-  if (winner < 0) return (float4)(p.background.xyz, 0.0f);
-  const uint k = fragment_of(q, f, winner);
-  return (float4)(f.red[k], f.green[k], f.blue[k], 1.0f);
 }
 
 /// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, and
@@ -173,11 +154,7 @@ kernel void aggregate_joint_sampled_forward(const AggregateParams p, global cons
   float4 sum = 0.0f;
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     NoiseCache unused;
-    int winners[DPR_WIDTH];
-    store_n(find_winners(p, q, f, block, &unused).winner, 0, winners);
-    for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
-      sum += seen_color(p, q, f, winners[lane]);
-    }
+    sum = add_winners(p, q.run, f.fragments, block, find_winners(p, q, f, block, &unused).winner, sum);
   }
   image[pixel] = sum / (float)p.sampling.samples;
 }
@@ -193,26 +170,11 @@ typedef struct {
   ScaleSums sigma, gamma;
 } PixelSums;
 
-/// y of every sample of a block, relative to `rigid`, and 1 to the wins of each winner.
-static inline realn block_values(const AggregateParams p, const Pixel q, const Layers f, float4 grad, float rigid,
-                                 uint block, intn winner, global float* wins) {
-  int winners[DPR_WIDTH];
-  float y[DPR_WIDTH];
-  store_n(winner, 0, winners);
-  for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-    y[lane] = 0.0f;
-    if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
-    y[lane] = dot(grad, seen_color(p, q, f, winners[lane])) - rigid;
-    if (winners[lane] >= 0) wins[fragment_of(q, f, winners[lane])] += 1.0f;
-  }
-  return load_n(0, y);
-}
-
 /// Adds a block's scores of one fragment.
 DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block, int place,
                                     const Lead lead, const NoiseCache* cache, realn grouped, const FragmentSums out,
                                     PixelSums* sums) {
-  const uint k = fragment_of(q, f, place);
+  const uint k = fragment_at(q.run, f.fragments, place);
   const Coordinates c = load_fragment(p, q, f, k);
   if (never_covers(c) || !any_lane(could_win(lead, c))) return;
   const intn counts = sample_counts(p.sampling, block);
@@ -241,19 +203,19 @@ DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, cons
 static inline PixelSums add_samples(const AggregateParams p, const Pixel q, const Layers f, float4 grad,
                                     const FragmentSums out) {
   PixelSums sums = {0.0f, {(realn)(0.0f), (realn)(0.0f)}, {(realn)(0.0f), (realn)(0.0f)}};
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
+  for (uint i = q.run.first; i < q.run.last; ++i) {
+    const uint k = f.fragments.list[i];
     out.wins[k] = out.by_distance[k] = out.distance_scores[k] = out.by_depth[k] = out.depth_scores[k] = 0.0f;
   }
-  const float rigid = p.sampling.baseline * dot(grad, seen_color(p, q, f, q.rigid));
+  const float rigid = rigid_value(p, q.run, f.fragments, grad);
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     NoiseCache cache;
     const Lead lead = find_winners(p, q, f, block, &cache);
-    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, out.wins);
+    const realn y = sample_values(p, q.run, f.fragments, grad, rigid, block, lead.winner, out.wins);
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
     sums.y += sum_lanes(y);
-    for (int place = 0; place < (int)(q.last - q.first); ++place) {
+    for (int place = 0; place < run_length(q.run); ++place) {
       add_fragment(p, q, f, block, place, lead, &cache, grouped, out, &sums);
     }
   }
@@ -285,7 +247,7 @@ kernel void aggregate_joint_sampled_backward(
     const PixelSums sums = add_samples(p, q, f, grad, collected);
     by_sigma = scale_estimate(p.sampling, sums.sigma, sums.y) / p.sigma;
     by_gamma = scale_estimate(p.sampling, sums.gamma, sums.y) / p.gamma;
-    for (uint i = q.first; i < q.last; ++i) {
+    for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] / (float)p.sampling.samples;
       background_weight -= weight;

@@ -7,34 +7,18 @@
 // with y = <dL/dcolour, colour of the winner>, the baselines b of noise.h, and the sums over the slots that could have
 // won in the sample's block, given the noise of the others: y does not depend on the rest. The sum over all d of them
 // has the constant d: the change of variables has the determinant gamma^-d.
-#include "noise.h"
-#include "pixel.h"
+#include "sampled_pixel.h"
 
-/// The face index that names the background's noise.
-#define DPR_BACKGROUND_FACE 0xffffffffu
-
-/// What a pixel's slots have in common, and what names their noise.
+/// What a pixel's slots have in common. A slot is a place in the pixel's run, or -1 for the background.
 typedef struct {
+  SampledRun run;
   BarrierPixel barrier;
-  uint view, in_view;  // the pixel's view, and its number in it
-  int slots;           // beside the background's
-  int rigid;           // the winner without noise
 } Pixel;
-
-/// What says which face's noise a fragment takes.
-typedef struct {
-  global const uint *fragment_pair, *pair_face;
-} FaceOf;
-
-/// A slot is a place in the pixel's run, or -1 for the background.
-static inline uint fragment_of(const Pixel q, const Fragments f, int slot) {
-  return f.list[q.barrier.first + (uint)slot];
-}
 
 /// DPR_LOG_ZERO for a fragment with p = 0.
 static inline float slot_beta(const Pixel q, const Fragments f, int slot) {
   if (slot < 0) return q.barrier.background;
-  const uint k = fragment_of(q, f, slot);
+  const uint k = fragment_at(q.run, f, slot);
   const float log_p = f.log_occupancy[k];
   return log_p > DPR_LOG_ZERO ? barrier_beta(q.barrier, f.depth[k], log_p) : DPR_LOG_ZERO;
 }
@@ -42,26 +26,23 @@ static inline float slot_beta(const Pixel q, const Fragments f, int slot) {
 static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                global const uint* restrict starts, const Fragments f) {
   Pixel q;
+  q.run = locate_run(p, pixel, starts);
   q.barrier = load_barrier_pixel(p, pixel, views, starts, f);
-  q.view = pixel / p.pixels_per_view;
-  q.in_view = pixel - q.view * p.pixels_per_view;
-  q.slots = (int)(q.barrier.last - q.barrier.first);
-  q.rigid = -1;
   float largest = q.barrier.background;
-  for (int slot = 0; slot < q.slots; ++slot) {
+  for (int slot = 0; slot < run_length(q.run); ++slot) {
     const float beta = slot_beta(q, f, slot);
     if (beta <= largest) continue;
     largest = beta;
-    q.rigid = slot;
+    q.run.rigid = slot;
   }
   return q;
 }
 
 static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
                                    int slot) {
-  uint index = DPR_BACKGROUND_FACE;
-  if (slot >= 0) index = face.pair_face[face.fragment_pair[fragment_of(q, f, slot)]] - q.view * p.faces;
-  return name_noise(p.first_view + q.view, q.in_view, index, DPR_STAGE_AGGREGATE);
+  const uint index =
+      slot < 0 ? DPR_BACKGROUND_FACE : face_of_fragment(p, q.run, face, fragment_at(q.run, f, slot));
+  return name_of_noise(p, q.run, index, DPR_STAGE_AGGREGATE);
 }
 
 /// The leading slots of a block's samples.
@@ -80,11 +61,11 @@ static inline int could_win(const Lead lead, float beta) {
 static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
                                 uint block, realn cache[DPR_NOISE_CACHE]) {
   Lead lead;
-  lead.winner = (intn)(q.rigid);
+  lead.winner = (intn)(q.run.rigid);
   lead.largest = (realn)(-INFINITY);
-  for (int turn = -2; turn < q.slots; ++turn) {
-    if (turn == q.rigid) continue;
-    const int slot = turn == -2 ? q.rigid : turn;
+  for (int turn = -2; turn < run_length(q.run); ++turn) {
+    if (turn == q.run.rigid) continue;
+    const int slot = turn == -2 ? q.run.rigid : turn;
     const float beta = slot_beta(q, f, slot);
     if (!could_win(lead, beta)) continue;
     const realn noise = draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
@@ -94,10 +75,6 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
     lead.largest = greater(value, lead.largest);
   }
   return lead;
-}
-
-static inline float3 slot_color(const AggregateParams p, const Pixel q, const Fragments f, int slot) {
-  return slot < 0 ? p.background.xyz : fragment_color(f, fragment_of(q, f, slot));
 }
 
 /// One work-item per pixel. Buffers as in aggregate.cl, and
@@ -118,51 +95,32 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const FaceOf face = {fragment_pair, pair_face};
   const Pixel q = load_pixel(p, pixel, views, starts, f);
-  float3 sum = 0.0f;
+  float4 sum = 0.0f;
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     realn unused[DPR_NOISE_CACHE];
-    int winners[DPR_WIDTH];
-    store_n(find_winners(p, q, f, face, block, unused).winner, 0, winners);
-    for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
-      sum += slot_color(p, q, f, winners[lane]);
-    }
+    sum = add_winners(p, q.run, f, block, find_winners(p, q, f, face, block, unused).winner, sum);
   }
-  image[pixel] = (float4)(sum / (float)p.sampling.samples, 1.0f - q.barrier.transparency);
-}
-
-/// y of every sample of a block, relative to `rigid`, and 1 to the weight of each winner.
-static inline realn block_values(const AggregateParams p, const Pixel q, const Fragments f, float3 grad, float rigid,
-                                 uint block, intn winner, global float* weight) {
-  int winners[DPR_WIDTH];
-  float y[DPR_WIDTH];
-  store_n(winner, 0, winners);
-  for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-    y[lane] = 0.0f;
-    if (DPR_WIDTH * block + lane >= p.sampling.samples) continue;
-    y[lane] = dot(grad, slot_color(p, q, f, winners[lane])) - rigid;
-    if (winners[lane] >= 0) weight[fragment_of(q, f, winners[lane])] += 1.0f;
-  }
-  return load_n(0, y);
+  image[pixel] = (float4)(sum.xyz / (float)p.sampling.samples, 1.0f - q.barrier.transparency);
 }
 
 /// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every slot.
 /// Returns sum y.
 static inline float add_samples(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                float3 grad, global float* weight, global float* by_score, global float* score_sum,
+                                float4 grad, global float* weight, global float* by_score, global float* score_sum,
                                 ScaleSums* gamma) {
   float y_sum = 0.0f;
-  for (uint i = q.barrier.first; i < q.barrier.last; ++i) {
+  for (uint i = q.run.first; i < q.run.last; ++i) {
     weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
   }
-  const float rigid = p.sampling.baseline * dot(grad, slot_color(p, q, f, q.rigid));
+  const float rigid = rigid_value(p, q.run, f, grad);
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
     realn cache[DPR_NOISE_CACHE];
     const Lead lead = find_winners(p, q, f, face, block, cache);
-    const realn y = block_values(p, q, f, grad, rigid, block, lead.winner, weight);
+    const realn y = sample_values(p, q.run, f, grad, rigid, block, lead.winner, weight);
     if (p.sampling.leave_out == 0.0f && !any_lane(y != 0.0f)) continue;
     const realn grouped = add_group(p.sampling, y);
     y_sum += sum_lanes(y);
-    for (int slot = -1; slot < q.slots; ++slot) {
+    for (int slot = -1; slot < run_length(q.run); ++slot) {
       if (!could_win(lead, slot_beta(q, f, slot))) continue;
       const realn noise = slot + 1 < DPR_NOISE_CACHE
                               ? cache[slot + 1]
@@ -170,8 +128,8 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
       const realn noise_scores = noise_score(DPR_PRIOR, noise);
       const float2 scores = add_scores(noise, noise_scores, sample_counts(p.sampling, block), grouped, gamma);
       if (slot < 0) continue;
-      by_score[fragment_of(q, f, slot)] += scores.x;
-      score_sum[fragment_of(q, f, slot)] += scores.y;
+      by_score[fragment_at(q.run, f, slot)] += scores.x;
+      score_sum[fragment_at(q.run, f, slot)] += scores.y;
     }
   }
   return y_sum;
@@ -197,9 +155,11 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
   if (starts[pixel] != starts[pixel + 1]) {
     const Pixel q = load_pixel(p, pixel, views, starts, f);
     ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
-    const float y_sum = add_samples(p, q, f, face, grad.xyz, grad_red, grad_depth, grad_log_occupancy, &gamma);
+    // The alpha is not sampled: y is of the colour alone.
+    const float4 grad_color = (float4)(grad.xyz, 0.0f);
+    const float y_sum = add_samples(p, q, f, face, grad_color, grad_red, grad_depth, grad_log_occupancy, &gamma);
     grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
-    for (uint i = q.barrier.first; i < q.barrier.last; ++i) {
+    for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] / (float)p.sampling.samples;
       const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], y_sum);

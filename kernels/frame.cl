@@ -8,4 +8,4 @@
 #include "shade.cl"
 #include "gather.cl"
 #include "reduce.cl"
-#include "loss.cl"
+#include "image_loss.cl"

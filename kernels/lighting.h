@@ -21,8 +21,10 @@ static inline Vec3n make_vec3n(realn x, realn y, realn z) {
   return v;
 }
 static inline Vec3n splat3(float4 v) { return make_vec3n((realn)(v.x), (realn)(v.y), (realn)(v.z)); }
+static inline Vec3n zero3n(void) { return make_vec3n(0.0f, 0.0f, 0.0f); }
 static inline realn dot3n(Vec3n a, Vec3n b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static inline Vec3n sub3n(Vec3n a, Vec3n b) { return make_vec3n(a.x - b.x, a.y - b.y, a.z - b.z); }
+static inline Vec3n mul3n(Vec3n a, Vec3n b) { return make_vec3n(a.x * b.x, a.y * b.y, a.z * b.z); }
 static inline Vec3n scale3n(Vec3n a, realn s) { return make_vec3n(a.x * s, a.y * s, a.z * s); }
 /// a + b * s
 static inline Vec3n mad3n(Vec3n b, realn s, Vec3n a) {
@@ -68,7 +70,7 @@ static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, flo
 static inline void light_point(const LightingParams lp, global const Light* restrict lights, Vec3n position,
                                Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
   *factor = splat3(lp.ambient);
-  *specular = splat3((float4)(0.0f));
+  *specular = zero3n();
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights[l].position, lp.shininess);
     *factor = mad3n(splat3(lights[l].diffuse), t.lambert, *factor);

@@ -42,16 +42,14 @@ kernel void shade_backward(const FrameParams p, const uint last_pair, global con
   const uint4 corners = face_colors[pair_face[pair] - view * p.faces] + view * p.color_stride;
   const float4 base = colors[corners.x], along1 = colors[corners.y] - base, along2 = colors[corners.z] - base;
   const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
-  const realn zero = 0.0f;
+  const uint last = end_of_fragments(first, masks[pair]);
   realn sum[9];
 #pragma unroll
-  for (int k = 0; k < 9; ++k) sum[k] = zero;
+  for (int k = 0; k < 9; ++k) sum[k] = 0.0f;
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const realn r = choose(real_fragment, load_n(i, grad_red), zero);
-    const realn g = choose(real_fragment, load_n(i, grad_green), zero);
-    const realn b = choose(real_fragment, load_n(i, grad_blue), zero);
+    const realn r = load_gradient(i, last, grad_red);
+    const realn g = load_gradient(i, last, grad_green);
+    const realn b = load_gradient(i, last, grad_blue);
     const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2), c0 = 1.0f - c1 - c2;
     store_n(r * along1.x + g * along1.y + b * along1.z, i, grad_bary1);
     store_n(r * along2.x + g * along2.y + b * along2.z, i, grad_bary2);

@@ -101,6 +101,12 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
   }
 }
 
+/// dL/dRGB of the fragments from `i` on; zero from `last` on.
+static inline Vec3n load_color_gradient(uint i, uint last, global const float* restrict red,
+                                        global const float* restrict green, global const float* restrict blue) {
+  return make_vec3n(load_gradient(i, last, red), load_gradient(i, last, green), load_gradient(i, last, blue));
+}
+
 /// Gradients of a surface's corners, as sums over lanes.
 typedef struct {
   Vec3n color[3], position[3], normal[3], factor[3], specular[3], eye;
@@ -118,9 +124,9 @@ static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) { return
 static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights, float4 eye,
                                         Vec3n position, Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
                                         Vec3n* grad_position, Vec3n* grad_normal, Vec3n* grad_eye) {
-  *grad_position = splat3((float4)(0.0f));
-  *grad_normal = splat3((float4)(0.0f));
-  Vec3n grad_light = splat3((float4)(0.0f));
+  *grad_position = zero3n();
+  *grad_normal = zero3n();
+  Vec3n grad_light = zero3n();
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights[l].position, lp.shininess);
     light_term_backward(t, lights[l], lp.shininess, normal, grad_factor, grad_specular, grad_position, grad_normal,
@@ -134,8 +140,7 @@ static inline void shade_fragment_backward(const Surface s, const LightingParams
                                            SurfaceGradients* g, realn* grad_bary1, realn* grad_bary2) {
   const Shaded f = shade_fragment(s, lp, lights, c1, c2);
   const realn c[3] = {1.0f - c1 - c2, c1, c2};
-  const Vec3n grad_base = make_vec3n(grad.x * f.factor.x, grad.y * f.factor.y, grad.z * f.factor.z);
-  const Vec3n grad_factor = make_vec3n(grad.x * f.base.x, grad.y * f.base.y, grad.z * f.base.z);
+  const Vec3n grad_base = mul3n(grad, f.factor), grad_factor = mul3n(grad, f.base);
   add_corners(g->color, grad_base, c);
   *grad_bary1 = along_corner(s.color, 1, grad_base);
   *grad_bary2 = along_corner(s.color, 2, grad_base);
@@ -203,19 +208,14 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
   if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
-  const Vec3n zero3 = splat3((float4)(0.0f));
   SurfaceGradients g;
 #pragma unroll
-  for (int k = 0; k < 3; ++k) g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3;
-  g.eye = zero3;
+  for (int k = 0; k < 3; ++k) g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3n();
+  g.eye = zero3n();
   const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
-  const realn zero = 0.0f;
+  const uint last = end_of_fragments(first, masks[pair]);
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const Vec3n grad = make_vec3n(choose(real_fragment, load_n(i, grad_red), zero),
-                                  choose(real_fragment, load_n(i, grad_green), zero),
-                                  choose(real_fragment, load_n(i, grad_blue), zero));
+    const Vec3n grad = load_color_gradient(i, last, grad_red, grad_green, grad_blue);
     realn b1, b2;
     shade_fragment_backward(s, lp, lights, load_n(i, bary1), load_n(i, bary2), grad, &g, &b1, &b2);
     store_n(b1, i, grad_bary1);
@@ -271,19 +271,14 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
   if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
-  const Vec3n zero3 = splat3((float4)(0.0f));
-  Vec3n sum[4] = {zero3, zero3, zero3, zero3};
+  Vec3n sum[4] = {zero3n(), zero3n(), zero3n(), zero3n()};
   const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
-  const realn zero = 0.0f;
+  const uint last = end_of_fragments(first, masks[pair]);
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const Vec3n grad = make_vec3n(choose(real_fragment, load_n(i, grad_red), zero),
-                                  choose(real_fragment, load_n(i, grad_green), zero),
-                                  choose(real_fragment, load_n(i, grad_blue), zero));
+    const Vec3n grad = load_color_gradient(i, last, grad_red, grad_green, grad_blue);
     const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2);
-    const Vec3n grad_factor = make_vec3n(grad.x * f.base.x, grad.y * f.base.y, grad.z * f.base.z);
+    const Vec3n grad_factor = mul3n(grad, f.base);
     sum[3] = mad3n(grad_factor, (realn)(1.0f), sum[3]);
     if (light >= lp.lights) continue;
     if (DPR_SHADING != DPR_GOURAUD) {

@@ -67,15 +67,12 @@ using float4 = cl_float4;
 #define DPR_PIXEL_CHANNELS 5
 
 /// Channels of the auxiliary outputs, and the face of a pixel that shows none.
-#define DPR_AOV_DEPTH 0
-#define DPR_AOV_NORMAL 1       /* 3 */
-#define DPR_AOV_BARYCENTRICS 4 /* of corners 1 and 2: 2 */
-#define DPR_AOV_EFFECTIVE_FACES 6
-#define DPR_AOV_CHANNELS 7
+#define DPR_AUXILIARY_DEPTH 0
+#define DPR_AUXILIARY_NORMAL 1       /* 3 */
+#define DPR_AUXILIARY_BARYCENTRICS 4 /* of corners 1 and 2: 2 */
+#define DPR_AUXILIARY_EFFECTIVE_FACES 6
+#define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
-
-/// Sums of a loss over the pixels of a view: squared error, absolute error, intersection and union of the alphas.
-#define DPR_LOSS_SUMS 4
 
 /// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge lengths; and its
 /// hinges: 1 - cos, and that squared.
@@ -172,13 +169,6 @@ typedef struct Slot {
   float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
   uint fragment;   /* or DPR_BACKGROUND_SLOT */
 } Slot;
-
-/// Weights of the losses, and the sizes to average over.
-typedef struct LossParams {
-  DPR_SHARED_NAME(LossParams)
-  float mse, l1;
-  uint views, pixels_per_view;
-} LossParams;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its sizes.
 typedef struct MeshLossParams {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 
 namespace dpr {

@@ -9,7 +9,7 @@
 
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/scene.hpp"
 

@@ -11,7 +11,7 @@
 #include "dpr/annealed_smoothing.hpp"
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/scene.hpp"
 

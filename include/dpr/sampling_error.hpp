@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 
 namespace dpr {

@@ -10,7 +10,7 @@
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/mesh_loss.hpp"
 #include "dpr/smoothing.hpp"

@@ -4,11 +4,12 @@
 #include <memory>
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
 #include "cli/target.hpp"
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 
 namespace dpr::cli {
@@ -99,7 +100,7 @@ void add_gradient_command(CLI::App& application, CommonOptions& common) {
   const auto options = std::make_shared<GradientOptions>();
   command->add_option("--scene", options->scene, "Scene file")->required()->type_name("S.json");
   command->add_option("--target", options->target, "Image to compare with")->required()->type_name("T.exr");
-  command->add_option("--loss", options->loss, "Which loss; mse by default")->type_name("mse|l1|silhouette");
+  command->add_option("--loss", options->loss, "Which loss; mse by default")->type_name(joined(loss_names()));
   command->add_option("-o,--output", options->output, "Gradients to write")->required()->type_name("G.json");
   add_common_options(*command, common);
   command->footer("Example: dpr gradient --scene scene.json --target target.exr --loss l1 -o gradient.json");

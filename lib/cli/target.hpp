@@ -4,7 +4,7 @@
 #include <string>
 
 #include "dpr/image.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 
 namespace dpr::cli {
 

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "cli/folder.hpp"
 #include "cli/json.hpp"
@@ -14,7 +15,6 @@
 #include "cli/provenance.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
-#include "smoothing/choice_names.hpp"
 
 namespace dpr::cli {
 namespace {

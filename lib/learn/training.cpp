@@ -9,13 +9,13 @@
 #include <sstream>
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/smoothing_options.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
 #include "mesh/adjacency.hpp"
-#include "smoothing/choice_names.hpp"
 #include "smoothing/priors.hpp"
 #include "torch/errors.hpp"
 #include "torch/render.hpp"

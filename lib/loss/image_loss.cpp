@@ -1,27 +1,36 @@
-// Losses on the device.
-#include "dpr/loss.hpp"
+// Losses between images on the device; their formulas are in kernels/loss_*.h.
+#include "dpr/image_loss.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/frame.hpp"
 
 namespace dpr {
 namespace {
 
-constexpr std::array<std::string_view, 3> k_names{"mse", "l1", "silhouette"};
+#define DPR_LOSS_ROW(name)                                                                       \
+  ImageLossRow{#name, &LossWeights::name, shared::name##_first, shared::name##_reads_alpha != 0, \
+               shared::name##_value},
+constexpr std::array k_losses{DPR_IMAGE_LOSSES(DPR_LOSS_ROW)};
+#define DPR_LOSS_ORDER(name) static_assert(static_cast<int>(LossKind::name) == shared::name##_number);
+DPR_IMAGE_LOSSES(DPR_LOSS_ORDER)
 
 void check_weights(const LossWeights& weights) {
-  for (const float weight : {weights.mse, weights.l1, weights.silhouette}) {
+  float sum = 0;
+  for (const ImageLossRow& loss : k_losses) {
+    const float weight = weights.*loss.weight;
     if (!(weight >= 0) || !std::isfinite(weight)) {
       throw InvalidArgument("weight (loss)", std::to_string(weight), "a finite number, at least 0");
     }
+    sum += weight;
   }
-  if (weights.mse + weights.l1 + weights.silhouette <= 0) {
-    throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
-  }
+  if (sum <= 0) throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
 }
 
 void check_targets(std::span<const Image> targets) {
@@ -43,32 +52,38 @@ void check_loss(const LossWeights& weights, std::span<const Image> targets) {
   check_targets(targets);
 }
 
-std::string_view to_string(LossKind kind) { return k_names[static_cast<std::size_t>(kind)]; }
+std::span<const ImageLossRow> image_losses() { return k_losses; }
+
+std::string_view to_string(LossKind kind) { return k_losses[static_cast<std::size_t>(kind)].name; }
+
+std::vector<std::string_view> loss_names() {
+  std::vector<std::string_view> names;
+  for (const ImageLossRow& loss : k_losses) names.push_back(loss.name);
+  return names;
+}
 
 LossKind parse_loss(std::string_view word, std::string_view where) {
-  for (std::size_t i = 0; i < k_names.size(); ++i) {
-    if (k_names[i] == word) return static_cast<LossKind>(i);
-  }
-  throw InvalidArgument(std::string(where), "'" + std::string(word) + "'", "mse, l1 or silhouette");
+  const std::vector<std::string_view> names = loss_names();
+  const auto found = std::ranges::find(names, word);
+  if (found != names.end()) return static_cast<LossKind>(found - names.begin());
+  throw InvalidArgument(std::string(where), "'" + std::string(word) + "'", one_of(names));
 }
 
 LossWeights LossWeights::only(LossKind kind) {
   LossWeights weights;
-  (kind == LossKind::mse ? weights.mse : kind == LossKind::l1 ? weights.l1 : weights.silhouette) = 1;
+  weights.*k_losses[static_cast<std::size_t>(kind)].weight = 1;
   return weights;
 }
 
-ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<const Image> targets,
+ImageLoss::Impl::Impl(const Device& device_, LossWeights weights, std::span<const Image> targets,
                       std::span<const unsigned char> has_alpha)
     : device(device_),
-      weights(weights_),
       width(targets[0].width),
       height(targets[0].height),
       views(targets.size()),
       per_view(targets.size()),
-      silhouettes(targets.size(), weights_.silhouette),
-      forward(device.impl(), "loss.cl", "loss_forward"),
-      backward(device.impl(), "loss.cl", "loss_backward"),
+      forward(device.impl(), "image_loss.cl", "image_loss_forward"),
+      backward(device.impl(), "image_loss.cl", "image_loss_backward"),
       reduce(device.impl()) {
   const std::size_t pixels = targets[0].pixels.size();
   std::vector<cl_float4> values;
@@ -79,11 +94,13 @@ ImageLoss::Impl::Impl(const Device& device_, LossWeights weights_, std::span<con
   }
   target.upload(device.impl(), values);
   view_starts.upload(device.impl(), starts);
-  for (std::size_t view = 0; view < has_alpha.size(); ++view) {
-    if (has_alpha[view] == 0) silhouettes[view] = 0;
+  for (std::size_t view = 0; view < views; ++view) {
+    const bool shows_alpha = has_alpha.empty() || has_alpha[view] != 0;
+    for (const ImageLossRow& loss : k_losses)
+      view_weights.push_back(loss.reads_alpha && !shows_alpha ? 0 : weights.*loss.weight);
   }
-  view_silhouettes.upload(device.impl(), silhouettes);
-  channels.resize(device.impl(), DPR_LOSS_SUMS * pixels * views);
+  device_weights.upload(device.impl(), view_weights);
+  channels.resize(device.impl(), shared::DPR_LOSS_SUMS * pixels * views);
   grad_image.resize(device.impl(), pixels * views);
 }
 
@@ -115,24 +132,24 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   }
   const std::size_t pixels_per_view = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
   const std::size_t pixels = pixels_per_view * m.views;
-  shared::LossParams p{};
-  p.mse = m.weights.mse;
-  p.l1 = m.weights.l1;
-  p.views = static_cast<cl_uint>(m.views);
-  p.pixels_per_view = static_cast<cl_uint>(pixels_per_view);
   m.frame_number = 0;  // until everything of this one is there
-  m.forward(pixels, p, frame.image, m.target, m.channels);
-  m.reduce({pixels, DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
-  m.backward(pixels, p, frame.image, m.target, m.sums, m.view_silhouettes, m.grad_image);
+  m.forward(pixels, static_cast<cl_uint>(pixels), frame.image, m.target, m.channels);
+  m.reduce({pixels, shared::DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
+  m.backward(pixels, static_cast<cl_uint>(m.views), static_cast<cl_uint>(pixels_per_view), frame.image,
+             m.target, m.sums, m.device_weights, m.grad_image);
 
   const std::vector<float> sums = m.sums.download();
   double total = 0;
   for (std::size_t view = 0; view < m.views; ++view) {
-    const auto sum = [&](std::size_t channel) { return static_cast<double>(sums[channel * m.views + view]); };
-    const double count = 3.0 * static_cast<double>(pixels_per_view);
-    const double iou = sum(3) > 0 ? sum(2) / sum(3) : 1.0;  // two empty images agree
-    m.per_view[view] = m.weights.mse * sum(0) / count + m.weights.l1 * sum(1) / count +
-                       static_cast<double>(m.silhouettes[view]) * (1 - iou);
+    std::array<double, shared::DPR_LOSS_SUMS> of_view{};
+    for (std::size_t k = 0; k < of_view.size(); ++k)
+      of_view[k] = static_cast<double>(sums[k * m.views + view]);
+    m.per_view[view] = 0;
+    for (std::size_t l = 0; l < k_losses.size(); ++l) {
+      m.per_view[view] +=
+          k_losses[l].value(static_cast<double>(m.weight(view, l)), &of_view[k_losses[l].first_sum],
+                            3.0 * static_cast<double>(pixels_per_view));
+    }
     total += m.per_view[view] / static_cast<double>(m.views);
   }
   m.frame_number = frame.number;

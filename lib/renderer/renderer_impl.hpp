@@ -9,7 +9,7 @@
 
 #include "dpr/renderer.hpp"
 #include "stages/aggregate.hpp"
-#include "stages/aov.hpp"
+#include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
@@ -94,8 +94,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Aggregate aggregate;
   Gather gather;
   Reduce reduce;
-  std::optional<AovStage> aov;  // made when first asked for
-  std::uint64_t aov_frame = 0;  // the frame it holds
+  std::optional<Auxiliary> aov;  // made when first asked for
+  std::uint64_t aov_frame = 0;   // the frame it holds
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]

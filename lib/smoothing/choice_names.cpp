@@ -65,21 +65,6 @@ std::span<const NamedChoice<OccupancyWidth>> choice_names() {
   return k_occupancy_widths;
 }
 
-std::string one_of(std::span<const std::string_view> names) {
-  std::string list;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i > 0) list += i + 1 < names.size() ? ", " : " or ";
-    list += names[i];
-  }
-  return list;
-}
-
-std::string joined(std::span<const std::string_view> names) {
-  std::string list;
-  for (const std::string_view name : names) list += (list.empty() ? "" : "|") + std::string(name);
-  return list;
-}
-
 template <SmoothingChoice Choice>
 std::string_view to_string(Choice value) {
   const auto rows = choice_names<Choice>();

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <string_view>
+#include <vector>
 
+#include "base/name_list.hpp"
 #include "dpr/smoothing.hpp"
 
 namespace dpr {
@@ -18,11 +19,6 @@ struct NamedChoice {
 /// All values of an enumeration with their names, in the order of their declaration.
 template <SmoothingChoice Choice>
 std::span<const NamedChoice<Choice>> choice_names();
-
-/// "a, b or c", as messages have it.
-std::string one_of(std::span<const std::string_view> names);
-/// "a|b|c", as --help has it.
-std::string joined(std::span<const std::string_view> names);
 
 template <SmoothingChoice Choice>
 std::vector<std::string_view> names_of_choices() {

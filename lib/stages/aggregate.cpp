@@ -16,37 +16,34 @@ std::string prior_options(const Smoothing& smoothing) {
 
 }  // namespace
 
-Aggregate::Exact::Exact(Device::Impl& device, Composition composition, const std::string& options)
+AggregateKernels::Exact::Exact(Device::Impl& device, Composition composition, const std::string& options)
     : forward(device, file_of(composition),
               composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
       backward(device, file_of(composition),
                composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward",
                options) {}
 
-Aggregate::Sampled::Sampled(Device::Impl& device, const std::string& options)
+AggregateKernels::Sampled::Sampled(Device::Impl& device, const std::string& options)
     : forward(device, "aggregate_sampled.cl", "aggregate_sampled_forward", options),
       backward(device, "aggregate_sampled.cl", "aggregate_sampled_backward", options) {}
 
-Aggregate::JointSampled::JointSampled(Device::Impl& device, const std::string& options)
+AggregateKernels::JointSampled::JointSampled(Device::Impl& device, const std::string& options)
     : forward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_forward", options),
       backward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_backward", options) {}
 
 Aggregate::Setting Aggregate::prepare(const Smoothing& smoothing) const {
-  Setting prepared{smoothing, now_.kernels};
   const std::string options = prior_options(smoothing);
   const std::string wanted = std::string(to_string(smoothing.composition)) +
                              std::string(to_string(smoothing.aggregation_estimator)) + options;
-  if (prepared.kernels && prepared.kernels->built == wanted) return prepared;
-  prepared.kernels = std::make_shared<Kernels>();
-  prepared.kernels->built = wanted;
-  if (smoothing.aggregation_estimator == Estimator::exact) {
-    prepared.kernels->exact.emplace(device_, smoothing.composition, options);
-  } else if (samples_jointly(smoothing)) {
-    prepared.kernels->joint_sampled.emplace(device_, options);
-  } else {
-    prepared.kernels->sampled.emplace(device_, options);
-  }
-  return prepared;
+  return SmoothedStage::prepare(smoothing, wanted, [&](AggregateKernels& kernels) {
+    if (smoothing.aggregation_estimator == Estimator::exact) {
+      kernels.exact.emplace(device_, smoothing.composition, options);
+    } else if (samples_jointly(smoothing)) {
+      kernels.joint_sampled.emplace(device_, options);
+    } else {
+      kernels.sampled.emplace(device_, options);
+    }
+  });
 }
 
 shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {

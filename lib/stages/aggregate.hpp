@@ -1,16 +1,15 @@
 // The perturbed arg-max of every pixel: the image, and the gradients of what it is made of.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
 #include "stages/occupancy.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/shade.hpp"
+#include "stages/smoothed_stage.hpp"
 #include "stages/transform.hpp"
 
 namespace dpr {
@@ -25,45 +24,8 @@ struct AggregateInputs {
   const Shade& shade;
 };
 
-class Aggregate {
- public:
-  explicit Aggregate(Device::Impl& device) : device_(device) {}
-
-  struct Kernels;
-  /// A smoothing with the kernels that it needs.
-  struct Setting {
-    Smoothing smoothing;
-    std::shared_ptr<Kernels> kernels;
-  };
-
-  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
-  /// already.
-  Setting prepare(const Smoothing& smoothing) const;
-  void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
-  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
-
-  /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
-  void forward(const AggregateInputs& in, const glm::vec3& background);
-  /// `grad_image` is [view][height][width].
-  void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
-
-  /// Of the buffers below and the slots.
-  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
-
-  Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
-  Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
-  ColorGradients grad_color;                     ///< [fragment]
-  Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
-
-  /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
-  /// written, but these are.
-  bool perturbs_distances() const;
-  Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
-  Buffer<float> grad_sigma;     ///< [view][height][width]
-
-  std::size_t bytes() const;
-
- private:
+/// Kernels of one composition, estimator and prior; `built` names them.
+struct AggregateKernels {
   using ForwardKernel =
       Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
              In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, Out<cl_uint>, Out<cl_float4>>;
@@ -99,22 +61,47 @@ class Aggregate {
         backward;
   };
 
-  shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
-
-  Device::Impl& device_;
-  Setting now_;
-  Buffer<shared::Slot> slots_;   // [listed fragment + pixel]
-  Buffer<cl_uint> slot_counts_;  // [pixel]
-};
-
-/// Of one composition, estimator and prior; `built` names them.
-struct Aggregate::Kernels {
   std::string built;
   std::optional<Exact> exact;
   std::optional<Sampled> sampled;
   std::optional<JointSampled> joint_sampled;
 };
 
-inline bool Aggregate::perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
+class Aggregate : public SmoothedStage<AggregateKernels> {
+ public:
+  explicit Aggregate(Device::Impl& device) : SmoothedStage(device) {}
+
+  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
+  /// already.
+  Setting prepare(const Smoothing& smoothing) const;
+  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
+
+  /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
+  void forward(const AggregateInputs& in, const glm::vec3& background);
+  /// `grad_image` is [view][height][width].
+  void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
+
+  /// Of the buffers below and the slots.
+  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
+
+  Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
+  Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
+  ColorGradients grad_color;                     ///< [fragment]
+  Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
+
+  /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
+  /// written, but these are.
+  bool perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
+  Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
+  Buffer<float> grad_sigma;     ///< [view][height][width]
+
+  std::size_t bytes() const;
+
+ private:
+  shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
+
+  Buffer<shared::Slot> slots_;   // [listed fragment + pixel]
+  Buffer<cl_uint> slot_counts_;  // [pixel]
+};
 
 }  // namespace dpr

@@ -23,27 +23,26 @@ shared::Sampling sampling_params(const Smoothing& smoothing) {
   return s;
 }
 
-Occupancy::Exact::Exact(Device::Impl& device, const std::string& options)
+OccupancyKernels::Exact::Exact(Device::Impl& device, const std::string& options)
     : forward(device, "occupancy.cl", "occupancy_forward", options),
       backward(device, "occupancy.cl", "occupancy_backward", options) {}
 
-Occupancy::Sampled::Sampled(Device::Impl& device, const std::string& options)
+OccupancyKernels::Sampled::Sampled(Device::Impl& device, const std::string& options)
     : forward(device, "occupancy_sampled.cl", "occupancy_sampled_forward", options),
       backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
 
 Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
-  Setting prepared{smoothing, now_.kernels};
-  if (samples_jointly(smoothing)) return prepared;
-  const bool exact = smoothing.occupancy_estimator == Estimator::exact;
+  if (samples_jointly(smoothing)) return {smoothing, now_.kernels};
   const std::string options = prior_option(smoothing.occupancy_prior) + " -DDPR_OCCUPANCY_WIDTH=" +
                               std::to_string(static_cast<int>(smoothing.occupancy_width));
-  const std::string wanted = std::string(to_string(smoothing.occupancy_estimator)) + options;
-  if (prepared.kernels && prepared.kernels->built == wanted) return prepared;
-  prepared.kernels = std::make_shared<Kernels>();
-  prepared.kernels->built = wanted;
-  if (exact) prepared.kernels->exact.emplace(device_, options);
-  if (!exact) prepared.kernels->sampled.emplace(device_, options);
-  return prepared;
+  return SmoothedStage::prepare(smoothing, std::string(to_string(smoothing.occupancy_estimator)) + options,
+                                [&](OccupancyKernels& kernels) {
+                                  if (smoothing.occupancy_estimator == Estimator::exact) {
+                                    kernels.exact.emplace(device_, options);
+                                  } else {
+                                    kernels.sampled.emplace(device_, options);
+                                  }
+                                });
 }
 
 void Occupancy::settle(std::size_t fragments) {

@@ -2,50 +2,19 @@
 // stage: there aggregation perturbs the distances together with the depths.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
 #include "stages/bin.hpp"
 #include "stages/rasterize.hpp"
+#include "stages/smoothed_stage.hpp"
 
 namespace dpr {
 
-class Occupancy {
- public:
-  explicit Occupancy(Device::Impl& device) : device_(device) {}
-
-  struct Kernels;
-  /// A smoothing with the kernels that it needs.
-  struct Setting {
-    Smoothing smoothing;
-    std::shared_ptr<Kernels> kernels;
-  };
-
-  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
-  /// already.
-  Setting prepare(const Smoothing& smoothing) const;
-  void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
-  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
-
-  void forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize);
-  void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                const Buffer<float>& grad_log_occupancy);
-  /// Says how many fragments there are, where forward() could not know.
-  void settle(std::size_t fragments);
-
-  static constexpr std::size_t k_fragment_bytes = 3 * sizeof(float);  ///< of those below
-
-  Buffer<float> log_occupancy, occupancy;  ///< [fragment]
-  Buffer<float> grad_distance;             ///< [fragment]
-  Buffer<float> grad_sigma;                ///< [pair]
-
-  std::size_t bytes() const;
-
- private:
+/// Kernels of one estimator and prior; `built` names them.
+struct OccupancyKernels {
   /// Kernels of the exact and of the sampled estimator, for one prior.
   struct Exact {
     Exact(Device::Impl& device, const std::string& options);
@@ -64,17 +33,36 @@ class Occupancy {
         backward;
   };
 
-  shared::OccupancyParams params(const shared::FrameParams& p) const;
-
-  Device::Impl& device_;
-  Setting now_;
-};
-
-/// Of one estimator and prior; `built` names them.
-struct Occupancy::Kernels {
   std::string built;
   std::optional<Exact> exact;
   std::optional<Sampled> sampled;
+};
+
+class Occupancy : public SmoothedStage<OccupancyKernels> {
+ public:
+  explicit Occupancy(Device::Impl& device) : SmoothedStage(device) {}
+
+  /// Everything about setting the smoothing that can fail: builds what it needs; cheap where that is there
+  /// already.
+  Setting prepare(const Smoothing& smoothing) const;
+  void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
+
+  void forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize);
+  void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
+                const Buffer<float>& grad_log_occupancy);
+  /// Says how many fragments there are, where forward() could not know.
+  void settle(std::size_t fragments);
+
+  static constexpr std::size_t k_fragment_bytes = 3 * sizeof(float);  ///< of those below
+
+  Buffer<float> log_occupancy, occupancy;  ///< [fragment]
+  Buffer<float> grad_distance;             ///< [fragment]
+  Buffer<float> grad_sigma;                ///< [pair]
+
+  std::size_t bytes() const;
+
+ private:
+  shared::OccupancyParams params(const shared::FrameParams& p) const;
 };
 
 /// The build option that chooses a prior.

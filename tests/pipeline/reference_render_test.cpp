@@ -235,10 +235,6 @@ TEST_SUITE("pipeline") {
     const int size = reduced(25, 7);
     const Device device = open_device();
     Worst worst;
-    const std::pair<LossKind, reference::Loss> kinds[] = {
-        {LossKind::mse, reference::Loss::mse},
-        {LossKind::l1, reference::Loss::l1},
-        {LossKind::silhouette, reference::Loss::silhouette}};
     for (const Composition composition : {Composition::barrier, Composition::joint}) {
       const Scene scene = with_composition(cube_scene(size, size), composition);
       const reference::Scene twin = to_reference(scene);
@@ -247,12 +243,12 @@ TEST_SUITE("pipeline") {
       renderer.set_scene(scene);
       renderer.forward();
       const Image target = random_image(size, size, 0.0F, 1.0F, 9);
-      for (const auto& [kind, reference_kind] : kinds) {
-        const std::string name = std::string(to_string(kind)) + " " + std::string(to_string(composition));
+      for (const std::string_view kind : loss_names()) {
+        const std::string name = std::string(kind) + " " + std::string(to_string(composition));
         CAPTURE(name);
-        ImageLoss loss(device, LossWeights::only(kind), std::span(&target, 1));
+        ImageLoss loss(device, LossWeights::only(parse_loss(kind, "kind")), std::span(&target, 1));
         const reference::LossResult expected =
-            reference::evaluate_loss(reference_kind, reference::render(twin), to_reference(target));
+            reference::evaluate_loss(kind, reference::render(twin), to_reference(target));
         const double error = std::fabs(loss.evaluate(renderer) / expected.value - 1);
         CHECK(error < 1e-5);
         worst.add("loss", name, error, 1e-5);

@@ -2,9 +2,12 @@
 /// images.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace dpr::reference {
@@ -22,6 +25,15 @@ inline Image make_image(int width, int height) {
 }
 
 enum class Loss { mse, l1, silhouette };
+
+struct NamedLoss {
+  Loss loss;
+  std::string_view name;
+};
+
+/// Every loss, by its name on the command line.
+inline constexpr std::array k_losses{NamedLoss{Loss::mse, "mse"}, NamedLoss{Loss::l1, "l1"},
+                                     NamedLoss{Loss::silhouette, "silhouette"}};
 
 struct LossResult {
   double value = 0.0;
@@ -73,6 +85,14 @@ inline LossResult evaluate_loss(Loss kind, const Image& image, const Image& targ
     throw std::invalid_argument("evaluate_loss: image and target differ in size");
   }
   return kind == Loss::silhouette ? silhouette_loss(image, target) : color_loss(kind, image, target);
+}
+
+/// The same by name. Throws std::invalid_argument if there is none.
+inline LossResult evaluate_loss(std::string_view name, const Image& image, const Image& target) {
+  for (const NamedLoss& row : k_losses) {
+    if (row.name == name) return evaluate_loss(row.loss, image, target);
+  }
+  throw std::invalid_argument("evaluate_loss: the reference has no loss " + std::string(name));
 }
 
 }  // namespace dpr::reference

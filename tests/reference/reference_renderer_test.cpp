@@ -291,7 +291,8 @@ TEST_SUITE("gradient") {
     Scene other = scene;
     other.meshes[0].transform = moved(other.meshes[0].transform, {0.1, 0.2, 0.3}, {0.1, 0.0, 0.0});
     const Image target = render(other);
-    for (const Loss loss : {Loss::mse, Loss::l1, Loss::silhouette}) {
+    for (const auto& [loss, name] : k_losses) {
+      CAPTURE(name);
       const ScalarFunction f = [&](const std::vector<double>& v) {
         Scene displaced = scene;
         displaced.meshes[0].transform = moved(displaced.meshes[0].transform, take(v, 0), take(v, 3));

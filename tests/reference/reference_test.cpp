@@ -295,7 +295,8 @@ TEST_SUITE("gradient") {
     Image target = make_image(3, 2);
     for (double& v : image.rgba) v = random(0.0, 1.0);
     for (double& v : target.rgba) v = random(0.0, 1.0);
-    for (const Loss loss : {Loss::mse, Loss::l1, Loss::silhouette}) {
+    for (const auto& [loss, name] : k_losses) {
+      CAPTURE(name);
       CAPTURE(static_cast<int>(loss));
       const ScalarFunction f = [&](const std::vector<double>& v) {
         return evaluate_loss(loss, {3, 2, v}, target).value;

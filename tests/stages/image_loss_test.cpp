@@ -7,7 +7,7 @@
 
 #include "device/context.hpp"
 #include "dpr/error.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/opencl.hpp"
 #include "dpr/renderer.hpp"
 #include "loss/image_loss_impl.hpp"
@@ -69,18 +69,21 @@ TEST_SUITE("gradient") {
     double expected = 0;
     for (std::size_t view = 0; view < k_views; ++view) {
       const auto image = to_reference(renderer.image(view)), target = to_reference(targets[view]);
-      using dpr::reference::Loss;
-      const auto mse = dpr::reference::evaluate_loss(Loss::mse, image, target);
-      const auto l1 = dpr::reference::evaluate_loss(Loss::l1, image, target);
-      const auto silhouette = dpr::reference::evaluate_loss(Loss::silhouette, image, target);
-      const double weight = has_alpha[view] != 0 ? 0.7 : 0.0;
-      const double value = 2 * mse.value + 0.5 * l1.value + weight * silhouette.value;
+      double value = 0;
+      std::vector<double> expected_grad(image.rgba.size());
+      for (const dpr::ImageLossRow& row : dpr::image_losses()) {
+        const auto reference = dpr::reference::evaluate_loss(row.name, image, target);
+        const double weight =
+            row.reads_alpha && has_alpha[view] == 0 ? 0.0 : static_cast<double>(weights.*row.weight);
+        REQUIRE((weight > 0 || row.reads_alpha));
+        value += weight * reference.value;
+        for (std::size_t i = 0; i < expected_grad.size(); ++i)
+          expected_grad[i] += weight * reference.grad_image.rgba[i] / k_views;
+      }
       CHECK(loss.per_view()[view] == doctest::Approx(value).epsilon(1e-6));
       expected += value / k_views;
-      for (std::size_t i = 0; i < image.rgba.size(); ++i) {
-        const double g = (2 * mse.grad_image.rgba[i] + 0.5 * l1.grad_image.rgba[i] +
-                          weight * silhouette.grad_image.rgba[i]) /
-                         k_views;
+      for (std::size_t i = 0; i < expected_grad.size(); ++i) {
+        const double g = expected_grad[i];
         const float found = grad[view * image.rgba.size() / 4 + i / 4].s[i % 4];
         CHECK(std::fabs(static_cast<double>(found) - g) < 1e-8 + 2e-6 * std::fabs(g));
       }

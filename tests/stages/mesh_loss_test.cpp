@@ -12,7 +12,7 @@
 #include <set>
 
 #include "dpr/error.hpp"
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "mesh/adjacency.hpp"

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "dpr/loss.hpp"
+#include "dpr/image_loss.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/perturbed_pose.hpp"
 #include "dpr/renderer.hpp"

@@ -4,6 +4,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
@@ -17,6 +18,8 @@ class Renderer;
 enum class LossKind { mse, l1, silhouette };
 
 std::string_view to_string(LossKind);
+/// In the order of LossKind.
+std::vector<std::string_view> loss_names();
 LossKind parse_loss(std::string_view word, std::string_view where);
 
 /// How much each loss counts in the total, eq. (74).

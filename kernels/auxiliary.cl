@@ -18,15 +18,16 @@ static inline float3 normalized(float3 v) {
 /// in   starts         uint[pixel + 1]        runs of `list`
 /// in   list           uint[...]              fragments, by pixel
 /// in   weight         float[fragment]        in the pixel's colour
-/// in   background_weight  float[pixel]
+/// in   channels       float[DPR_PIXEL_CHANNELS][pixel]  of aggregation's backward pass for a gradient of 1 in red: the
+///                     background's weight is in that of the background colour
 /// in   depth, bary1, bary2  float[fragment]
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]
 /// in   faces          uint4[face]            vertex indices
 /// in   world          float4[view][vertex]
-/// out  outputs        float[DPR_AOV_CHANNELS][pixel]
+/// out  outputs        float[DPR_AUXILIARY_CHANNELS][pixel]
 /// out  face_id        uint[pixel]            face of the scene, DPR_NO_FACE for the background
-kernel void aov_forward(const FrameParams p, global const uint* restrict starts, global const uint* restrict list,
-                        global const float* restrict weight, global const float* restrict background_weight,
+kernel void auxiliary_forward(const FrameParams p, global const uint* restrict starts, global const uint* restrict list,
+                        global const float* restrict weight, global const float* restrict channels,
                         global const float* restrict depth, global const float* restrict bary1,
                         global const float* restrict bary2, global const uint* restrict fragment_pair,
                         global const uint* restrict pair_face, global const uint4* restrict faces,
@@ -36,7 +37,7 @@ kernel void aov_forward(const FrameParams p, global const uint* restrict starts,
   const uint pixels_per_view = p.width * p.height, pixels = p.views * pixels_per_view;
   if (pixel >= pixels) return;
   global const float4* vertices = world + pixel / pixels_per_view * p.vertices;
-  float sum = 0.0f, squares = 0.0f, depth_sum = 0.0f, largest = background_weight[pixel];
+  float sum = 0.0f, squares = 0.0f, depth_sum = 0.0f, largest = channels[DPR_CHANNEL_BACKGROUND * pixels + pixel];
   float2 barycentrics = (float2)(0.0f, 0.0f);
   float3 normal = 0.0f;
   uint seen = DPR_NO_FACE;
@@ -54,12 +55,12 @@ kernel void aov_forward(const FrameParams p, global const uint* restrict starts,
     barycentrics = (float2)(bary1[k], bary2[k]);
   }
   normal = normalized(normal);
-  outputs[DPR_AOV_DEPTH * pixels + pixel] = sum > 0.0f ? depth_sum / sum : 0.0f;
-  outputs[DPR_AOV_NORMAL * pixels + pixel] = normal.x;
-  outputs[(DPR_AOV_NORMAL + 1) * pixels + pixel] = normal.y;
-  outputs[(DPR_AOV_NORMAL + 2) * pixels + pixel] = normal.z;
-  outputs[DPR_AOV_BARYCENTRICS * pixels + pixel] = barycentrics.x;
-  outputs[(DPR_AOV_BARYCENTRICS + 1) * pixels + pixel] = barycentrics.y;
-  outputs[DPR_AOV_EFFECTIVE_FACES * pixels + pixel] = squares > 0.0f ? sum * sum / squares : 0.0f;
+  outputs[DPR_AUXILIARY_DEPTH * pixels + pixel] = sum > 0.0f ? depth_sum / sum : 0.0f;
+  outputs[DPR_AUXILIARY_NORMAL * pixels + pixel] = normal.x;
+  outputs[(DPR_AUXILIARY_NORMAL + 1) * pixels + pixel] = normal.y;
+  outputs[(DPR_AUXILIARY_NORMAL + 2) * pixels + pixel] = normal.z;
+  outputs[DPR_AUXILIARY_BARYCENTRICS * pixels + pixel] = barycentrics.x;
+  outputs[(DPR_AUXILIARY_BARYCENTRICS + 1) * pixels + pixel] = barycentrics.y;
+  outputs[DPR_AUXILIARY_EFFECTIVE_FACES * pixels + pixel] = squares > 0.0f ? sum * sum / squares : 0.0f;
   face_id[pixel] = seen;
 }

@@ -63,11 +63,11 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
     m.aov->outputs.download(values, (index * m.views.size() + view) * count);
     return values;
   };
-  result.depth = channel(DPR_AOV_DEPTH);
-  result.effective_faces = channel(DPR_AOV_EFFECTIVE_FACES);
-  const std::vector<float> x = channel(DPR_AOV_NORMAL), y = channel(DPR_AOV_NORMAL + 1),
-                           z = channel(DPR_AOV_NORMAL + 2), b1 = channel(DPR_AOV_BARYCENTRICS),
-                           b2 = channel(DPR_AOV_BARYCENTRICS + 1);
+  result.depth = channel(DPR_AUXILIARY_DEPTH);
+  result.effective_faces = channel(DPR_AUXILIARY_EFFECTIVE_FACES);
+  const std::vector<float> x = channel(DPR_AUXILIARY_NORMAL), y = channel(DPR_AUXILIARY_NORMAL + 1),
+                           z = channel(DPR_AUXILIARY_NORMAL + 2), b1 = channel(DPR_AUXILIARY_BARYCENTRICS),
+                           b2 = channel(DPR_AUXILIARY_BARYCENTRICS + 1);
   std::vector<cl_uint> faces(count);
   m.aov->face_id.download(faces, view * count);
   const std::vector<std::array<glm::vec2, 3>> texcoords = corner_texcoords(m.scene);

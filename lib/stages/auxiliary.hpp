@@ -7,21 +7,20 @@
 
 namespace dpr {
 
-class AovStage {
+class Auxiliary {
  public:
-  explicit AovStage(Device::Impl& device);
+  explicit Auxiliary(Device::Impl& device);
 
   /// Runs the aggregation backward pass for a gradient of 1 in red, which leaves the weight of every fragment
   /// in the gradient of its red: `aggregate` is left with that.
   void forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                Aggregate& aggregate);
 
-  Buffer<float> outputs;    ///< [DPR_AOV_CHANNELS][view][height][width]
+  Buffer<float> outputs;    ///< [DPR_AUXILIARY_CHANNELS][view][height][width]
   Buffer<cl_uint> face_id;  ///< [view][height][width] DPR_NO_FACE for the background
 
   std::size_t bytes() const {
-    return outputs.capacity_bytes() + face_id.capacity_bytes() + unit_gradient_.capacity_bytes() +
-           background_weight_.capacity_bytes();
+    return outputs.capacity_bytes() + face_id.capacity_bytes() + grad_red_.capacity_bytes();
   }
 
  private:
@@ -29,8 +28,7 @@ class AovStage {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
          In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
       forward_;
-  Buffer<cl_float4> unit_gradient_;
-  Buffer<float> background_weight_;
+  Buffer<cl_float4> grad_red_;  // [view][height][width] 1 in red
 };
 
 }  // namespace dpr

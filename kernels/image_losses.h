@@ -1,0 +1,38 @@
+// Every loss between an image and its target, for host and kernels. A loss is a file, loss_<name>.h, and a name in the list:
+//
+//   enum { <name>_sums,          how many numbers it sums over the pixels of a view
+//          <name>_reads_alpha }  1: it counts only where the target has a silhouette
+//
+// on the device
+//
+//   <name>_add(image, target, sums)               writes what a pixel, RGBA, adds to them
+//   <name>_gradient(weight, image, target, sums)  weight times its derivative by the pixel's RGBA, from the sums of the view;
+//                                                 of RGB, times the number of pixels and colour channels of a view
+//
+// and on the host
+//
+//   <name>_value(weight, sums, channels)          weight times the loss of a view of so many pixels times colour channels
+#ifndef DPR_IMAGE_LOSSES_H
+#define DPR_IMAGE_LOSSES_H
+
+#ifndef __OPENCL_C_VERSION__
+namespace dpr::shared {
+#endif
+
+#include "loss_l1.h"
+#include "loss_mse.h"
+#include "loss_silhouette.h"
+
+/// In the order of dpr::LossKind.
+#define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette)
+
+/// Their numbers, and where the sums of each begin.
+#define DPR_LOSS_NUMBER(name) name##_number,
+#define DPR_LOSS_FIRST_SUM(name) name##_first, name##_last = name##_first + name##_sums - 1,
+enum { DPR_IMAGE_LOSSES(DPR_LOSS_NUMBER) DPR_LOSS_COUNT };
+enum { DPR_IMAGE_LOSSES(DPR_LOSS_FIRST_SUM) DPR_LOSS_SUMS };
+
+#ifndef __OPENCL_C_VERSION__
+}  // namespace dpr::shared
+#endif
+#endif
