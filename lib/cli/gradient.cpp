@@ -11,6 +11,7 @@
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
+#include "scene/gradient_table.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -19,58 +20,46 @@ struct GradientOptions {
   std::string scene, target, loss = "mse", output;
 };
 
-Json meshes_to_json(const GradientRequest& request, const SceneGradient& gradient) {
-  Json meshes = Json::array();
-  const ViewGradient& view = gradient.views.front();
-  for (std::size_t i = 0; i < gradient.meshes.size(); ++i) {
-    Json mesh = Json::object();
-    if (request.positions) mesh["positions"] = to_json(gradient.meshes[i].positions);
-    if (request.colors) mesh["colors"] = to_json(gradient.meshes[i].colors);
-    if (request.transform) {
-      mesh["rotation"] = to_json(view.transforms[i].rotation);
-      mesh["translation"] = to_json(view.transforms[i].translation);
-    }
-    meshes.push_back(mesh);
-  }
-  return meshes;
+Json array_to_json(const GradientArray& array) {
+  if (double* const* value = std::get_if<double*>(&array)) return **value;
+  if (glm::dvec3* const* vector = std::get_if<glm::dvec3*>(&array)) return to_json(**vector);
+  return to_json(*std::get<std::vector<glm::vec3>*>(array));
 }
 
-Json camera_to_json(const Camera& camera, const CameraGradient& gradient) {
-  Json json;
-  json["rotation"] = to_json(gradient.view.rotation);
-  json["translation"] = to_json(gradient.view.translation);
-  if (camera.intrinsics) {
-    const auto& [fx, fy, cx, cy] = gradient.intrinsics;
-    json["intrinsics"] = {{"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}};
-  } else {
-    json["fov_y_degrees"] = gradient.fov_y_degrees;
-  }
-  return json;
+/// The member of a path like "camera.rotation".
+Json& member(Json& json, std::string_view path) {
+  const std::size_t dot = path.find('.');
+  Json& first = json[std::string(path.substr(0, dot))];
+  return dot == std::string_view::npos ? first : member(first, path.substr(dot + 1));
 }
 
-Json lights_to_json(const SceneGradient& gradient) {
-  Json point = Json::array();
-  for (const PointLightGradient& light : gradient.lights) {
-    point.push_back({{"position", to_json(light.position)},
-                     {"diffuse", to_json(light.diffuse)},
-                     {"specular", to_json(light.specular)}});
+/// The arrays of a row, in the first view.
+void add_row(Json& json, const GradientRow& row, SceneGradient& gradient) {
+  constexpr std::string_view k_list = "[].";
+  const std::size_t end_of_list = row.path.find(k_list);
+  if (end_of_list == std::string_view::npos) {
+    member(json, row.path) = array_to_json(row.array(gradient, {}));
+    return;
   }
-  return {{"ambient", to_json(gradient.ambient)}, {"point", point}};
+  Json& list = member(json, row.path.substr(0, end_of_list));
+  if (list.is_null()) list = Json::array();
+  const std::size_t count = count_arrays(row, gradient).item;
+  while (list.size() < count) list.push_back(Json::object());
+  for (std::size_t i = 0; i < count; ++i) {
+    member(list[i], row.path.substr(end_of_list + k_list.size())) =
+        array_to_json(row.array(gradient, {0, i}));
+  }
 }
 
-Json gradient_to_json(const Scene& scene, double loss, const SceneGradient& gradient) {
-  const GradientRequest& request = scene.gradients;
+Json gradient_to_json(const Scene& scene, double loss, SceneGradient gradient) {
   Json json;
   json["loss"] = loss;
-  json["meshes"] = meshes_to_json(request, gradient);
-  if (request.camera) json["camera"] = camera_to_json(scene.camera, gradient.views.front().camera);
-  if (request.lights && scene.lights) json["lights"] = lights_to_json(gradient);
-  if (request.smoothing) {
-    json["sigma"] = gradient.sigma;
-    json["gamma"] = gradient.gamma;
-    json["alpha"] = gradient.alpha;
+  json["meshes"] = std::vector<Json>(scene.meshes.size(), Json::object());
+  for (const GradientRow& row : gradient_rows()) {
+    const bool exists = row.exists == nullptr || row.exists(scene);
+    if (scene.gradients.*row.wanted && exists && row.of != GradientOf::all_views)
+      add_row(json, row, gradient);
   }
-  if (request.background) json["background"] = to_json(gradient.background);
   return json;
 }
 

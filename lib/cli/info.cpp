@@ -11,6 +11,7 @@
 #include "cli/mesh_materials.hpp"
 #include "mesh/bounding_box.hpp"
 #include "mesh/mesh_facts.hpp"
+#include "scene/gradient_table.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -113,12 +114,8 @@ Json smoothing_to_json(const Smoothing& s) {
 
 Json gradients_to_json(const GradientRequest& request) {
   Json names = Json::array();
-  const std::pair<const char*, bool> all[] = {
-      {"positions", request.positions},  {"colors", request.colors}, {"transform", request.transform},
-      {"camera", request.camera},        {"lights", request.lights}, {"smoothing", request.smoothing},
-      {"background", request.background}};
-  for (const auto& [name, wanted] : all) {
-    if (wanted) names.push_back(name);
+  for (const GradientName& name : gradient_names()) {
+    if (request.*name.wanted) names.push_back(name.word);
   }
   return names;
 }

@@ -4,30 +4,14 @@
 #include <string>
 
 #include "base/checks.hpp"
+#include "scene/gradient_table.hpp"
 
 namespace dpr {
 namespace {
 
-void check(double value, const std::string& name) {
-  if (std::isfinite(value)) return;
+[[noreturn]] void fail(const std::string& name, double value) {
   throw InvalidArgument("gradient of " + name + " (backward)", checks::text(value),
                         "a finite number; the scene's lengths or the smoothing are beyond single precision");
-}
-
-template <typename Vector>
-void check_vector(const Vector& v, const std::string& name) {
-  for (int axis = 0; axis < 3; ++axis) check(static_cast<double>(v[axis]), name);
-}
-
-void check_all(const std::vector<glm::vec3>& values, const std::string& name) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!checks::is_finite(values[i])) check_vector(values[i], checks::element(name, i));
-  }
-}
-
-void check_pose(const PoseGradient& pose, const std::string& name) {
-  check_vector(pose.rotation, name + ".rotation");
-  check_vector(pose.translation, name + ".translation");
 }
 
 }  // namespace
@@ -53,35 +37,19 @@ void require_scales(const Camera& camera, const Smoothing& smoothing, bool lit) 
   }
 }
 
-void require_finite(const SceneGradient& gradient) {
-  for (std::size_t m = 0; m < gradient.meshes.size(); ++m) {
-    const std::string mesh = checks::element("meshes", m);
-    check_all(gradient.meshes[m].positions, mesh + ".positions");
-    check_all(gradient.meshes[m].colors, mesh + ".colors");
-  }
-  check_all(gradient.shapes.positions, "shapes.positions");
-  check_all(gradient.shapes.colors, "shapes.colors");
-  for (std::size_t v = 0; v < gradient.views.size(); ++v) {
-    const std::string view = checks::element("views", v);
-    const CameraGradient& camera = gradient.views[v].camera;
-    check_pose(camera.view, view + ".camera");
-    check(camera.fov_y_degrees, view + ".camera.fov_y_degrees");
-    for (const double value : camera.intrinsics) check(value, view + ".camera.intrinsics");
-    for (std::size_t m = 0; m < gradient.views[v].transforms.size(); ++m) {
-      check_pose(gradient.views[v].transforms[m], checks::element(view + ".transforms", m));
-    }
-  }
-  check_vector(gradient.ambient, "lights.ambient");
-  for (std::size_t l = 0; l < gradient.lights.size(); ++l) {
-    const std::string light = checks::element("lights.point", l);
-    check_vector(gradient.lights[l].position, light + ".position");
-    check_vector(gradient.lights[l].diffuse, light + ".diffuse");
-    check_vector(gradient.lights[l].specular, light + ".specular");
-  }
-  check(gradient.sigma, "sigma");
-  check(gradient.gamma, "gamma");
-  check(gradient.alpha, "alpha");
-  check_vector(gradient.background, "background");
+void require_finite(SceneGradient& gradient) {
+  for_each_array(gradient, [](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    std::size_t count = 0;
+    transform_numbers(array, [&](double value) {
+      if (!std::isfinite(value)) {
+        const bool is_list = std::holds_alternative<std::vector<glm::vec3>*>(array);
+        const std::string name = name_of(row, index);
+        fail(is_list ? checks::element(name, count / 3) : name, value);
+      }
+      ++count;
+      return value;
+    });
+  });
 }
 
 }  // namespace dpr

@@ -10,6 +10,6 @@ namespace dpr {
 void require_scales(const Camera& camera, const Smoothing& smoothing, bool lit);
 
 /// Throws InvalidArgument that names the first gradient that is not finite.
-void require_finite(const SceneGradient& gradient);
+void require_finite(SceneGradient& gradient);
 
 }  // namespace dpr

@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <thread>
 
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/setter_checks.hpp"
+#include "scene/gradient_table.hpp"
 
 namespace dpr {
 namespace {
@@ -35,66 +37,47 @@ std::vector<Chunk> make_chunks(std::size_t views, std::size_t most) {
   return chunks;
 }
 
-/// sum += factor * term, in double precision.
-void add(std::vector<glm::dvec3>& sum, const std::vector<glm::vec3>& term, double factor) {
-  sum.resize(term.size(), glm::dvec3(0.0));
-  for (std::size_t i = 0; i < term.size(); ++i) sum[i] += factor * glm::dvec3(term[i]);
-}
-
-void add(PoseGradient& sum, const PoseGradient& term, double factor) {
-  sum.rotation += factor * term.rotation;
-  sum.translation += factor * term.translation;
-}
-
-ViewGradient scaled(const ViewGradient& term, double factor) {
-  ViewGradient view;
-  add(view.camera.view, term.camera.view, factor);
-  view.camera.fov_y_degrees = factor * term.camera.fov_y_degrees;
-  for (std::size_t k = 0; k < term.camera.intrinsics.size(); ++k)
-    view.camera.intrinsics[k] = factor * term.camera.intrinsics[k];
-  view.transforms.resize(term.transforms.size());
-  for (std::size_t m = 0; m < term.transforms.size(); ++m)
-    add(view.transforms[m], term.transforms[m], factor);
-  return view;
-}
-
-/// Adds the gradients of chunks, which come in their order.
+/// Adds the gradients of chunks, which come in their order, in double precision.
 class GradientSum {
  public:
-  void add_chunk(const SceneGradient& chunk, double factor) {
-    meshes_.resize(chunk.meshes.size());
-    for (std::size_t m = 0; m < chunk.meshes.size(); ++m) {
-      add(meshes_[m].positions, chunk.meshes[m].positions, factor);
-      add(meshes_[m].colors, chunk.meshes[m].colors, factor);
-    }
-    for (const ViewGradient& view : chunk.views) sum_.views.push_back(scaled(view, factor));
-    sum_.lights.resize(chunk.lights.size());
-    for (std::size_t l = 0; l < chunk.lights.size(); ++l) {
-      sum_.lights[l].position += factor * chunk.lights[l].position;
-      sum_.lights[l].diffuse += factor * chunk.lights[l].diffuse;
-      sum_.lights[l].specular += factor * chunk.lights[l].specular;
-    }
-    sum_.ambient += factor * chunk.ambient;
-    sum_.background += factor * chunk.background;
-    sum_.sigma += factor * chunk.sigma;
-    sum_.gamma += factor * chunk.gamma;
-    sum_.alpha += factor * chunk.alpha;
+  void add_chunk(SceneGradient&& chunk, double factor) {
+    std::size_t next = 0;
+    for_each_array(chunk, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
+      if (is_per_view(row.of)) {
+        transform_numbers(array, [&](double value) { return 0.0 + factor * value; });
+      } else {
+        if (next == sums_.size()) sums_.emplace_back();
+        add(sums_[next++], array, factor);
+      }
+    });
+    std::ranges::move(chunk.views, std::back_inserter(views_));
+    last_ = std::move(chunk);
   }
 
   SceneGradient finish() {
-    for (const MeshSum& mesh : meshes_) {
-      sum_.meshes.push_back(
-          {{mesh.positions.begin(), mesh.positions.end()}, {mesh.colors.begin(), mesh.colors.end()}});
-    }
-    return std::move(sum_);
+    std::size_t next = 0;
+    for_each_array(last_, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
+      if (is_per_view(row.of)) return;
+      auto value = sums_[next++].begin();
+      transform_numbers(array, [&](double) { return *value++; });
+    });
+    last_.views = std::move(views_);
+    return std::move(last_);
   }
 
  private:
-  struct MeshSum {
-    std::vector<glm::dvec3> positions, colors;
-  };
-  std::vector<MeshSum> meshes_;
-  SceneGradient sum_;
+  static void add(std::vector<double>& sum, const GradientArray& array, double factor) {
+    std::size_t i = 0;
+    transform_numbers(array, [&](double value) {
+      if (i == sum.size()) sum.push_back(0.0);
+      sum[i++] += factor * value;
+      return value;
+    });
+  }
+
+  std::vector<std::vector<double>> sums_;  // [array that is a sum over the views]
+  std::vector<ViewGradient> views_;
+  SceneGradient last_;
 };
 
 /// How often each part of the scene has been set.
@@ -292,7 +275,7 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
     parts[c] = worker.renderer.backward(grad_images.subspan(m.chunks[c].first, m.chunks[c].size()));
   });
   GradientSum sum;
-  for (const SceneGradient& part : parts) sum.add_chunk(part, 1.0);
+  for (SceneGradient& part : parts) sum.add_chunk(std::move(part), 1.0);
   return sum.finish();
 }
 
@@ -325,7 +308,8 @@ MultiDeviceRenderer::Evaluation MultiDeviceRenderer::evaluate() {
   GradientSum sum;
   for (std::size_t c = 0; c < parts.size(); ++c) {
     // A chunk's loss is the mean over its own views.
-    sum.add_chunk(parts[c], static_cast<double>(m.chunks[c].size()) / static_cast<double>(m.views.size()));
+    sum.add_chunk(std::move(parts[c]),
+                  static_cast<double>(m.chunks[c].size()) / static_cast<double>(m.views.size()));
   }
   result.gradient = sum.finish();
   for (const double loss : result.per_view) result.loss += loss / static_cast<double>(m.views.size());

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "renderer/renderer_impl.hpp"
+#include "scene/gradient_table.hpp"
 #include "solve/require.hpp"
 
 namespace dpr {
@@ -32,41 +33,6 @@ class Spread {
   std::vector<double> mean_, squares_;
   double count_ = 0;
 };
-
-/// Calls f(double) -> double for every number of a gradient, in a fixed order, and keeps what it returns.
-template <typename F>
-void transform_numbers(SceneGradient& gradient, F f) {
-  const auto one = [&](auto& value) {
-    value = static_cast<std::remove_reference_t<decltype(value)>>(f(static_cast<double>(value)));
-  };
-  const auto three = [&](auto& v) {
-    for (int axis = 0; axis < 3; ++axis) one(v[axis]);
-  };
-  const auto pose = [&](PoseGradient& p) {
-    three(p.rotation);
-    three(p.translation);
-  };
-  for (MeshGradient& mesh : gradient.meshes) {
-    for (auto* list : {&mesh.positions, &mesh.colors}) {
-      for (glm::vec3& v : *list) three(v);
-    }
-  }
-  for (auto* list : {&gradient.shapes.positions, &gradient.shapes.colors}) {
-    for (glm::vec3& v : *list) three(v);
-  }
-  for (ViewGradient& view : gradient.views) {
-    pose(view.camera.view);
-    one(view.camera.fov_y_degrees);
-    for (double& value : view.camera.intrinsics) one(value);
-    for (PoseGradient& p : view.transforms) pose(p);
-  }
-  three(gradient.ambient);
-  for (PointLightGradient& light : gradient.lights) {
-    for (auto* v : {&light.position, &light.diffuse, &light.specular}) three(*v);
-  }
-  for (double* value : {&gradient.sigma, &gradient.gamma, &gradient.alpha}) one(*value);
-  three(gradient.background);
-}
 
 /// What the replicates of a renderer leave behind.
 class Replicates {

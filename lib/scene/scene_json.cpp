@@ -2,13 +2,14 @@
 #include "scene/scene_json.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <string>
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
+#include "base/name_list.hpp"
 #include "dpr/scene.hpp"
+#include "scene/gradient_table.hpp"
 #include "smoothing/option_fields.hpp"
 #include "smoothing/presets.hpp"
 
@@ -116,24 +117,18 @@ Lights parse_lights(const JsonNode& node) {
 }
 
 GradientRequest parse_gradients(const JsonNode& node) {
-  GradientRequest request{false, false, false, false, false, false, false};
-  const std::array<std::pair<std::string_view, bool*>, 7> names{{{"positions", &request.positions},
-                                                                 {"colors", &request.colors},
-                                                                 {"transform", &request.transform},
-                                                                 {"camera", &request.camera},
-                                                                 {"lights", &request.lights},
-                                                                 {"smoothing", &request.smoothing},
-                                                                 {"background", &request.background}}};
+  GradientRequest request = no_gradients();
+  const std::span<const GradientName> names = gradient_names();
   for (const JsonNode& element : node.elements()) {
     const std::string word = element.string();
-    const auto* found =
-        std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == word; });
+    const auto found = std::ranges::find(names, word, &GradientName::word);
     if (found == names.end()) {
-      element.fail("\"" + word + "\"",
-                   "positions, colors, transform, camera, lights, smoothing or background");
+      std::vector<std::string_view> words;
+      for (const GradientName& name : names) words.push_back(name.word);
+      element.fail("\"" + word + "\"", one_of(words));
     }
-    if (*found->second) element.fail("\"" + word + "\" twice", "it once");
-    *found->second = true;
+    if (request.*found->wanted) element.fail("\"" + word + "\" twice", "it once");
+    request.*found->wanted = true;
   }
   return request;
 }

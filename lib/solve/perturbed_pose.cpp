@@ -10,6 +10,7 @@
 
 #include "dpr/error.hpp"
 #include "dpr/pose.hpp"
+#include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
 #include "solve/require.hpp"
 #include "solve/score_estimator.hpp"
@@ -88,7 +89,7 @@ void validate_scale(const Flat& scale, const Camera& camera) {
 
 Scene rigid_scene(Scene scene) {
   scene.smoothing = rigid_smoothing();
-  scene.gradients = {false, false, false, false, false, false, false};
+  scene.gradients = no_gradients();
   return scene;
 }
 

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "dpr/renderer.hpp"
+#include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
 #include "solve/require.hpp"
 
@@ -165,13 +166,9 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
                            const Pose& initial, const PoseSolver::Callback& callback) {
   const auto& descent = std::get<Descent>(options.method);
   // Nothing is computed that no step needs; the smoothing's gradient only feeds the schedule.
-  scene.gradients = {.positions = false,
-                     .colors = false,
-                     .transform = true,
-                     .camera = false,
-                     .lights = false,
-                     .smoothing = std::holds_alternative<AdaptiveSchedule>(descent.schedule),
-                     .background = false};
+  scene.gradients = no_gradients();
+  scene.gradients.transform = true;
+  scene.gradients.smoothing = std::holds_alternative<AdaptiveSchedule>(descent.schedule);
   Objective objective(device, scene, target, descent.loss);
 
   PoseResult result;

@@ -6,6 +6,7 @@
 
 #include "mesh/cluster_vertices.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
 
@@ -90,7 +91,7 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
   if (short_side < full) simplify(result, space);  // the answer comes from the mesh itself
   result.smoothing = level_smoothing(result, space, options, blur);
-  result.gradients = {false, false, false, false, false, false, false};
+  result.gradients = no_gradients();
   if (light != PoseLight::fixed) {  // without light, over black: LightFit adds both
     result.lights.reset();
     result.background = glm::vec3(0);

@@ -12,6 +12,7 @@
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/remesh.hpp"
+#include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/require.hpp"
 #include "solve/resample.hpp"
@@ -174,13 +175,10 @@ class Run {
     scene.camera = batches_->cameras(0).front().camera;
     scene.meshes.push_back({mesh});
     scene.smoothing = finest_;
-    scene.gradients = {.positions = true,
-                       .colors = true,
-                       .transform = false,
-                       .camera = false,
-                       .lights = false,
-                       .smoothing = is_adaptive(),
-                       .background = false};
+    scene.gradients = no_gradients();
+    scene.gradients.positions = true;
+    scene.gradients.colors = true;
+    scene.gradients.smoothing = is_adaptive();
     renderer_.set_scene(scene);
   }
 

@@ -1,0 +1,95 @@
+// Every gradient once: its name, its shape and where it lives. Files, commands, sums over devices, standard
+// errors, checks and tests walk this table.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "dpr/scene.hpp"
+
+namespace dpr {
+
+/// What a scene's list of gradients may ask for.
+struct GradientName {
+  std::string_view word;
+  bool GradientRequest::*wanted;
+};
+std::span<const GradientName> gradient_names();
+/// Asks for none.
+GradientRequest no_gradients();
+
+/// What an array of numbers is one of. Those of a view belong to it alone; the others are sums over the
+/// views.
+enum class GradientOf { scene, mesh, light, view, mesh_in_view, all_views };
+
+/// Whether a batch rendered in parts has the arrays one after the other, and not their sum.
+inline bool is_per_view(GradientOf of) {
+  return of == GradientOf::view || of == GradientOf::mesh_in_view || of == GradientOf::all_views;
+}
+
+/// Which of them: a view, and a mesh or light; 0 where there is one.
+struct GradientIndex {
+  std::size_t view = 0, item = 0;
+};
+
+/// A number, a vector, or one vector for each vertex or colour.
+using GradientArray = std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*>;
+
+struct GradientRow {
+  bool GradientRequest::*wanted;
+  GradientOf of;
+  /// In a gradient file: members, and [] after a list that has one object for each mesh or light. Views'
+  /// arrays are those of the file's only view, and no file has those of `all_views`.
+  std::string_view path;
+  GradientArray (*array)(SceneGradient& gradient, GradientIndex index);
+  /// Whether a scene has what this is the gradient of. None: every scene has.
+  bool (*exists)(const Scene& scene) = nullptr;
+};
+std::span<const GradientRow> gradient_rows();
+
+/// How many arrays of a row a gradient has.
+GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient);
+
+/// "views[0].camera.rotation", as messages have it.
+std::string name_of(const GradientRow& row, GradientIndex index);
+
+/// visit(row, index, array) for every array of a gradient, in the order of the table.
+template <class Visit>
+void for_each_array(SceneGradient& gradient, const Visit& visit) {
+  for (const GradientRow& row : gradient_rows()) {
+    const GradientIndex count = count_arrays(row, gradient);
+    for (GradientIndex i; i.view < count.view; ++i.view) {
+      for (i.item = 0; i.item < count.item; ++i.item) visit(row, i, row.array(gradient, i));
+    }
+  }
+}
+
+/// Replaces every number of an array by f(number), in order.
+template <class F>
+void transform_numbers(const GradientArray& array, F&& f) {
+  const auto replace = [&](auto& number) {
+    number = static_cast<std::remove_reference_t<decltype(number)>>(f(static_cast<double>(number)));
+  };
+  const auto replace_all = [&](auto& vector) {
+    for (int axis = 0; axis < 3; ++axis) replace(vector[axis]);
+  };
+  if (double* const* number = std::get_if<double*>(&array)) return replace(**number);
+  if (glm::dvec3* const* vector = std::get_if<glm::dvec3*>(&array)) return replace_all(**vector);
+  for (glm::vec3& vector : *std::get<std::vector<glm::vec3>*>(array)) replace_all(vector);
+}
+
+/// Replaces every number of a gradient.
+template <class F>
+void transform_numbers(SceneGradient& gradient, F&& f) {
+  for_each_array(gradient, [&](const GradientRow&, GradientIndex, const GradientArray& array) {
+    transform_numbers(array, f);
+  });
+}
+
+}  // namespace dpr

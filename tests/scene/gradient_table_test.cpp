@@ -1,0 +1,63 @@
+// The table of gradients: whether every number of a gradient is in it once, and every word of a request has
+// rows.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "scene/gradient_table.hpp"
+
+using namespace dpr;
+
+namespace {
+
+/// Two views of two meshes and two lights.
+SceneGradient sample_gradient() {
+  SceneGradient gradient;
+  gradient.meshes = {{std::vector<glm::vec3>(3), std::vector<glm::vec3>(2)}, {std::vector<glm::vec3>(4), {}}};
+  gradient.shapes = {std::vector<glm::vec3>(5), std::vector<glm::vec3>(1)};
+  gradient.lights.resize(2);
+  gradient.views.resize(2);
+  for (ViewGradient& view : gradient.views) view.transforms.resize(2);
+  return gradient;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("gradient table: every number is visited once, whatever it belongs to") {
+    SceneGradient gradient = sample_gradient();
+    double count = 0;
+    transform_numbers(gradient, [&](double value) {
+      CHECK(value == 0);  // visited before, it would hold its number
+      return ++count;
+    });
+    constexpr int k_meshes = 3 * (3 + 2 + 4), k_shapes = 3 * (5 + 1), k_lights = 3 + 2 * 9;
+    constexpr int k_views = 2 * (6 + 1 + 4 + 2 * 6), k_rest = 3 + 3;
+    CHECK(count == k_meshes + k_shapes + k_lights + k_views + k_rest);
+    CHECK(gradient.views[1].transforms[1].translation.z != 0);
+    CHECK(gradient.views[0].camera.intrinsics[3] != 0);
+  }
+
+  TEST_CASE("gradient table: names are different, and every request has rows") {
+    SceneGradient gradient = sample_gradient();
+    std::set<std::string> names;
+    std::size_t arrays = 0;
+    for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray&) {
+      names.insert(name_of(row, index));
+      ++arrays;
+    });
+    CHECK(names.size() == arrays);
+    CHECK(names.contains("views[1].meshes[0].rotation"));
+    CHECK(names.contains("lights.point[1].diffuse"));
+    CHECK_FALSE(names.contains("meshes[2].positions"));
+    for (const GradientName& name : gradient_names()) {
+      CAPTURE(name.word);
+      CHECK(std::ranges::any_of(gradient_rows(),
+                                [&](const GradientRow& row) { return row.wanted == name.wanted; }));
+      const GradientRequest none = no_gradients();
+      CHECK_FALSE(none.*name.wanted);
+    }
+  }
+}
