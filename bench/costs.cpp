@@ -5,15 +5,13 @@ namespace {
 
 StageCost rasterize_cost(const FrameWork& w) {
   return {w.pairs * (k_cover_per_pair + k_list_per_pair + k_rasterize_per_pair) +
-              w.pixels * k_list_per_pixel + w.fragments * (k_list_per_fragment + k_rasterize_per_fragment) +
-              w.padded * k_rasterize_per_padded,
-          w.pairs * k_rasterize_backward_per_pair + w.fragments * k_rasterize_backward_per_fragment +
-              w.padded * k_rasterize_backward_per_padded};
+              w.pixels * k_list_per_pixel + w.fragments * (k_list_per_fragment + k_rasterize_per_fragment),
+          w.pairs * k_rasterize_backward_per_pair + w.fragments * k_rasterize_backward_per_fragment};
 }
 
 StageCost shade_cost(const FrameWork& w) {
-  return {w.pairs * k_shade_per_pair + w.padded * k_shade_per_padded,
-          w.pairs * k_shade_backward_per_pair + w.padded * k_shade_backward_per_padded};
+  return {w.pairs * k_shade_per_pair + w.fragments * k_shade_per_fragment,
+          w.pairs * k_shade_backward_per_pair + w.fragments * k_shade_backward_per_fragment};
 }
 
 std::optional<StageCost> occupancy_cost(const FrameWork& w, const Smoothing& s) {
@@ -29,8 +27,8 @@ std::optional<StageCost> occupancy_cost(const FrameWork& w, const Smoothing& s) 
     return std::nullopt;
   }
   return StageCost{
-      w.padded * Cost{forward, k_occupancy_bytes},
-      w.pairs * k_occupancy_backward_per_pair + w.padded * Cost{backward, k_occupancy_backward_bytes}};
+      w.fragments * Cost{forward, k_occupancy_bytes},
+      w.pairs * k_occupancy_backward_per_pair + w.fragments * Cost{backward, k_occupancy_backward_bytes}};
 }
 
 std::optional<StageCost> aggregate_cost(const FrameWork& w, const Smoothing& s) {

@@ -49,23 +49,21 @@ inline constexpr Cost k_list_per_pair{0, 12 + 16};  // rasterize_count, rasteriz
 inline constexpr Cost k_list_per_pixel{0, 4 + 4};
 inline constexpr Cost k_list_per_fragment{0, 4};
 inline constexpr Cost k_rasterize_per_pair{0, 4 + 4 + 48 + 8 + 4};
-inline constexpr Cost k_rasterize_per_fragment{k_view + k_inside + k_distance + k_barycentrics + 9, 0};
-inline constexpr Cost k_rasterize_per_padded{0, 24};
-inline constexpr Cost k_rasterize_backward_per_pair{0, 4 + 8 + 4 + 48 + 36};
+inline constexpr Cost k_rasterize_per_fragment{k_view + k_inside + k_distance + k_barycentrics + 9, 24};
+inline constexpr Cost k_rasterize_backward_per_pair{0, 4 + 4 + 48 + 36};
 /// Distance: the closest edge (45), factor (2), three corners of 5. Barycentrics: those (8), clipped (12),
 /// their gradients (9), three edges of 14.
-inline constexpr Cost k_rasterize_backward_per_fragment{k_view + 62 + 71, 0};
-inline constexpr Cost k_rasterize_backward_per_padded{0, 8 + 16};
+inline constexpr Cost k_rasterize_backward_per_fragment{k_view + 62 + 71, 8 + 16};
 
 // shade.cl, unlit
 inline constexpr Cost k_shade_per_pair{0, 4 + 4 + 16 + 48};
-inline constexpr Cost k_shade_per_padded{12, 8 + 12};
-inline constexpr Cost k_shade_backward_per_pair{0, 4 + 8 + 4 + 16 + 48 + 36};
-inline constexpr Cost k_shade_backward_per_padded{2 + 10 + 18, 8 + 12 + 8};
+inline constexpr Cost k_shade_per_fragment{12, 8 + 12};
+inline constexpr Cost k_shade_backward_per_pair{0, 4 + 4 + 16 + 48 + 36};
+inline constexpr Cost k_shade_backward_per_fragment{2 + 10 + 18, 8 + 12 + 8};
 
 // occupancy.cl, occupancy_sampled.cl; evaluations are samples
 inline constexpr double k_occupancy_bytes = 4 + 8, k_occupancy_backward_bytes = 12;
-inline constexpr Cost k_occupancy_backward_per_pair{0, 8 + 4 + 4};
+inline constexpr Cost k_occupancy_backward_per_pair{0, 4 + 4};
 inline constexpr double k_occupancy_sample = k_normal_sample + 2;           // x + noise, sum
 inline constexpr double k_occupancy_backward_sample = k_normal_sample + 8;  // also excess, two sums, score
 

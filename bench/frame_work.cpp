@@ -146,7 +146,6 @@ FrameWork count_work(const Renderer& renderer) {
   FrameWork work;
   work.pairs = static_cast<double>(found.pairs);
   work.fragments = static_cast<double>(found.fragments);
-  work.padded = static_cast<double>(found.padded);
   work.pixels = static_cast<double>(pixels_per_view * renderer.views().size());
   const Fragments f(found);
   for (std::size_t i = 0; i < pixels_per_view * renderer.views().size(); ++i) {

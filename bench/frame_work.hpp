@@ -7,8 +7,7 @@ namespace dpr::bench {
 
 struct FrameWork {
   double pairs = 0;      ///< (8x8 tile, triangle)
-  double fragments = 0;  ///< (pixel, triangle), without padding
-  double padded = 0;     ///< with the padding of the pairs' runs to whole vectors
+  double fragments = 0;  ///< (pixel, triangle)
   double pixels = 0;     ///< of all views
   /// Slots (fragments, and the background) that aggregation visits, times the nodes or samples at which it
   /// does. 0 for a prior whose rule is not counted here.

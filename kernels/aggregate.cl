@@ -123,7 +123,7 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
                               global Slot* restrict slots, global uint* restrict slot_counts,
                               global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   const float3 background = p.background.xyz;
   if (starts[pixel] == starts[pixel + 1]) {
     image[pixel] = (float4)(background, 0.0f);
@@ -169,7 +169,7 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
                                global float* restrict grad_green, global float* restrict grad_blue,
                                global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   const float4 grad = grad_image[pixel];
   float grad_gamma = 0.0f, grad_alpha = 0.0f, background_weight = 1.0f;
   const uint first = starts[pixel], last = starts[pixel + 1];

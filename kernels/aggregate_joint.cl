@@ -127,7 +127,12 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
                                     global Slot* restrict slots, global uint* restrict slot_counts,
                                     global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
+  if (starts[pixel] == starts[pixel + 1]) {
+    slot_counts[pixel] = 0;
+    image[pixel] = (float4)(p.background.xyz, 0.0f);
+    return;
+  }
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
@@ -188,9 +193,13 @@ kernel void aggregate_joint_backward(
     global float* restrict grad_log_occupancy, global float* restrict grad_red,
     global float* restrict grad_green, global float* restrict grad_blue, global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  if (pixel >= p.last_pixel) return;
   const float4 grad = grad_image[pixel];
+  if (starts[pixel] == starts[pixel + 1]) {
+    write_channels(p, pixel, 0.0f, 0.0f, 1.0f, grad, channels);
+    return;
+  }
+  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
   const uint seen = slot_counts[pixel];

@@ -144,7 +144,7 @@ kernel void aggregate_joint_sampled_forward(const AggregateParams p, global cons
                                             global const uint* restrict fragment_pair,
                                             global const uint* restrict pair_face, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
     image[pixel] = (float4)(p.background.xyz, 0.0f);
     return;
@@ -236,7 +236,7 @@ kernel void aggregate_joint_sampled_backward(
     global float* restrict grad_red, global float* restrict grad_green, global float* restrict grad_blue,
     global float* restrict grad_sigma, global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);
   const float4 grad = grad_image[pixel];
   float by_sigma = 0.0f, by_gamma = 0.0f, background_weight = 1.0f;

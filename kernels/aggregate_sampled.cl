@@ -87,7 +87,7 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
                                       global const uint* restrict fragment_pair, global const uint* restrict pair_face,
                                       global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
     image[pixel] = (float4)(p.background.xyz, 0.0f);
     return;
@@ -147,7 +147,7 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
                                        global float* restrict grad_green, global float* restrict grad_blue,
                                        global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
-  if (pixel >= p.pixels) return;
+  if (pixel >= p.last_pixel) return;
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   const FaceOf face = {fragment_pair, pair_face};
   const float4 grad = grad_image[pixel];

@@ -14,7 +14,7 @@ static inline float3 normalized(float3 v) {
   return length2 > 0.0f ? v * rsqrt(length2) : (float3)(0.0f);
 }
 
-/// One work-item per pixel. Deterministic.
+/// One work-item per pixel, up to `last_pixel`. Deterministic.
 /// in   starts         uint[pixel + 1]        runs of `list`
 /// in   list           uint[...]              fragments, by pixel
 /// in   weight         float[fragment]        in the pixel's colour
@@ -26,8 +26,9 @@ static inline float3 normalized(float3 v) {
 /// in   world          float4[view][vertex]
 /// out  outputs        float[DPR_AUXILIARY_CHANNELS][pixel]
 /// out  face_id        uint[pixel]            face of the scene, DPR_NO_FACE for the background
-kernel void auxiliary_forward(const FrameParams p, global const uint* restrict starts, global const uint* restrict list,
-                        global const float* restrict weight, global const float* restrict channels,
+kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global const uint* restrict starts,
+                        global const uint* restrict list, global const float* restrict weight,
+                        global const float* restrict channels,
                         global const float* restrict depth, global const float* restrict bary1,
                         global const float* restrict bary2, global const uint* restrict fragment_pair,
                         global const uint* restrict pair_face, global const uint4* restrict faces,
@@ -35,7 +36,7 @@ kernel void auxiliary_forward(const FrameParams p, global const uint* restrict s
                         global uint* restrict face_id) {
   const uint pixel = (uint)get_global_id(0);
   const uint pixels_per_view = p.width * p.height, pixels = p.views * pixels_per_view;
-  if (pixel >= pixels) return;
+  if (pixel >= last_pixel) return;
   global const float4* vertices = world + pixel / pixels_per_view * p.vertices;
   float sum = 0.0f, squares = 0.0f, depth_sum = 0.0f, largest = channels[DPR_CHANNEL_BACKGROUND * pixels + pixel];
   float2 barycentrics = (float2)(0.0f, 0.0f);

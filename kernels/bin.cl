@@ -30,6 +30,11 @@ static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile
   return !any((behind && nx * nx + ny * ny > blur * blur).xyz);
 }
 
+/// Whether a tile within the triangle's bounds is listed for it; always where there is but one.
+static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
+  return t.first_tile == t.last_tile || tile_overlaps(p, t, tile_x, tile_y);
+}
+
 /// Counts the pairs of every triangle. One work-item per (view, face).
 /// out  counts  uint[view][face]
 kernel void bin_count(const FrameParams p, global const Triangle* restrict triangles, global uint* restrict counts) {
@@ -39,7 +44,7 @@ kernel void bin_count(const FrameParams p, global const Triangle* restrict trian
   uint count = 0;
   if (t.orientation != 0.0f) {
     for (uint y = t.first_tile >> 16; y <= t.last_tile >> 16; ++y) {
-      for (uint x = t.first_tile & 0xffffu; x <= (t.last_tile & 0xffffu); ++x) count += tile_overlaps(p, t, x, y) ? 1 : 0;
+      for (uint x = t.first_tile & 0xffffu; x <= (t.last_tile & 0xffffu); ++x) count += is_listed(p, t, x, y) ? 1 : 0;
     }
   }
   counts[i] = count;
@@ -61,13 +66,13 @@ kernel void bin_fill(const FrameParams p, const uint room, global const Triangle
   const uint total = offsets[p.views * p.faces];
   if (i == 0) pairs[0] = total > room ? 0 : total;
   if (total > room) return;
+  if (offsets[i] == offsets[i + 1]) return;
   const Triangle t = triangles[i];
-  if (t.orientation == 0.0f) return;
   const uint first_tile = i / p.faces * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
   for (uint y = t.first_tile >> 16; y <= t.last_tile >> 16; ++y) {
     for (uint x = t.first_tile & 0xffffu; x <= (t.last_tile & 0xffffu); ++x) {
-      if (!tile_overlaps(p, t, x, y)) continue;
+      if (!is_listed(p, t, x, y)) continue;
       place_face[place] = i;
       place_tile[place] = first_tile + y * p.tiles_x + x;
       places[place] = place;

@@ -1,9 +1,6 @@
 // The perturbed Heaviside: p = E[H(s + sigma X)], exactly. Le Lidec et al. 2021, eq. (8), (21), (31), (36).
-#ifdef DPR_LANES
-#if DPR_LANES == 16
-#define DPR_WIDTH 8 /* runs of fragments are padded to the width of the rasterizer's vectors */
-#endif
-#endif
+#include "tile_lanes.h"
+
 #include "priors.h"
 
 #ifndef DPR_OCCUPANCY_WIDTH
@@ -87,26 +84,28 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
   store_n(v.p, i, occupancy);
 }
 
-/// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per pair.
-/// in   masks               uint2[pair]      says which fragments are padding: their gradients become 0
+/// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per
+/// group of pairs.
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
-kernel void occupancy_backward(const OccupancyParams p, const uint pairs, global const uint2* restrict masks,
-                               global const uint* restrict fragment_starts, global const float* restrict distance,
+kernel void occupancy_backward(const OccupancyParams p, const uint2 pairs, global const uint* restrict fragment_starts,
+                               global const float* restrict distance,
                                global const float* restrict grad_log_occupancy, global float* restrict grad_distance,
                                global float* restrict grad_sigma) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
-  const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
-  realn sum = 0.0f;
-  for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const Perturbed v = perturb(load_n(i, distance), p.sigma);
-    const realn grad = choose(real_fragment, load_n(i, grad_log_occupancy) * v.slope, (realn)(0.0f));
-    store_n(grad, i, grad_distance);
-    sum -= v.ratio * grad;
+  const uint2 group = pair_group(pairs);
+  if (group.x >= group.y) return;
+  const uint end = fragment_starts[group.y];
+  for (uint pair = group.x; pair < group.y; ++pair) {
+    const uint last = fragment_starts[pair + 1];
+    realn sum = 0.0f;
+    for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
+      const intn in_run = lanes_before(last, i);
+      const Perturbed v = perturb(load_run(in_run, i, distance), p.sigma);
+      const realn grad = load_run(in_run, i, grad_log_occupancy) * v.slope;
+      store_run(grad, i, end, grad_distance);
+      sum -= v.ratio * grad;
+    }
+    grad_sigma[pair] = sum_lanes(sum);
   }
-  grad_sigma[pair] = sum_lanes(sum);
 }

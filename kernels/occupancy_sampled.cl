@@ -1,6 +1,7 @@
 // The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise. The
 // backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
 #include "noise.h"
+#include "tile_lanes.h"
 
 /// Below the least share of samples that is not 0.
 #define DPR_LEAST_SHARE 1e-7f
@@ -25,10 +26,9 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 #if DPR_LANES < DPR_WIDTH
   for (uint i = first; i < last; ++i) log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
 #else
-  // Runs are padded to whole vectors.
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const realn p = load_n(i, occupancy);
-    store_n(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, log_occupancy);
+    const realn p = load_run(lanes_before(last, i), i, occupancy);
+    store_run(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, last, log_occupancy);
   }
 #endif
 }
@@ -78,12 +78,11 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
 }
 
 /// One work-item per pair.
-/// in   masks               uint2[pair]  says which fragments are padding: their gradients become 0
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]
 kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs,
-                                       global const uint* restrict pair_face, global const uint2* restrict masks,
+                                       global const uint* restrict pair_face,
                                        global const uint* restrict fragment_starts,
                                        global const uint* restrict pixels, global const float* restrict distance,
                                        global const float* restrict occupancy,
@@ -92,15 +91,14 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
-  const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   float total = 0.0f;
-  for (uint i = first; i < fragment_starts[pair + 1]; ++i) {
+  for (uint i = first; i < last; ++i) {
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
     // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
     const int agrees = always_covers(x) || (!signbit(x) && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
-    if (i >= last || occupancy[i] <= 0.0f || agrees) continue;
+    if (occupancy[i] <= 0.0f || agrees) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p
     const float chain = grad_log_occupancy[i] / (occupancy[i] * p.sigma);

@@ -13,6 +13,9 @@
 #define DPR_EDGE_ERROR 1.8e-7f
 #define DPR_EDGE_FLOOR 1e-30f
 
+/// What rounding moves a projected coordinate by at most, in pixels of images up to 16384 wide or high.
+#define DPR_BOUNDS_SLACK 1e-2f
+
 /// The largest coordinate is scaled to about 2^60: the products' sum stays below 2^128, and the products of coordinates
 /// down to 2^-99 of the largest have all their bits.
 #define DPR_EXACT_EXPONENT 60

@@ -1,7 +1,6 @@
 // Triangles to fragments. A pair's coverage of its tile is a 64-bit mask; fragments are listed by pair (so that a
 // triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel has the list of
-// its own. A pair's run of fragments is padded to whole vectors; the padding repeats the last fragment, no pixel lists
-// it, and backward passes take its gradients as zero.
+// its own.
 #include "geometry.h"
 
 #define DPR_ROW_MASK 0xffu
@@ -23,31 +22,30 @@ static inline uint lane_bits(intn condition) {
 #endif
 }
 
-/// The rows [x, y) of a tile that the triangle's blurred bounds may touch. Rounding outwards to whole rows is a slack far
-/// above the arithmetic's error.
+/// The rows [x, y) of a tile that have samples within the triangle's blurred bounds.
 static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint first_row) {
   const float high = fmax(fmax(t.y0, t.y1), t.y2) + p.blur_distance, low = fmin(fmin(t.y0, t.y1), t.y2) - p.blur_distance;
   const float centre = 0.5f * (float)p.height - 0.5f - (float)first_row;
   const float end = min((float)DPR_TILE, (float)(p.height - first_row));
-  const float first = clamp(floor(centre - high / p.pixel_size), 0.0f, end);
-  const float last = clamp(ceil(centre - low / p.pixel_size) + 1.0f, 0.0f, end);
+  const float first = clamp(ceil(centre - high / p.pixel_size - DPR_BOUNDS_SLACK), 0.0f, end);
+  const float last = clamp(floor(centre - low / p.pixel_size + DPR_BOUNDS_SLACK) + 1.0f, 0.0f, end);
   return (uint2)((uint)first, (uint)last);
 }
 
-/// The pixels of a tile's row that a triangle owns, as bits.
-static uint owned_in_row(const FrameParams p, const Triangle t, uint first_column, uint row) {
-  uint bits = 0;
-  for (uint k = 0; k < DPR_TILE && first_column + k < p.width; ++k) {
-    bits |= owns_sample(t, pixel_centre(p, first_column + k, row)) ? 1u << k : 0u;
+/// Those of the given pixels of a row that a triangle owns; bit k is `first_column` + k.
+static uint owned_of(uint bits, const FrameParams p, const Triangle t, uint first_column, uint row) {
+  uint owned = 0;
+  for (; bits != 0; bits &= bits - 1) {
+    owned |= owns_sample(t, pixel_centre(p, first_column + lowest_bit(bits), row)) ? bits & -bits : 0u;
   }
-  return bits;
+  return owned;
 }
 
 /// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur distance.
 /// One work-item for every pair there is room for; where there is no pair, nothing is covered.
 /// in   pairs   uint[1]      how many there are
 /// out  masks   uint2[room]  bit 8 * row + column
-/// out  counts  uint[room]   covered pixels, rounded up to whole vectors
+/// out  counts  uint[room]   covered pixels
 kernel void rasterize_cover(const FrameParams p, const uint room, global const uint* restrict pairs,
                             global const Triangle* restrict triangles, global const uint* restrict pair_face,
                             global const uint* restrict pair_tile, global uint2* restrict masks,
@@ -65,7 +63,6 @@ kernel void rasterize_cover(const FrameParams p, const uint room, global const u
   const float limit = is_sliver(t) ? 0.0f : p.blur_distance * p.blur_distance;
   const uint2 rows = blurred_rows(p, t, first_row);
   const float error = side_error(p, t);
-  intn doubtful = 0;
   uint halves[2] = {0, 0};
   for (uint row = rows.x; row < rows.y; ++row) {
     const realn y = pixel_y(p, (realn)((float)(first_row + row)));
@@ -73,21 +70,17 @@ kernel void rasterize_cover(const FrameParams p, const uint room, global const u
       const intn column = (int)(first_column + part) + DPR_LANE_INDEX;
       const View3 v = view_triangle(t, pixel_x(p, convert_realn(column)), y);
       const realn side = least_side(v, t.orientation);
-      doubtful |= !(fabs(side) > error);
-      const intn covered = side > 0.0f || triangle_distance2(v) < limit;
-      halves[row / 4] |= lane_bits(covered && column < (int)p.width) << (8 * (row & 3) + part);
-    }
-  }
-  if (any_lane(doubtful)) {
-    // What rounding has let in besides lies within any blur.
-    if (limit == 0.0f) halves[0] = halves[1] = 0;
-    for (uint row = rows.x; row < rows.y; ++row) {
-      halves[row / 4] |= owned_in_row(p, t, first_column, first_row + row) << (8 * (row & 3));
+      const intn in_image = column < (int)p.width, doubtful = !(fabs(side) > error);
+      uint bits = lane_bits(side > error && in_image);
+      if (limit > 0.0f) bits |= lane_bits((side > 0.0f || triangle_distance2(v) < limit) && in_image);
+      if (any_lane(doubtful)) {
+        bits |= owned_of(lane_bits(doubtful && in_image), p, t, first_column + part, first_row + row);
+      }
+      halves[row / 4] |= bits << (8 * (row & 3) + part);
     }
   }
   masks[pair] = (uint2)(halves[0], halves[1]);
-  const uint count = popcount(halves[0]) + popcount(halves[1]);
-  counts[pair] = (count + DPR_WIDTH - 1) / DPR_WIDTH * DPR_WIDTH;
+  counts[pair] = popcount(halves[0]) + popcount(halves[1]);
 }
 
 /// Counts the fragments of every pixel. One work-item per vector of pixels of a tile's row.
@@ -118,47 +111,48 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
 /// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
 /// more.
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
-/// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
-/// in   pixel_starts     uint[pixel + 1]  exclusive scan of the counts
-/// out  rows  uint4[view * tiles_y + 1]   the first pair, fragment and list entry; w = the number of pairs
+/// in   fragment_starts  uint[pair + 1]   runs of fragments
+/// out  rows  uint4[view * tiles_y + 1]   the first pair and fragment; z = the number of pairs
 kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
                            global const uint* restrict pair_starts, global const uint* restrict fragment_starts,
-                           global const uint* restrict pixel_starts, global uint4* restrict rows) {
+                           global uint4* restrict rows) {
   const uint row = (uint)get_global_id(0);
   if (row > p.views * p.tiles_y) return;
   const uint pair = tile_starts[row * p.tiles_x];
-  const uint pixel = (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
-  rows[row] = (uint4)(pair, fragment_starts[pair], pixel_starts[pixel], pair_starts[p.views * p.faces]);
+  rows[row] = (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], 0);
 }
 
 /// Empties a frame whose fragments do not fit into the room made for them, so that no later kernel writes behind a
 /// buffer's end. Any number of work-items.
 /// in   rows  uint4[last_row + 1]  whose last has the totals
 /// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
-kernel void rasterize_fit(const uint pairs, const uint pixels, const uint room, const uint list_room,
-                          const uint last_row, global const uint4* restrict rows, global uint2* restrict masks,
+kernel void rasterize_fit(const uint pairs, const uint pixels, const uint room, const uint last_row,
+                          global const uint4* restrict rows, global uint2* restrict masks,
                           global uint* restrict fragment_starts, global uint* restrict pixel_starts) {
-  const uint4 total = rows[last_row];
-  if (total.y <= room && total.z <= list_room) return;
+  if (rows[last_row].y <= room) return;
   const uint first = (uint)get_global_id(0), step = (uint)get_global_size(0);
   for (uint i = first; i < pairs; i += step) masks[i] = 0;
   for (uint i = first; i <= pairs; i += step) fragment_starts[i] = 0;
   for (uint i = first; i <= pixels; i += step) pixel_starts[i] = 0;
 }
 
-/// Counts runs from a band's first element; those before and behind the band are empty. One work-item per run.
-/// in   starts       uint[count]  of the frame
-/// out  band_starts  uint[count]
-kernel void rasterize_rebase(const uint count, const uint first, const uint last, global const uint* restrict starts,
-                             global uint* restrict band_starts) {
+/// Counts runs from a band's first element. The runs are `columns` from `first` on and as many from every `stride` after,
+/// `rows` times. One work-item per run, and one more in every row.
+/// in   starts       uint[...]  of the frame
+/// out  band_starts  uint[...]  those of the band, where they were
+kernel void rasterize_rebase(const uint first, const uint columns, const uint rows, const uint stride,
+                             global const uint* restrict starts, global uint* restrict band_starts) {
   const uint i = (uint)get_global_id(0);
-  if (i >= count) return;
-  band_starts[i] = clamp(starts[i], first, last) - first;
+  const uint row = i / (columns + 1), begin = first + row * stride, run = begin + i % (columns + 1);
+  if (row >= rows) return;
+  uint before = 0;
+  for (uint k = first; k < begin; k += stride) before += starts[k + columns] - starts[k];
+  band_starts[run] = before + starts[run] - starts[begin];
 }
 
 /// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of pixels of a
 /// tile's row, up to `last_vector`.
-/// in   fragment_starts  uint[pair + 1]   runs of fragments, padded
+/// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixel_starts     uint[pixel + 1]  runs of the lists
 /// out  lists            uint[...]        fragments, by pixel
 kernel void rasterize_list(const FrameParams p, const uint last_vector, global const uint* restrict tile_starts,
@@ -187,67 +181,82 @@ kernel void rasterize_list(const FrameParams p, const uint last_vector, global c
   }
 }
 
-/// Writes the pixels of a pair's fragments, x | y << 16, row by row; the padding repeats the last.
-static inline void list_pixels(uint2 mask, uint first_column, uint first_row, uint first, uint last,
-                               global uint* restrict pixels) {
-  uint fragment = first, packed = 0;
-  for (uint row = 0; row < DPR_TILE; ++row) {
-    for (uint bits = mask_row(mask, row); bits != 0; bits &= bits - 1) {
-      packed = (first_column + lowest_bit(bits)) | (first_row + row) << 16;
-      pixels[fragment++] = packed;
-    }
+/// Takes a vector of pixels, x | y << 16, out of a mask, row by row. Behind the mask's last pixel that one is repeated.
+/// `corner` is the tile's first pixel.
+static inline uintn take_pixels(ulong* mask, uint corner) {
+  uint lanes[DPR_WIDTH];
+#pragma unroll
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
+    const uint bit = 63 - (uint)clz(*mask & -*mask);
+    lanes[lane] = corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
+    const ulong rest = *mask & (*mask - 1);
+    *mask = rest != 0 ? rest : *mask;
   }
-  while (fragment < last) pixels[fragment++] = packed;
+  return load_n(0, lanes);
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per pair, up to `last_pair`.
+/// The signed distance of a vector of fragments, with the sign of the edge functions where that is certain, of
+/// owns_sample() where it is not.
+static inline realn signed_distance(const FrameParams p, const Triangle t, const View3 v, float error, uintn packed) {
+  const realn distance2 = triangle_distance2(v);
+  const realn s = p.euclidean ? sqrt(distance2) : distance2;
+  const realn side = least_side(v, t.orientation);
+  intn inside = side > 0.0f;
+  const intn doubtful = !(fabs(side) > error);
+  if (any_lane(doubtful)) {
+    uint pixels[DPR_WIDTH];
+    store_n(packed, 0, pixels);
+    int owned[DPR_WIDTH];
+    for (uint k = 0; k < DPR_WIDTH; ++k) {
+      owned[k] = -owns_sample(t, pixel_centre(p, pixels[k] & 0xffffu, pixels[k] >> 16));
+    }
+    inside = select(inside, load_n(0, owned), doubtful);
+  }
+  return choose(inside, s, -s);
+}
+
+/// What a fragment is: distance, depth, barycentrics. One work-item per group of pairs.
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
 /// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the triangle
-///                                 owns the sample, at distance 0 too
+///                                 owns the sample, at distance 0 too. 0 where p.sharp is set
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
-kernel void rasterize_forward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
+kernel void rasterize_forward(const FrameParams p, const uint2 pairs, global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
                               global float* restrict distance, global float* restrict depth,
                               global float* restrict bary1, global float* restrict bary2) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
-  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
-  if (first == last) return;
-  const Triangle t = triangles[pair_face[pair]];
-  const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
-  list_pixels(masks[pair], tile % p.tiles_x * DPR_TILE, tile / p.tiles_x * DPR_TILE, first, last, pixels);
+  const uint2 group = pair_group(pairs);
+  if (group.x >= group.y) return;
+  const uint end = fragment_starts[group.y];
+  for (uint pair = group.x; pair < group.y; ++pair) {
+    const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    if (first == last) continue;
+    const Triangle t = triangles[pair_face[pair]];
+    const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
+    const uint corner = tile % p.tiles_x * DPR_TILE | tile / p.tiles_x * DPR_TILE << 16;
+    const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
+    const float error = side_error(p, t);
+    ulong mask = (ulong)masks[pair].y << 32 | masks[pair].x;
+    for (uint i = first; i < last; i += DPR_WIDTH) {
+      const uintn packed = take_pixels(&mask, corner);
+      store_run_uint((uintn)(pair), i, end, fragment_pair);
+      store_run_uint(packed, i, end, pixels);
+      const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+      const View3 v = view_triangle(t, x, y);
+      store_run(p.sharp ? (realn)(0.0f) : signed_distance(p, t, v, error, packed), i, end, distance);
 
-  const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
-  const float error = side_error(p, t);
-  intn doubtful = 0;
-  for (uint i = first; i < last; i += DPR_WIDTH) {
-    store_n((uintn)(pair), i, fragment_pair);
-    const uintn packed = load_n(i, pixels);
-    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
-    const View3 v = view_triangle(t, x, y);
-    const realn distance2 = triangle_distance2(v);
-    const realn s = p.euclidean ? sqrt(distance2) : distance2;
-    const realn side = least_side(v, t.orientation);
-    doubtful |= !(fabs(side) > error);
-    store_n(choose(side > 0.0f, s, -s), i, distance);
-
-    realn n[3];
-    raw_barycentrics(v, scale, n);
-    const realn inverse_sum = inverse_of_clipped(n);
-    const realn c1 = greater(n[1], 0.0f) * inverse_sum, c2 = greater(n[2], 0.0f) * inverse_sum;
-    store_n(c1, i, bary1);
-    store_n(c2, i, bary2);
-    // Around z0, so that the difference of the depths keeps its digits.
-    store_n(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, depth);
-  }
-  if (!any_lane(doubtful)) return;
-  for (uint i = first; i < last; ++i) {
-    const int is_owned = owns_sample(t, pixel_centre(p, pixels[i] & 0xffffu, pixels[i] >> 16));
-    distance[i] = copysign(distance[i], is_owned ? 1.0f : -1.0f);
+      realn n[3];
+      raw_barycentrics(v, scale, n);
+      const realn inverse_sum = inverse_of_clipped(n);
+      const realn c1 = greater(n[1], 0.0f) * inverse_sum, c2 = greater(n[2], 0.0f) * inverse_sum;
+      store_run(c1, i, end, bary1);
+      store_run(c2, i, end, bary2);
+      // Around z0, so that the difference of the depths keeps its digits.
+      store_run(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, end, depth);
+    }
   }
 }
 
@@ -318,37 +327,44 @@ static inline void add_barycentric_gradient(const View3 v, const Triangle t, con
   }
 }
 
+/// The pixels of a run of fragments; in the lanes outside of it pixel 0, which is as good as any.
+static inline uintn load_pixels(intn in_run, uint first, global const uint* pixels) {
+  return select((uintn)(0), load_n(first, pixels), in_run);
+}
+
 /// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
-/// in   masks          uint2[pair]      says which fragments are padding
 /// in   distance       float[fragment]  whose sign says on which side the sample lies
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
 kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
-                               global const uint* restrict pair_face, global const uint2* restrict masks,
-                               global const uint* restrict fragment_starts, global const uint* restrict pixels,
-                               global const float* restrict distance, global const float* restrict grad_distance,
-                               global const float* restrict grad_depth, global const float* restrict grad_bary1,
-                               global const float* restrict grad_bary2, global float* restrict grad_corners) {
+                               global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+                               global const uint* restrict pixels, global const float* restrict distance,
+                               global const float* restrict grad_distance, global const float* restrict grad_depth,
+                               global const float* restrict grad_bary1, global const float* restrict grad_bary2,
+                               global float* restrict grad_corners) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  if (first == last) {
+    for (int k = 0; k < 9; ++k) grad_corners[9 * pair + k] = 0.0f;
+    return;
+  }
   CornerGradients g;
 #pragma unroll
   for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
   const Triangle t = triangles[pair_face[pair]];
   const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
-  const uint first = fragment_starts[pair];
-  const uint last = first + popcount(masks[pair].x) + popcount(masks[pair].y);
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn real_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-    const realn zero = 0.0f;
-    const uintn packed = load_n(i, pixels);
+    const intn in_run = lanes_before(last, i);
+    const uintn packed = load_pixels(in_run, i, pixels);
     const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
     const View3 v = view_triangle(t, x, y);
-    add_distance_gradient(v, as_intn(load_n(i, distance)) >= 0, p.euclidean,
-                          choose(real_fragment, load_n(i, grad_distance), zero), &g);
-    add_barycentric_gradient(v, t, scale, choose(real_fragment, load_n(i, grad_depth), zero),
-                             choose(real_fragment, load_n(i, grad_bary1), zero),
-                             choose(real_fragment, load_n(i, grad_bary2), zero), &g);
+    if (!p.sharp) {
+      add_distance_gradient(v, as_intn(load_run(in_run, i, distance)) >= 0, p.euclidean,
+                            load_run(in_run, i, grad_distance), &g);
+    }
+    add_barycentric_gradient(v, t, scale, load_run(in_run, i, grad_depth), load_run(in_run, i, grad_bary1),
+                             load_run(in_run, i, grad_bary2), &g);
   }
 #pragma unroll
   for (int k = 0; k < 3; ++k) {

@@ -5,15 +5,20 @@
 /// Corners further away than this, NDC, have squared distances that single precision does not hold.
 #define DPR_MAX_NDC 1e18f
 
-/// The tiles along one axis that [low, high] (pixels, clipped to the image) touches; first > last if none.
+/// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does not.
+static inline int meets_image(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
+
+/// The tiles along one axis that have samples within [low, high], pixels; first > last if there is none.
 static inline uint2 tile_range(float low, float high, uint size) {
-  const float first = fmax(floor(low), 0.0f), last = fmin(ceil(high), (float)size - 1.0f);
+  const float first = fmax(ceil(low - DPR_BOUNDS_SLACK), 0.0f);
+  const float last = fmin(floor(high + DPR_BOUNDS_SLACK), (float)size - 1.0f);
   if (!(first <= last)) return (uint2)(1u, 0u);
   return (uint2)((uint)first / DPR_TILE, (uint)last / DPR_TILE);
 }
 
 /// Assembles the triangles. Dropped (orientation 0) is what reaches nearer than znear, lies wholly beyond zfar, has
-/// exactly no area, reaches beyond DPR_MAX_NDC, or whose blurred bounds miss the image. One work-item per (view, face).
+/// exactly no area, reaches beyond DPR_MAX_NDC, or whose blurred bounds miss the image. What is kept but has no sample
+/// within its bounds has no tiles. One work-item per (view, face).
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
 /// out  triangles  Triangle[view][face]
@@ -33,15 +38,17 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   const float2 centre = 0.5f * (float2)((float)p.width, (float)p.height) - 0.5f;
   const float2 lowest = fmin(fmin(a.xy, b.xy), c.xy), highest = fmax(fmax(a.xy, b.xy), c.xy);
   const float2 low = lowest - p.blur_distance, high = highest + p.blur_distance;
-  const uint2 columns = tile_range(low.x * scale.x + centre.x, high.x * scale.x + centre.x, p.width);
-  const uint2 rows = tile_range(high.y * scale.y + centre.y, low.y * scale.y + centre.y, p.height);
+  const float left = low.x * scale.x + centre.x, right = high.x * scale.x + centre.x;
+  const float top = high.y * scale.y + centre.y, bottom = low.y * scale.y + centre.y;
+  const uint2 columns = tile_range(left, right, p.width), rows = tile_range(top, bottom, p.height);
 
   // Written so that a NaN fails.
   const float znear = views[view].znear;
   const float2 reach = fmax(fabs(lowest), fabs(highest));
   const int in_range = fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC;
   const int in_view = a.z >= znear && b.z >= znear && c.z >= znear && nearest < views[view].zfar &&
-                      furthest < INFINITY && columns.x <= columns.y && rows.x <= rows.y;
+                      furthest < INFINITY && meets_image(left, right, p.width) &&
+                      meets_image(top, bottom, p.height);
   Triangle t;
   t.x0 = a.x;
   t.y0 = a.y;

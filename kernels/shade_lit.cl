@@ -93,18 +93,19 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
   if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
-  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; i += DPR_WIDTH) {
+  const uint last = fragment_starts[pair + 1];
+  for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
     const Shaded f = shade_fragment(s, lp, lights, load_n(i, bary1), load_n(i, bary2));
-    store_n(f.base.x * f.factor.x + f.specular.x, i, red);
-    store_n(f.base.y * f.factor.y + f.specular.y, i, green);
-    store_n(f.base.z * f.factor.z + f.specular.z, i, blue);
+    store_run(f.base.x * f.factor.x + f.specular.x, i, last, red);
+    store_run(f.base.y * f.factor.y + f.specular.y, i, last, green);
+    store_run(f.base.z * f.factor.z + f.specular.z, i, last, blue);
   }
 }
 
-/// dL/dRGB of the fragments from `i` on; zero from `last` on.
-static inline Vec3n load_color_gradient(uint i, uint last, global const float* restrict red,
+/// dL/dRGB of the fragments from `first` on that are in the run; 0 in the other lanes.
+static inline Vec3n load_color_gradient(intn in_run, uint first, global const float* restrict red,
                                         global const float* restrict green, global const float* restrict blue) {
-  return make_vec3n(load_gradient(i, last, red), load_gradient(i, last, green), load_gradient(i, last, blue));
+  return make_vec3n(load_run(in_run, first, red), load_run(in_run, first, green), load_run(in_run, first, blue));
 }
 
 /// Gradients of a surface's corners, as sums over lanes.
@@ -197,8 +198,8 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
                                global const uint4* restrict faces, global const uint4* restrict face_colors,
                                global const float4* restrict colors, global const float4* restrict world,
                                global const float4* restrict normals, global const uint* restrict pair_face,
-                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
-                               global const float* restrict bary1, global const float* restrict bary2,
+                               global const uint* restrict fragment_starts, global const float* restrict bary1,
+                               global const float* restrict bary2,
                                global const float* restrict grad_red, global const float* restrict grad_green,
                                global const float* restrict grad_blue, global float* restrict grad_bary1,
                                global float* restrict grad_bary2, global float* restrict grad_colors,
@@ -212,14 +213,14 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
 #pragma unroll
   for (int k = 0; k < 3; ++k) g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3n();
   g.eye = zero3n();
-  const uint first = fragment_starts[pair];
-  const uint last = end_of_fragments(first, masks[pair]);
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const Vec3n grad = load_color_gradient(i, last, grad_red, grad_green, grad_blue);
+    const intn in_run = lanes_before(last, i);
+    const Vec3n grad = load_color_gradient(in_run, i, grad_red, grad_green, grad_blue);
     realn b1, b2;
-    shade_fragment_backward(s, lp, lights, load_n(i, bary1), load_n(i, bary2), grad, &g, &b1, &b2);
-    store_n(b1, i, grad_bary1);
-    store_n(b2, i, grad_bary2);
+    shade_fragment_backward(s, lp, lights, load_run(in_run, i, bary1), load_run(in_run, i, bary2), grad, &g, &b1, &b2);
+    store_run(b1, i, last, grad_bary1);
+    store_run(b2, i, last, grad_bary2);
   }
   if (DPR_SHADING == DPR_GOURAUD) corners_backward(s, lp, lights, &g);
   float4 position[3];
@@ -263,8 +264,8 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
                                       global const uint4* restrict faces, global const uint4* restrict face_colors,
                                       global const float4* restrict colors, global const float4* restrict world,
                                       global const float4* restrict normals, global const uint* restrict pair_face,
-                                      global const uint2* restrict masks, global const uint* restrict fragment_starts,
-                                      global const float* restrict bary1, global const float* restrict bary2,
+                                      global const uint* restrict fragment_starts, global const float* restrict bary1,
+                                      global const float* restrict bary2,
                                       global const float* restrict grad_red, global const float* restrict grad_green,
                                       global const float* restrict grad_blue, global float* restrict channels) {
   const uint pair = (uint)get_global_id(0);
@@ -272,11 +273,11 @@ kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams 
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
   Vec3n sum[4] = {zero3n(), zero3n(), zero3n(), zero3n()};
-  const uint first = fragment_starts[pair];
-  const uint last = end_of_fragments(first, masks[pair]);
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const Vec3n grad = load_color_gradient(i, last, grad_red, grad_green, grad_blue);
-    const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
+    const intn in_run = lanes_before(last, i);
+    const Vec3n grad = load_color_gradient(in_run, i, grad_red, grad_green, grad_blue);
+    const realn c1 = load_run(in_run, i, bary1), c2 = load_run(in_run, i, bary2);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2);
     const Vec3n grad_factor = mul3n(grad, f.base);
     sum[3] = mad3n(grad_factor, (realn)(1.0f), sum[3]);

@@ -28,6 +28,9 @@ using float4 = cl_float4;
 #define DPR_SORT_BLOCK 1024
 #endif
 
+/// Pairs that a work-item handles in order, on devices whose lanes are vector registers (tile_lanes.h).
+#define DPR_PAIR_GROUP 8
+
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 
@@ -91,6 +94,7 @@ typedef struct FrameParams {
   float blur_distance;   /* NDC: triangles further than this from a pixel are not in its list */
   uint euclidean;        /* distances are NDC, not NDC^2 */
   uint perspective_correct;
+  uint sharp; /* distances have no noise: triangles cover what they own, and distances are not needed */
 } FrameParams;
 
 /// A camera, ready for the kernels.
@@ -158,7 +162,8 @@ typedef struct AggregateParams {
   uint pixels; /* of all views */
   uint faces;  /* of one view */
   uint first_view; /* of the batch that names the noise */
-  uint unused0, unused1;
+  uint last_pixel; /* where those of the launch end */
+  uint unused;
 } AggregateParams;
 
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward pass.

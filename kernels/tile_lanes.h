@@ -1,4 +1,6 @@
-// Lanes no wider than a row of a tile, to which the runs of fragments are padded.
+// Lanes no wider than a row of a tile, for runs of fragments. A pair's run begins anywhere and has any length, so its last
+// vector reaches into the next run. What writes fragments by pair handles pairs in groups, in order: each run is written
+// over what the one before has left there, and only where the group ends are lanes stored apart.
 #ifndef DPR_TILE_LANES_H
 #define DPR_TILE_LANES_H
 
@@ -8,14 +10,52 @@
 #endif
 #endif
 #include "lanes.h"
+#include "shared_types.h"
 
-/// Where the fragments of a pair end, whose run begins at `first`: what follows is padding.
-static inline uint end_of_fragments(uint first, uint2 mask) { return first + popcount(mask.x) + popcount(mask.y); }
+/// The pairs [x, y) of a work-item, out of those of the launch; none if x is not less.
+static inline uint2 pair_group(uint2 pairs) {
+  const uint size = DPR_WIDTH == 1 ? 1 : DPR_PAIR_GROUP;
+  const uint first = pairs.x + (uint)get_global_id(0) * size;
+  return (uint2)(first, min(first + size, pairs.y));
+}
 
-/// Gradients of fragments from `i` on, zero from `last` on: what they hold of padding was never written.
-static inline realn load_gradient(uint i, uint last, global const float* grad) {
-  const intn is_fragment = DPR_LANE_INDEX < (intn)((int)(last - i));
-  return choose(is_fragment, load_n(i, grad), (realn)(0.0f));
+/// Which lanes of the vector at `first` lie before `last`.
+static inline intn lanes_before(uint last, uint first) { return DPR_LANE_INDEX < (intn)((int)(last - first)); }
+
+/// Elements of a run in those lanes, 0 in the others.
+static inline realn load_run(intn in_run, uint first, global const float* values) {
+  return choose(in_run, load_n(first, values), (realn)(0.0f));
+}
+
+/// Stores the lanes before `last`.
+static inline void store_run(realn v, uint first, uint last, global float* values) {
+#if DPR_WIDTH == 1
+  (void)last;
+  values[first] = v;
+#else
+  const uint count = last - first;
+  if (count >= DPR_WIDTH) {
+    store_n(v, first, values);
+    return;
+  }
+  values += first;
+  float4 rest4 = v.lo;
+  if (count & 4) {
+    vstore4(rest4, 0, values);
+    values += 4;
+    rest4 = v.hi;
+  }
+  float2 rest2 = rest4.lo;
+  if (count & 2) {
+    vstore2(rest2, 0, values);
+    values += 2;
+    rest2 = rest4.hi;
+  }
+  if (count & 1) *values = rest2.x;
+#endif
+}
+static inline void store_run_uint(uintn v, uint first, uint last, global uint* values) {
+  store_run(as_realn(v), first, last, (global float*)values);
 }
 
 #endif

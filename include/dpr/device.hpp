@@ -40,11 +40,11 @@ class Device {
 
   /// Memory for the fragments of a frame, bytes. Unless set: a quarter of the device's; of a CPU's, which is
   /// the whole machine's, an eighth and at most 1 GiB. A frame with more fragments is rendered in bands of
-  /// tile rows, forward and backward, with the same results bit by bit. What grows with the scene, the image
-  /// and the number of triangles in each tile comes on top.
+  /// tile rows, or of parts of one, forward and backward, with the same results bit by bit. What grows with
+  /// the scene, the image and the number of triangles in each tile comes on top.
   std::size_t memory_budget() const;
-  /// For all that use the device, from their next forward() on, which throws InvalidArgument if one row of
-  /// tiles does not fit. Throws InvalidArgument for 0.
+  /// For all that use the device, from their next forward() on, which throws InvalidArgument if one tile
+  /// of 8x8 pixels does not fit. Throws InvalidArgument for 0.
   void set_memory_budget(std::size_t bytes);
 
   Impl& impl() const { return *impl_; }

@@ -18,14 +18,8 @@ FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
     throw InvalidArgument(std::string("bands (") + caller + ")", std::to_string(r.bands.size()),
                           "a frame in one");
   }
-  return {r.bin.pairs,
-          r.rasterize.listed_fragments,
-          r.rasterize.fragments,
-          r.rasterize.pixel_starts,
-          r.rasterize.list,
-          r.rasterize.depth,
-          r.occupancy.log_occupancy,
-          r.occupancy.occupancy};
+  return {r.bin.pairs,       r.rasterize.fragments,     r.rasterize.pixel_starts, r.rasterize.list,
+          r.rasterize.depth, r.occupancy.log_occupancy, r.occupancy.occupancy};
 }
 
 void require_same_device(const Device& device, const Renderer& renderer, const char* what) {

@@ -27,9 +27,9 @@ Frame last_frame(const Renderer& renderer, const char* caller);
 
 /// The fragments of a frame in one band, after its forward pass.
 struct FrameFragments {
-  std::size_t pairs, fragments, padded;  ///< the last with the padding of the pairs' runs
-  const Buffer<cl_uint>& pixel_starts;   ///< [view * height * width + 1] runs of `list`
-  const Buffer<cl_uint>& list;           ///< [fragments] places in the buffers below, by pixel
+  std::size_t pairs, fragments;
+  const Buffer<cl_uint>& pixel_starts;  ///< [view * height * width + 1] runs of `list`
+  const Buffer<cl_uint>& list;          ///< [fragments] places in the buffers below, by pixel
   const Buffer<float>&depth, &log_occupancy, &occupancy;
 };
 

@@ -79,7 +79,7 @@ void Renderer::Impl::forward_measured() {
   last_counts.reset();
   bin.forward(frame, setup.triangles);
   rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, device.memory_budget(), k_fragment_bytes);
+  bands = rasterize.cut(frame, bin, device.memory_budget(), k_fragment_bytes);
   for (const Band& band : bands) render(band);
   if (bands.size() == 1) last_counts = rasterize.counted();
 }

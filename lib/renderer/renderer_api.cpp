@@ -182,7 +182,7 @@ RenderStatistics Renderer::statistics() const {
     if (triangle.orientation == 0.0F) ++s.faces_dropped;
   }
   s.pairs = m.bin.pairs;
-  s.fragments = m.rasterize.listed_fragments;
+  s.fragments = m.rasterize.frame_fragments;
   s.bands = m.bands.size();
   s.device_bytes = m.bytes();
   return s;

@@ -30,7 +30,9 @@ shared::ViewParams view_params(const Camera& camera, int width, int height) {
   return v;
 }
 
+/// 0 where distances have no noise: what lies outside a triangle has no part in it then.
 float blur_distance(const Smoothing& smoothing) {
+  if (smoothing.occupancy_width == OccupancyWidth::zero) return 0;
   const float radius = blur_radius(smoothing);
   return smoothing.distance == DistanceMetric::euclidean ? radius : std::sqrt(radius);
 }
@@ -51,6 +53,7 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   p.blur_distance = blur_distance(scene.smoothing);
   p.perspective_correct = scene.perspective_correct ? 1 : 0;
+  p.sharp = scene.smoothing.occupancy_width == OccupancyWidth::zero ? 1 : 0;
   return p;
 }
 
@@ -132,6 +135,7 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
   scene.smoothing = prepared.aggregate.smoothing;
   frame.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   frame.blur_distance = prepared.blur_distance;
+  frame.sharp = scene.smoothing.occupancy_width == OccupancyWidth::zero ? 1 : 0;
   occupancy.set(std::move(prepared.occupancy));
   aggregate.set(std::move(prepared.aggregate));
   rendered = false;

@@ -74,8 +74,7 @@ class Replicates {
     const Buffer<float>& grad_distance =
         m_.aggregate.perturbs_distances() ? m_.aggregate.grad_distance : m_.occupancy.grad_distance;
     const std::vector<float> by_distance = grad_distance.download();
-    // The rest of the buffers is padding.
-    for (const cl_uint k : m_.rasterize.list.download()) {
+    for (std::size_t k = 0; k < by_depth.size(); ++k) {
       depth_.add(k, static_cast<double>(by_depth[k]));
       distance_.add(k, static_cast<double>(by_distance[k]));
     }

@@ -62,13 +62,21 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
 }
 
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
-  const shared::AggregateParams a = params(in.p, background);
+  shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
-  const Range pixels = in.rasterize.pixels(in.p);
+  if (now_.kernels->exact) {
+    slots_.resize(device_, in.rasterize.fragments + a.pixels);
+    slot_counts_.resize(device_, a.pixels);
+  }
+  for (const Range& pixels : in.rasterize.pixels(in.p)) {
+    a.last_pixel = pixels.last();
+    forward(in, a, pixels);
+  }
+}
+
+void Aggregate::forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels) {
   const Rasterize& r = in.rasterize;
   if (now_.kernels->exact) {
-    slots_.resize(device_, r.listed_fragments + a.pixels);
-    slot_counts_.resize(device_, a.pixels);
     now_.kernels->exact->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
                                  in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
                                  in.shade.green, in.shade.blue, slots_, slot_counts_, image);
@@ -85,13 +93,24 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
 
 void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
                          const Buffer<cl_float4>& grad_image) {
-  const shared::AggregateParams a = params(in.p, background);
+  shared::AggregateParams a = params(in.p, background);
   for (Buffer<float>* buffer :
        {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
     buffer->resize(device_, in.rasterize.fragments);
   }
   channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
-  const Range pixels = in.rasterize.pixels(in.p);
+  if (now_.kernels->joint_sampled) {
+    grad_distance.resize(device_, in.rasterize.fragments);
+    grad_sigma.resize(device_, a.pixels);
+  }
+  for (const Range& pixels : in.rasterize.pixels(in.p)) {
+    a.last_pixel = pixels.last();
+    backward(in, a, pixels, grad_image);
+  }
+}
+
+void Aggregate::backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
+                         const Buffer<cl_float4>& grad_image) {
   const Rasterize& r = in.rasterize;
   if (now_.kernels->exact) {
     now_.kernels->exact->backward(
@@ -99,8 +118,6 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
         in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_, grad_image,
         grad_depth, grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
   } else if (now_.kernels->joint_sampled) {
-    grad_distance.resize(device_, in.rasterize.fragments);
-    grad_sigma.resize(device_, a.pixels);
     now_.kernels->joint_sampled->backward(
         pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth, in.shade.red,
         in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_distance,

@@ -98,9 +98,13 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   std::size_t bytes() const;
 
  private:
+  /// Of a run of pixels.
+  void forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels);
+  void backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
+                const Buffer<cl_float4>& grad_image);
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
 
-  Buffer<shared::Slot> slots_;   // [listed fragment + pixel]
+  Buffer<shared::Slot> slots_;   // [fragment + pixel]
   Buffer<cl_uint> slot_counts_;  // [pixel]
 };
 

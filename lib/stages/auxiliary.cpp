@@ -15,9 +15,11 @@ void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, con
   outputs.resize(device_, DPR_AUXILIARY_CHANNELS * pixels);
   face_id.resize(device_, pixels);
   const Rasterize& r = in.rasterize;
-  forward_(r.pixels(in.p), in.p, r.pixel_starts, r.list, aggregate.grad_color.red, aggregate.channels,
-           r.depth, r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices,
-           transform.world, outputs, face_id);
+  for (const Range& run : r.pixels(in.p)) {
+    forward_(run, in.p, run.last(), r.pixel_starts, r.list, aggregate.grad_color.red, aggregate.channels,
+             r.depth, r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices,
+             transform.world, outputs, face_id);
+  }
 }
 
 }  // namespace dpr

@@ -25,8 +25,8 @@ class Auxiliary {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
-         In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
+         In<float>, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
       forward_;
   Buffer<cl_float4> grad_red_;  // [view][height][width] 1 in red
 };

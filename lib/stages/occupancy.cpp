@@ -79,12 +79,13 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
   grad_distance.resize(device_, rasterize.fragments);
   grad_sigma.resize(device_, bin.pairs);
   if (now_.kernels->exact) {
-    now_.kernels->exact->backward(pairs, params(p), pairs.last(), rasterize.masks, rasterize.fragment_starts,
+    const PairGroups groups = rasterize.pair_groups(bin);
+    now_.kernels->exact->backward(groups.count, params(p), groups.pairs, rasterize.fragment_starts,
                                   rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
   } else {
-    now_.kernels->sampled->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.masks,
-                                    rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance,
-                                    occupancy, grad_log_occupancy, grad_distance, grad_sigma);
+    now_.kernels->sampled->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
+                                    rasterize.fragment_pixel, rasterize.distance, occupancy,
+                                    grad_log_occupancy, grad_distance, grad_sigma);
   }
 }
 

@@ -19,8 +19,7 @@ struct OccupancyKernels {
   struct Exact {
     Exact(Device::Impl& device, const std::string& options);
     Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<float>, Out<float>, Out<float>> forward;
-    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, Out<float>,
-           Out<float>>
+    Kernel<shared::OccupancyParams, cl_uint2, In<cl_uint>, In<float>, In<float>, Out<float>, Out<float>>
         backward;
   };
   struct Sampled {
@@ -28,8 +27,8 @@ struct OccupancyKernels {
     Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>,
            Out<float>>
         forward;
-    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, In<float>,
-           In<float>, In<float>, Out<float>, Out<float>>
+    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+           In<float>, Out<float>, Out<float>>
         backward;
   };
 

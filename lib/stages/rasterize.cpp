@@ -27,10 +27,37 @@ std::size_t pixels_of(const shared::FrameParams& p) { return std::size_t{p.views
 std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
 
 Band whole_frame(const shared::FrameParams& p, const FrameCounts& counts) {
-  return {tiles_of(p), counts.pairs, pixels_of(p), counts.fragments, counts.listed};
+  return {tiles_of(p), counts.pairs, {0, pixels_of(p)}, counts.fragments};
+}
+
+/// The pixels of a stretch of tiles: of whole rows, or of a part of one.
+PixelBlock pixel_block(const shared::FrameParams& p, const Range& tiles) {
+  const auto first_pixel = [&](std::size_t row) {
+    return (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
+  };
+  const std::size_t row = tiles.first / p.tiles_x, column = tiles.first % p.tiles_x * DPR_TILE;
+  if (tiles.count % p.tiles_x == 0) {
+    return {first_pixel(row), first_pixel(row + tiles.count / p.tiles_x) - first_pixel(row)};
+  }
+  return {first_pixel(row) + column, std::min<std::size_t>(tiles.count * DPR_TILE, p.width - column),
+          std::min<std::size_t>(DPR_TILE, p.height - row % p.tiles_y * DPR_TILE), p.width};
+}
+
+template <class Start>
+Band make_band(const shared::FrameParams& p, const Start& first, const Start& last) {
+  const auto between = [](std::size_t begin, std::size_t end) { return Range(begin, end - begin); };
+  const Range tiles = between(first.tile, last.tile);
+  return {tiles, between(first.pair, last.pair), pixel_block(p, tiles),
+          between(first.fragment, last.fragment)};
 }
 
 }  // namespace
+
+PairGroups::PairGroups(const Device::Impl& device, const Range& of)
+    : pairs{{static_cast<cl_uint>(of.first), of.last()}} {
+  const std::size_t size = device.info.lanes == 1 ? 1 : DPR_PAIR_GROUP;
+  count = (of.count + size - 1) / size;
+}
 
 void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                       const Bin& bin) {
@@ -45,7 +72,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
-  rows_(rows + 1, p, bin.tile_starts, bin.pair_starts, fragment_starts, pixel_starts, device_rows_);
+  rows_(rows + 1, p, bin.tile_starts, bin.pair_starts, fragment_starts, device_rows_);
   in_bands_ = false;
 }
 
@@ -54,70 +81,90 @@ void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangl
   counted_ = true;
   count(p, triangles, bin);
   row_starts_.clear();
-  for (const cl_uint4& row : device_rows_.download()) row_starts_.push_back({row.s[0], row.s[1], row.s[2]});
-  check_total(row_starts_.back().fragment, "fragments (frame)");
-  listed_fragments = row_starts_.back().listed;
-}
-
-FrameCounts Rasterize::counted() const {
-  return {row_starts_.back().pair, row_starts_.back().fragment, row_starts_.back().listed};
-}
-
-Band Rasterize::make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const {
-  const auto first_pixel = [&](std::size_t row) {
-    return (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
-  };
-  const auto between = [](std::size_t first, std::size_t last) { return Range(first, last - first); };
-  const RowStart &first = row_starts_[first_row], &last = row_starts_[last_row];
-  return {between(first_row * p.tiles_x, last_row * p.tiles_x), between(first.pair, last.pair),
-          between(first_pixel(first_row), first_pixel(last_row)), between(first.fragment, last.fragment),
-          between(first.listed, last.listed)};
-}
-
-std::vector<Band> Rasterize::cut(const shared::FrameParams& p, std::size_t budget,
-                                 std::size_t fragment_bytes) const {
-  const std::size_t rows = row_starts_.size() - 1, total = row_starts_.back().fragment;
-  const auto count = [&](std::size_t first, std::size_t last) {
-    return row_starts_[last].fragment - row_starts_[first].fragment;
-  };
-  std::size_t largest_row = 0;
-  for (std::size_t row = 0; row < rows; ++row) largest_row = std::max(largest_row, count(row, row + 1));
-  if (with_headroom(largest_row) * fragment_bytes > budget) {
-    throw InvalidArgument("memory budget (frame)", std::to_string(budget) + " bytes",
-                          "at least " + std::to_string(with_headroom(largest_row) * fragment_bytes) +
-                              " for the fragments of one row of tiles");
+  for (const cl_uint4& row : device_rows_.download()) {
+    row_starts_.push_back({row_starts_.size() * p.tiles_x, row.s[0], row.s[1]});
   }
+  check_total(row_starts_.back().fragment, "fragments (frame)");
+  frame_fragments = row_starts_.back().fragment;
+}
+
+FrameCounts Rasterize::counted() const { return {row_starts_.back().pair, row_starts_.back().fragment}; }
+
+std::vector<Rasterize::TileStart> Rasterize::tile_starts(const shared::FrameParams& p, const Bin& bin,
+                                                         std::size_t row) const {
+  const TileStart &begin = row_starts_[row], &end = row_starts_[row + 1];
+  std::vector<cl_uint> first_pairs(p.tiles_x), first_fragments(end.pair - begin.pair + 1);
+  bin.tile_starts.download(first_pairs, begin.tile);
+  fragment_starts.download(first_fragments, begin.pair);
+  std::vector<TileStart> starts;
+  for (std::size_t x = 0; x < first_pairs.size(); ++x) {
+    starts.push_back({begin.tile + x, first_pairs[x], first_fragments[first_pairs[x] - begin.pair]});
+  }
+  return starts;
+}
+
+std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
+                                 std::size_t fragment_bytes) const {
+  const auto bytes_of = [&](std::size_t number) { return with_headroom(number) * fragment_bytes; };
+  std::vector<TileStart> cuts;
+  for (std::size_t row = 0; row + 1 < row_starts_.size(); ++row) {
+    const bool fits = bytes_of(row_starts_[row + 1].fragment - row_starts_[row].fragment) <= budget;
+    const std::vector<TileStart> tiles = fits ? std::vector{row_starts_[row]} : tile_starts(p, bin, row);
+    cuts.insert(cuts.end(), tiles.begin(), tiles.end());
+  }
+  cuts.push_back(row_starts_.back());
+  const auto count = [&](std::size_t first, std::size_t last) {
+    return cuts[last].fragment - cuts[first].fragment;
+  };
+  std::size_t largest = 0;
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) largest = std::max(largest, count(i, i + 1));
+  if (bytes_of(largest) > budget) {
+    throw InvalidArgument(
+        "memory budget (frame)", std::to_string(budget) + " bytes",
+        "at least " + std::to_string(bytes_of(largest)) + " for the fragments of one tile of 8x8 pixels");
+  }
+  const auto row_of = [&](std::size_t i) { return cuts[i].tile / p.tiles_x; };
+  const auto is_row = [&](std::size_t i) { return cuts[i + 1].tile - cuts[i].tile == p.tiles_x; };
+  const auto may_join = [&](std::size_t first, std::size_t next) {
+    return is_row(first) ? is_row(next) : row_of(first) == row_of(next);
+  };
   // Of equal size rather than as large as may be; and none larger than the first, so that buffers do not
   // grow.
-  const std::size_t least_bands = with_headroom(total) * fragment_bytes / budget + 1;
-  std::size_t most = least_bands == 1 ? total : std::max(total / least_bands, largest_row);
+  const std::size_t total = cuts.back().fragment, least_bands = bytes_of(total) / budget + 1;
+  std::size_t most = least_bands == 1 ? total : std::max(total / least_bands, largest);
   std::vector<Band> bands;
-  for (std::size_t first = 0, last = 0; first < rows; first = last) {
+  for (std::size_t first = 0, last = 0; last + 1 < cuts.size(); first = last) {
     last = first + 1;
-    while (last < rows && count(first, last + 1) <= most) ++last;
-    bands.push_back(make_band(p, first, last));
-    most = std::max(bands.front().fragments.count, largest_row);
+    while (last + 1 < cuts.size() && may_join(first, last) && count(first, last + 1) <= most) ++last;
+    bands.push_back(make_band(p, cuts[first], cuts[last]));
+    most = std::max(bands.front().fragments.count, largest);
   }
   return bands;
 }
 
-/// The runs of a band, counted from its first element. Work-groups reach beyond its last pixel: there the
-/// runs must be empty.
+std::vector<Range> Rasterize::pixels(const shared::FrameParams& p) const {
+  if (!band) return {pixels_of(p)};
+  std::vector<Range> rows;
+  for (std::size_t row = 0; row < band->pixels.rows; ++row) rows.push_back(band->pixels.row(row));
+  return rows;
+}
+
+/// The runs of a band, counted from its first element.
 void Rasterize::rebase(const Band& next) {
   if (!in_bands_) {
     std::swap(fragment_starts, frame_fragment_starts_);
     std::swap(pixel_starts, frame_pixel_starts_);
     in_bands_ = true;
   }
-  const auto rebase = [&](const Range& runs, const Range& elements, const Buffer<cl_uint>& frame_starts,
+  const auto rebase = [&](const PixelBlock& runs, const Buffer<cl_uint>& frame_starts,
                           Buffer<cl_uint>& starts) {
     starts.resize(device_, frame_starts.size());
-    rebase_(Range(runs.first, runs.count + 1 + device_.local_size()),
-            static_cast<cl_uint>(frame_starts.size()), static_cast<cl_uint>(elements.first), elements.last(),
-            frame_starts, starts);
+    rebase_(runs.rows * (runs.columns + 1), static_cast<cl_uint>(runs.first),
+            static_cast<cl_uint>(runs.columns), static_cast<cl_uint>(runs.rows),
+            static_cast<cl_uint>(runs.stride), frame_starts, starts);
   };
-  rebase(next.pairs, next.fragments, frame_fragment_starts_, fragment_starts);
-  rebase(next.pixels, next.listed, frame_pixel_starts_, pixel_starts);
+  rebase({next.pairs.first, next.pairs.count}, frame_fragment_starts_, fragment_starts);
+  rebase(next.pixels, frame_pixel_starts_, pixel_starts);
 }
 
 void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
@@ -125,15 +172,15 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
   if (next.tiles.count < tiles_of(p)) rebase(next);
   band = next;
   fragments = next.fragments.count;
-  list.resize(device_, length(next.listed.count));
-  for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel})
+  for (Buffer<cl_uint>* buffer : {&list, &fragment_pair, &fragment_pixel})
     buffer->resize(device_, fragment_length());
   for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2})
     buffer->resize(device_, fragment_length());
   const std::size_t vectors = vectors_of_tile(device_);
   const Range listing(next.tiles.first * vectors, next.tiles.count * vectors);
   list_(listing, p, listing.last(), bin.tile_starts, masks, fragment_starts, pixel_starts, list);
-  forward_(next.pairs, p, next.pairs.last(), triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,
+  const PairGroups groups(device_, next.pairs);
+  forward_(groups.count, p, groups.pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,
            fragment_pair, fragment_pixel, distance, depth, bary1, bary2);
 }
 
@@ -151,26 +198,23 @@ void Rasterize::forward_within(const FrameCounts& room, const shared::FrameParam
   last_row_.start(device_rows_, last_row);
   fit_(device_.local_size() * device_.info.compute_units, static_cast<cl_uint>(bin.pairs),
        static_cast<cl_uint>(pixels_of(p)), static_cast<cl_uint>(room.fragments),
-       static_cast<cl_uint>(room.listed), static_cast<cl_uint>(last_row), device_rows_, masks,
-       fragment_starts, pixel_starts);
-  listed_fragments = room.listed;
+       static_cast<cl_uint>(last_row), device_rows_, masks, fragment_starts, pixel_starts);
+  frame_fragments = room.fragments;
   forward(p, triangles, bin, whole_frame(p, room));
 }
 
 FrameCounts Rasterize::read_counts() {
   const cl_uint4 last = last_row_.take();
-  return {last.s[3], last.s[1], last.s[2]};
+  return {last.s[2], last.s[1]};
 }
 
 Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) {
   band = whole_frame(p, counts);
-  fragments = counts.fragments;
-  listed_fragments = counts.listed;
+  fragments = frame_fragments = counts.fragments;
   counted_ = true;
   masks.settle(counts.pairs);
   fragment_starts.settle(counts.pairs + 1);
-  list.settle(counts.listed);
-  for (Buffer<cl_uint>* buffer : {&fragment_pair, &fragment_pixel}) buffer->settle(fragments);
+  for (Buffer<cl_uint>* buffer : {&list, &fragment_pair, &fragment_pixel}) buffer->settle(fragments);
   for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->settle(fragments);
   return *band;
 }
@@ -179,8 +223,7 @@ FrameCounts Rasterize::room_for(const FrameCounts& counts, const Bin& bin) const
   const auto room = [](std::size_t count, std::size_t made_for) {
     return std::min(with_headroom(count), std::max(count, made_for));
   };
-  return {room(counts.pairs, bin.pair_face.room()), room(counts.fragments, distance.room()),
-          room(counts.listed, list.room())};
+  return {room(counts.pairs, bin.pair_face.room()), room(counts.fragments, distance.room())};
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
@@ -188,8 +231,8 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range range = pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
-  backward_(range, p, range.last(), triangles, bin.pair_face, masks, fragment_starts, fragment_pixel,
-            distance, grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
+  backward_(range, p, range.last(), triangles, bin.pair_face, fragment_starts, fragment_pixel, distance,
+            grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
 }
 
 std::size_t Rasterize::bytes() const {

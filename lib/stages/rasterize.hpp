@@ -13,18 +13,32 @@ namespace dpr {
 
 /// How many of what grows and shrinks a frame holds, or has room for.
 struct FrameCounts {
-  std::size_t pairs = 0, fragments = 0, listed = 0;  ///< fragments with the padding of the pairs' runs
+  std::size_t pairs = 0, fragments = 0;
 
-  bool fit(const FrameCounts& room) const {
-    return pairs <= room.pairs && fragments <= room.fragments && listed <= room.listed;
-  }
+  bool fit(const FrameCounts& room) const { return pairs <= room.pairs && fragments <= room.fragments; }
 };
 
-/// A stretch of tile rows, all views' one after the other, whose fragments are on the device at the same
-/// time.
+/// Rows of as many pixels of the frame.
+struct PixelBlock {
+  Range row(std::size_t r) const { return {first + r * stride, columns}; }
+
+  std::size_t first, columns, rows = 1, stride = 0;
+};
+
+/// A stretch of tiles whose fragments are on the device at the same time: whole rows of tiles, all views' one
+/// after the other, as a single row of pixels; or a part of a row that is too large.
 struct Band {
-  Range tiles, pairs, pixels;
-  Range fragments, listed;  ///< of the frame's; the former with the padding of the pairs' runs
+  Range tiles, pairs;
+  PixelBlock pixels;
+  Range fragments;  ///< of the frame's, by pair; as many by pixel
+};
+
+/// The launch of a kernel that handles pairs in groups (kernels/tile_lanes.h).
+struct PairGroups {
+  PairGroups(const Device::Impl& device, const Range& of);
+
+  cl_uint2 pairs;     ///< the first, and the one behind the last
+  std::size_t count;  ///< work-items
 };
 
 class Rasterize {
@@ -46,10 +60,11 @@ class Rasterize {
   FrameCounts counted() const;
   /// Room for so much and a little more, in the buffers that are there.
   FrameCounts room_for(const FrameCounts& counts, const Bin& bin) const;
-  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Throws
-  /// InvalidArgument if one row of tiles does not fit.
-  std::vector<Band> cut(const shared::FrameParams& p, std::size_t budget, std::size_t fragment_bytes) const;
-  /// The fragments of a band; their numbers, and those of the list's entries, count from the band's first.
+  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
+  /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
+  std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
+                        std::size_t fragment_bytes) const;
+  /// The fragments of a band; their numbers count from the band's first.
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                const Band& band);
   /// All of it: cover() and forward() of the whole frame.
@@ -61,9 +76,9 @@ class Rasterize {
 
   /// What the stages behind this one work on: the band, or everything where none was cut.
   Range pairs(const Bin& bin) const { return band ? band->pairs : Range(bin.pairs); }
-  Range pixels(const shared::FrameParams& p) const {
-    return band ? band->pixels : Range(std::size_t{p.views} * p.width * p.height);
-  }
+  std::vector<Range> pixels(const shared::FrameParams& p) const;
+
+  PairGroups pair_groups(const Bin& bin) const { return PairGroups(device_, pairs(bin)); }
 
   /// Of what later stages hold of every fragment.
   Length fragment_length() const { return length(fragments); }
@@ -71,27 +86,28 @@ class Rasterize {
   static constexpr std::size_t k_fragment_bytes =
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
 
-  std::optional<Band> band;          ///< whose fragments these are
-  std::size_t fragments = 0;         ///< of the band, with the padding of the pairs' runs; or room for them
-  std::size_t listed_fragments = 0;  ///< of the frame, without
-  Buffer<cl_uint2> masks;            ///< [pair] pixels of its tile that a pair covers
-  Buffer<cl_uint> fragment_starts;   ///< [pair + 1]
-  Buffer<cl_uint> pixel_starts;      ///< [view * height * width + 1] runs of `list`
-  Buffer<cl_uint> list;              ///< fragments by pixel
-  Buffer<cl_uint> fragment_pair;     ///< [fragment]
-  Buffer<cl_uint> fragment_pixel;    ///< [fragment] x | y << 16
+  std::optional<Band> band;                     ///< whose fragments these are
+  std::size_t fragments = 0;                    ///< of the band; or room for them
+  std::size_t frame_fragments = 0;              ///< of all bands
+  Buffer<cl_uint2> masks;                       ///< [pair] pixels of its tile that a pair covers
+  Buffer<cl_uint> fragment_starts;              ///< [pair + 1]
+  Buffer<cl_uint> pixel_starts;                 ///< [view * height * width + 1] runs of `list`
+  Buffer<cl_uint> list;                         ///< [fragment] fragments by pixel
+  Buffer<cl_uint> fragment_pair;                ///< [fragment]
+  Buffer<cl_uint> fragment_pixel;               ///< [fragment] x | y << 16
   Buffer<float> distance, depth, bary1, bary2;  ///< [fragment]
   Buffer<float> grad_corners;                   ///< [pair][9] x, y (NDC) and view depth of the corners
 
   std::size_t bytes() const;
 
  private:
-  /// Where a row of tiles begins.
-  struct RowStart {
-    std::size_t pair, fragment, listed;
+  /// What comes before a tile.
+  struct TileStart {
+    std::size_t tile, pair, fragment;
   };
 
-  Band make_band(const shared::FrameParams& p, std::size_t first_row, std::size_t last_row) const;
+  /// The tiles of a row.
+  std::vector<TileStart> tile_starts(const shared::FrameParams& p, const Bin& bin, std::size_t row) const;
   void rebase(const Band& next);
   Length length(std::size_t count) const { return counted_ ? Length(count) : Length::at_most(count); }
   void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
@@ -101,25 +117,24 @@ class Rasterize {
          Out<cl_uint2>, Out<cl_uint>>
       cover_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>>
-      fit_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>> fit_;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
       list_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint2>,
+  Kernel<shared::FrameParams, cl_uint2, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint2>,
          In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
       forward_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint2>, In<cl_uint>,
-         In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>>
       backward_;
   Scan scan_;
   Buffer<cl_uint> counts_;
   Buffer<cl_uint4> device_rows_;
   PendingRead<cl_uint4> last_row_;
-  std::vector<RowStart> row_starts_;  // [view * tiles_y + 1]
-  bool counted_ = true;               // the counts are the frame's, not the room for them
-  bool in_bands_ = false;             // the starts above are a band's, those below the frame's
+  std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
+  bool counted_ = true;                // the counts are the frame's, not the room for them
+  bool in_bands_ = false;              // the starts above are a band's, those below the frame's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };
 

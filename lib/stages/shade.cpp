@@ -46,9 +46,10 @@ void Shade::settle(std::size_t fragments) {
 
 void Shade::forward(const ShadeInputs& in) {
   const Range pairs = in.rasterize.pairs(in.bin);
+  const PairGroups groups = in.rasterize.pair_groups(in.bin);
   for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragment_length());
   if (!now_.kernels) {
-    forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
+    forward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
              in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
              red, green, blue);
     return;
@@ -71,7 +72,8 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
   grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
   if (!now_.kernels) {
-    backward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.masks, in.rasterize.fragment_starts,
+    const PairGroups groups = in.rasterize.pair_groups(in.bin);
+    backward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
               in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
     return;
@@ -82,9 +84,9 @@ void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
   now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
                          in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
                          in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
-                         in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
-                         in.rasterize.bary2, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
-                         grad_corner_colors, grad_corner_positions_, grad_corner_normals_, grad_eye);
+                         in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
+                         grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors,
+                         grad_corner_positions_, grad_corner_normals_, grad_eye);
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
@@ -107,8 +109,8 @@ void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, st
                                 static_cast<cl_uint>(light), in.views.cameras, now_.lights,
                                 in.geometry.face_vertices, in.geometry.face_colors,
                                 in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
-                                in.rasterize.masks, in.rasterize.fragment_starts, in.rasterize.bary1,
-                                in.rasterize.bary2, grad.red, grad.green, grad.blue, light_channels);
+                                in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2,
+                                grad.red, grad.green, grad.blue, light_channels);
 }
 
 std::size_t Shade::bytes() const {

@@ -40,13 +40,12 @@ class LitShading {
       forward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
          In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
-         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
+         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
       backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, cl_uint, In<shared::ViewParams>,
          In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>,
-         Out<float>>
+         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
       backward_lights;
 };
 
@@ -103,11 +102,11 @@ class Shade {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
+  Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
          In<float>, Out<float>, Out<float>, Out<float>>
       forward_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
-         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       backward_;
   Lighting now_;
   Buffer<cl_float4> normals_, grad_normals_;                   // [view][vertex]

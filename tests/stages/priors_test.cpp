@@ -110,34 +110,21 @@ std::vector<float> line() {
   return xs;
 }
 
-/// The occupancy stage on a list of distances, in runs of 13 fragments padded to the width of the
-/// rasterizer's vectors.
+/// The occupancy stage on a list of distances, in runs of 13 fragments: no multiple of a vector's lanes.
 class Distances {
  public:
   static constexpr std::size_t k_run = 13;
 
   explicit Distances(const std::vector<float>& values)
       : bin_(device_impl()), rasterize_(device_impl()), occupancy_(device_impl()) {
-    const std::size_t width = std::min<std::size_t>(device_impl().info.lanes, DPR_TILE);
-    std::vector<cl_uint2> masks;
     std::vector<cl_uint> starts{0};
-    std::vector<float> padded;
-    for (std::size_t first = 0; first < values.size(); first += k_run) {
-      const std::size_t count = std::min(k_run, values.size() - first);
-      masks.push_back({{(1U << count) - 1U, 0U}});
-      for (std::size_t i = 0; i < count; ++i) {
-        place_.push_back(padded.size());
-        pair_.push_back(masks.size() - 1);
-        padded.push_back(values[first + i]);
-      }
-      while (padded.size() % width != 0) padded.push_back(padded.back());
-      starts.push_back(static_cast<cl_uint>(padded.size()));
+    while (starts.back() < values.size()) {
+      starts.push_back(static_cast<cl_uint>(std::min(starts.back() + k_run, values.size())));
     }
-    bin_.pairs = masks.size();
-    rasterize_.fragments = padded.size();
-    rasterize_.masks.upload(device_impl(), masks);
+    bin_.pairs = starts.size() - 1;
+    rasterize_.fragments = values.size();
     rasterize_.fragment_starts.upload(device_impl(), starts);
-    rasterize_.distance.upload(device_impl(), padded);
+    rasterize_.distance.upload(device_impl(), values);
   }
 
   void forward(Prior prior, float sigma) {
@@ -148,41 +135,29 @@ class Distances {
     poison(occupancy_.log_occupancy, rasterize_.fragments);
     poison(occupancy_.occupancy, rasterize_.fragments);
     occupancy_.forward({}, bin_, rasterize_);
-    log_p = listed(occupancy_.log_occupancy);
-    p = listed(occupancy_.occupancy);
+    log_p = occupancy_.log_occupancy.download();
+    p = occupancy_.occupancy.download();
   }
 
-  /// `grads` one for each distance; the padding's are not numbers.
+  /// `grads` one for each distance.
   void backward(const std::vector<float>& grads) {
-    std::vector<float> padded(rasterize_.fragments, dpr::test::k_poison);
-    for (std::size_t i = 0; i < place_.size(); ++i) padded[place_[i]] = grads[i];
-    const Buffer<float> grad(device_impl(), std::span<const float>(padded));
+    const Buffer<float> grad(device_impl(), std::span<const float>(grads));
     poison(occupancy_.grad_distance, rasterize_.fragments);
     poison(occupancy_.grad_sigma, bin_.pairs);
     occupancy_.backward({}, bin_, rasterize_, grad);
-    grad_distance = listed(occupancy_.grad_distance);
+    grad_distance = occupancy_.grad_distance.download();
     grad_sigma = occupancy_.grad_sigma.download();
-    all_grad_distance = occupancy_.grad_distance.download();
   }
 
-  std::size_t pair(std::size_t i) const { return pair_[i]; }
+  static std::size_t pair(std::size_t i) { return i / k_run; }
 
   std::vector<float> log_p, p, grad_distance;  // by distance
   std::vector<float> grad_sigma;               // by pair
-  std::vector<float> all_grad_distance;        // with the padding
 
  private:
-  std::vector<float> listed(const Buffer<float>& buffer) const {
-    const std::vector<float> all = buffer.download();
-    std::vector<float> values;
-    for (const std::size_t place : place_) values.push_back(all[place]);
-    return values;
-  }
-
   dpr::Bin bin_;
   dpr::Rasterize rasterize_;
   dpr::Occupancy occupancy_;
-  std::vector<std::size_t> place_, pair_;
 };
 
 double relative(double found, double expected, double floor) {
@@ -392,7 +367,7 @@ TEST_SUITE("gradient") {
         DPR_CHECK_WORST(hazard, c.hazard);
         DPR_CHECK_WORST(sum, c.hazard);
         CHECK(halved.error > c.hazard);
-        for (const float grad : stage.all_grad_distance) CHECK(!std::isnan(grad));
+        for (const float grad : stage.grad_distance) CHECK(!std::isnan(grad));
       }
     }
   }

@@ -199,7 +199,7 @@ ShadeErrors all_errors(const Model& model) {
 
   RandomFloat random(9);
   std::array<std::vector<float>, 3> grad;
-  for (auto& plane : grad) plane.assign(fragments, dpr::test::k_poison);  // the padding's are not numbers
+  for (auto& plane : grad) plane.assign(fragments, dpr::test::k_poison);
   dpr::ColorGradients device_grad;
   for (const cl_uint fragment : s.list) {
     for (auto& plane : grad) plane[fragment] = random(-1, 1);

@@ -92,7 +92,7 @@ class NdcStages {
          {&rasterize.distance, &rasterize.depth, &rasterize.bary1, &rasterize.bary2}) {
       poison(*buffer, rasterize.fragments);
     }
-    poison(rasterize.list, rasterize.listed_fragments, 0xdeadbeefU);
+    poison(rasterize.list, rasterize.fragments, 0xdeadbeefU);
     poison(rasterize.fragment_pair, rasterize.fragments, 0xdeadbeefU);
     rasterize.forward(params, setup.triangles, bin);
   }

@@ -103,7 +103,6 @@ class SyntheticFrame {
     bin_.pairs = faces.size();
     bin_.pair_face.upload(device_impl(), faces);
     rasterize_.fragments = fragments_;
-    rasterize_.listed_fragments = count;
     rasterize_.pixel_starts.upload(device_impl(), starts);
     rasterize_.list.resize(device_impl(), std::max<std::size_t>(count, 1));
     rasterize_.list.upload(device_impl(), list);
