@@ -65,3 +65,20 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
   outputs[DPR_AUXILIARY_EFFECTIVE_FACES * pixels + pixel] = squares > 0.0f ? sum * sum / squares : 0.0f;
   face_id[pixel] = seen;
 }
+
+/// Auxiliary outputs as what noise on the pixel can blend and blur: times the sample's alpha, by which to divide after.
+/// One work-item per pixel. Deterministic.
+/// in   outputs   float[DPR_AUXILIARY_CHANNELS][pixel]
+/// in   image     float4[pixel]  whose w is alpha
+/// out  surface   float4[pixel]  depth and normal
+/// out  coverage  float4[pixel]  1 and the effective number of faces
+kernel void auxiliary_weigh(const FrameParams p, global const float* restrict outputs, global const float4* restrict image,
+                      global float4* restrict surface, global float4* restrict coverage) {
+  const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
+  if (pixel >= pixels) return;
+  const float alpha = image[pixel].w;
+  surface[pixel] = alpha * (float4)(outputs[DPR_AUXILIARY_DEPTH * pixels + pixel], outputs[DPR_AUXILIARY_NORMAL * pixels + pixel],
+                                    outputs[(DPR_AUXILIARY_NORMAL + 1) * pixels + pixel],
+                                    outputs[(DPR_AUXILIARY_NORMAL + 2) * pixels + pixel]);
+  coverage[pixel] = alpha * (float4)(1.0f, outputs[DPR_AUXILIARY_EFFECTIVE_FACES * pixels + pixel], 0.0f, 0.0f);
+}

@@ -77,6 +77,13 @@ using float4 = cl_float4;
 #define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
 
+/// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own face where
+/// colours or normals may jump there, in the other where it goes through the edge in the same direction.
+#define DPR_EDGE_FLAG 0x80000000u
+
+/// The contour of a step between samples that none crosses.
+#define DPR_NO_CROSSING 0xffffffffu
+
 /// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge lengths; and its
 /// hinges: 1 - cos, and that squared.
 #define DPR_MESH_LOSS_CHANNELS 2
@@ -174,6 +181,22 @@ typedef struct Slot {
   float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
   uint fragment;   /* or DPR_BACKGROUND_SLOT */
 } Slot;
+
+/// What contours are looked for.
+typedef struct ContourParams {
+  DPR_SHARED_NAME(ContourParams)
+  uint edges;   /* of the scene */
+  uint shading; /* DPR_UNLIT, DPR_FLAT, ...: whose creases count */
+  uint unused0, unused1;
+} ContourParams;
+
+/// What crossings are looked for.
+typedef struct AntialiasParams {
+  DPR_SHARED_NAME(AntialiasParams)
+  uint edges;        /* of the scene */
+  float depth_reach; /* normalised depth: surfaces that much behind the nearest may still be seen */
+  uint unused0, unused1;
+} AntialiasParams;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its sizes.
 typedef struct MeshLossParams {

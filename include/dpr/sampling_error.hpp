@@ -22,7 +22,8 @@ struct SamplingError {
   /// [view][height * width] of the gradient where it arises: the root of the summed variances, over the
   /// pixel's fragments, of gamma (zfar - znear) dL/dz and sigma dL/ds, by how much the loss changes when
   /// depth or distance moves by one scale of its noise. Empty where the frame was
-  /// rendered in bands of the memory budget: no fragment outlives its band.
+  /// rendered in bands of the memory budget: no fragment outlives its band; and with noise of the pixel,
+  /// whose fragments are no pixel's.
   std::vector<std::vector<float>> pixel_gradients;
   SceneGradient gradient;  ///< of every number that the scene asks for
 

@@ -17,6 +17,13 @@ enum class Prior { gaussian, cauchy, logistic, gumbel, uniform };
 /// in it.
 enum class Composition { barrier, joint };
 
+/// What moves edges at random. triangle: every triangle's distances have noise of their own, so the image
+/// depends on how a surface is cut into triangles. pixel: the pixel's position has, in two dimensions, the
+/// same for all triangles: the rigid image, whose depths alone are perturbed, is convolved with the density
+/// of that noise. The image is the same for every tessellation of a surface, and its cost does not depend on
+/// sigma.
+enum class Noise { triangle, pixel };
+
 /// exact: closed form or quadrature, no variance. monte_carlo: `samples` draws, eq. (11)-(16).
 enum class Estimator { exact, monte_carlo };
 
@@ -59,6 +66,8 @@ struct Smoothing {
   float background_depth = 1e-10F;  ///< normalised depth of the background slot (barrier only)
   DistanceMetric distance = DistanceMetric::squared;
   OccupancyWidth occupancy_width = OccupancyWidth::fixed;
+  Noise noise = Noise::triangle;
+  std::uint32_t supersampling = 1;  ///< 1, 2 or 4: samples of a pixel along each axis, of its noise
 
   bool operator==(const Smoothing&) const = default;
 };
@@ -74,12 +83,17 @@ struct Smoothing {
 /// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
 ///   half's value is correlated with the score. With stratified draws it is refused: every other sample's
 ///   stratum tells of one's own, which biases the gradient.
+/// - Noise of the pixel needs a symmetric occupancy_prior, so not Gumbel's (it would shift the image), the
+///   exact estimators, a fixed width and no blur_radius: no triangle is blurred. Its scale is sigma with
+///   Euclidean distances, else the root of sigma, NDC; the occupancy_threshold has no part in it.
+///   `supersampling` is of the pixel's noise alone.
 void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to
 /// `occupancy_threshold`: sigma times the prior's quantile at 1 - threshold. The Cauchy prior's tail is so
 /// heavy that its radius is capped at 100 sigma, where p = 1/2 - atan(100)/pi = 3.18e-3: a threshold below
 /// that has no effect there.
+/// With noise of the pixel it is 0.
 float blur_radius(const Smoothing& smoothing);
 
 /// Sets sigma; a blur radius, where there is one, stays the same number of sigmas. With a variable width it
@@ -113,6 +127,8 @@ Smoothing rigid_smoothing();
 ///   blur radius 9.21 sigma: the published program
 /// - "gaussian": the default above, Gaussian noise in the barrier, exact: (36), (10)
 /// - "joint_gaussian": the joint composition, exact: the expectation of (3) under (8)
+/// - "pixel": Gaussian noise of the pixel's position, joint composition, exact; gamma is 1e-4, so that what
+///   lies a thousandth of the depth range behind is not seen
 /// - "rigid": rigid_smoothing()
 Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
 
@@ -123,7 +139,7 @@ std::vector<std::string_view> smoothing_preset_names();
 template <typename Type>
 concept SmoothingChoice = std::same_as<Type, Prior> || std::same_as<Type, Composition> ||
     std::same_as<Type, Estimator> || std::same_as<Type, VarianceReduction> || std::same_as<Type, Draws> ||
-    std::same_as<Type, DistanceMetric> || std::same_as<Type, OccupancyWidth>;
+    std::same_as<Type, DistanceMetric> || std::same_as<Type, OccupancyWidth> || std::same_as<Type, Noise>;
 
 /// "gaussian", "leave_one_out" and so on; empty for what is no value of the enumeration.
 template <SmoothingChoice Choice>

@@ -24,6 +24,8 @@ struct SmoothingOptions {
   std::optional<float> occupancy_threshold = {}, blur_radius = {}, background_depth = {};
   std::optional<DistanceMetric> distance = {};
   std::optional<OccupancyWidth> occupancy_width = {};
+  std::optional<Noise> noise = {};
+  std::optional<std::uint32_t> supersampling = {};
 };
 
 /// The smoothing that the options describe, for images of `width` x `height`. Throws InvalidArgument where
@@ -33,8 +35,8 @@ struct SmoothingOptions {
 /// 3. The blur radius that is given decides alone. Else, where an occupancy_threshold is given, the radius
 ///    follows from it (blur_radius()). Else that of step 1 stays the same number of sigmas, as set_sigma()
 ///    has it: 9.21 of them in "softras", "paper_gaussian" and "paper_cauchy", none in "rigid". A variable
-///    width keeps the radius of step 1 in NDC: 0.5 in "nmr". The other presets have no radius of their own,
-///    so that theirs follows from sigma, prior and threshold.
+///    width keeps the radius of step 1 in NDC: 0.5 in "nmr"; noise of the pixel has none. The other presets
+///    have no radius of their own, so that theirs follows from sigma, prior and threshold.
 Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
                             const Smoothing& otherwise = {});
 

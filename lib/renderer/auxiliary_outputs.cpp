@@ -44,8 +44,78 @@ void Renderer::Impl::render_aov() {
     if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
   }
+  if (pixel_noise) {
+    Buffer<cl_float4> surface, coverage;
+    aov->weigh(frame, aggregate, surface, coverage);
+    pixel_noise->smooth(contour_inputs(), surface, image_size(), aov_surface);
+    pixel_noise->smooth(contour_inputs(), coverage, image_size(), aov_coverage);
+  }
   aov_frame = frame_number;
 }
+
+namespace {
+
+/// A pixel of the auxiliary outputs, but for its texture coordinates.
+struct AovPixel {
+  float depth, effective_faces;
+  glm::vec3 normal;
+  cl_uint face;
+  float bary1, bary2;
+};
+
+/// What the stage left of the samples of a view.
+std::vector<AovPixel> read_samples(const Renderer::Impl& m, std::size_t view) {
+  const std::size_t count = std::size_t{m.frame.width} * m.frame.height;
+  const auto channel = [&](std::size_t index) {
+    std::vector<float> values(count);
+    m.aov->outputs.download(values, (index * m.views.size() + view) * count);
+    return values;
+  };
+  const std::vector<float> depth = channel(DPR_AUXILIARY_DEPTH),
+                           effective_faces = channel(DPR_AUXILIARY_EFFECTIVE_FACES),
+                           x = channel(DPR_AUXILIARY_NORMAL), y = channel(DPR_AUXILIARY_NORMAL + 1),
+                           z = channel(DPR_AUXILIARY_NORMAL + 2), b1 = channel(DPR_AUXILIARY_BARYCENTRICS),
+                           b2 = channel(DPR_AUXILIARY_BARYCENTRICS + 1);
+  std::vector<cl_uint> faces(count);
+  m.aov->face_id.download(faces, view * count);
+  std::vector<AovPixel> samples;
+  samples.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    samples.push_back({depth[i], effective_faces[i], {x[i], y[i], z[i]}, faces[i], b1[i], b2[i]});
+  }
+  return samples;
+}
+
+/// With noise on the pixel: face and barycentrics are those of the sample at the pixel's centre or, of an
+/// even number, behind it; the rest is the mean over what covers the pixel.
+std::vector<AovPixel> to_pixels(const Renderer::Impl& m, std::size_t view,
+                                const std::vector<AovPixel>& samples) {
+  const auto width = static_cast<std::size_t>(m.scene.width),
+             height = static_cast<std::size_t>(m.scene.height);
+  const auto step = static_cast<std::size_t>(m.raster.supersampling),
+             margin = static_cast<std::size_t>(m.raster.margin);
+  std::vector<cl_float4> surface(width * height), coverage(width * height);
+  m.aov_surface.download(surface, view * width * height);
+  m.aov_coverage.download(coverage, view * width * height);
+  std::vector<AovPixel> pixels;
+  pixels.reserve(width * height);
+  for (std::size_t i = 0; i < width * height; ++i) {
+    const std::size_t row = margin + i / width * step + step / 2,
+                      column = margin + i % width * step + step / 2;
+    AovPixel pixel = samples[row * m.frame.width + column];
+    const cl_float4& s = surface[i];
+    const float covered = coverage[i].s[0], scale = covered > 0 ? 1 / covered : 0;
+    const glm::vec3 normal(s.s[1], s.s[2], s.s[3]);
+    const float length = glm::length(normal);
+    pixel.depth = s.s[0] * scale;
+    pixel.effective_faces = coverage[i].s[1] * scale;
+    pixel.normal = length > 0 ? normal / length : glm::vec3(0);
+    pixels.push_back(pixel);
+  }
+  return pixels;
+}
+
+}  // namespace
 
 AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
   Renderer::Impl& m = renderer.impl();
@@ -57,28 +127,20 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
   AuxiliaryOutputs result;
   result.width = m.scene.width;
   result.height = m.scene.height;
-  const std::size_t count = std::size_t{m.frame.width} * m.frame.height;
-  const auto channel = [&](std::size_t index) {
-    std::vector<float> values(count);
-    m.aov->outputs.download(values, (index * m.views.size() + view) * count);
-    return values;
-  };
-  result.depth = channel(DPR_AUXILIARY_DEPTH);
-  result.effective_faces = channel(DPR_AUXILIARY_EFFECTIVE_FACES);
-  const std::vector<float> x = channel(DPR_AUXILIARY_NORMAL), y = channel(DPR_AUXILIARY_NORMAL + 1),
-                           z = channel(DPR_AUXILIARY_NORMAL + 2), b1 = channel(DPR_AUXILIARY_BARYCENTRICS),
-                           b2 = channel(DPR_AUXILIARY_BARYCENTRICS + 1);
-  std::vector<cl_uint> faces(count);
-  m.aov->face_id.download(faces, view * count);
+  std::vector<AovPixel> pixels = read_samples(m, view);
+  if (m.pixel_noise) pixels = to_pixels(m, view, pixels);
   const std::vector<std::array<glm::vec2, 3>> texcoords = corner_texcoords(m.scene);
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool shows_face = faces[i] != DPR_NO_FACE;
-    result.normal.emplace_back(x[i], y[i], z[i]);
-    result.face_id.push_back(shows_face ? static_cast<std::int32_t>(faces[i]) : -1);
-    const glm::vec3 b = shows_face ? glm::vec3(1 - b1[i] - b2[i], b1[i], b2[i]) : glm::vec3(0);
+  for (const AovPixel& pixel : pixels) {
+    const bool shows_face = pixel.face != DPR_NO_FACE;
+    result.depth.push_back(pixel.depth);
+    result.effective_faces.push_back(pixel.effective_faces);
+    result.normal.push_back(pixel.normal);
+    result.face_id.push_back(shows_face ? static_cast<std::int32_t>(pixel.face) : -1);
+    const glm::vec3 b =
+        shows_face ? glm::vec3(1 - pixel.bary1 - pixel.bary2, pixel.bary1, pixel.bary2) : glm::vec3(0);
     result.barycentrics.push_back(glm::max(b, glm::vec3(0)));
     if (texcoords.empty()) continue;
-    const auto corners = shows_face ? texcoords[faces[i]] : std::array<glm::vec2, 3>{};
+    const auto corners = shows_face ? texcoords[pixel.face] : std::array<glm::vec2, 3>{};
     result.uv.push_back(b.x * corners[0] + b.y * corners[1] + b.z * corners[2]);
   }
   return result;

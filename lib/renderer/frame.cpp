@@ -7,8 +7,8 @@ namespace dpr {
 Frame last_frame(const Renderer& renderer, const char* caller) {
   Renderer::Impl& r = renderer.impl();
   r.require_forward(caller);
-  return {r.frame_number,    r.views.size(),        r.scene.width,      r.scene.height,
-          r.aggregate.image, r.geometry->positions, r.geometry->meshes, r.frame.position_stride != 0};
+  return {r.frame_number, r.views.size(),        r.scene.width,      r.scene.height,
+          r.image(),      r.geometry->positions, r.geometry->meshes, r.frame.position_stride != 0};
 }
 
 FrameFragments last_fragments(const Renderer& renderer, const char* caller) {

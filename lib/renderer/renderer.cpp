@@ -51,6 +51,10 @@ void Renderer::Impl::forward() {
   rendered = false;
   transform.forward(frame, device_views, *geometry);
   setup.forward(frame, device_views, *geometry, transform.ndc);
+  room.reset();
+  if (pixel_noise && !pixel_noise->edges) {
+    pixel_noise->edges.emplace(device.impl(), scene, shape_of_first_view());
+  }
   room = expected_room();
   if (room) {
     forward_within(*room);
@@ -61,26 +65,67 @@ void Renderer::Impl::forward() {
   frame_number = ++frames_rendered;
 }
 
+std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
+  std::vector<cl_float4> values(geometry->vertices);
+  geometry->positions_of(frame).download(values);
+  std::vector<glm::vec3> shape;
+  shape.reserve(values.size());
+  for (const cl_float4& v : values) shape.emplace_back(v.s[0], v.s[1], v.s[2]);
+  return shape;
+}
+
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
 std::optional<FrameCounts> Renderer::Impl::expected_room() const {
-  if (!last_counts) return std::nullopt;
+  if (!last_counts || (pixel_noise && !pixel_noise->last_contours)) return std::nullopt;
   const FrameCounts expected = rasterize.room_for(*last_counts, bin);
   if (with_headroom(expected.fragments) * k_fragment_bytes >= device.memory_budget()) return std::nullopt;
   return expected;
 }
 
+ContourInputs Renderer::Impl::contour_inputs() const {
+  return {frame,     device_views,
+          *geometry, *pixel_noise->edges,
+          transform, scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
+}
+
+Blur::Size Renderer::Impl::image_size() const {
+  return {views.size(), static_cast<std::size_t>(scene.width), static_cast<std::size_t>(scene.height)};
+}
+
+/// Of noise on the pixel. With room for what is expected, or blocks to count.
+void Renderer::Impl::find_contours(std::optional<std::size_t> expected) {
+  if (!pixel_noise) return;
+  Contour& contour = pixel_noise->contour;
+  if (expected) {
+    contour.forward_within(contour_inputs(), contour.room_for(*expected));
+  } else {
+    contour.forward(contour_inputs());
+    pixel_noise->last_contours = contour.pairs;
+  }
+}
+
+/// From samples to pixels, once all bands are rendered.
+void Renderer::Impl::finish_image() {
+  if (!pixel_noise) return;
+  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), depth_reach(scene.smoothing));
+}
+
 void Renderer::Impl::forward_within(const FrameCounts& expected) {
+  if (pixel_noise) find_contours(pixel_noise->last_contours);
   bin.forward(frame, setup.triangles, expected.pairs);
   rasterize.forward_within(expected, frame, setup.triangles, bin);
   shade_and_aggregate();
+  finish_image();
 }
 
 void Renderer::Impl::forward_measured() {
   last_counts.reset();
+  find_contours(std::nullopt);
   bin.forward(frame, setup.triangles);
   rasterize.cover(frame, setup.triangles, bin);
   bands = rasterize.cut(frame, bin, device.memory_budget(), k_fragment_bytes);
   for (const Band& band : bands) render(band);
+  finish_image();
   if (bands.size() == 1) last_counts = rasterize.counted();
 }
 
@@ -88,7 +133,8 @@ void Renderer::Impl::forward_measured() {
 void Renderer::Impl::settle() {
   if (!room) return;
   const FrameCounts found = rasterize.read_counts();
-  const bool fits = found.fit(*room);
+  const std::size_t contours = pixel_noise ? pixel_noise->contour.read_count() : 0;
+  const bool fits = found.fit(*room) && (!pixel_noise || contours <= pixel_noise->contour.pairs);
   room.reset();
   if (fits) {
     bin.settle(found.pairs);
@@ -96,6 +142,10 @@ void Renderer::Impl::settle() {
     shade.settle(found.fragments);
     occupancy.settle(found.fragments);
     last_counts = found;
+    if (pixel_noise) {
+      pixel_noise->contour.settle(contours);
+      pixel_noise->last_contours = contours;
+    }
     return;
   }
   rendered = false;
@@ -112,18 +162,24 @@ void Renderer::Impl::shade_and_aggregate() {
   shade.forward(shade_inputs());
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
+  if (pixel_noise) pixel_noise->antialias.find_front(frame, rasterize);
 }
 
 SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
                                        const AddToGradient& add_to_positions) {
   const GradientRequest& wanted = scene.gradients;
+  if (pixel_noise) {
+    pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
+  }
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
-    differentiate(grad_images);
+    differentiate(pixel_noise ? pixel_noise->grad_raster : grad_images);
   }
   if (is_geometric(wanted)) {
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
                     grad_ndc);
+    if (pixel_noise)
+      pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
     transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
   }
@@ -161,10 +217,10 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
-         (aov ? aov->bytes() : 0) + ViewSet::bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
-         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
-         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
-         grad_colors.capacity_bytes();
+         (aov ? aov->bytes() : 0) + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
+         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
+         grad_world.capacity_bytes() + grad_colors.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -94,7 +94,7 @@ Image Renderer::image(std::size_t view) const {
   }
   Image image(m.scene.width, m.scene.height);
   std::vector<cl_float4> values(image.pixels.size());
-  m.aggregate.image.download(values, view * values.size());
+  m.image().download(values, view * values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     image.pixels[i] = glm::vec4(values[i].s[0], values[i].s[1], values[i].s[2], values[i].s[3]);
   }
@@ -104,16 +104,16 @@ Image Renderer::image(std::size_t view) const {
 void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
   Impl& m = *impl_;
   m.require_forward("Renderer::read_pixels");
-  require_pixel_count(pixels.size(), m.aggregate.image.size());
-  check_cl(m.device.impl().queue.enqueueReadBuffer(m.aggregate.image.cl_buffer(), CL_TRUE, 0,
-                                                   pixels.size_bytes(), pixels.data()),
+  require_pixel_count(pixels.size(), m.image().size());
+  check_cl(m.device.impl().queue.enqueueReadBuffer(m.image().cl_buffer(), CL_TRUE, 0, pixels.size_bytes(),
+                                                   pixels.data()),
            "clEnqueueReadBuffer");
 }
 
 SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) {
   Impl& m = *impl_;
   m.require_forward("Renderer::backward_pixels");
-  require_pixel_count(grad_pixels.size(), m.aggregate.image.size());
+  require_pixel_count(grad_pixels.size(), m.image().size());
   checks::require_finite(grad_pixels, "grad_pixels");
   m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
   check_cl(m.device.impl().queue.enqueueWriteBuffer(m.host_grad_images.cl_buffer(), CL_TRUE, 0,
@@ -190,13 +190,13 @@ RenderStatistics Renderer::statistics() const {
 
 cl::Buffer image_buffer(const Renderer& renderer) {
   renderer.impl().require_forward("image_buffer");
-  return renderer.impl().aggregate.image.cl_buffer();
+  return renderer.impl().image().cl_buffer();
 }
 
 SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
   Renderer::Impl& m = renderer.impl();
   m.require_forward("backward");
-  const std::size_t count = m.aggregate.image.size();
+  const std::size_t count = m.image().size();
   if (cl_info<CL_MEM_CONTEXT>(grad_images, "clGetMemObjectInfo")() != m.device.impl().context()) {
     throw InvalidArgument("grad_images", "a buffer of another context", "one of the device's own");
   }

@@ -125,6 +125,22 @@ void add_light_gradients(const std::vector<float>& sums, std::size_t lights, Sce
 
 }  // namespace
 
+/// One segment of all pixels, uploaded anew where they have become more or less.
+const Buffer<cl_uint>& Renderer::Impl::one_segment(std::size_t pixels) {
+  if (all_pixels_count_ != pixels) {
+    all_pixels_count_ = 0;
+    all_pixels_.upload(device.impl(), std::array<cl_uint, 2>{0, static_cast<cl_uint>(pixels)});
+    all_pixels_count_ = pixels;
+  }
+  return all_pixels_;
+}
+
+double Renderer::Impl::read_sigma_gradient() {
+  double sum = 0;
+  for (const float by_scale : pixel_noise->blur.grad_scale.download()) sum += static_cast<double>(by_scale);
+  return sum * pixel_scale(scene.smoothing, std::min(scene.width, scene.height)).by_sigma;
+}
+
 void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
   const GradientRequest& wanted = scene.gradients;
   const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
@@ -134,7 +150,8 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
              lights = wanted.lights && shade.lit();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
-  const std::size_t sigmas = channels(wanted.smoothing, 1);
+  const std::size_t sigmas = channels(wanted.smoothing && !pixel_noise, 1);
+  const Buffer<cl_uint>& all_pixels = one_segment(pixels);
   const Summation sigma = aggregate.perturbs_distances()
                               ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
                               : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma};
@@ -152,7 +169,7 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
     gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
-    gradient.sigma = sums[1][0];
+    gradient.sigma = pixel_noise ? read_sigma_gradient() : static_cast<double>(sums[1][0]);
   }
   if (wanted.background) {
     gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],

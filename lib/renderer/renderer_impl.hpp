@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
+#include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
@@ -32,7 +33,6 @@ struct ViewSet {
   std::vector<View> views;
   DeviceViews device_views;
   Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
-  Buffer<cl_uint> all_pixels;          // [2]: one segment
   shared::FrameParams frame{};
 
   std::size_t bytes() const;
@@ -40,9 +40,13 @@ struct ViewSet {
 
 /// The smoothing of every stage.
 struct SmoothingSetting {
+  Smoothing smoothing;
   Occupancy::Setting occupancy;
   Aggregate::Setting aggregate;
   float blur_distance;
+  Raster raster;
+  std::shared_ptr<PixelNoise> pixel_noise;  // none: the triangles'
+  Blur::Setting blur;
 };
 
 /// Adds a gradient of the positions ([vertex], object space) to the one that is there.
@@ -59,7 +63,11 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
-  SmoothingSetting prepare(const Smoothing& smoothing) const;
+  /// For images of the scene's size, and so many views.
+  SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
+  SmoothingSetting prepare(const Smoothing& smoothing) const {
+    return prepare(smoothing, scene, views.size());
+  }
   void set(SmoothingSetting&& prepared) noexcept;
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
   /// blocks to read the sizes to allocate.
@@ -73,6 +81,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// again, and what forward() throws is thrown here.
   void require_scene(const char* caller) const;
   void require_forward(const char* caller);
+  /// Of the last frame: [view][height][width] RGBA.
+  const Buffer<cl_float4>& image() const { return pixel_noise ? pixel_noise->image : aggregate.image; }
   /// Held in buffers.
   std::size_t bytes() const;
 
@@ -94,8 +104,11 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Aggregate aggregate;
   Gather gather;
   Reduce reduce;
-  std::optional<Auxiliary> aov;  // made when first asked for
-  std::uint64_t aov_frame = 0;   // the frame it holds
+  Raster raster;                                // around the frame
+  std::shared_ptr<PixelNoise> pixel_noise;      // made when first asked for; none: the triangles' noise
+  std::optional<Auxiliary> aov;                 // made when first asked for
+  std::uint64_t aov_frame = 0;                  // the frame it holds
+  Buffer<cl_float4> aov_surface, aov_coverage;  // of noise on the pixel: Auxiliary::weigh(), as pixels
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
@@ -107,8 +120,11 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
 
   ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
+  ContourInputs contour_inputs() const;
+  Blur::Size image_size() const;
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
+  std::vector<glm::vec3> shape_of_first_view() const;
   std::optional<FrameCounts> expected_room() const;
   void forward_within(const FrameCounts& expected);
   void forward_measured();
@@ -116,11 +132,18 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   /// The stages from the fragments on: of a band, and backward of the one rendered last.
   void render(const Band& band);
+  void find_contours(std::optional<std::size_t> expected);
+  void finish_image();
   void shade_and_aggregate();
   void differentiate(const Buffer<cl_float4>& grad_images);
 
   void read_mesh_gradients(SceneGradient& gradient, const AddToGradient& add_to_positions);
   void read_summed_gradients(SceneGradient& gradient);
+  double read_sigma_gradient();
+  const Buffer<cl_uint>& one_segment(std::size_t pixels);
+
+  Buffer<cl_uint> all_pixels_;  // [2]: one segment
+  std::size_t all_pixels_count_ = 0;
 
   // Where the next setter prepares what it sets.
   ViewSet spare_views_;

@@ -30,30 +30,46 @@ shared::ViewParams view_params(const Camera& camera, int width, int height) {
   return v;
 }
 
+/// Whether distances have no noise.
+bool is_sharp(const Smoothing& smoothing) {
+  return smoothing.noise == Noise::pixel || smoothing.occupancy_width == OccupancyWidth::zero;
+}
+
 /// 0 where distances have no noise: what lies outside a triangle has no part in it then.
 float blur_distance(const Smoothing& smoothing) {
-  if (smoothing.occupancy_width == OccupancyWidth::zero) return 0;
+  if (is_sharp(smoothing)) return 0;
   const float radius = blur_radius(smoothing);
   return smoothing.distance == DistanceMetric::euclidean ? radius : std::sqrt(radius);
 }
 
+/// Samples along a side of the frame, with the margin.
+std::size_t samples_of_side(int pixels, const Raster& raster) {
+  return static_cast<std::size_t>(pixels) * static_cast<std::size_t>(raster.supersampling) +
+         2 * static_cast<std::size_t>(raster.margin);
+}
+
+/// NDC are the frame's own: the raster has the same middle, and reaches beyond them.
+void set_raster(shared::FrameParams& p, const Scene& scene, const Raster& raster) noexcept {
+  p.width = static_cast<cl_uint>(samples_of_side(scene.width, raster));
+  p.height = static_cast<cl_uint>(samples_of_side(scene.height, raster));
+  p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
+  p.tiles_y = (p.height + DPR_TILE - 1) / DPR_TILE;
+  p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height) * raster.supersampling);
+}
+
 shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
-                                 std::size_t first_view) {
+                                 std::size_t first_view, const Raster& raster) {
   shared::FrameParams p{};
   p.views = static_cast<cl_uint>(views);
   p.first_view = static_cast<cl_uint>(first_view);
   p.meshes = static_cast<cl_uint>(scene.meshes.size());
   p.vertices = static_cast<cl_uint>(geometry.vertices);
   p.faces = static_cast<cl_uint>(geometry.faces);
-  p.width = static_cast<cl_uint>(scene.width);
-  p.height = static_cast<cl_uint>(scene.height);
-  p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
-  p.tiles_y = (p.height + DPR_TILE - 1) / DPR_TILE;
-  p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height));
+  set_raster(p, scene, raster);
   p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   p.blur_distance = blur_distance(scene.smoothing);
   p.perspective_correct = scene.perspective_correct ? 1 : 0;
-  p.sharp = scene.smoothing.occupancy_width == OccupancyWidth::zero ? 1 : 0;
+  p.sharp = is_sharp(scene.smoothing) ? 1 : 0;
   return p;
 }
 
@@ -70,11 +86,32 @@ void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_v
   }
 }
 
+/// Throws InvalidArgument for a raster whose samples cannot be counted, or named by two 16-bit numbers.
+void check_raster(const Scene& scene, std::size_t views, const Raster& raster) {
+  constexpr std::size_t k_most_on_side = 1U << 15U, k_most = 0xfffffffeU / DPR_PIXEL_CHANNELS;
+  const std::size_t width = samples_of_side(scene.width, raster),
+                    height = samples_of_side(scene.height, raster);
+  if (raster.margin == 0 && raster.supersampling == 1) return;  // the frame itself
+  if (std::max(width, height) <= k_most_on_side && width * height <= k_most / views) return;
+  throw InvalidArgument("sigma and supersampling (smoothing)",
+                        "a raster of " + std::to_string(width) + "x" + std::to_string(height) + " samples",
+                        "smaller ones: at most " + std::to_string(k_most_on_side) +
+                            " a side, and fewer than 2^32 / " + std::to_string(DPR_PIXEL_CHANNELS) +
+                            " in all views");
+}
+
+/// What the stages before the blur do with noise of the pixel: nothing to distances.
+Smoothing without_distance_noise(Smoothing smoothing) {
+  smoothing.occupancy_width = OccupancyWidth::zero;
+  smoothing.occupancy_prior = Prior::gaussian;  // has no part in it
+  return smoothing;
+}
+
 }  // namespace
 
 std::size_t ViewSet::bytes() const {
   return device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
-         view_vertex_starts.capacity_bytes() + all_pixels.capacity_bytes();
+         view_vertex_starts.capacity_bytes();
 }
 
 void Renderer::Impl::set_scene(const Scene& wanted) {
@@ -83,7 +120,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   Scene new_scene = wanted;
   Geometry new_geometry(device.impl(), wanted);
   Shade::Lighting lighting = shade.prepare(wanted.lights);
-  SmoothingSetting smoothing = prepare(wanted.smoothing);
+  SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1);
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
 
   std::swap(scene, new_scene);
@@ -92,10 +129,15 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   set(spare_views_);
   set(std::move(smoothing));
   last_counts.reset();
+  if (pixel_noise) {
+    pixel_noise->edges.reset();
+    pixel_noise->last_contours.reset();
+  }
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
   check_frame_size(scene, new_views.size(), first_view);
+  check_raster(scene, new_views.size(), raster);
   fill(spare_views_, scene, *geometry, new_views, first_view);
   set(spare_views_);
 }
@@ -112,30 +154,55 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
       starts.push_back(starts.back() + static_cast<cl_uint>(its.meshes[m].vertices));
     }
   }
-  prepared.frame = frame_params(of, its, its_views.size(), first_view);
+  prepared.frame = frame_params(of, its, its_views.size(), first_view, raster);
   prepared.views.assign(its_views.begin(), its_views.end());
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);
   prepared.view_vertex_starts.upload(device.impl(), starts);
-  const shared::FrameParams& p = prepared.frame;
-  prepared.all_pixels.upload(device.impl(), std::array<cl_uint, 2>{0, p.views * p.width * p.height});
 }
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {
-  if (prepared.frame.views != frame.views) last_counts.reset();
+  if (prepared.frame.views != frame.views) {
+    last_counts.reset();
+    if (pixel_noise) pixel_noise->last_contours.reset();
+  }
   std::swap(static_cast<ViewSet&>(*this), prepared);
   rendered = false;
 }
 
-SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing) const {
-  return {occupancy.prepare(smoothing), aggregate.prepare(smoothing), blur_distance(smoothing)};
+SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene& of,
+                                         std::size_t its_views) const {
+  if (smoothing.noise == Noise::triangle) {
+    return {smoothing,
+            occupancy.prepare(smoothing),
+            aggregate.prepare(smoothing),
+            blur_distance(smoothing),
+            {},
+            nullptr,
+            {}};
+  }
+  const double scale = pixel_scale(smoothing, std::min(of.width, of.height)).value;
+  BlurKernel kernel =
+      blur_kernel(smoothing.occupancy_prior, scale, static_cast<int>(smoothing.supersampling));
+  const Raster around{kernel.supersampling, kernel.margin};
+  check_raster(of, its_views, around);
+  const std::shared_ptr<PixelNoise> stages =
+      pixel_noise ? pixel_noise : std::make_shared<PixelNoise>(device.impl());
+  Blur::Setting blur = stages->blur.prepare(std::move(kernel));
+  const Smoothing rigid = without_distance_noise(smoothing);
+  return {smoothing, occupancy.prepare(rigid), aggregate.prepare(rigid), 0.0F, around,
+          stages,    std::move(blur)};
 }
 
 void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
-  scene.smoothing = prepared.aggregate.smoothing;
+  scene.smoothing = prepared.smoothing;
   frame.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   frame.blur_distance = prepared.blur_distance;
-  frame.sharp = scene.smoothing.occupancy_width == OccupancyWidth::zero ? 1 : 0;
+  frame.sharp = is_sharp(scene.smoothing) ? 1 : 0;
+  raster = prepared.raster;
+  set_raster(frame, scene, raster);
+  std::swap(pixel_noise, prepared.pixel_noise);
+  if (pixel_noise) pixel_noise->blur.set(std::move(prepared.blur));
   occupancy.set(std::move(prepared.occupancy));
   aggregate.set(std::move(prepared.aggregate));
   rendered = false;

@@ -42,7 +42,7 @@ class Replicates {
   void add(const Renderer& renderer, SceneGradient gradient) {
     for (Spread* spread : {&image_, &depth_, &distance_, &gradient_}) spread->next_replicate();
     for (std::size_t v = 0; v < m_.views.size(); ++v) add_image(renderer.image(v), v);
-    if (m_.bands.size() == 1) add_fragments();
+    if (has_fragments_of_pixels()) add_fragments();
     std::size_t i = 0;
     transform_numbers(gradient, [&](double value) {
       gradient_.add(i++, value);
@@ -54,7 +54,7 @@ class Replicates {
   SamplingError result() const {
     SamplingError error;
     for (std::size_t v = 0; v < m_.views.size(); ++v) error.images.push_back(image_of(v));
-    if (m_.bands.size() == 1) error.pixel_gradients = pixel_gradients();
+    if (has_fragments_of_pixels()) error.pixel_gradients = pixel_gradients();
     error.gradient = last_;
     std::size_t i = 0;
     transform_numbers(error.gradient, [&](double) { return gradient_.deviation(i++); });
@@ -62,6 +62,9 @@ class Replicates {
   }
 
  private:
+  /// With noise of the pixel they are the samples'.
+  bool has_fragments_of_pixels() const { return m_.bands.size() == 1 && !m_.pixel_noise; }
+
   void add_image(const Image& image, std::size_t view) {
     std::size_t i = view * 4 * image.pixels.size();
     for (const glm::vec4& pixel : image.pixels) {

@@ -5,6 +5,7 @@
 namespace dpr {
 
 float blur_radius(const Smoothing& smoothing) {
+  if (smoothing.noise == Noise::pixel) return 0;
   if (smoothing.blur_radius) return *smoothing.blur_radius;
   const double tail = static_cast<double>(smoothing.occupancy_threshold);
   return static_cast<float>(reach(smoothing.occupancy_prior, tail) * static_cast<double>(smoothing.sigma));

@@ -28,6 +28,7 @@ constexpr Names<DistanceMetric, 2> k_distance_metrics{
 constexpr Names<OccupancyWidth, 3> k_occupancy_widths{{{OccupancyWidth::fixed, "fixed"},
                                                        {OccupancyWidth::variable, "variable"},
                                                        {OccupancyWidth::zero, "zero"}}};
+constexpr Names<Noise, 2> k_noises{{{Noise::triangle, "triangle"}, {Noise::pixel, "pixel"}}};
 
 }  // namespace
 
@@ -64,6 +65,10 @@ template <>
 std::span<const NamedChoice<OccupancyWidth>> choice_names() {
   return k_occupancy_widths;
 }
+template <>
+std::span<const NamedChoice<Noise>> choice_names() {
+  return k_noises;
+}
 
 template <SmoothingChoice Choice>
 std::string_view to_string(Choice value) {
@@ -99,6 +104,7 @@ DPR_INSTANTIATE(VarianceReduction)
 DPR_INSTANTIATE(Draws)
 DPR_INSTANTIATE(DistanceMetric)
 DPR_INSTANTIATE(OccupancyWidth)
+DPR_INSTANTIATE(Noise)
 #undef DPR_INSTANTIATE
 
 }  // namespace dpr

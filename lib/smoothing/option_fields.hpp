@@ -39,6 +39,9 @@ void for_each_option(Visit&& visit) {
   visit("distance", "Unit of the distance: NDC^2 or NDC", &O::distance);
   visit("occupancy_width", "Width of the distance noise: sigma, up to the pixel, or none",
         &O::occupancy_width);
+  visit("noise", "What moves edges at random: each triangle's distances, or the pixel's position", &O::noise);
+  visit("supersampling", "Rigid samples of a pixel along each axis (1, 2 or 4), of the pixel's noise",
+        &O::supersampling);
 }
 
 /// The keys, in that order.

@@ -40,6 +40,14 @@ Smoothing joint_gaussian() {
   return smoothing;
 }
 
+Smoothing pixel() {
+  constexpr float k_gamma = 1e-4F;  // at the default's, closed surfaces show their back
+  Smoothing smoothing = joint_gaussian();
+  smoothing.noise = Noise::pixel;
+  smoothing.gamma = k_gamma;
+  return smoothing;
+}
+
 /// Rigid depths under uniform noise on the distances.
 Smoothing uniform_edges(float sigma) {
   Smoothing smoothing = rigid_smoothing();
@@ -68,7 +76,7 @@ struct Preset {
   Smoothing (*make)(int width, int height);
 };
 
-constexpr std::array<Preset, 8> k_presets{
+constexpr std::array<Preset, 9> k_presets{
     {{"softras", [](int, int) { return softras(); }},
      {"opendr", opendr},
      {"nmr", [](int, int) { return nmr(); }},
@@ -76,6 +84,7 @@ constexpr std::array<Preset, 8> k_presets{
      {"paper_cauchy", [](int, int) { return published(Prior::cauchy); }},
      {"gaussian", [](int, int) { return Smoothing{}; }},
      {"joint_gaussian", [](int, int) { return joint_gaussian(); }},
+     {"pixel", [](int, int) { return pixel(); }},
      {"rigid", [](int, int) { return rigid_smoothing(); }}}};
 
 const Preset& find_preset(std::string_view name, std::string_view where) {

@@ -16,8 +16,10 @@ void take_reach(const SmoothingOptions& given, Smoothing& smoothing) {
   if (given.sigma) set_sigma(smoothing, *given.sigma);
   take(given.occupancy_threshold, smoothing.occupancy_threshold);
   take(given.occupancy_width, smoothing.occupancy_width);
+  take(given.noise, smoothing.noise);
   const bool needs_radius = smoothing.occupancy_width == OccupancyWidth::variable;
   if (given.occupancy_threshold && !needs_radius) smoothing.blur_radius.reset();
+  if (smoothing.noise == Noise::pixel) smoothing.blur_radius.reset();
   if (given.blur_radius) smoothing.blur_radius = given.blur_radius;
 }
 
@@ -50,6 +52,7 @@ Smoothing resolve_smoothing(const SmoothingOptions& given, int width, int height
   take(given.seed, smoothing.seed);
   take(given.background_depth, smoothing.background_depth);
   take(given.distance, smoothing.distance);
+  take(given.supersampling, smoothing.supersampling);
   validate(smoothing);
   return smoothing;
 }

@@ -29,6 +29,7 @@ void validate_choices(const Smoothing& s) {
   require_known(s.draws, "draws (smoothing)");
   require_known(s.distance, "distance (smoothing)");
   require_known(s.occupancy_width, "occupancy_width (smoothing)");
+  require_known(s.noise, "noise (smoothing)");
 }
 
 /// What a sampled stage asks of its prior.
@@ -98,6 +99,29 @@ void validate_width(const Smoothing& s) {
   require_with(s.blur_radius.has_value(), "no blur_radius", "a blur_radius");
 }
 
+/// What noise of the pixel goes with.
+void validate_noise(const Smoothing& s) {
+  const bool known = s.supersampling == 1 || s.supersampling == 2 || s.supersampling == 4;
+  if (!known || (s.noise == Noise::triangle && s.supersampling != 1)) {
+    throw InvalidArgument("supersampling (smoothing)", checks::text(s.supersampling),
+                          known ? "1, or noise of the pixel" : "1, 2 or 4");
+  }
+  if (s.noise == Noise::triangle) return;
+  const auto require_with = [](bool ok, const std::string& with, const char* expected) {
+    if (!ok)
+      throw InvalidArgument("noise (smoothing)", "pixel with " + with,
+                            std::string("pixel with ") + expected + ", or triangle");
+  };
+  require_with(!is_sampled(s), "monte_carlo", "the exact estimators");
+  require_with(row_of(s.occupancy_prior).is_symmetric(),
+               std::string("the ") + std::string(row_of(s.occupancy_prior).name) + " occupancy_prior",
+               "a symmetric one, which does not shift the image");
+  require_with(s.occupancy_width == OccupancyWidth::fixed,
+               std::string("occupancy_width ") + std::string(to_string(s.occupancy_width)),
+               "occupancy_width fixed");
+  require_with(!s.blur_radius, "a blur_radius", "none: no triangle is blurred");
+}
+
 /// Single precision holds the inverses of these, and what they multiply.
 void require_scale(float value, const std::string& argument) {
   checks::require_positive(value, argument);
@@ -131,6 +155,7 @@ void validate(const Smoothing& smoothing) {
                           "a finite number >= 0");
   }
   checks::require_finite(smoothing.background_depth, "background_depth (smoothing)");
+  validate_noise(smoothing);
   validate_width(smoothing);
   validate_estimators(smoothing);
 }

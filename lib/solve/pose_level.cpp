@@ -164,7 +164,7 @@ void PoseLevel::render(std::span<const View> views, std::size_t images_together,
     renderer.forward();
     renderer.impl().require_forward("PoseLevel");
     images.resize(part.size() * pixels);
-    renderer.impl().aggregate.image.download(images);
+    renderer.impl().image().download(images);
   };
   for (std::size_t first = 0; first < views.size(); first += batch) {
     const auto part = views.subspan(first, std::min(batch, views.size() - first));

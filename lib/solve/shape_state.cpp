@@ -67,7 +67,8 @@ void add(Hash& hash, const Smoothing& s) {
        {static_cast<int>(s.occupancy_prior), static_cast<int>(s.depth_prior), static_cast<int>(s.composition),
         static_cast<int>(s.occupancy_estimator), static_cast<int>(s.aggregation_estimator),
         static_cast<int>(s.variance_reduction), static_cast<int>(s.draws), static_cast<int>(s.distance),
-        static_cast<int>(s.occupancy_width), static_cast<int>(s.samples)}) {
+        static_cast<int>(s.occupancy_width), static_cast<int>(s.samples), static_cast<int>(s.noise),
+        static_cast<int>(s.supersampling)}) {
     hash.add(value);
   }
   for (const float value : {s.sigma, s.gamma, s.alpha, s.occupancy_threshold, s.blur_radius.value_or(-1.0F),

@@ -3,7 +3,9 @@
 namespace dpr {
 
 Auxiliary::Auxiliary(Device::Impl& device)
-    : device_(device), forward_(device, "auxiliary.cl", "auxiliary_forward") {}
+    : device_(device),
+      forward_(device, "auxiliary.cl", "auxiliary_forward"),
+      weigh_(device, "auxiliary.cl", "auxiliary_weigh") {}
 
 void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                         Aggregate& aggregate) {
@@ -20,6 +22,14 @@ void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, con
              r.depth, r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices,
              transform.world, outputs, face_id);
   }
+}
+
+void Auxiliary::weigh(const shared::FrameParams& p, const Aggregate& aggregate, Buffer<cl_float4>& surface,
+                      Buffer<cl_float4>& coverage) {
+  const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
+  surface.resize(device_, pixels);
+  coverage.resize(device_, pixels);
+  weigh_(pixels, p, outputs, aggregate.image, surface, coverage);
 }
 
 }  // namespace dpr

@@ -16,6 +16,11 @@ class Auxiliary {
   void forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                Aggregate& aggregate);
 
+  /// What noise on the pixel can blend and blur: depth and normal, and 1 and the effective number of faces,
+  /// all times the sample's alpha.
+  void weigh(const shared::FrameParams& p, const Aggregate& aggregate, Buffer<cl_float4>& surface,
+             Buffer<cl_float4>& coverage);
+
   Buffer<float> outputs;    ///< [DPR_AUXILIARY_CHANNELS][view][height][width]
   Buffer<cl_uint> face_id;  ///< [view][height][width] DPR_NO_FACE for the background
 
@@ -28,6 +33,7 @@ class Auxiliary {
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
          In<float>, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
       forward_;
+  Kernel<shared::FrameParams, In<float>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>> weigh_;
   Buffer<cl_float4> grad_red_;  // [view][height][width] 1 in red
 };
 

@@ -45,7 +45,10 @@ const std::vector<json> k_overrides{
      {"occupancy_estimator", "exact"},
      {"variance_reduction", "rigid"},
      {"draws", "antithetic"}},
-    {{"occupancy_width", "fixed"}, {"distance", "squared"}, {"sigma", 5e-5}}};
+    {{"occupancy_width", "fixed"}, {"distance", "squared"}, {"sigma", 5e-5}},
+    {{"noise", "triangle"}, {"occupancy_width", "fixed"}},
+    {{"noise", "pixel"}, {"estimator", "exact"}, {"occupancy_width", "fixed"}},
+    {{"noise", "pixel"}, {"estimator", "exact"}, {"supersampling", 2}}};
 
 std::vector<std::string> presets() {
   std::vector<std::string> names{""};  // none
@@ -150,6 +153,8 @@ TEST_SUITE("unit") {
     CHECK(radius({.preset = "paper_cauchy", .sigma = 2e-3F}) == doctest::Approx(1.842e-2).epsilon(1e-4));
     CHECK(radius({.preset = "softras", .sigma = 1e-4F, .blur_radius = 0.25F}) == 0.25F);
     CHECK(radius({.preset = "rigid", .sigma = 1e-4F}) == 0);
+    CHECK(radius({.preset = "pixel", .sigma = 1e-4F}) == 0);
+    CHECK(radius({.preset = "softras", .noise = Noise::pixel}) == 0);
     CHECK(radius({.preset = "nmr", .sigma = 1e-2F}) == 0.5F);
     CHECK(radius({.preset = "nmr", .occupancy_threshold = 1e-2F}) == 0.5F);  // its width needs one
     CHECK(radius({.sigma = 1e-4F}) == doctest::Approx(3.719e-4).epsilon(1e-4));
@@ -200,7 +205,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, by_file(folder, {{"preset", "SoftRas"}}), "smoothing.preset (");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, by_file(folder, {{"preset", "SoftRas"}}),
                           "got \"SoftRas\", expected softras, opendr, nmr, paper_gaussian, paper_cauchy, "
-                          "gaussian, joint_gaussian or rigid");
+                          "gaussian, joint_gaussian, pixel or rigid");
     DPR_CHECK_MESSAGE_HAS(
         InvalidArgument, by_command_line(folder, json::object(), {{"depth_prior", "normal"}}),
         "--depth-prior: got \"normal\", expected gaussian, cauchy, logistic, gumbel or uniform");

@@ -76,7 +76,7 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("presets") {
-    CHECK(smoothing_preset_names().size() == 8);
+    CHECK(smoothing_preset_names().size() == 9);
     for (const std::string_view name : smoothing_preset_names())
       CHECK_NOTHROW(validate(smoothing_preset(name)));
     const Smoothing softras = smoothing_preset("softras");
@@ -268,6 +268,34 @@ TEST_SUITE("robustness") {
     smoothing.occupancy_width = static_cast<OccupancyWidth>(7);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "occupancy_width (smoothing): got 7");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, smoothing_preset("opendr", 0, 5), "size (preset): got 0x5");
+  }
+
+  TEST_CASE("noise of the pixel goes with what has a meaning there") {
+    const auto check = [](auto change, const std::string& part) {
+      Smoothing smoothing = smoothing_preset("pixel");
+      change(smoothing);
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), part);
+    };
+    check([](Smoothing& s) { s.occupancy_estimator = s.aggregation_estimator = Estimator::monte_carlo; },
+          "noise (smoothing): got pixel with monte_carlo, expected pixel with the exact estimators");
+    check([](Smoothing& s) { s.occupancy_prior = Prior::gumbel; },
+          "got pixel with the gumbel occupancy_prior");
+    check([](Smoothing& s) { s.occupancy_width = OccupancyWidth::zero; },
+          "got pixel with occupancy_width zero");
+    check([](Smoothing& s) { s.blur_radius = 0.1F; }, "got pixel with a blur_radius");
+    check([](Smoothing& s) { s.supersampling = 3; }, "supersampling (smoothing): got 3, expected 1, 2 or 4");
+    check([](Smoothing& s) { s.noise = static_cast<Noise>(5); },
+          "noise (smoothing): got 5, expected triangle or pixel");
+    Smoothing smoothing;
+    smoothing.supersampling = 2;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing),
+                          "supersampling (smoothing): got 2, expected 1, or noise of the pixel");
+    smoothing.noise = Noise::pixel;
+    CHECK_NOTHROW(validate(smoothing));
+    for (const Prior prior : {Prior::cauchy, Prior::logistic, Prior::uniform}) {
+      smoothing.occupancy_prior = smoothing.depth_prior = prior;
+      CHECK_NOTHROW(validate(smoothing));
+    }
   }
 
   TEST_CASE("unknown words") {

@@ -1,0 +1,253 @@
+// Contours of a view: the edges where its rigid image may jump. An edge is one if both of its faces lie on the same side
+// of it in the image (facing changes, or there is one face only), or if its faces' colours or normals differ there.
+// Listed by tile, like triangles: pairs of tile and contour, counted, listed in the order of the edges, sorted by tile,
+// linked.
+//
+// Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once. Where both
+// faces have vertices of their own, there are two edges, one on each face's: as long as they coincide one of them stands
+// for both, and when they part each is a boundary.
+#include "contour.h"
+
+/// What rounding may move a crossing by, in samples.
+#define DPR_CROSSING_SLACK 0.01f
+
+/// The sine of the angle between faces from which they count as shaded differently.
+#define DPR_LEAST_CREASE 1e-4f
+
+/// How faces look. Dropped is what setup drops for its depth or its area. One work-item per (view, face).
+/// in   faces   uint4[face]            vertex indices
+/// in   ndc     float4[view][vertex]
+/// out  facing  uint[view][face]
+kernel void contour_facing(const FrameParams p, global const ViewParams* restrict views,
+                           global const uint4* restrict faces, global const float4* restrict ndc,
+                           global uint* restrict facing) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.faces) return;
+  const uint view = i / p.faces;
+  const uint4 face = faces[i - view * p.faces];
+  global const float4* vertices = ndc + view * p.vertices;
+  const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
+  // Written so that a NaN fails.
+  const int in_view = fmin(fmin(a.z, b.z), c.z) >= views[view].znear && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY;
+  const int side = in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
+  facing[i] = side > 0 ? DPR_FACE_FRONT : side < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
+}
+
+/// Everything that says what an edge is; of one view.
+typedef struct {
+  global const uint* facing;         // [face]
+  global const float4 *ndc, *world;  // [vertex]
+  global const uint4 *faces, *face_colors;
+  global const float4* colors;
+} ContourScene;
+
+static inline int is_same(float4 a, float4 b) { return all(a.xyz == b.xyz); }
+
+/// Which corner of the face a vertex is, or coincides with; 3 where none does.
+static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) {
+  const float4 v = ndc[vertex];
+  return is_same(ndc[face.x], v) ? 0 : is_same(ndc[face.y], v) ? 1 : is_same(ndc[face.z], v) ? 2 : 3;
+}
+
+static inline uint component(uint4 v, uint k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
+
+/// Whether the faces' colours differ at an end of the edge.
+static inline int color_jumps(const ContourScene s, uint4 edge, uint vertex) {
+  const uint own = own_face(edge), other = other_face(edge);
+  const uint in_own = corner_at(s.faces[own], vertex, s.ndc), in_other = corner_at(s.faces[other], vertex, s.ndc);
+  return !is_same(s.colors[component(s.face_colors[own], in_own)], s.colors[component(s.face_colors[other], in_other)]);
+}
+
+static inline float3 winding_normal(const ContourScene s, uint face) {
+  const uint4 f = s.faces[face];
+  const float3 a = s.world[f.x].xyz;
+  return cross(s.world[f.y].xyz - a, s.world[f.z].xyz - a);
+}
+
+static inline int normals_differ(const ContourScene s, uint4 edge) {
+  const float3 n0 = winding_normal(s, own_face(edge)), n1 = winding_normal(s, other_face(edge));
+  const float3 c = cross(n0, n1);
+  return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
+}
+
+/// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is in front.
+static inline int stands_for_both(uint4 edge, global const uint* facing) {
+  const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
+  const int own_rank = own == DPR_FACE_DROPPED ? 0 : own == DPR_FACE_BACK ? 1 : 2;
+  const int other_rank = other == DPR_FACE_DROPPED ? 0 : other == DPR_FACE_BACK ? 1 : 2;
+  return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
+}
+
+static inline int contour_kind(const ContourScene s, uint4 edge, uint shading) {
+  EdgeSides sides = edge_sides(edge, s.facing);
+  if (!has_other_face(edge)) return sides.own != 0 ? DPR_OCCLUDES : DPR_NO_CONTOUR;
+  int is_split = 0;
+  if (edge.z & DPR_EDGE_FLAG) {
+    const uint4 other = s.faces[other_face(edge)];
+    is_split = !(other.x == edge.x || other.y == edge.x || other.z == edge.x) ||
+               !(other.x == edge.y || other.y == edge.y || other.z == edge.y);
+    if (is_split && (corner_at(other, edge.x, s.ndc) == 3 || corner_at(other, edge.y, s.ndc) == 3)) {
+      return sides.own != 0 ? DPR_OCCLUDES : DPR_NO_CONTOUR;
+    }
+    if (is_split && !stands_for_both(edge, s.facing)) return DPR_NO_CONTOUR;
+  }
+  if (sides.own != -sides.other) return DPR_OCCLUDES;
+  if (sides.own == 0) return DPR_NO_CONTOUR;
+  if (shading == DPR_FLAT && normals_differ(s, edge)) return DPR_CREASE;
+  if (!(edge.z & DPR_EDGE_FLAG)) return DPR_NO_CONTOUR;
+  if (is_split && shading != DPR_UNLIT && shading != DPR_FLAT) return DPR_CREASE;
+  return color_jumps(s, edge, edge.x) || color_jumps(s, edge, edge.y) ? DPR_CREASE : DPR_NO_CONTOUR;
+}
+
+static inline ContourScene scene_of_view(const FrameParams p, uint view, global const uint* facing,
+                                         global const float4* ndc, global const float4* world,
+                                         global const uint4* faces, global const uint4* face_colors,
+                                         global const float4* colors) {
+  ContourScene s;
+  s.facing = facing + view * p.faces;
+  s.ndc = ndc + view * p.vertices;
+  s.world = world + view * p.vertices;
+  s.faces = faces;
+  s.face_colors = face_colors;
+  s.colors = colors + view * p.color_stride;
+  return s;
+}
+
+/// The tiles [x, y) along one axis with a sample from which a step may cross the edge's extent on it.
+static inline uint2 crossed_tiles(float low, float high, uint size) {
+  const float last = (float)size - 1.0f;
+  const float first = fmax(floor(low - DPR_CROSSING_SLACK), 0.0f), end = fmin(floor(high + DPR_CROSSING_SLACK), last);
+  if (!(first <= end)) return (uint2)(0u, 0u);
+  return (uint2)((uint)first / DPR_TILE, (uint)end / DPR_TILE + 1);
+}
+
+/// An edge over tiles.
+typedef struct {
+  float2 a, d;         // an end and the way to the other, in samples
+  uint2 columns, rows; // of tiles, [x, y)
+} TiledEdge;
+
+static inline TiledEdge tiled_edge(const FrameParams p, float2 a, float2 b) {
+  TiledEdge e;
+  e.a = to_samples(p, a);
+  const float2 end = to_samples(p, b);
+  e.d = end - e.a;
+  e.columns = crossed_tiles(fmin(e.a.x, end.x), fmax(e.a.x, end.x), p.width);
+  e.rows = crossed_tiles(fmin(e.a.y, end.y), fmax(e.a.y, end.y), p.height);
+  return e;
+}
+
+/// False only if the line misses every step from a sample of the tile: those reach from its first sample to one behind
+/// its last.
+static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
+  const float half_extent = 0.5f * DPR_TILE;
+  const float2 centre = (float2)((float)(column * DPR_TILE), (float)(row * DPR_TILE)) + half_extent;
+  const float side = e.d.x * (centre.y - e.a.y) - e.d.y * (centre.x - e.a.x);
+  return !(fabs(side) > (half_extent + DPR_CROSSING_SLACK) * (fabs(e.d.x) + fabs(e.d.y)));
+}
+
+/// Counts the tiles of every contour. One work-item per (view, edge).
+/// in   edges        uint4[edge]           see DPR_EDGE_FLAG
+/// in   facing       uint[view][face]
+/// in   ndc, world   float4[view][vertex]
+/// in   faces, face_colors  uint4[face]    vertices and colours of the corners
+/// in   colors       float4[color] or, with a stride, float4[view][color]
+/// out  counts       uint[view][edge]
+kernel void contour_count(const FrameParams p, const ContourParams c, global const uint4* restrict edges,
+                          global const uint* restrict facing, global const float4* restrict ndc,
+                          global const float4* restrict world, global const uint4* restrict faces,
+                          global const uint4* restrict face_colors, global const float4* restrict colors,
+                          global uint* restrict counts) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * c.edges) return;
+  const uint view = i / c.edges;
+  const uint4 edge = edges[i - view * c.edges];
+  const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
+  uint count = 0;
+  if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
+    const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
+    for (uint row = t.rows.x; row < t.rows.y; ++row) {
+      for (uint column = t.columns.x; column < t.columns.y; ++column) count += line_meets_tile(t, column, row) ? 1 : 0;
+    }
+  }
+  counts[i] = count;
+}
+
+/// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as above.
+/// in   room        places that there are
+/// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
+/// out  pairs       uint[1]      how many there are; 0 where they do not fit
+/// out  place_contour  uint[place]  contour_number()
+/// out  place_tile     uint[place]  view * tiles + tile
+/// out  places         uint[place]  the place itself: what sorting permutes
+kernel void contour_fill(const FrameParams p, const ContourParams c, const uint room,
+                         global const uint4* restrict edges, global const uint* restrict facing,
+                         global const float4* restrict ndc, global const float4* restrict world,
+                         global const uint4* restrict faces, global const uint4* restrict face_colors,
+                         global const float4* restrict colors, global const uint* restrict offsets,
+                         global uint* restrict pairs, global uint* restrict place_contour,
+                         global uint* restrict place_tile, global uint* restrict places) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * c.edges) return;
+  const uint total = offsets[p.views * c.edges];
+  if (i == 0) pairs[0] = total > room ? 0 : total;
+  if (total > room || offsets[i] == offsets[i + 1]) return;
+  const uint view = i / c.edges;
+  const uint4 edge = edges[i - view * c.edges];
+  const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
+  const uint contour = contour_number(i, contour_kind(s, edge, c.shading));
+  const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
+  const uint first_tile = view * p.tiles_x * p.tiles_y;
+  uint place = offsets[i];
+  for (uint row = t.rows.x; row < t.rows.y; ++row) {
+    for (uint column = t.columns.x; column < t.columns.y; ++column) {
+      if (!line_meets_tile(t, column, row)) continue;
+      place_contour[place] = contour;
+      place_tile[place] = first_tile + row * p.tiles_x + column;
+      places[place] = place;
+      ++place;
+    }
+  }
+}
+
+/// Links pairs, numbered by tile, and the places where edges list theirs. One work-item for every pair there is room
+/// for.
+/// in   pairs          uint[1]
+/// in   places         uint[pair]   where the pair's edge lists it
+/// in   place_contour  uint[place]
+/// out  pair_contour   uint[pair]
+/// out  edge_pairs     uint[place]  the pairs of every edge
+kernel void contour_link(const uint room, global const uint* restrict pairs, global const uint* restrict places,
+                         global const uint* restrict place_contour, global uint* restrict pair_contour,
+                         global uint* restrict edge_pairs) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= room || pair >= pairs[0]) return;
+  pair_contour[pair] = place_contour[places[pair]];
+  edge_pairs[places[pair]] = pair;
+}
+
+/// Adds the gradients of contours' ends to those of the vertices: each vertex its edges in order, each edge its pairs.
+/// One work-item per (view, vertex). Deterministic.
+/// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`
+/// in      edge_pairs    uint[...]
+/// in      end_starts    uint[vertex + 1]       runs of `ends`
+/// in      ends          uint[...]              edge * 2 + end, by vertex
+/// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
+/// in out  grad_ndc      float4[view][vertex]
+kernel void contour_gather(const FrameParams p, const ContourParams c, global const uint* restrict pair_starts,
+                           global const uint* restrict edge_pairs, global const uint* restrict end_starts,
+                           global const uint* restrict ends, global const float4* restrict grad_ends,
+                           global float4* restrict grad_ndc) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  float2 sum = 0.0f;
+  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
+    const uint edge = view * c.edges + ends[k] / 2;
+    for (uint place = pair_starts[edge]; place < pair_starts[edge + 1]; ++place) {
+      const float4 grad = grad_ends[edge_pairs[place]];
+      sum += ends[k] % 2 ? grad.zw : grad.xy;
+    }
+  }
+  grad_ndc[i] += (float4)(sum, 0.0f, 0.0f);
+}

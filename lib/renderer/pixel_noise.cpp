@@ -1,0 +1,53 @@
+#include "renderer/pixel_noise.hpp"
+
+#include <cmath>
+
+#include "smoothing/priors.hpp"
+
+namespace dpr {
+
+PixelScale pixel_scale(const Smoothing& smoothing, int short_side) {
+  const double pixels = short_side / 2.0, sigma = static_cast<double>(smoothing.sigma);
+  if (smoothing.distance == DistanceMetric::euclidean) return {pixels * sigma, pixels};
+  return {pixels * std::sqrt(sigma), pixels * 0.5 / std::sqrt(sigma)};
+}
+
+float depth_reach(const Smoothing& smoothing) {
+  constexpr double k_seen = 1e-3;  // of the weight
+  // The difference of two depths has noise of twice the variance.
+  return smoothing.gamma * static_cast<float>(std::sqrt(2.0) * reach(smoothing.depth_prior, k_seen));
+}
+
+PixelNoise::PixelNoise(Device::Impl& device)
+    : contour(device), antialias(device), blur(device), device_(device) {}
+
+void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+                         float reach) {
+  antialias.cross(in, contour, reach);
+  antialias.forward(in.p, raster, blended_);
+  image.resize(device_, size.views * size.width * size.height);
+  blur.forward(size, blended_, image);
+}
+
+void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
+                        Buffer<cl_float4>& pixels) {
+  antialias.forward(in.p, samples, other_blended_);
+  pixels.resize(device_, size.views * size.width * size.height);
+  blur.forward(size, other_blended_, pixels);
+  blur.forward(size, blended_, image);  // which leaves what the backward pass needs
+}
+
+void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+                          const Buffer<cl_float4>& grad_image, bool by_scale) {
+  blur.backward(size, grad_image, grad_blended_);
+  if (by_scale) blur.backward_scale(size, blended_, grad_image);
+  antialias.backward(in, contour, raster, grad_blended_, grad_raster);
+}
+
+std::size_t PixelNoise::bytes() const {
+  return contour.bytes() + antialias.bytes() + blur.bytes() + (edges ? edges->bytes() : 0) +
+         image.capacity_bytes() + grad_raster.capacity_bytes() + blended_.capacity_bytes() +
+         grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
+}
+
+}  // namespace dpr

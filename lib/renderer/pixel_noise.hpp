@@ -1,0 +1,58 @@
+// Noise on the pixel: from the samples of the rigid image to the image, and back.
+#pragma once
+
+#include <optional>
+
+#include "stages/antialias.hpp"
+#include "stages/blur.hpp"
+#include "stages/contour.hpp"
+
+namespace dpr {
+
+/// The raster of rigid samples around a frame of pixels.
+struct Raster {
+  int supersampling = 1;  ///< samples of a pixel along each axis
+  int margin = 0;         ///< samples around the frame
+};
+
+/// The scale of the pixel's noise, in pixels of a frame whose shorter side is that long; and its derivative
+/// by sigma.
+struct PixelScale {
+  double value, by_sigma;
+};
+PixelScale pixel_scale(const Smoothing& smoothing, int short_side);
+
+/// How far behind the nearest surface, in normalised depth, the noise of the depths lets another be seen.
+float depth_reach(const Smoothing& smoothing);
+
+class PixelNoise {
+ public:
+  explicit PixelNoise(Device::Impl& device);
+
+  Contour contour;
+  Antialias antialias;
+  Blur blur;
+  std::optional<Edges> edges;                // of the scene; made for its first frame
+  std::optional<std::size_t> last_contours;  // pairs of a frame like the next one
+
+  /// From samples to the image, after the antialiasing's find_front() of all bands.
+  void forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
+  /// To `grad_raster` and the contours' ends; and, if asked for, to the scale.
+  void backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+                const Buffer<cl_float4>& grad_image, bool by_scale);
+
+  /// Samples other than those of forward() the same way, to [view][height][width].
+  void smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
+              Buffer<cl_float4>& pixels);
+
+  Buffer<cl_float4> image;        ///< [view][height][width] RGBA
+  Buffer<cl_float4> grad_raster;  ///< of the samples
+
+  std::size_t bytes() const;
+
+ private:
+  Buffer<cl_float4> blended_, grad_blended_, other_blended_;
+  Device::Impl& device_;
+};
+
+}  // namespace dpr

@@ -1,0 +1,67 @@
+#include "stages/antialias.hpp"
+
+namespace dpr {
+namespace {
+
+std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
+
+shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
+  shared::AntialiasParams a{};
+  a.edges = static_cast<cl_uint>(in.edges.count);
+  a.depth_reach = depth_reach;
+  return a;
+}
+
+}  // namespace
+
+Antialias::Antialias(Device::Impl& device)
+    : device_(device),
+      front_(device, "antialias.cl", "antialias_front"),
+      cross_(device, "antialias.cl", "antialias_cross"),
+      forward_(device, "antialias.cl", "antialias_forward"),
+      backward_(device, "antialias.cl", "antialias_backward"),
+      backward_samples_(device, "antialias.cl", "antialias_backward_samples"),
+      backward_edges_(device, "antialias.cl", "antialias_backward_edges") {}
+
+void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
+  front.resize(device_, samples_of(p));
+  for (const Range& run : rasterize.pixels(p)) {
+    front_(run, run.last(), rasterize.pixel_starts, rasterize.list, rasterize.depth, front);
+  }
+}
+
+void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
+  winner.resize(device_, 2 * samples_of(in.p));
+  cut.resize(device_, 2 * samples_of(in.p));
+  cross_(std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, in.p, params(in, depth_reach),
+         in.views.cameras, in.edges.edges, in.geometry.face_vertices, contour.facing, in.transform.ndc,
+         contour.tile_starts, contour.pair_contour, front, winner, cut);
+}
+
+void Antialias::forward(const shared::FrameParams& p, const Buffer<cl_float4>& raster,
+                        Buffer<cl_float4>& blended) {
+  blended.resize(device_, samples_of(p));
+  forward_(samples_of(p), p, winner, cut, raster, blended);
+}
+
+void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
+                         const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster) {
+  const std::size_t samples = samples_of(in.p);
+  share_.resize(device_, 2 * samples);
+  grad_cut_.resize(device_, 2 * samples);
+  grad_raster.resize(device_, samples);
+  grad_ends.resize(device_, contour.pairs);
+  backward_(samples, in.p, winner, cut, raster, grad_blended, share_, grad_cut_);
+  backward_samples_(samples, in.p, winner, cut, share_, grad_blended, grad_raster);
+  backward_edges_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
+                  contour.facing, in.transform.ndc, contour.pair_contour, contour.pair_tile, winner, cut,
+                  grad_cut_, grad_ends);
+}
+
+std::size_t Antialias::bytes() const {
+  std::size_t bytes = winner.capacity_bytes() + grad_ends.capacity_bytes();
+  for (const Buffer<float>* buffer : {&front, &cut, &share_, &grad_cut_}) bytes += buffer->capacity_bytes();
+  return bytes;
+}
+
+}  // namespace dpr

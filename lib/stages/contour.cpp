@@ -1,0 +1,160 @@
+#include "stages/contour.hpp"
+
+#include <limits>
+
+#include "mesh/welded_edges.hpp"
+
+namespace dpr {
+namespace {
+
+cl_uint index(std::size_t value) { return static_cast<cl_uint>(value); }
+
+/// Whether the colours of two faces can differ at the edge that they share: those of meshes with colours of
+/// faces can, and those of vertices of the faces' own.
+bool may_jump(const Mesh& mesh, const WeldedEdge& edge) {
+  return !edge.shares_vertices || (mesh.vertex_colors.empty() && !mesh.face_colors.empty());
+}
+
+cl_uint4 joined(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_vertex, std::size_t first_face) {
+  cl_uint4 row{{index(first_vertex) + edge.first, index(first_vertex) + edge.second,
+                index(first_face) + edge.face, DPR_NO_FACE}};
+  if (!edge.other) return row;
+  row.s[3] = (index(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
+  if (may_jump(mesh, edge)) row.s[2] |= DPR_EDGE_FLAG;
+  return row;
+}
+
+}  // namespace
+
+Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3> positions) {
+  std::vector<cl_uint4> rows;
+  std::size_t first_vertex = 0, first_face = 0;
+  for (const Instance& instance : scene.meshes) {
+    const Mesh& mesh = instance.mesh;
+    for (const WeldedEdge& edge :
+         make_welded_edges(positions.subspan(first_vertex, mesh.positions.size()), mesh.faces)) {
+      rows.push_back(joined(mesh, edge, first_vertex, first_face));
+    }
+    first_vertex += mesh.positions.size();
+    first_face += mesh.faces.size();
+  }
+  count = rows.size();
+
+  std::vector<cl_uint> starts(first_vertex + 1, 0), by_vertex(2 * count);
+  for (const cl_uint4& row : rows) {
+    for (int end = 0; end < 2; ++end) ++starts[row.s[end] + 1];
+  }
+  for (std::size_t v = 0; v < first_vertex; ++v) starts[v + 1] += starts[v];
+  std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
+  for (std::size_t edge = 0; edge < count; ++edge) {
+    for (cl_uint end = 0; end < 2; ++end) by_vertex[next[rows[edge].s[end]]++] = index(2 * edge) + end;
+  }
+  if (rows.empty()) rows.emplace_back();  // never read, but an argument all the same
+  edges.upload(device, rows);
+  end_starts.upload(device, starts);
+  if (by_vertex.empty()) by_vertex.emplace_back();
+  ends.upload(device, by_vertex);
+}
+
+std::size_t Edges::bytes() const {
+  return edges.capacity_bytes() + end_starts.capacity_bytes() + ends.capacity_bytes();
+}
+
+Contour::Contour(Device::Impl& device)
+    : device_(device),
+      facing_(device, "contour.cl", "contour_facing"),
+      count_(device, "contour.cl", "contour_count"),
+      fill_(device, "contour.cl", "contour_fill"),
+      link_(device, "contour.cl", "contour_link"),
+      gather_(device, "contour.cl", "contour_gather"),
+      scan_(device),
+      sort_(device) {}
+
+namespace {
+
+std::size_t view_edges(const ContourInputs& in) { return std::size_t{in.p.views} * in.edges.count; }
+
+shared::ContourParams params(const ContourInputs& in) {
+  shared::ContourParams c{};
+  c.edges = index(in.edges.count);
+  c.shading = in.shading ? static_cast<cl_uint>(*in.shading) + DPR_FLAT : DPR_UNLIT;
+  return c;
+}
+
+constexpr const char* k_pairs = "pairs of tiles and contours (frame)";
+
+}  // namespace
+
+void Contour::forward(const ContourInputs& in) {
+  count(in);
+  const std::size_t found = read_total(pair_starts_, view_edges(in), k_pairs);
+  list(in, found);
+  settle(found);
+}
+
+void Contour::forward_within(const ContourInputs& in, std::size_t room) {
+  count(in);
+  total_.start(pair_starts_, view_edges(in));
+  list(in, room);
+}
+
+std::size_t Contour::read_count() {
+  const std::size_t total = total_.take();
+  check_total(total, k_pairs);
+  return total;
+}
+
+void Contour::settle(std::size_t known_pairs) {
+  pairs = known_pairs;
+  for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
+    buffer->settle(known_pairs);
+}
+
+std::size_t Contour::room_for(std::size_t count) const {
+  return std::min(with_headroom(count), std::max(count, pair_contour.room()));
+}
+
+void Contour::count(const ContourInputs& in) {
+  const std::size_t faces = std::size_t{in.p.views} * in.p.faces;
+  if (view_edges(in) > std::numeric_limits<cl_uint>::max() / 2) {
+    throw InvalidArgument("edges (frame)", std::to_string(view_edges(in)),
+                          "fewer, so that they can be counted");
+  }
+  facing.resize(device_, faces);
+  facing_(faces, in.p, in.views.cameras, in.geometry.face_vertices, in.transform.ndc, facing);
+  counts_.resize(device_, view_edges(in));
+  count_(view_edges(in), in.p, params(in), in.edges.edges, facing, in.transform.ndc, in.transform.world,
+         in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p), counts_);
+  scan_(view_edges(in), counts_, pair_starts_);
+}
+
+void Contour::list(const ContourInputs& in, std::size_t room) {
+  pairs = room;
+  pair_count_.resize(device_, 1);
+  for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
+    buffer->resize(device_, Length::at_most(pairs));
+  fill_(view_edges(in), in.p, params(in), index(room), in.edges.edges, facing, in.transform.ndc,
+        in.transform.world, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
+        pair_starts_, pair_count_, place_contour_, pair_tile, places_);
+  sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
+        tile_starts);
+  link_(pairs, index(room), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
+}
+
+void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends,
+                     Buffer<cl_float4>& grad_ndc) {
+  gather_(std::size_t{in.p.views} * in.p.vertices, in.p, params(in), pair_starts_, edge_pairs_,
+          in.edges.end_starts, in.edges.ends, grad_ends, grad_ndc);
+}
+
+std::size_t Contour::bytes() const {
+  std::size_t bytes = scan_.bytes() + sort_.bytes();
+  for (const Buffer<cl_uint>* buffer :
+       {&facing, &pair_contour, &pair_tile, &tile_starts, &counts_, &pair_count_, &pair_starts_, &edge_pairs_,
+        &place_contour_, &places_}) {
+    bytes += buffer->capacity_bytes();
+  }
+  return bytes;
+}
+
+}  // namespace dpr

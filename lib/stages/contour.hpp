@@ -1,0 +1,93 @@
+// Contours of every view: the edges where its rigid image may jump, by tile.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "device/kernel.hpp"
+#include "dpr/light.hpp"
+#include "stages/geometry.hpp"
+#include "stages/scan.hpp"
+#include "stages/sort.hpp"
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+/// The edges of the scene's meshes on the device.
+struct Edges {
+  /// `positions` are [vertex], object space: what coincides there belongs together.
+  Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3> positions);
+
+  std::size_t count = 0;
+  Buffer<cl_uint4> edges;      ///< [edge] ends, own face, other face: see DPR_EDGE_FLAG
+  Buffer<cl_uint> end_starts;  ///< [vertex + 1] runs of `ends`
+  Buffer<cl_uint> ends;        ///< edge * 2 + end, by vertex
+
+  std::size_t bytes() const;
+};
+
+/// Everything of a frame that contours are found by.
+struct ContourInputs {
+  const shared::FrameParams& p;
+  const DeviceViews& views;
+  const Geometry& geometry;
+  const Edges& edges;
+  const Transform& transform;
+  std::optional<Shading> shading;  ///< of a lit scene
+};
+
+class Contour {
+ public:
+  explicit Contour(Device::Impl& device);
+
+  /// Blocks to read the number of pairs.
+  void forward(const ContourInputs& in);
+  /// With room for so many pairs, without waiting to learn how many there are. If they are more, there are
+  /// none.
+  void forward_within(const ContourInputs& in, std::size_t room);
+  /// How many there are, after forward_within(). Blocks until the device has counted, not until it has
+  /// rendered.
+  std::size_t read_count();
+  /// Says how many pairs there are, after a forward_within() whose room was enough.
+  void settle(std::size_t known_pairs);
+  /// Room for so many and a few more, in the buffers that are there.
+  std::size_t room_for(std::size_t count) const;
+  /// Adds the gradients of the pairs' ends to those of the vertices.
+  void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc);
+
+  std::size_t pairs = 0;         ///< or how many there is room for, until it is known
+  Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
+  Buffer<cl_uint> pair_contour;  ///< [pair] contour_number()
+  Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
+  Buffer<cl_uint> tile_starts;   ///< [view * tile + 1] runs of pairs
+
+  std::size_t bytes() const;
+
+ private:
+  void count(const ContourInputs& in);
+  void list(const ContourInputs& in, std::size_t room);
+
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>> facing_;
+  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
+         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
+      count_;
+  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,
+         In<cl_float4>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>,
+         Out<cl_uint>, Out<cl_uint>>
+      fill_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
+  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
+         In<cl_float4>, Out<cl_float4>>
+      gather_;
+  Scan scan_;
+  Sort sort_;
+  PendingRead<cl_uint> total_;
+  Buffer<cl_uint> counts_;                  // [view * edge]
+  Buffer<cl_uint> pair_count_;              // [1] 0 where they do not fit
+  Buffer<cl_uint> pair_starts_;             // [view * edge + 1] runs of `edge_pairs_`
+  Buffer<cl_uint> edge_pairs_;              // the pairs of every edge
+  Buffer<cl_uint> place_contour_, places_;  // [pair] before sorting
+};
+
+}  // namespace dpr

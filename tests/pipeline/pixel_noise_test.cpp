@@ -1,0 +1,439 @@
+// Noise on the pixel: images that do not depend on the tessellation, and every gradient against finite
+// differences of the renderer itself.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/determinism.hpp"
+#include "renderer/renderer_impl.hpp"
+#include "support/messages.hpp"
+#include "support/worst.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+using dpr::test::reduced;
+
+namespace {
+
+/// A sphere as its subdivision has it, seen from the distance at which issue and README measure.
+Scene sphere_scene(unsigned subdivisions, int size, float sigma) {
+  Scene scene;
+  scene.width = scene.height = size;
+  scene.camera.view = glm::translate(glm::mat4(1.0F), glm::vec3(0.0F, 0.0F, -2.732F));
+  scene.camera.fov_y_degrees = 60.0F;
+  scene.background = {0.1F, 0.3F, 0.2F};
+  scene.meshes.push_back({make_icosphere(subdivisions), placed(23.0F)});
+  scene.smoothing = smoothing_preset("pixel");
+  scene.smoothing.sigma = sigma;
+  return scene;
+}
+
+/// The sigma whose noise has a scale of so many pixels.
+float sigma_of_pixels(double pixels, int size) {
+  const double scale = pixels * 2 / size;
+  return static_cast<float>(scale * scale);
+}
+
+double cross_of(const glm::dvec2& o, const glm::dvec2& a, const glm::dvec2& b) {
+  return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x);
+}
+
+/// The area of the silhouette of a convex mesh, NDC^2: that of the convex hull of the projected vertices
+/// (Andrew's monotone chain).
+double silhouette_area(const Scene& scene, double radius) {
+  const double focal = 1 / std::tan(glm::radians(static_cast<double>(scene.camera.fov_y_degrees)) / 2);
+  const glm::dmat4 to_view = glm::dmat4(scene.camera.view) * glm::dmat4(scene.meshes[0].transform);
+  std::vector<glm::dvec2> points;
+  for (const glm::vec3& p : scene.meshes[0].mesh.positions) {
+    const glm::dvec4 v = to_view * glm::dvec4(radius * glm::dvec3(p), 1);
+    points.emplace_back(focal * v.x / -v.z, focal * v.y / -v.z);
+  }
+  std::ranges::sort(points, [](const glm::dvec2& a, const glm::dvec2& b) {
+    return a.x < b.x || (a.x == b.x && a.y < b.y);
+  });
+  double area = 0;
+  for (const bool upper : {false, true}) {
+    if (upper) std::ranges::reverse(points);
+    std::vector<glm::dvec2> chain;
+    for (const glm::dvec2& p : points) {
+      while (chain.size() > 1 && cross_of(chain[chain.size() - 2], chain.back(), p) <= 0) chain.pop_back();
+      chain.push_back(p);
+    }
+    for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+      area += (chain[i].x * chain[i + 1].y - chain[i].y * chain[i + 1].x) / 2;
+    }
+  }
+  return area;
+}
+
+double pixel_area(const Scene& scene) { return 4.0 / (scene.width * scene.height); }
+
+double alpha_area(const Scene& scene, const Image& image) {
+  double sum = 0;
+  for (const glm::vec4& pixel : image.pixels) sum += static_cast<double>(pixel.w);
+  return sum * pixel_area(scene);
+}
+
+/// d area of alpha / d radius.
+double area_by_radius(Renderer& renderer) {
+  const Scene& scene = renderer.scene();
+  Image grad(scene.width, scene.height);
+  for (glm::vec4& pixel : grad.pixels) pixel.w = static_cast<float>(pixel_area(scene));
+  const SceneGradient gradient = renderer.backward(std::span(&grad, 1));
+  double sum = 0;
+  for (std::size_t i = 0; i < gradient.meshes[0].positions.size(); ++i) {
+    sum +=
+        glm::dot(glm::dvec3(gradient.meshes[0].positions[i]), glm::dvec3(scene.meshes[0].mesh.positions[i]));
+  }
+  return sum;
+}
+
+/// A cube on eight vertices, each triangle of a colour of its own: all edges are contours.
+Mesh welded_cube() {
+  Random random(3);
+  const Mesh cube = make_cube();
+  Mesh mesh;
+  for (const glm::uvec3& face : cube.faces) {
+    glm::uvec3 welded;
+    for (int i = 0; i < 3; ++i) {
+      const auto found = std::ranges::find(mesh.positions, cube.positions[face[i]]);
+      welded[i] = static_cast<unsigned>(found - mesh.positions.begin());
+      if (found == mesh.positions.end()) mesh.positions.push_back(cube.positions[face[i]]);
+    }
+    mesh.faces.push_back(welded);
+    mesh.face_colors.push_back(random.vector(0.0F, 1.0F));
+  }
+  return mesh;
+}
+
+Scene cube_of_eight(int size) {
+  Scene scene = scene_of(welded_cube(), size, size - 3);
+  scene.smoothing = smoothing_preset("pixel");
+  scene.smoothing.sigma = sigma_of_pixels(1.5, size);
+  return scene;
+}
+
+/// Smooth random numbers: what a loss' gradient looks like where its target is an image.
+Image smooth_image(int width, int height) {
+  Image image(width, height);
+  for (int row = 0; row < height; ++row) {
+    for (int column = 0; column < width; ++column) {
+      const float x = static_cast<float>(column) / static_cast<float>(width),
+                  y = static_cast<float>(row) / static_cast<float>(height);
+      image.pixels[static_cast<std::size_t>(row * width + column)] = {
+          std::sin(5 * x + 3 * y), std::cos(4 * x - 6 * y), std::sin(7 * x * y + 1), std::cos(5 * y + 2 * x)};
+    }
+  }
+  return image;
+}
+
+double loss_of(Renderer& renderer, const Image& grad) {
+  renderer.forward();
+  const Image image = renderer.image();
+  double sum = 0;
+  for (std::size_t i = 0; i < grad.pixels.size(); ++i) {
+    sum += glm::dot(glm::dvec4(grad.pixels[i]), glm::dvec4(image.pixels[i]));
+  }
+  return sum;
+}
+
+/// The central difference of the loss by a number that `set` puts into the scene.
+double difference(const Device& device, const Scene& scene, const Image& grad, double step,
+                  const std::function<void(Scene&, double)>& set) {
+  Renderer renderer(device);
+  double sum = 0;
+  for (const double sign : {1.0, -1.0}) {
+    Scene moved = scene;
+    set(moved, sign * step);
+    renderer.set_scene(moved);
+    sum += sign * loss_of(renderer, grad);
+  }
+  return sum / (2 * step);
+}
+
+glm::mat4 turned(const glm::mat4& m, int axis, double angle) {
+  glm::dvec3 about(0);
+  about[axis] = 1;
+  glm::dmat4 turn = glm::rotate(glm::dmat4(1), angle, about) * glm::dmat4(glm::dmat3(glm::dmat4(m)));
+  turn[3] = glm::dmat4(m)[3];
+  return glm::mat4(turn);
+}
+
+glm::mat4 moved(glm::mat4 m, int axis, double by) {
+  m[3][axis] += static_cast<float>(by);
+  return m;
+}
+
+/// Differences for every block of blocks_of(), by name; empty for what has none. Where lengths and angles
+/// change by more than `length_step`, edges pass samples whose neighbours have other colours, and the image
+/// jumps a little.
+std::vector<double> differences(const Device& device, const Scene& scene, const Image& grad,
+                                const std::string& name, double length_step) {
+  std::vector<double> found;
+  const auto add = [&](double step, const std::function<void(Scene&, double)>& set) {
+    found.push_back(difference(device, scene, grad, step, set));
+  };
+  constexpr double k_degrees = 20;  // of the field of view, for a step of 1
+  const auto relative = [&](float value) { return 1e-2 * static_cast<double>(value); };
+  const Mesh& mesh = scene.meshes[0].mesh;
+  const std::size_t colors = mesh.vertex_colors.empty() ? mesh.face_colors.size() : mesh.vertex_colors.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (name == "rotation")
+      add(length_step,
+          [=](Scene& m, double x) { m.meshes[0].transform = turned(m.meshes[0].transform, axis, x); });
+    if (name == "translation")
+      add(length_step,
+          [=](Scene& m, double x) { m.meshes[0].transform = moved(m.meshes[0].transform, axis, x); });
+    if (name == "camera rotation")
+      add(length_step, [=](Scene& m, double x) { m.camera.view = turned(m.camera.view, axis, x); });
+    if (name == "camera translation")
+      add(length_step, [=](Scene& m, double x) { m.camera.view = moved(m.camera.view, axis, x); });
+    if (name == "background")
+      add(0.1, [=](Scene& m, double x) { m.background[axis] += static_cast<float>(x); });
+    if (name == "ambient" && scene.lights)
+      add(0.1, [=](Scene& m, double x) { m.lights->ambient[axis] += static_cast<float>(x); });
+  }
+  if (name == "fov")
+    add(k_degrees * length_step, [](Scene& m, double x) { m.camera.fov_y_degrees += static_cast<float>(x); });
+  if (name == "sigma")
+    add(relative(scene.smoothing.sigma),
+        [](Scene& m, double x) { m.smoothing.sigma += static_cast<float>(x); });
+  if (name == "gamma")
+    add(relative(scene.smoothing.gamma),
+        [](Scene& m, double x) { m.smoothing.gamma += static_cast<float>(x); });
+  for (std::size_t i = 0; name == "positions" && i < mesh.positions.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      add(length_step,
+          [=](Scene& m, double x) { m.meshes[0].mesh.positions[i][axis] += static_cast<float>(x); });
+    }
+  }
+  for (std::size_t i = 0; name == "colors" && i < colors; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      add(0.1, [=](Scene& m, double x) {
+        Mesh& its = m.meshes[0].mesh;
+        (its.vertex_colors.empty() ? its.face_colors : its.vertex_colors)[i][axis] += static_cast<float>(x);
+      });
+    }
+  }
+  return found;
+}
+
+void check_gradients(const Device& device, const Scene& scene, double length_step, double tolerance) {
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  const Image grad = smooth_image(scene.width, scene.height);
+  for (Block block : blocks_of(renderer.backward(std::span(&grad, 1)))) {
+    CAPTURE(block.name);
+    block.expected = differences(device, scene, grad, block.name, length_step);
+    if (block.expected.empty()) continue;
+    CHECK((norm(block.expected) > 0 || block.name == "gamma"));
+    const double error = block_error(block, tolerance);
+    CHECK_MESSAGE(error < (is_sensitivity(block) ? 10 : 1) * tolerance, block.name << ": " << error);
+  }
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("pixel noise: areas are the polyhedron's, and their derivatives, whatever triangles and sigma") {
+    const Device device = open_device();
+    const int size = reduced(128, 16);
+    for (const unsigned subdivisions : {2U, 3U, 4U, 5U}) {
+      if (test::is_reduced() && subdivisions > 2) continue;
+      for (const float sigma : {1e-5F, 1e-4F, 1e-3F}) {
+        const Scene scene = sphere_scene(subdivisions, size, sigma);
+        CAPTURE(subdivisions);
+        CAPTURE(sigma);
+        Renderer renderer(device);
+        renderer.set_scene(scene);
+        renderer.forward();
+        const double wanted = silhouette_area(scene, 1);
+        CHECK(alpha_area(scene, renderer.image()) == doctest::Approx(wanted).epsilon(reduced(3, 20) * 1e-3));
+        constexpr double k_step = 1e-3;
+        const double by_radius =
+            (silhouette_area(scene, 1 + k_step) - silhouette_area(scene, 1 - k_step)) / (2 * k_step);
+        const double found = area_by_radius(renderer);
+        CAPTURE(found / by_radius);
+        CHECK(found == doctest::Approx(by_radius).epsilon(reduced(1, 5) * 1e-2));
+      }
+    }
+  }
+
+  TEST_CASE("pixel noise: opaque inside") {
+    const Scene scene = sphere_scene(reduced(4, 1), reduced(128, 16), reduced(1, 0) == 1 ? 1e-3F : 1e-4F);
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    const Image image = renderer.image();
+    float least = 1, most = 0;
+    for (int row = 0; row < scene.height; ++row) {
+      for (int column = 0; column < scene.width; ++column) {
+        const float alpha = image.pixels[static_cast<std::size_t>(row * scene.width + column)].w;
+        most = std::max(most, alpha);
+        const double x = (column + 0.5) * 2 / scene.width - 1, y = (row + 0.5) * 2 / scene.height - 1;
+        if (std::hypot(x, y) < 0.4) least = std::min(least, alpha);
+      }
+    }
+    CHECK(least > 1 - 1e-5F);
+    CHECK(most < 1 + 1e-5F);
+  }
+
+  TEST_CASE("pixel noise: few triangles and many look alike") {
+    if (test::is_reduced()) return;
+    const int size = 128;
+    for (const double pixels : {1.0, 3.0}) {
+      std::vector<Image> images;
+      for (const unsigned subdivisions : {4U, 6U}) {
+        Renderer renderer(open_device());
+        renderer.set_scene(sphere_scene(subdivisions, size, sigma_of_pixels(pixels, size)));
+        renderer.forward();
+        images.push_back(renderer.image());
+      }
+      float largest = 0;
+      for (std::size_t i = 0; i < images[0].pixels.size(); ++i) {
+        const glm::vec4 apart = glm::abs(images[0].pixels[i] - images[1].pixels[i]);
+        largest = std::max({largest, apart.x, apart.y, apart.z, apart.w});
+      }
+      CAPTURE(pixels);
+      CHECK(largest < 0.02F);
+    }
+  }
+
+  TEST_CASE("pixel noise: the same bits again, in another renderer, in bands") {
+    Device device = open_device();
+    Scene scene = cube_of_eight(reduced(45, 14));
+    scene.lights = two_lights(Shading::phong);
+    scene.gradients.lights = true;
+    scene.smoothing.gamma = 1e-2F;
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    const Result first = render(renderer);
+    CHECK(norm(flat(first.gradient.meshes[0].positions)) > 0);
+    CHECK(same_bits(first, render(renderer)));
+    CHECK(same_bits(first, render(open_device(), scene)));
+
+    Device small = open_device();
+    small.set_memory_budget(std::size_t{1} << reduced(17, 15));
+    Renderer banded(small);
+    banded.set_scene(scene);
+    CHECK(same_bits(first, render(banded)));
+    CHECK(banded.statistics().bands > 1);
+  }
+
+  TEST_CASE("pixel noise: auxiliary outputs are the pixels'") {
+    for (const std::uint32_t supersampling : {1U, 2U}) {
+      const int size = reduced(41, 15);
+      Scene scene = sphere_scene(reduced(4, 1), size, sigma_of_pixels(1, size));
+      scene.smoothing.supersampling = supersampling;
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      const Result before = render(renderer);
+      const AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+      const auto pixels = static_cast<std::size_t>(size * size), middle = pixels / 2;
+      REQUIRE(outputs.depth.size() == pixels);
+      REQUIRE(outputs.face_id.size() == pixels);
+      CHECK(outputs.depth[middle] == doctest::Approx(1.732).epsilon(reduced(1, 10) * 1e-2));
+      CHECK(outputs.normal[middle].z > 0.9F);
+      CHECK(outputs.face_id[middle] >= 0);
+      CHECK(outputs.effective_faces[middle] == doctest::Approx(1).epsilon(1e-3));
+      CHECK(outputs.depth[0] == 0);
+      CHECK(outputs.face_id[0] == -1);
+      // They leave what the backward pass needs.
+      const Image grad = random_image(size, size, -1.0F, 1.0F);
+      CHECK(same_bits(before.gradient, renderer.backward(std::span(&grad, 1))));
+    }
+  }
+
+  TEST_CASE("pixel noise: views with shapes of their own, and what set_positions() moves") {
+    const Scene scene = cube_of_eight(reduced(33, 12));
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    const std::vector<View> views(2, {scene.camera, {scene.meshes[0].transform}});
+    std::vector<glm::vec3> shapes = scene.meshes[0].mesh.positions;
+    for (const glm::vec3& p : scene.meshes[0].mesh.positions) shapes.push_back(0.7F * p);
+    renderer.set_views(views);
+    renderer.set_shapes(shapes, {});
+    renderer.forward();
+    const Image grad = smooth_image(scene.width, scene.height);
+    const SceneGradient both = renderer.backward(std::vector<Image>{grad, grad});
+    for (std::size_t v = 0; v < 2; ++v) {
+      Renderer alone(open_device());
+      alone.set_scene(scene);
+      alone.forward();
+      alone.set_positions(0, std::span(shapes).subspan(v * 8, 8));
+      alone.forward();
+      CHECK(same_bits(renderer.image(v), alone.image()));
+      const std::vector<double> wanted = flat(alone.backward(std::span(&grad, 1)).meshes[0].positions);
+      std::vector<double> found = flat(both.shapes.positions);
+      found = {found.begin() + static_cast<std::ptrdiff_t>(24 * v),
+               found.begin() + static_cast<std::ptrdiff_t>(24 * (v + 1))};
+      CHECK(same_bits(found, wanted));
+    }
+  }
+
+  TEST_CASE("pixel noise: every prior, every supersampling, and back to triangles") {
+    const Device device = open_device();
+    Scene scene = cube_of_eight(reduced(33, 12));
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    const Result first = render(renderer);
+    const double area = alpha_area(scene, first.image);
+    for (const Prior prior : {Prior::gaussian, Prior::cauchy, Prior::logistic, Prior::uniform}) {
+      for (const std::uint32_t supersampling : {1U, 2U, 4U}) {
+        Smoothing smoothing = scene.smoothing;
+        smoothing.occupancy_prior = prior;
+        smoothing.sigma *= 0.1F;  // so that little leaves the frame
+        smoothing.supersampling = supersampling;
+        renderer.set_smoothing(smoothing);
+        renderer.forward();
+        CAPTURE(to_string(prior));
+        CAPTURE(supersampling);
+        CHECK(alpha_area(scene, renderer.image()) == doctest::Approx(area).epsilon(reduced(1, 10) * 1e-2));
+      }
+    }
+    Scene triangles = scene;
+    triangles.smoothing = Smoothing{};
+    renderer.set_smoothing(triangles.smoothing);
+    CHECK(same_bits(render(renderer), render(device, triangles)));
+    renderer.set_smoothing(scene.smoothing);
+    CHECK(same_bits(render(renderer), first));
+  }
+
+  TEST_CASE("pixel noise: a raster that cannot be counted is refused, and what was set stays") {
+    Scene scene = cube_of_eight(reduced(33, 12));
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    const Result first = render(renderer);
+    Smoothing wide = scene.smoothing;
+    wide.sigma = 1e6F;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_smoothing(wide),
+                          "sigma and supersampling (smoothing): got a raster of");
+    CHECK(same_bits(render(renderer), first));
+  }
+}
+
+TEST_SUITE("gradient") {
+  TEST_CASE("pixel noise: every gradient of flat colours against differences of the image") {
+    Scene scene = cube_of_eight(reduced(96, 16));
+    scene.smoothing.gamma = 1e-8F;
+    check_gradients(open_device(), scene, 3e-4, 1e-3);
+  }
+
+  TEST_CASE("pixel noise: every gradient where depths mix and lights shine") {
+    for (const Composition composition : {Composition::joint, Composition::barrier}) {
+      Scene scene = cube_of_eight(reduced(96, 16));
+      scene.smoothing.composition = composition;
+      scene.smoothing.gamma = 3e-2F;
+      scene.smoothing.background_depth = 0.6F;
+      scene.lights = two_lights(Shading::phong);
+      scene.gradients.lights = true;
+      check_gradients(open_device(), scene, 5e-5, 5e-3);
+    }
+  }
+}

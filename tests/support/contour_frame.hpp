@@ -1,0 +1,68 @@
+// Meshes given directly in NDC and view depth, through the stages that look for contours and blend across
+// them.
+#pragma once
+
+#include <vector>
+
+#include "stages/antialias.hpp"
+#include "stages/contour.hpp"
+#include "support/probe.hpp"
+
+namespace dpr::test {
+
+/// One view of one mesh, whose positions are x, y in NDC and z the view depth.
+class ContourFrame {
+ public:
+  ContourFrame(const Mesh& mesh, int width, int height)
+      : geometry(device_impl(), scene_of(mesh)),
+        transform(device_impl()),
+        edges(device_impl(), scene_of(mesh), mesh.positions),
+        contour(device_impl()),
+        antialias(device_impl()) {
+    p.views = p.meshes = 1;
+    p.vertices = static_cast<cl_uint>(geometry.vertices);
+    p.faces = static_cast<cl_uint>(geometry.faces);
+    p.width = static_cast<cl_uint>(width);
+    p.height = static_cast<cl_uint>(height);
+    p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
+    p.tiles_y = (p.height + DPR_TILE - 1) / DPR_TILE;
+    p.pixel_size = 2.0F / static_cast<float>(std::min(width, height));
+    p.perspective_correct = 1;
+    shared::ViewParams camera{};
+    camera.znear = 1;
+    camera.zfar = 100;
+    camera.inverse_range = 1.0F / 99;
+    views.cameras.upload(device_impl(), std::span(&camera, 1));
+    place(mesh.positions);
+  }
+
+  /// Moves the vertices; what belongs together stays as it was.
+  void place(const std::vector<glm::vec3>& positions) {
+    std::vector<cl_float4> values;
+    for (const glm::vec3& v : positions) values.push_back({{v.x, v.y, v.z, 0.0F}});
+    transform.ndc.upload(device_impl(), values);
+    transform.world.upload(device_impl(), values);
+  }
+
+  ContourInputs inputs() const { return {p, views, geometry, edges, transform, shading}; }
+
+  std::size_t samples() const { return std::size_t{p.width} * p.height; }
+
+  shared::FrameParams p{};
+  DeviceViews views;
+  Geometry geometry;
+  Transform transform;
+  Edges edges;
+  std::optional<Shading> shading;
+  Contour contour;
+  Antialias antialias;
+
+ private:
+  static Scene scene_of(const Mesh& mesh) {
+    Scene scene;
+    scene.meshes.push_back({mesh});
+    return scene;
+  }
+};
+
+}  // namespace dpr::test
