@@ -141,14 +141,14 @@ Evaluations count_pixel(const Fragments& f, std::span<const cl_uint> run, const 
 FrameWork count_work(const Renderer& renderer) {
   const FrameFragments found = last_fragments(renderer, "count_work");
   const Scene& scene = renderer.scene();
-  const std::size_t pixels_per_view =
-      static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+  const Fragments f(found);
+  const std::size_t pixels = f.starts.size() - 1;  // with noise of the pixel, samples around the frame too
+  const std::size_t pixels_per_view = pixels / renderer.views().size();
   FrameWork work;
   work.pairs = static_cast<double>(found.pairs);
   work.fragments = static_cast<double>(found.fragments);
-  work.pixels = static_cast<double>(pixels_per_view * renderer.views().size());
-  const Fragments f(found);
-  for (std::size_t i = 0; i < pixels_per_view * renderer.views().size(); ++i) {
+  work.pixels = static_cast<double>(pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
     const std::span<const cl_uint> run = f.pixel(i);
     if (run.empty()) continue;
     const Evaluations pixel =

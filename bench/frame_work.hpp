@@ -8,7 +8,7 @@ namespace dpr::bench {
 struct FrameWork {
   double pairs = 0;      ///< (8x8 tile, triangle)
   double fragments = 0;  ///< (pixel, triangle)
-  double pixels = 0;     ///< of all views
+  double pixels = 0;     ///< of all views; with noise of the pixel, samples
   /// Slots (fragments, and the background) that aggregation visits, times the nodes or samples at which it
   /// does. 0 for a prior whose rule is not counted here.
   double forward_evaluations = 0, backward_evaluations = 0;

@@ -153,6 +153,7 @@ Json describe_row(const Workload& workload, const Variant& variant) {
           {"composition", to_string(s.composition)},
           {"estimator", to_string(exact ? Estimator::exact : Estimator::monte_carlo)},
           {"samples", exact ? 0 : s.samples},
+          {"sigma", rounded(static_cast<double>(s.sigma))},
           {"seed", s.seed},
           {"triangles", workload.scene.meshes[0].mesh.faces.size()},
           {"width", workload.scene.width},

@@ -46,7 +46,8 @@ Json read_results(const std::filesystem::path& file) {
 std::string row_name(const Json& row) {
   const std::string name = row["workload"].get<std::string>();
   std::string text = name;
-  if (name == "sweep-triangles") text += "/" + row["triangles"].dump();
+  if (name == "sweep-triangles" || name == "sweep-tessellation") text += "/" + row["triangles"].dump();
+  if (name == "sweep-sigma") text += "/" + row["sigma"].dump();
   if (name == "sweep-pixels") text += "/" + row["width"].dump();
   if (name == "sweep-views") text += "/" + row["views"].dump();
   for (const char* const key : {"preset", "composition", "estimator"}) {

@@ -18,7 +18,11 @@ struct Definition {
   std::vector<std::uint32_t> samples;
   bool softras, own;  // rows of SoftRas' priors; of the joint composition and of the library's defaults
   unsigned views;
+  float pixel_sigma = 0;  // of a row with noise of the pixel; 0: none
 };
+
+/// Noise of the pixel's rows: a blur of four pixels at 256x256, whatever the size.
+constexpr float k_pixel_sigma = 1e-3F;
 
 constexpr std::string_view k_sweep = "sweep-";
 
@@ -26,6 +30,12 @@ void add_sweeps(std::vector<Definition>& list) {
   constexpr float k_sigma = 1e-4F, k_gamma = 1e-3F;
   for (const unsigned subdivisions : {1U, 2U, 3U, 4U, 5U, 6U, 7U}) {
     list.push_back({"sweep-triangles", subdivisions, 256, k_sigma, k_gamma, {k_exact}, false, false, 1});
+  }
+  for (const unsigned subdivisions : {1U, 2U, 3U, 4U, 5U, 6U, 7U}) {
+    list.push_back({"sweep-tessellation", subdivisions, 256, k_sigma, k_gamma, {}, false, false, 1, k_sigma});
+  }
+  for (const float sigma : {1e-5F, 1e-4F, 1e-3F, 1e-2F}) {
+    list.push_back({"sweep-sigma", 6, 512, k_sigma, k_gamma, {}, false, false, 1, sigma});
   }
   for (const int size : {64, 128, 256, 512, 1024}) {
     list.push_back({"sweep-pixels", 3, size, k_sigma, k_gamma, {k_exact}, false, false, 1});
@@ -39,14 +49,15 @@ void add_sweeps(std::vector<Definition>& list) {
 
 const std::vector<Definition>& definitions() {
   static const std::vector<Definition> all = [] {
-    std::vector<Definition> list{{"cube128", 0, 128, 1e-3F, 1e-2F, {k_exact, 8, 32, 128}, false, true, 1},
-                                 {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-                                 {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-                                 {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
-                                 {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
-                                 {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
-                                 {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1},
-                                 {"million", 8, 1024, 1e-6F, 1e-3F, {k_exact, 8}, false, true, 1}};
+    std::vector<Definition> list{
+        {"cube128", 0, 128, 1e-3F, 1e-2F, {k_exact, 8, 32, 128}, false, true, 1, k_pixel_sigma},
+        {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
+        {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
+        {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1, k_pixel_sigma},
+        {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
+        {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
+        {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
+        {"million", 8, 1024, 1e-6F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma}};
     add_sweeps(list);
     return list;
   }();
@@ -108,6 +119,11 @@ std::vector<Variant> make_variants(const Definition& d, const Smoothing& publish
     defaults.gamma = d.gamma;
     list.push_back({"default", defaults});
   }
+  if (d.pixel_sigma > 0) {
+    Smoothing smoothing = smoothing_preset("pixel", d.size, d.size);
+    smoothing.sigma = d.pixel_sigma;
+    list.push_back({"pixel", smoothing});
+  }
   return list;
 }
 
@@ -139,6 +155,8 @@ std::string_view describe(std::string_view name) {
       {"sphere80k", "81,920 triangles, 512x512; exact, M = 8"},
       {"million", "1,310,720 triangles, 1024x1024; exact, M = 8"},
       {"sweep-triangles", "spheres of 80 to 327,680 triangles, 256x256, exact"},
+      {"sweep-tessellation", "the same with noise of the pixel"},
+      {"sweep-sigma", "sphere80k with noise of the pixel, sigma 1e-5 to 1e-2"},
       {"sweep-pixels", "1,280 triangles, 64x64 to 1024x1024, exact"},
       {"sweep-samples", "sphere128, M = 1 to 256"},
       {"sweep-views", "sphere128, exact, 1 to 64 views in a batch"}};

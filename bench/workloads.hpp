@@ -13,7 +13,7 @@ namespace dpr::bench {
 
 /// One way in which a workload is rendered.
 struct Variant {
-  std::string preset;  ///< "gaussian" and "softras": the priors; "default": what Smoothing{} says
+  std::string preset;  ///< "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"
   Smoothing smoothing;
 };
 

@@ -97,7 +97,9 @@ const Axis k_axes[] = {
     {"sweep-pixels", "pixels",
      [](const Json& row) { return row["width"].get<double>() * row["height"].get<double>(); }},
     {"sweep-samples", "samples", [](const Json& row) { return row["samples"].get<double>(); }},
-    {"sweep-views", "views", [](const Json& row) { return row["views"].get<double>(); }}};
+    {"sweep-views", "views", [](const Json& row) { return row["views"].get<double>(); }},
+    {"sweep-tessellation", "tessellation", [](const Json& row) { return row["triangles"].get<double>(); }},
+    {"sweep-sigma", "sigma", [](const Json& row) { return row["sigma"].get<double>(); }}};
 
 /// One curve a file and figure, over an axis; empty where no file has the sweep.
 std::string curves(std::span<const Json> files, const Axis& axis,
