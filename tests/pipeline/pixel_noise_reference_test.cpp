@@ -1,0 +1,206 @@
+// Noise of the pixel against its reference in double precision: the image, and every kind of gradient against
+// finite differences of the reference.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/comparison.hpp"
+#include "pipeline/scenes.hpp"
+#include "reference/pixel_noise.hpp"
+#include "support/reduced.hpp"
+
+using namespace dpr;
+using namespace dpr::test::pipeline;
+using dpr::test::reduced;
+
+namespace {
+
+constexpr int k_width = 20, k_height = 16;
+
+/// A cube whose sides share its eight corners, so that no move tears it, each triangle of a colour of its
+/// own.
+Mesh welded_cube() {
+  Random random(3);
+  const Mesh cube = make_cube();
+  Mesh mesh;
+  for (const glm::uvec3& face : cube.faces) {
+    glm::uvec3 welded;
+    for (int i = 0; i < 3; ++i) {
+      const glm::vec3 corner = cube.positions[face[i]];
+      const auto found = std::ranges::find(mesh.positions, corner);
+      welded[i] = static_cast<unsigned>(found - mesh.positions.begin());
+      if (found == mesh.positions.end()) mesh.positions.push_back(corner);
+    }
+    mesh.faces.push_back(welded);
+    mesh.face_colors.push_back(random.vector(0, 1));
+  }
+  return mesh;
+}
+
+/// With 4x4 samples a pixel, what lies between the raster and the reference is a sixteenth of what one would
+/// leave.
+Scene blurred(double pixels, float gamma) {
+  Scene scene = scene_of(welded_cube(), reduced(k_width, 8), reduced(k_height, 6));
+  scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
+  scene.smoothing.supersampling = 4;
+  scene.smoothing.gamma = gamma;
+  const double ndc = 2 * pixels / std::min(scene.width, scene.height);
+  scene.smoothing.sigma = static_cast<float>(ndc * ndc);
+  return scene;
+}
+
+reference::Scene twin_of(const Scene& scene, bool is_opaque) {
+  reference::Scene twin = to_reference(scene);
+  if (is_opaque) twin.smoothing.gamma = 0;
+  return twin;
+}
+
+/// A derivative of the image that changes over some pixels.
+reference::Image smooth_weights(int width, int height) {
+  reference::Image image = reference::make_image(width, height);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    const double x = static_cast<double>(i / 4 % static_cast<std::size_t>(width)) / width;
+    const double y = static_cast<double>(i / 4 / static_cast<std::size_t>(width)) / height;
+    image.rgba[i] =
+        std::cos(5 * x + static_cast<double>(i % 4)) + std::sin(6 * y - 0.7 * static_cast<double>(i % 4));
+  }
+  return image;
+}
+
+Image to_library(const reference::Image& image) {
+  Image result(image.width, image.height);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i)
+    result.pixels[i / 4][static_cast<int>(i % 4)] = static_cast<float>(image.rgba[i]);
+  return result;
+}
+
+/// A way to move the reference's scene, and what the library says of it.
+struct Direction {
+  std::string name;
+  double found, size;  ///< derivative along it; norm of the block times that of the direction
+  double step;
+  std::function<void(reference::Scene&, double)> move;
+};
+
+reference::Vec3d axis(int i) { return {i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0}; }
+
+/// A row of the rotation exp([r]x) to first order is enough: the step's error is of its square.
+reference::Mat4d turned(const reference::Mat4d& m, const reference::Vec3d& r) {
+  reference::Mat4d result = m;
+  for (std::size_t column = 0; column < 3; ++column) {
+    const reference::Vec3d change = cross(r, {m[0][column], m[1][column], m[2][column]});
+    for (std::size_t row = 0; row < 3; ++row) result[row][column] += change[row];
+  }
+  return result;
+}
+
+void add_positions(const SceneGradient& gradient, std::vector<Direction>& list) {
+  const std::vector<glm::vec3>& positions = gradient.meshes[0].positions;
+  const double size = norm(flat(positions));
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    Random random(seed);
+    std::vector<glm::vec3> direction;
+    double found = 0, squares = 0;
+    for (const glm::vec3& g : positions) {
+      direction.push_back(random.vector(-1, 1));
+      found += static_cast<double>(glm::dot(g, direction.back()));
+      squares += static_cast<double>(glm::dot(direction.back(), direction.back()));
+    }
+    // The part of a random direction that lies along the gradient is its size over the root of the dimension.
+    const double scale = std::sqrt(squares / static_cast<double>(3 * positions.size()));
+    list.push_back({"positions", found, size * scale, 1e-3, [direction](reference::Scene& s, double t) {
+                      for (std::size_t i = 0; i < direction.size(); ++i)
+                        s.meshes[0].positions[i] += t * to_reference(direction[i]);
+                    }});
+  }
+}
+
+std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradient) {
+  std::vector<Direction> list;
+  add_positions(gradient, list);
+  const PoseGradient& model = gradient.views[0].transforms[0];
+  const CameraGradient& camera = gradient.views[0].camera;
+  for (int i = 0; i < 3; ++i) {
+    const reference::Vec3d e = axis(i);
+    const auto k = static_cast<std::size_t>(i);
+    list.push_back({"rotation", model.rotation[i], glm::length(model.rotation), 1e-3,
+                    [e](reference::Scene& s, double t) {
+                      s.meshes[0].transform = turned(s.meshes[0].transform, t * e);
+                    }});
+    list.push_back({"translation", model.translation[i], glm::length(model.translation), 1e-3,
+                    [k](reference::Scene& s, double t) { s.meshes[0].transform[k][3] += t; }});
+    list.push_back({"camera rotation", camera.view.rotation[i], glm::length(camera.view.rotation), 1e-3,
+                    [e](reference::Scene& s, double t) { s.camera.view = turned(s.camera.view, t * e); }});
+    list.push_back({"background", gradient.background[i], glm::length(gradient.background), 1e-2,
+                    [k](reference::Scene& s, double t) { s.background[k] += t; }});
+  }
+  list.push_back({"fov", camera.fov_y_degrees, std::abs(camera.fov_y_degrees), 1e-2,
+                  [](reference::Scene& s, double t) { s.camera.fov_y_degrees += t; }});
+  list.push_back({"sigma", gradient.sigma, std::abs(gradient.sigma),
+                  1e-3 * static_cast<double>(scene.smoothing.sigma),
+                  [](reference::Scene& s, double t) { s.smoothing.sigma += t; }});
+  return list;
+}
+
+/// Of edges that end between two lines of samples up to half a line is missing or too much, 1% of an edge
+/// here.
+double tolerance_of(const Direction& d) { return d.name == "sigma" || d.name == "background" ? 5e-3 : 0.12; }
+
+double largest_difference(const Image& found, const reference::Image& expected) {
+  double largest = 0;
+  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
+    const double difference =
+        std::abs(static_cast<double>(found.pixels[i / 4][static_cast<int>(i % 4)]) - expected.rgba[i]);
+    if (!(difference <= largest)) largest = difference;
+  }
+  return largest;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("pixel noise: the image is the reference's, opaque and mixed by depth") {
+    for (const double pixels : {1.0, 2.0}) {
+      for (const float gamma : {1e-8F, 3e-2F}) {
+        const Scene scene = blurred(pixels, gamma);
+        Renderer renderer(open_device());
+        renderer.set_scene(scene);
+        renderer.forward();
+        const reference::Scene twin = twin_of(scene, gamma < 1e-6F);
+        CAPTURE(pixels);
+        CAPTURE(gamma);
+        const double error = largest_difference(renderer.image(), reference::render_pixel_noise(twin));
+        // What is left is the variance of the samples' cells, so it falls with the square of the scale.
+        CHECK(error < 6e-3 / (pixels * pixels));
+      }
+    }
+  }
+}
+
+TEST_SUITE("gradient") {
+  TEST_CASE("pixel noise: gradients against differences of the reference") {
+    const Scene scene = blurred(2, 1e-8F);
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    const reference::Image weights = smooth_weights(scene.width, scene.height);
+    const Image grad_image = to_library(weights);
+    const SceneGradient gradient = renderer.backward(std::span(&grad_image, 1));
+    for (const Direction& d : directions(scene, gradient)) {
+      reference::Scene above = twin_of(scene, true), below = above;
+      d.move(above, d.step);
+      d.move(below, -d.step);
+      const double expected = (reference::pixel_noise_objective(above, weights) -
+                               reference::pixel_noise_objective(below, weights)) /
+                              (2 * d.step);
+      const double error = std::abs(d.found - expected) / d.size;
+      CHECK(d.size > 0);
+      CHECK_MESSAGE(error < tolerance_of(d), d.name << ": " << d.found << ", expected " << expected);
+    }
+  }
+}
