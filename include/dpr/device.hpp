@@ -20,7 +20,9 @@ struct DeviceInfo {
   std::string default_reason;  ///< why it is the default; empty for the others
 };
 
-/// Every OpenCL device of every platform, in the order of the ICD loader. Empty where there is none.
+/// Every OpenCL device of every platform, in the order of the ICD loader; empty where there is none. Devices that
+/// do not say what they are, and those of platforms that do not answer, are left out. Throws DeviceError if for
+/// that reason no device is left.
 std::vector<DeviceInfo> list_devices();
 
 /// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them,

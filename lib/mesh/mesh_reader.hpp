@@ -28,7 +28,7 @@ Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& not
 Mesh read_obj(const std::filesystem::path& file, std::string_view text, Notes& notes);
 Mesh read_ply(const std::filesystem::path& file, std::string bytes);
 Mesh read_off(const std::filesystem::path& file, std::string_view text);
-Mesh read_stl(const std::filesystem::path& file, std::string_view bytes);
+Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 
 /// A material of OBJ, as far as it is of use.
 struct Material {

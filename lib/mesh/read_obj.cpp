@@ -1,8 +1,10 @@
 // The reader of OBJ: vertices with their colours, texture coordinates, polygons and the diffuse colours of
 // materials.
 //
-// The format: Wavefront's "Object Files", version 3.0. Words that say nothing of polygons are passed over.
+// The format: Wavefront's "Object Files", version 3.0. Statements that say nothing of polygons are passed
+// over, with a note where they describe a shape.
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <set>
 #include <system_error>
@@ -16,6 +18,10 @@ namespace dpr {
 namespace {
 
 using Indices = std::vector<std::uint32_t>;
+
+/// Statements of shapes that are not read: lines, points, curves, surfaces, and what other files hold.
+constexpr std::array<std::string_view, 11> k_other_shapes{"bsp",   "bzp", "call", "cdc", "cdp", "curv",
+                                                          "curv2", "l",   "p",    "res", "surf"};
 
 class ObjReader {
  public:
@@ -31,6 +37,10 @@ class ObjReader {
     require_known(farthest_vertex_, mesh.positions.size(), "vertex");
     finish_colors();
     finish_texcoords();
+    for (const auto& [keyword, count] : other_shapes_) {
+      notes_.push_back(file_.string() + ": the statement \"" + std::string(keyword) + "\" is not read (" +
+                       std::to_string(count) + (count == 1 ? " line)" : " lines)"));
+    }
   }
 
   Mesh mesh;
@@ -57,6 +67,8 @@ class ObjReader {
     if (keyword == "f") face();
     if (keyword == "mtllib") material_libraries();
     if (keyword == "usemtl") use_material();
+    if (const auto shape = std::ranges::find(k_other_shapes, keyword); shape != k_other_shapes.end())
+      ++other_shapes_[*shape];
   }
 
   float number(std::size_t word) const {
@@ -193,8 +205,9 @@ class ObjReader {
   Reference farthest_vertex_, farthest_texcoord_;
   std::set<std::filesystem::path> libraries_;
   Materials materials_;
-  std::set<std::string> used_;      // names of materials
-  std::optional<glm::vec3> color_;  // of the material in use
+  std::set<std::string> used_;                            // names of materials
+  std::optional<glm::vec3> color_;                        // of the material in use
+  std::map<std::string_view, std::size_t> other_shapes_;  // lines by keyword
   bool lacks_library_ = false;
   Notes& notes_;
 };

@@ -69,6 +69,16 @@ bool is_binary(std::string_view bytes) {
   return !text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size())).starts_with("solid");
 }
 
+/// Of a binary file that is as long as its header promises.
+void note_attributes(const std::filesystem::path& file, std::string_view bytes, Notes& notes) {
+  std::size_t count = 0;
+  for (std::size_t end = k_binary_header + k_binary_facet; end <= bytes.size(); end += k_binary_facet)
+    count += bytes[end - 2] != 0 || bytes[end - 1] != 0 ? 1U : 0U;
+  if (count == 0) return;
+  notes.push_back(file.string() + ": the attributes of " + std::to_string(count) +
+                  " facets, which may be colours, are not read");
+}
+
 std::vector<Facet> binary_facets(const std::filesystem::path& file, std::string_view bytes) {
   if (bytes.size() < k_binary_header) throw IoError(file, "the file is too short for an STL file");
   const std::uint64_t size = binary_size(bytes);
@@ -160,8 +170,12 @@ class StlTextReader {
 
 }  // namespace
 
-Mesh read_stl(const std::filesystem::path& file, std::string_view bytes) {
-  if (is_binary(bytes)) return weld(binary_facets(file, bytes));
+Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes) {
+  if (is_binary(bytes)) {
+    Mesh mesh = weld(binary_facets(file, bytes));
+    note_attributes(file, bytes, notes);
+    return mesh;
+  }
   StlTextReader reader(file, bytes);
   reader.run();
   return weld(reader.facets);

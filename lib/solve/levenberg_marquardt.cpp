@@ -122,7 +122,7 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
   return result;
 }
 
-bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, unsigned iterations,
+bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report) {
   std::vector<Hypothesis> hypotheses;
   std::vector<Trial> trials;
@@ -134,9 +134,9 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
   for (std::size_t i = 0; i < trials.size(); ++i) candidates[i].equations = equations[i];
 
   std::vector<double> losses;
-  for (unsigned iteration = 0; iteration < k_patience * iterations; ++iteration) {
+  for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
     losses.push_back(least_loss(candidates));
-    if (iteration >= iterations && !still_falls(losses)) break;
+    if (iteration >= turns.enough && !still_falls(losses)) break;
     if (!report()) return false;
     std::vector<Trial*> moving;
     hypotheses.clear();

@@ -26,10 +26,14 @@ bool damped_step(const NormalEquations& equations, std::size_t parameters, doubl
 /// Row-major [parameters]^2; empty where H is not positive definite to rounding.
 std::vector<double> covariance(const NormalEquations& equations, std::size_t parameters);
 
-/// Turns every candidate until it stands still, at most `iterations` times, or k_patience times as often while the
-/// best still falls; all in the same launches.
-/// `report` is called after each iteration; false stops. Returns false if it was stopped.
-bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, unsigned iterations,
+struct Turns {
+  unsigned enough, most;
+};
+
+/// Turns every candidate until it stands still or often enough, and on as long as the best still falls, all
+/// in the same launches. `report` is called after each iteration; false stops. Returns false if it was
+/// stopped.
+bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report);
 
 }  // namespace dpr

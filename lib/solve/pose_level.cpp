@@ -82,21 +82,37 @@ Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const Leas
   return smoothing;
 }
 
-Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares& options, int short_side,
-                  float blur, PoseLight light) {
+Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares& options,
+                  const LevelShape& shape, PoseLight light) {
   const int full = std::min(scene.width, scene.height);
   Scene result = scene;
-  result.width = scaled(scene.width, full, short_side);
-  result.height = scaled(scene.height, full, short_side);
+  result.width = shape.samples * scaled(scene.width, full, shape.short_side);
+  result.height = shape.samples * scaled(scene.height, full, shape.short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
-  if (short_side < full) simplify(result, space);  // the answer comes from the mesh itself
-  result.smoothing = level_smoothing(result, space, options, blur);
+  if (shape.short_side < full) simplify(result, space);  // the answer comes from the mesh itself
+  result.smoothing = level_smoothing(result, space, options, shape.blur);
   result.gradients = no_gradients();
   if (light != PoseLight::fixed) {  // without light, over black: LightFit adds both
     result.lights.reset();
     result.background = glm::vec3(0);
   }
   return result;
+}
+
+std::size_t pixels_of(const Scene& scene) {
+  return static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+}
+
+/// The means of blocks of samples x samples, of images on top of each other; their height is a multiple too.
+void average(const std::vector<cl_float4>& drawn, int width, int samples, std::vector<cl_float4>& images) {
+  const auto side = static_cast<std::size_t>(samples), row_length = static_cast<std::size_t>(width);
+  const std::size_t columns = row_length / side;
+  const float share = 1.0F / static_cast<float>(samples * samples);
+  images.assign(drawn.size() / (side * side), cl_float4{});
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const std::size_t row = i / row_length / side, column = i % row_length / side;
+    for (int c = 0; c < 4; ++c) images[row * columns + column].s[c] += share * drawn[i].s[c];
+  }
 }
 
 /// Of a pixel's squared colour difference (Geman & McClure 1985).
@@ -126,11 +142,12 @@ void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], 
 }  // namespace
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
-                     const LeastSquares& options, const PoseSpace& space, int short_side, float blur,
+                     const LeastSquares& options, const PoseSpace& space, const LevelShape& shape,
                      PoseLight light)
     : space_(space),
       light_(light),
-      scene_(level_scene(scene, space, options, short_side, blur, light)),
+      samples_(shape.samples),
+      scene_(level_scene(scene, space, options, shape, light)),
       renderer_(device) {
   renderer_.set_scene(scene_);
   if (light == PoseLight::harmonics) {
@@ -140,32 +157,38 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
     normal_renderer_.emplace(device).set_scene(normals);
   }
   target_.background = scene.background;
-  for (const glm::vec4& p : resample(target, scene_.width, scene_.height).pixels) {
+  for (const glm::vec4& p : resample(target, width(), height()).pixels) {
     target_.colors.push_back({{p.x, p.y, p.z, p.w}});
   }
   target_.weights.assign(target_.colors.size(), 1.0F);
   if (!options.mask.pixels.empty()) {
-    const Image mask = resample(options.mask, scene_.width, scene_.height);
+    const Image mask = resample(options.mask, width(), height());
     std::ranges::transform(mask.pixels, target_.weights.begin(), [](const glm::vec4& p) { return p.x; });
   }
   for (const float w : target_.weights) weight_ += static_cast<double>(w);
 }
 
-double PoseLevel::pixel_ndc() const { return 2.0 / std::min(scene_.width, scene_.height); }
+double PoseLevel::pixel_ndc() const { return 2.0 / std::min(width(), height()); }
+
+void PoseLevel::render_batch(Renderer& renderer, std::span<const View> views,
+                             std::vector<cl_float4>& images) {
+  renderer.set_views(views);
+  renderer.forward();
+  renderer.impl().require_forward("PoseLevel");
+  drawn_.resize(views.size() * pixels_of(scene_));
+  renderer.impl().image().download(drawn_);
+  if (samples_ == 1) {
+    images.swap(drawn_);
+  } else {
+    average(drawn_, scene_.width, samples_, images);
+  }
+}
 
 template <typename Visitor>
 void PoseLevel::render(std::span<const View> views, std::size_t images_together, const Visitor& visit) {
   const std::size_t pixels = target_.colors.size(), faces = scene_.meshes.front().mesh.faces.size();
-  const std::size_t fitting = std::min(k_most_pixels / pixels, k_most_faces / faces);
+  const std::size_t fitting = std::min(k_most_pixels / pixels_of(scene_), k_most_faces / faces);
   const std::size_t batch = std::max(fitting / images_together, std::size_t{1}) * images_together;
-  const auto render_batch = [&](Renderer& renderer, std::span<const View> part,
-                                std::vector<cl_float4>& images) {
-    renderer.set_views(part);
-    renderer.forward();
-    renderer.impl().require_forward("PoseLevel");
-    images.resize(part.size() * pixels);
-    renderer.impl().image().download(images);
-  };
   for (std::size_t first = 0; first < views.size(); first += batch) {
     const auto part = views.subspan(first, std::min(batch, views.size() - first));
     render_batch(renderer_, part, images_);

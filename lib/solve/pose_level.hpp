@@ -24,11 +24,16 @@ struct NormalEquations {
   PoseSpace::Matrix scatter{};  ///< sum over pixels of the outer products of what each adds to the gradient
 };
 
+struct LevelShape {
+  int short_side;   ///< of its images, in pixels
+  float blur;       ///< of the edges, in samples
+  int samples = 1;  ///< on a pixel's side; their mean over the pixel's area is what it shows
+};
+
 class PoseLevel {
  public:
-  /// `short_side`: in pixels, of its images; `blur`: of the edges, in those pixels.
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
-            const PoseSpace& space, int short_side, float blur, PoseLight light);
+            const PoseSpace& space, const LevelShape& shape, PoseLight light);
 
   /// The mean squared error over colour channels and pixels, or its robust version, of every hypothesis.
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
@@ -43,8 +48,8 @@ class PoseLevel {
   void set_scale(float scale);
   float scale() const { return scale_; }
 
-  int width() const { return scene_.width; }
-  int height() const { return scene_.height; }
+  int width() const { return scene_.width / samples_; }
+  int height() const { return scene_.height / samples_; }
   const Smoothing& smoothing() const { return scene_.smoothing; }
   double pixel_ndc() const;
 
@@ -52,6 +57,7 @@ class PoseLevel {
   /// Renders views in batches that fit the device and hands every image to a visitor, in order.
   template <typename Visitor>
   void render(std::span<const View> views, std::size_t images_together, const Visitor& visit);
+  void render_batch(Renderer& renderer, std::span<const View> views, std::vector<cl_float4>& images);
   /// Some images of a batch, the normals beside them if the light needs them.
   HypothesisImages images_at(std::size_t pixel) const;
   /// Pixels that one of so many images from `images` on shows the object at.
@@ -68,10 +74,11 @@ class PoseLevel {
 
   const PoseSpace& space_;
   PoseLight light_;
-  Scene scene_;
+  int samples_;
+  Scene scene_;  // of the samples' size
   Renderer renderer_;
   std::optional<Renderer> normal_renderer_;
-  std::vector<cl_float4> images_, normals_;
+  std::vector<cl_float4> images_, normals_, drawn_;
   std::vector<std::size_t> shown_;
   WeighedTarget target_;
   double weight_ = 0;

@@ -1,13 +1,16 @@
 // Hypotheses from a grid of rotations, halved from level to level.
 #include "solve/pose_search.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <string>
 
 #include "solve/levenberg_marquardt.hpp"
+#include "solve/polar.hpp"
 #include "solve/require.hpp"
 #include "solve/rotation_grid.hpp"
 
@@ -24,16 +27,41 @@ constexpr double k_same_pixels = 0.5;
 // pixels' grid makes that much of one pose or its symmetric twin.
 constexpr double k_equal_losses = 1e-3;
 
-// Hypotheses are given up before the next level where their loss is beyond this multiple of the best one and,
-// besides, this part of what a wrong pose leaves: the best may fit its pixels by luck.
-constexpr double k_hopeless_ratio = 3, k_hopeless_part = 0.02;
+// Hypotheses are given up where their loss is beyond this multiple of the best one and, besides, this part of
+// what a wrong pose leaves: the best may fit its pixels by luck. The last level changes little.
+struct Hope {
+  double ratio, part;
+};
+constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
+
+// Samples of a pixel whose mean is compared, on its side: less than a quarter of a pixel matters little, and
+// large images show the pose without. So many, or fewer where an image has too many of them.
+constexpr int k_samples = 4;
+constexpr std::size_t k_most_samples = std::size_t{1} << 18;
+
+// Of the best hypotheses in a light of their own: so many are tried after half a turn too.
+constexpr std::size_t k_turned = 4;
+
+/// By half a turn about each of the object's axes of inertia, through its origin.
+std::array<glm::dmat3, 3> half_turns(const Instance& object) {
+  const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const glm::vec3& position : object.mesh.positions) {
+    const glm::dvec3 p = stretch * glm::dvec3(position);
+    const Eigen::Vector3d v(p.x, p.y, p.z);
+    spread += v * v.transpose();
+  }
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  std::array<glm::dmat3, 3> turns;
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    const glm::dvec3 axis(axes(0, column), axes(1, column), axes(2, column));
+    turns[i] = 2.0 * glm::outerProduct(axis, axis) - glm::dmat3(1.0);
+  }
+  return turns;
+}
 
 bool by_loss(const Candidate& a, const Candidate& b) { return a.equations.loss < b.equations.loss; }
-
-struct LevelShape {
-  int short_side;
-  float blur;
-};
 
 /// The resolution doubles; the last level is the finest once more, with the final blur.
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {
@@ -59,22 +87,34 @@ class Fit {
         callback_(callback),
         beam_(method_.robust ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
-        space_(scene, initial.front(), options.solve_translation, options.solve_focal) {}
+        space_(scene, initial.front(), options.solve_translation, options.solve_focal),
+        half_turns_(half_turns(scene.meshes.front())) {}
 
   PoseResult run(bool anywhere);
 
  private:
   void start(PoseLevel& level);
-  bool descend(const std::vector<LevelShape>& shapes, const std::vector<Candidate>& found);
+  /// What was found in another light, and the level at which it was given up.
+  struct Found {
+    std::vector<Candidate> candidates;
+    std::size_t level = 0;
+  };
+
+  std::optional<Found> descend(const std::vector<LevelShape>& shapes, const Found& found);
+  void add_others(PoseLevel& level, const std::vector<Candidate>& found);
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
-  bool is_unexplained(std::size_t level) const;
-  bool light_differs(PoseLevel& level, const LevelShape& shape) const;
-  void make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses);
+  LevelShape final_shape(LevelShape shape) const;
+  bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
+  float light_gain(PoseLevel& level, const LevelShape& shape) const;
+  void make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
   std::vector<Hypothesis> hypotheses() const;
   std::vector<Hypothesis> grid(std::size_t rotations) const;
   /// Refines all candidates at a level and keeps the best distinct ones.
   void work(PoseLevel& level, std::size_t keep);
+  void turn(PoseLevel& level, Turns turns);
   void keep_distinct(const PoseLevel& level, std::size_t count);
+  void drop_hopeless(std::size_t first, const Hope& hope);
+  void drop_hopeless(PoseLevel& level, std::size_t first, const Hope& hope);
   void finish(PoseLevel& level, bool anywhere);
   void choose_equals(bool anywhere);
   double wrong_loss(PoseLevel& level) const;
@@ -89,6 +129,7 @@ class Fit {
   const Beam& beam_;
   std::vector<Pose> initial_;
   PoseSpace space_;
+  std::array<glm::dmat3, 3> half_turns_;
   PoseLight light_ = PoseLight::fixed;  // tried at present
   bool goes_on_ = true;
   std::vector<Candidate> candidates_;
@@ -99,21 +140,22 @@ class Fit {
 PoseResult Fit::run(bool anywhere) {
   result_.start = initial_.front();
   const std::vector<LevelShape> shapes = level_shapes(scene_, method_);
-  if (!descend(shapes, {}) && method_.light != PoseLight::fixed && goes_on_) {
-    const std::vector<Candidate> found = std::move(candidates_);
+  if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
     light_ = method_.light;
-    descend(shapes, found);
+    descend(shapes, *found);
   }
-  PoseLevel level = make_level(shapes.back(), light_);
+  PoseLevel level = make_level(final_shape(shapes.back()), light_);
   make_robust(level, hypotheses());
+  drop_hopeless(level, 0, k_last_hope);
   work(level, beam_.back());
   finish(level, anywhere);
   return result_;
 }
 
-/// Through all levels but the last, where `found` come in again. Returns false if another light should be
-/// tried.
-bool Fit::descend(const std::vector<LevelShape>& shapes, const std::vector<Candidate>& found) {
+/// Through all levels but the last; `found` come in again where they were given up. Returns what was found if
+/// another light should be tried.
+std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, const Found& found) {
+  const std::vector<Candidate> none;
   candidates_.clear();
   for (std::size_t i = 0; i + 1 < shapes.size() && (goes_on_ || i == 0); ++i) {
     const bool is_finest = i + 2 == shapes.size();
@@ -121,36 +163,75 @@ bool Fit::descend(const std::vector<LevelShape>& shapes, const std::vector<Candi
     const bool is_known = light_ == PoseLight::fixed || i > 0 || is_finest;
     PoseLevel level = make_level(shapes[i], is_known ? light_ : PoseLight::gain);
     if (i == 0) start(level);
-    if (is_finest) candidates_.insert(candidates_.end(), found.begin(), found.end());
     if (i > 0) make_robust(level, hypotheses());
+    if (i > 0 && light_ != PoseLight::fixed) add_others(level, i == found.level ? found.candidates : none);
     work(level, beam_[std::min(i + 1, beam_.size() - 1)]);
-    if (light_ != PoseLight::fixed) continue;
-    if (is_finest ? light_differs(level, shapes[i]) : is_unexplained(i)) return false;
+    if (!goes_on_ || light_ != PoseLight::fixed || method_.light == PoseLight::fixed) continue;
+    constexpr float k_better = 0.7F;
+    if (is_finest ? light_gain(level, shapes[i]) < k_better : i > 0 && is_unexplained(level, shapes[i]))
+      return Found{std::move(candidates_), i};
   }
-  return true;
+  return std::nullopt;
+}
+
+/// What was found elsewhere, and the best after half a turn, as far as there is hope: many an object looks
+/// much the same so, and where the light is unknown coarse images don't tell one from the other.
+void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
+  const std::size_t own = candidates_.size();
+  for (std::size_t i = 0; i < std::min(own, k_turned); ++i) {
+    for (const glm::dmat3& turn : half_turns_) {
+      Candidate turned = candidates_[i];
+      turned.hypothesis.pose.rotation *= turn;
+      turned.is_initial = false;
+      candidates_.push_back(turned);
+    }
+  }
+  candidates_.insert(candidates_.end(), found.begin(), found.end());
+  drop_hopeless(level, own, k_hope);
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
-  return PoseLevel(device_, scene_, target_, method_, space_, shape.short_side, shape.blur, light);
+  return PoseLevel(device_, scene_, target_, method_, space_, shape, light);
 }
 
 /// Whether a further look for the pose in the scene's own light is in vain. A robust loss can't tell.
-bool Fit::is_unexplained(std::size_t level) const {
-  constexpr double k_unexplained = 0.2;  // of what a wrong pose leaves
-  return level > 0 && !method_.robust && candidates_.front().equations.loss > k_unexplained * wrong_;
+bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape) const {
+  constexpr double k_unexplained = 0.2, k_doubtful = 0.1;  // of what a wrong pose leaves
+  constexpr float k_much_better = 0.5F;
+  if (method_.robust) return false;
+  const double part = candidates_.front().equations.loss / wrong_;
+  return part > k_unexplained || (part > k_doubtful && light_gain(level, shape) < k_much_better);
 }
 
-/// Whether most of the object looks so much better in a light of its own that it's not the scene's.
-bool Fit::light_differs(PoseLevel& level, const LevelShape& shape) const {
-  constexpr float k_better = 0.7F;
-  if (method_.light == PoseLight::fixed) return false;
+/// What a light of its own leaves of most of the object, as a part of what the scene's leaves.
+float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
   PoseLevel lit = make_level(shape, method_.light);
   level.estimate_scale(hypotheses());
   lit.estimate_scale(hypotheses());
-  return lit.scale() < k_better * level.scale();
+  return level.scale() > 0 ? lit.scale() / level.scale() : 1;
 }
 
-void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) {
+/// Pictures show a sample in each pixel or, as other software makes them, the mean over its area: whichever
+/// explains the target better.
+LevelShape Fit::final_shape(LevelShape shape) const {
+  PoseLevel sampled = make_level(shape, light_);
+  make_robust(sampled, hypotheses());
+  const auto least_loss = [&](PoseLevel& level) {
+    level.set_scale(sampled.scale());
+    return std::ranges::min(level.losses(hypotheses()));
+  };
+  const double loss = least_loss(sampled);
+  const std::size_t pixels = target_.pixels.size();
+  for (int side = k_samples; side > 1 && shape.samples == 1; --side) {
+    if (pixels * static_cast<std::size_t>(side * side) <= k_most_samples) shape.samples = side;
+  }
+  if (shape.samples == 1) return shape;
+  PoseLevel averaged = make_level(shape, light_);
+  if (least_loss(averaged) >= loss) shape.samples = 1;
+  return shape;
+}
+
+void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) const {
   if (!method_.robust) return;
   if (method_.robust_scale > 0) {
     level.set_scale(method_.robust_scale);
@@ -197,13 +278,21 @@ void Fit::start(PoseLevel& level) {
 }
 
 void Fit::work(PoseLevel& level, std::size_t keep) {
-  const unsigned iterations = goes_on_ ? method_.iterations : 0;  // stopped: only judged at this level
-  goes_on_ = refine(level, space_, candidates_, iterations, [&] { return report(level); }) && goes_on_;
-  std::ranges::stable_sort(candidates_, by_loss);
+  constexpr unsigned k_few = 4;  // within which many come to the same pose, or to none
+  const unsigned enough = method_.iterations, few = std::min(k_few, enough);
+  turn(level, {few, few});
+  keep_distinct(level, candidates_.size());
+  if (enough > few) turn(level, {enough - few, k_patience * enough - few});
   keep_distinct(level, keep);
 }
 
+void Fit::turn(PoseLevel& level, Turns turns) {
+  if (!goes_on_) turns = {0, 0};  // stopped: only judged at this level
+  goes_on_ = refine(level, space_, candidates_, turns, [&] { return report(level); }) && goes_on_;
+}
+
 void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
+  std::ranges::stable_sort(candidates_, by_loss);
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates_) {
     const auto same = std::ranges::find_if(kept, [&](const Candidate& other) {
@@ -216,8 +305,24 @@ void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
     }
   }
   candidates_ = std::move(kept);
-  const double hopeless = k_hopeless_ratio * candidates_.front().equations.loss + k_hopeless_part * wrong_;
-  std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > hopeless; });
+  drop_hopeless(0, k_hope);
+}
+
+/// Those from the `first` on, by their losses.
+void Fit::drop_hopeless(std::size_t first, const Hope& hope) {
+  const double least = std::ranges::min_element(candidates_, by_loss)->equations.loss;
+  const auto is_hopeless = [&](const Candidate& c) {
+    return c.equations.loss > hope.ratio * least + hope.part * wrong_;
+  };
+  const auto begin = candidates_.begin() + static_cast<std::ptrdiff_t>(first);
+  candidates_.erase(std::remove_if(begin, candidates_.end(), is_hopeless), candidates_.end());
+}
+
+/// By what they leave at a level, as they are.
+void Fit::drop_hopeless(PoseLevel& level, std::size_t first, const Hope& hope) {
+  const std::vector<double> losses = level.losses(hypotheses());
+  for (std::size_t i = 0; i < losses.size(); ++i) candidates_[i].equations.loss = losses[i];
+  drop_hopeless(first, hope);
 }
 
 bool Fit::report(const PoseLevel& level) {

@@ -140,6 +140,8 @@ TEST_SUITE("robustness") {
     fails(changed([](json& v) { v["initial"] = "missing.obj"; }), k_short, "missing.obj");
     fails(changed([](json& v) { v.erase("width"); }), k_short, "width");
     fails(good, with(k_short, {"--checkpoint", "garbage"}), "garbage");
+    fails(good, with(k_short, {"--checkpoint", "/dev/zero"}),
+          "/dev/zero: is no regular file and does not end");
     fails(good, with(k_short, {"--steps", "small"}), "small");
     fails(good, with(k_short, {"--schedule", "sometimes"}), "sometimes");
     fails(good, with(k_short, {"--blur", "0"}), "--blur (command line)");

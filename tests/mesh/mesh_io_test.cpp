@@ -183,6 +183,25 @@ TEST_SUITE("unit") {
     CHECK(read_mesh(folder.write("b.obj", "mtllib no.mtl\n" + faces), notes).faces.size() == 3);
     REQUIRE(notes.size() == 1);
     CHECK(notes[0].find("b.obj: the material library \"no.mtl\" is no regular file") != std::string::npos);
+    notes.clear();
+    const std::string surface = "cstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nparm u 0 1\nparm v 0 1\nend\n";
+    const std::string line = "l 1 2\n";
+    CHECK(read_mesh(folder.write("c.obj", faces + line + surface + line), notes).faces.size() == 3);
+    REQUIRE(notes.size() == 4);  // two of them about the materials
+    CHECK(notes[2].find("c.obj: the statement \"l\" is not read (2 lines)") != std::string::npos);
+    CHECK(notes[3].find("c.obj: the statement \"surf\" is not read (1 line)") != std::string::npos);
+  }
+
+  TEST_CASE("STL: attributes, which may be colours, are noted") {
+    const TempDir folder;
+    Notes notes;
+    std::string bytes = one_facet();
+    CHECK(read_mesh(folder.write("plain.stl", bytes), notes).faces.size() == 1);
+    CHECK(notes.empty());
+    bytes.back() = '\x80';  // VisCAM's bit of a valid colour
+    CHECK(read_mesh(folder.write("coloured.stl", bytes), notes).faces.size() == 1);
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("coloured.stl: the attributes of 1 facets") != std::string::npos);
   }
 
   TEST_CASE("a byte-order mark before a text") {

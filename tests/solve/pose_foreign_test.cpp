@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -70,20 +71,19 @@ TEST_SUITE("pipeline") {
     }
     REQUIRE(errors.size() == 6);
     std::ranges::sort(errors);
-    CHECK((errors[2] + errors[3]) / 2 < 1);
+    CHECK((errors[2] + errors[3]) / 2 < 0.5);
   }
 
   TEST_CASE("a target in another colour of light is explained by the gain, and by it alone") {
+    if (dpr::test::is_reduced()) return;
     const dpr::Device device = dpr::open_device();
-    const dpr::Scene scene = cube_scene(dpr::test::reduced(64, 8));
+    const dpr::Scene scene = cube_scene(64);
     dpr::Image target = rigid_image(device, scene);
     for (glm::vec4& pixel : target.pixels) pixel *= glm::vec4(0.2F, 0.5F, 1.4F, 1);
     dpr::LeastSquares method;
-    if (dpr::test::is_reduced()) method.coarsest = 8, method.iterations = 1;
     const double found = error_from_turned(device, scene, target, method);
     method.light = dpr::PoseLight::fixed;
     const double missed = error_from_turned(device, scene, target, method);
-    if (dpr::test::is_reduced()) return;
     CHECK(found < 0.5);
     CHECK(missed > 2 * found);
   }
@@ -95,7 +95,8 @@ TEST_SUITE("robustness") {
     const int size = dpr::test::reduced(16, 8);
     dpr::Scene dark = cube_scene(size);
     dark.meshes.front().mesh.face_colors.assign(12, glm::vec3(0));
-    for (const dpr::Scene& scene : {cube_scene(size), dark}) {
+    const std::array<dpr::Scene, 2> scenes{cube_scene(size), dark};
+    for (const dpr::Scene& scene : scenes) {
       for (const float shade : {0.0F, 0.5F, 1e4F}) {
         for (const dpr::PoseLight light : {dpr::PoseLight::gain, dpr::PoseLight::harmonics}) {
           for (const bool robust : {false, true}) {
@@ -105,8 +106,9 @@ TEST_SUITE("robustness") {
             method.coarsest = 8;
             method.light = light;
             method.robust = robust;
-            if (dpr::test::is_reduced() && !(light == dpr::PoseLight::harmonics && robust && shade == 0))
-              continue;
+            const bool is_one =
+                &scene == &scenes.front() && light == dpr::PoseLight::harmonics && robust && shade == 0;
+            if (dpr::test::is_reduced() && !is_one) continue;
             const dpr::Image target(size, size, glm::vec4(shade, shade, shade, 1));
             const dpr::PoseResult result =
                 dpr::PoseSolver(device, scene, target, {.method = method}).search();

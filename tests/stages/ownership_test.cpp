@@ -164,8 +164,8 @@ TEST_SUITE("unit") {
   TEST_CASE(
       "ownership: a grid whose vertices are the samples, and a quad whose diagonal passes through them") {
     at_every_width([] {
-      for (const int size : {64, 256}) {
-        if (size > reduced(256, 64)) continue;
+      for (const int size : {16, 64, 256}) {
+        if (size > reduced(256, 16)) continue;
         const NdcFrame frame{size, size};
         RandomFloat random(1);
         for (const int step : {1, 3, 8}) {
@@ -181,8 +181,9 @@ TEST_SUITE("unit") {
 
   TEST_CASE("ownership: vertices a few last bits from the samples, images of any shape") {
     at_every_width([] {
-      for (const glm::ivec2 size : {glm::ivec2(64, 48), glm::ivec2(37, 53), glm::ivec2(100, 75)}) {
-        if (size.x > reduced(100, 40)) continue;
+      for (const glm::ivec2 size :
+           {glm::ivec2(13, 18), glm::ivec2(64, 48), glm::ivec2(37, 53), glm::ivec2(100, 75)}) {
+        if (size.x > reduced(100, 13)) continue;
         const NdcFrame frame{size.x, size.y};
         RandomFloat random(static_cast<unsigned>(size.x));
         const auto nudged = [&](glm::vec2 v) {
@@ -198,7 +199,8 @@ TEST_SUITE("unit") {
 
   TEST_CASE("ownership: triangles that reach far beyond the image leave no gap between them") {
     at_every_width([] {
-      const NdcFrame frame{96, 96};
+      const int size = reduced(96, 24);
+      const NdcFrame frame{size, size};
       RandomFloat random(9);
       for (int i = 0; i < reduced(30, 4); ++i) {
         const float extent = std::pow(10.0F, random(0.5F, 6.0F));
@@ -237,18 +239,18 @@ TEST_SUITE("unit") {
 
   TEST_CASE("ownership: triangles on a grid own what whole numbers say") {
     at_every_width([] {
-      const int size = 64;
+      const int size = reduced(64, 16);
       const NdcFrame frame{size, size};
       RandomFloat random(5);
       for (int round = 0; round < reduced(12, 2); ++round) {
         std::vector<GridTriangle> grid_triangles;
         std::vector<NdcTriangle> triangles;
         const int step = round % 2 == 0 ? 8 : 1;  // half pixels, so that samples are hit; or sixteenths
-        for (int i = 0; i < 50; ++i) {
+        for (int i = 0; i < size; ++i) {
           GridTriangle g;
           NdcTriangle t{};
-          const float reach = random(1, 40);
-          const glm::vec2 centre(random(-36, 36), random(-36, 36));
+          const float side = static_cast<float>(size), reach = random(1, 0.6F * side);
+          const glm::vec2 centre(random(-0.55F, 0.55F) * side, random(-0.55F, 0.55F) * side);
           for (std::size_t k = 0; k < 3; ++k) {
             const auto snapped = [&](float at) {
               const float pixels = at + reach * random(-1, 1);
@@ -256,7 +258,7 @@ TEST_SUITE("unit") {
                                         static_cast<float>(step));
             };
             g[k] = {snapped(centre.x), snapped(centre.y)};
-            const float scale = 2.0F / (static_cast<float>(dpr::test::k_subpixels) * size);
+            const float scale = 2.0F / (static_cast<float>(dpr::test::k_subpixels) * side);
             t[k] = {static_cast<float>(g[k].x) * scale, static_cast<float>(g[k].y) * scale, 5.0F};
           }
           grid_triangles.push_back(g);

@@ -7,6 +7,7 @@
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"
 #include "cli/process.hpp"
+#include "cli/text.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
 #include "experiments/pose/figures.hpp"
@@ -21,7 +22,7 @@ struct Options {
   std::vector<double> angles{20, 50, 80, 0};
   std::vector<std::uint64_t> seeds{1};
   PoseProblemSet set;
-  std::size_t count = 100;
+  unsigned count = 100;
   int size = 128;
   std::string folder, problems, device;
   bool smoke = false, quiet = false;
@@ -29,6 +30,13 @@ struct Options {
 
 constexpr std::size_t k_smoke_count = 2;
 constexpr int k_smoke_size = 32;
+
+std::vector<std::uint64_t> parse_seeds(const std::vector<std::string>& words) {
+  std::vector<std::uint64_t> seeds;
+  for (const std::string& word : words)
+    seeds.push_back(cli::parse_whole_number(word, "--seed (command line)"));
+  return seeds;
+}
 
 PoseRun common_of(const Options& options) {
   PoseRun run;
@@ -110,7 +118,15 @@ void add_set_options(CLI::App& application, Options& options, const char* group)
   add("--method", options.methods, methods);
   add("--angle", options.angles,
       "Degrees between initial pose and truth, 0 for a uniform initial rotation; may be repeated");
-  add("--seed", options.seeds, "Seed of the problems; may be repeated");
+  application
+      .add_option_function<std::vector<std::string>>(
+          "--seed",
+          [&options](const std::vector<std::string>& words) {
+            options.seeds = dpr::bench::parse_seeds(words);
+          },
+          "Seed of the problems; may be repeated")
+      ->type_name("N")
+      ->group(group);
   add("--object", options.set.object, "cube, published_cube, mailbox, bag or a mesh file");
   add("--translation-error", options.set.translation_error, "Part of the camera's distance");
   add("--occluded", options.set.occluded, "Part of the object that is hidden");
@@ -157,8 +173,8 @@ int main(int argc, char** argv) {
     application.add_subcommand(figure.name, figure.description);
   }
   application.footer("Example: dpr_pose_table figure5 --count 20 -o figures");
-  CLI11_PARSE(application, argc, argv);
   try {
+    CLI11_PARSE(application, argc, argv);
     if (const Figure* figure = figure_of(application, k_set_group)) {
       dpr::bench::run_figure(options, *figure);
     } else {
