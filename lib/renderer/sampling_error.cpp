@@ -5,9 +5,9 @@
 #include <cmath>
 #include <functional>
 
+#include "base/require.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/gradient_table.hpp"
-#include "solve/require.hpp"
 
 namespace dpr {
 namespace {

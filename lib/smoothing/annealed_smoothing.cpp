@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solve/require.hpp"
+#include "base/require.hpp"
 
 namespace dpr {
 namespace {

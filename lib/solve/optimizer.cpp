@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "solve/require.hpp"
+#include "base/require.hpp"
 
 namespace dpr {
 namespace {

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "base/require.hpp"
 #include "dpr/error.hpp"
 #include "dpr/pose.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
-#include "solve/require.hpp"
 #include "solve/score_estimator.hpp"
 
 namespace dpr {

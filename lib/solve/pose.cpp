@@ -7,11 +7,11 @@
 #include <utility>
 #include <variant>
 
+#include "base/require.hpp"
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_descent.hpp"
 #include "solve/pose_search.hpp"
-#include "solve/require.hpp"
 
 namespace dpr {
 namespace {

@@ -10,10 +10,10 @@
 #include <utility>
 #include <variant>
 
+#include "base/require.hpp"
 #include "dpr/renderer.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
-#include "solve/require.hpp"
 
 namespace dpr {
 namespace {

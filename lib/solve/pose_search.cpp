@@ -9,9 +9,9 @@
 #include <optional>
 #include <string>
 
+#include "base/require.hpp"
 #include "solve/levenberg_marquardt.hpp"
 #include "solve/polar.hpp"
-#include "solve/require.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {

@@ -5,10 +5,10 @@
 #include <string>
 #include <utility>
 
+#include "base/require.hpp"
 #include "dpr/error.hpp"
 #include "smoothing/choice_names.hpp"
 #include "smoothing/priors.hpp"
-#include "solve/require.hpp"
 
 namespace dpr {
 namespace {

@@ -9,12 +9,12 @@
 #include <system_error>
 #include <utility>
 
+#include "base/require.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/remesh.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
-#include "solve/require.hpp"
 #include "solve/resample.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
