@@ -1,0 +1,56 @@
+// The folders of lib as floors: a file includes only its own folder and those below it.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "support/data.hpp"
+
+namespace {
+
+/// From the ground up.
+const std::vector<std::string> k_floors{"base",   "image",  "mesh",     "smoothing", "scene",
+                                        "device", "stages", "renderer", "loss",      "solve",
+                                        "torch",  "cli",    "learn"};
+
+/// The one arrow up: a renderer runs the backward pass of losses, which see its last frame through
+/// renderer/frame.hpp.
+bool is_interface(const std::string& from, const std::string& to) {
+  return from == "renderer" && to == "loss";
+}
+
+std::ptrdiff_t floor_of(const std::string& folder) {
+  return std::ranges::find(k_floors, folder) - k_floors.begin();
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("rooms: no folder of the library includes one above it") {
+    const std::filesystem::path lib = dpr::test::data_folder() / "../../lib";
+    const std::regex include(R"rx(^#include "([a-z]+)/)rx");
+    std::size_t arrows = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(lib)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".cpp" && extension != ".hpp") continue;
+      const std::string from = entry.path().parent_path().filename().string();
+      CAPTURE(entry.path().string());
+      REQUIRE(floor_of(from) < std::ssize(k_floors));
+      std::ifstream file(entry.path());
+      for (std::string line; std::getline(file, line);) {
+        std::smatch found;
+        if (!std::regex_search(line, found, include) || found[1] == "dpr") continue;
+        CAPTURE(line);
+        const std::string to = found[1];
+        CHECK(floor_of(to) < std::ssize(k_floors));
+        CHECK((floor_of(to) <= floor_of(from) || is_interface(from, to)));
+        ++arrows;
+      }
+    }
+    CHECK(arrows > 100);
+  }
+}
