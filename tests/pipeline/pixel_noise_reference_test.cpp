@@ -147,9 +147,11 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
   return list;
 }
 
-/// Of edges that end between two lines of samples up to half a line is missing or too much, 1% of an edge
-/// here.
-double tolerance_of(const Direction& d) { return d.name == "sigma" || d.name == "background" ? 5e-3 : 0.12; }
+/// Of edges that end between two lines of samples up to half a line is missing or too much: of the geometry's
+/// gradients a share that falls as the resolution grows.
+double tolerance_of(const Direction& d) {
+  return d.name == "sigma" || d.name == "background" ? 5e-3 : 2.4 / reduced(k_width, 8);
+}
 
 double largest_difference(const Image& found, const reference::Image& expected) {
   double largest = 0;
