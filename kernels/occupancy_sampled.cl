@@ -27,7 +27,7 @@ static inline void write_logarithms(uint first, uint last, global const float* o
   for (uint i = first; i < last; ++i) log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
 #else
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const realn p = load_run(lanes_before(last, i), i, occupancy);
+    const realn p = load_own_run(last, i, occupancy);
     store_run(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, last, log_occupancy);
   }
 #endif

@@ -27,6 +27,20 @@ static inline realn load_run(intn in_run, uint first, global const float* values
   return choose(in_run, load_n(first, values), (realn)(0.0f));
 }
 
+/// The same of a buffer that the kernel writes: the next run, which another work-item may be writing, is not read.
+static inline realn load_own_run(uint last, uint first, global const float* values) {
+#if DPR_WIDTH == 1
+  (void)last;
+  return values[first];
+#else
+  const uint count = last - first;
+  if (count >= DPR_WIDTH) return load_n(first, values);
+  float lanes[DPR_WIDTH] = {0.0f};
+  for (uint lane = 0; lane < count; ++lane) lanes[lane] = values[first + lane];
+  return vload8(0, lanes);
+#endif
+}
+
 /// Stores the lanes before `last`.
 static inline void store_run(realn v, uint first, uint last, global float* values) {
 #if DPR_WIDTH == 1
