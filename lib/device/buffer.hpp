@@ -46,7 +46,7 @@ class Buffer {
   /// Makes room and forgets the content if it has to grow; growth leaves headroom, so that sizes that vary
   /// from frame to frame settle. Where it throws, the buffer is empty.
   void resize(Device::Impl& device, Length length) {
-    if (length.count > capacity_)
+    if (length.count > 0 && length.count + k_padding > capacity_)
       allocate(device, capacity_ == 0 ? length.count : with_headroom(length.count));
     length_ = length;
   }
