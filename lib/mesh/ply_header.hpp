@@ -1,0 +1,52 @@
+// What a PLY file's header says, and the header that OpenMesh reads instead.
+//
+// What OpenMesh 9 does with such a file:
+// - a number that it cannot read is a zero, and at the end of the file it goes on with zeros;
+// - colours in floats are cut to eight bits, downwards; those of other types, and 300 in a text, wrap around;
+// - a list other than the corners is skipped as if it were one number, unless custom properties are
+//   asked for;
+//   then it is allocated at the length it claims, and in a text a property of type uchar is one character;
+// - lists may be counted by uint8, uint16, uchar and int alone;
+// - a normal that is not in floats is not skipped at all;
+// - a header that never ends is read for ever.
+//
+// So its stream throws at the first number that cannot be read; and every property but the coordinates, the
+// corners and a binary file's colours in bytes gets a name that means nothing to OpenMesh, and types that it
+// skips correctly.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace dpr {
+
+/// The names under which colours pass OpenMesh whole, as custom properties; what it calls "red" it cuts to
+/// eight bits.
+inline constexpr std::array<const char*, 3> k_custom_colors{"dpr_red", "dpr_green", "dpr_blue"};
+
+/// How the colours of an element arrive.
+struct ColorForm {
+  bool custom = false;  ///< as custom properties
+  bool native = false;  ///< as OpenMesh's colours
+  double one = 1;       ///< what stands for the full intensity in a custom property
+};
+
+/// What is known of a file before its body is read.
+struct PlyHeader {
+  std::string text;       ///< for OpenMesh
+  std::size_t bytes = 0;  ///< of the header in the file
+  std::size_t lines = 0;  ///< of the header in the file
+  bool binary = false;
+  bool ends_with_faces = false;  ///< nothing may follow
+  bool has_custom_properties = false;
+  std::size_t vertices = 0, polygons = 0;
+  ColorForm vertex_colors, face_colors;
+};
+
+/// Throws IoError where the header is wrong, or the file too short for what it promises.
+PlyHeader read_ply_header(const std::filesystem::path& file, std::string_view bytes);
+
+}  // namespace dpr
