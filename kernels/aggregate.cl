@@ -109,6 +109,7 @@ static inline float slot_log(const Slot s, const Fragments f) {
 }
 
 /// One work-item per pixel. Deterministic.
+/// in   views   ViewParams[view]
 /// in   starts  uint[pixel + 1]  runs of `list`
 /// in   list    uint[...]        fragments, by pixel
 /// in   depth, log_occupancy, occupancy, red, green, blue  float[fragment]
@@ -154,7 +155,7 @@ static inline void clear_gradients(const Fragments f, uint first, uint last, flo
 }
 
 /// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic.
-/// in   slots, slot_counts   as the forward pass left them; changed
+/// in   slots, slot_counts   as aggregate_forward left them; changed. The other inputs as there
 /// in   grad_image  float4[pixel]
 /// out  grad_depth, grad_log_occupancy, grad_red, grad_green, grad_blue  float[fragment]
 /// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma, alpha and the background colour

@@ -116,7 +116,7 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
   return sum.w > 0.0f ? sum.xyz * (c.coverage / sum.w) : sum.xyz;
 }
 
-/// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, but a pixel's slots begin at
+/// One work-item per pixel. Deterministic. Arguments as aggregate_forward, but a pixel's slots begin at
 /// starts[pixel], sorted by depth, and those are left that anything is seen of.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
@@ -182,7 +182,7 @@ static inline float cluster_gradients(Slots run, const Fragments f, float3 grad,
 }
 
 /// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
-/// Deterministic. Buffers as in aggregate.cl and the forward pass.
+/// Deterministic. Arguments as aggregate_backward, with the slots that aggregate_joint_forward left.
 kernel void aggregate_joint_backward(
     const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
     global const uint* restrict list, global const float* restrict depth,

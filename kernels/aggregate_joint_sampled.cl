@@ -132,7 +132,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
   return lead;
 }
 
-/// One work-item per pixel. Deterministic. Buffers as in aggregate.cl, and
+/// One work-item per pixel. Deterministic. Arguments as aggregate_forward, and
 /// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 /// out  image          float4[pixel]    means over the samples; alpha: the share in which any fragment covers
@@ -222,7 +222,8 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
   return sums;
 }
 
-/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic.
+/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic. Inputs
+/// as aggregate_joint_sampled_forward, and
 /// in   grad_image  float4[pixel]
 /// out  grad_distance, grad_depth, grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_sigma  float[pixel]                      what the pixel adds to dL/dsigma

@@ -77,7 +77,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
   return lead;
 }
 
-/// One work-item per pixel. Buffers as in aggregate.cl, and
+/// One work-item per pixel. Deterministic. Arguments as aggregate_forward, and
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 kernel void aggregate_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
                                       global const uint* restrict starts, global const uint* restrict list,
@@ -135,7 +135,7 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
   return y_sum;
 }
 
-/// One work-item per pixel. Buffers as in aggregate.cl and aggregate_sampled_forward.
+/// One work-item per pixel. Deterministic. Inputs as aggregate_sampled_forward, gradients as aggregate_backward.
 kernel void aggregate_sampled_backward(const AggregateParams p, global const ViewParams* restrict views,
                                        global const uint* restrict starts, global const uint* restrict list,
                                        global const float* restrict depth, global const float* restrict log_occupancy,

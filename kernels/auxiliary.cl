@@ -27,13 +27,12 @@ static inline float3 normalized(float3 v) {
 /// out  outputs        float[DPR_AUXILIARY_CHANNELS][pixel]
 /// out  face_id        uint[pixel]            face of the scene, DPR_NO_FACE for the background
 kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global const uint* restrict starts,
-                        global const uint* restrict list, global const float* restrict weight,
-                        global const float* restrict channels,
-                        global const float* restrict depth, global const float* restrict bary1,
-                        global const float* restrict bary2, global const uint* restrict fragment_pair,
-                        global const uint* restrict pair_face, global const uint4* restrict faces,
-                        global const float4* restrict world, global float* restrict outputs,
-                        global uint* restrict face_id) {
+                              global const uint* restrict list, global const float* restrict weight,
+                              global const float* restrict channels, global const float* restrict depth,
+                              global const float* restrict bary1, global const float* restrict bary2,
+                              global const uint* restrict fragment_pair, global const uint* restrict pair_face,
+                              global const uint4* restrict faces, global const float4* restrict world,
+                              global float* restrict outputs, global uint* restrict face_id) {
   const uint pixel = (uint)get_global_id(0);
   const uint pixels_per_view = p.width * p.height, pixels = p.views * pixels_per_view;
   if (pixel >= last_pixel) return;
@@ -72,8 +71,9 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
 /// in   image     float4[pixel]  whose w is alpha
 /// out  surface   float4[pixel]  depth and normal
 /// out  coverage  float4[pixel]  1 and the effective number of faces
-kernel void auxiliary_weigh(const FrameParams p, global const float* restrict outputs, global const float4* restrict image,
-                      global float4* restrict surface, global float4* restrict coverage) {
+kernel void auxiliary_weigh(const FrameParams p, global const float* restrict outputs,
+                            global const float4* restrict image, global float4* restrict surface,
+                            global float4* restrict coverage) {
   const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
   if (pixel >= pixels) return;
   const float alpha = image[pixel].w;

@@ -2,7 +2,7 @@
 // corner its pairs. No atomics, so the sum is the same from run to run.
 #include "shared_types.h"
 
-/// One work-item per (view, target), or per target where the views are summed.
+/// One work-item per (view, target) of `targets`, or per target where the views are summed.
 /// in   pair_starts    uint[view * face + 1]  runs of `face_pairs`
 /// in   face_pairs     uint[...]              pairs of a face of a view
 /// in   corner_starts  uint[target + 1]

@@ -35,9 +35,10 @@ kernel void mesh_loss_vertices(const MeshLossParams p, global const uint* restri
 
 /// What every hinge adds: two faces with corners `a` and `b` across from their common edge from e0 to e1. Their normals
 /// are formed along the edge, so the faces' own orientation has no part in it. One work-item per hinge.
-/// in   hinges    uint4[hinge]     a, b, e0, e1
-/// out  channels  float[DPR_MESH_LOSS_CHANNELS][hinge]
-/// out  partial   float4[hinge][4] gradient of the weighted terms for each of the four
+/// in   hinges     uint4[hinge]      a, b, e0, e1
+/// in   positions  as mesh_loss_vertices
+/// out  channels   float[DPR_MESH_LOSS_CHANNELS][hinge]
+/// out  partial    float4[hinge][4]  gradient of the weighted terms for each of the four
 kernel void mesh_loss_hinges(const MeshLossParams p, global const uint4* restrict hinges,
                              global const float4* restrict positions, global float* restrict channels,
                              global float4* restrict partial) {
@@ -67,7 +68,8 @@ kernel void mesh_loss_hinges(const MeshLossParams p, global const uint4* restric
   partial[4 * i + 3] = (float4)(grad_e1, 0.0f);
 }
 
-/// Adds the gradient of all terms. One work-item per vertex of the mesh.
+/// Adds the gradient of all terms. One work-item per vertex of the mesh. Arguments as mesh_loss_vertices and
+/// mesh_loss_hinges leave them, and
 /// in   hinge_starts, hinge_places  the entries of `partial` that belong to a vertex: a compressed sparse row
 /// out  grad  float4[...]  the mesh's from p.first_vertex on
 kernel void mesh_loss_gather(const MeshLossParams p, global const uint* restrict ring_starts,

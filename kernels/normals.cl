@@ -10,8 +10,11 @@ static inline float3 face_normal(global const float4* world, uint4 face) {
 }
 
 /// One work-item per (view, vertex).
-/// in   corner_starts, corners  the faces around a vertex, as face * 3 + corner
-/// out  normals  float4[view][vertex]  unit, or zero; w = 1 / length of the sum, or zero
+/// in   faces          uint4[face]           vertex indices
+/// in   corner_starts  uint[vertex + 1]      runs of `corners`
+/// in   corners        uint[corner]          the faces around a vertex, as face * 3 + corner
+/// in   world          float4[view][vertex]  world space
+/// out  normals        float4[view][vertex]  unit, or zero; w = 1 / length of the sum, or zero
 kernel void normals_forward(const FrameParams p, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
                             global const float4* restrict world, global float4* restrict normals) {
@@ -29,6 +32,7 @@ kernel void normals_forward(const FrameParams p, global const uint4* restrict fa
 }
 
 /// From the unit normals' gradients to those of the sums. One work-item per (view, vertex).
+/// in      normals       as normals_forward left them
 /// in out  grad_normals  float4[view][vertex]
 kernel void normals_backward_normalize(const FrameParams p, global const float4* restrict normals,
                                        global float4* restrict grad_normals) {
@@ -39,7 +43,7 @@ kernel void normals_backward_normalize(const FrameParams p, global const float4*
 }
 
 /// From the sums' gradients to the world positions': a face's normal belongs to its three vertices' sums.
-/// One work-item per (view, vertex).
+/// One work-item per (view, vertex). Faces, corners and world positions as normals_forward, and
 /// in      grad_sums   float4[view][vertex]
 /// in out  grad_world  float4[view][vertex]  added to
 kernel void normals_backward(const FrameParams p, global const uint4* restrict faces,

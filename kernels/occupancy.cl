@@ -69,11 +69,11 @@ static inline Perturbed perturb(realn distance, float sigma) {
 
 #endif
 
-/// One work-item for every vector of fragments there is room for. Deterministic.
-/// in   fragment_starts  uint[pair + 1]  up to `last_pair`: its last is the number of fragments
-/// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
-/// out  log_occupancy  float[fragment]  ln p, DPR_LOG_ZERO for p = 0
-/// out  occupancy      float[fragment]  p, in [0, 1]
+/// One work-item for every vector of fragments within the capacity of the buffers. Deterministic.
+/// in   fragment_starts  uint[pair + 1]   up to `last_pair`: its last is the number of fragments
+/// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
+/// out  log_occupancy    float[fragment]  ln p, DPR_LOG_ZERO for p = 0
+/// out  occupancy        float[fragment]  p, in [0, 1]
 kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
                               global const uint* restrict fragment_starts, global const float* restrict distance,
                               global float* restrict log_occupancy, global float* restrict occupancy) {
@@ -85,7 +85,8 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
 }
 
 /// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per
-/// group of pairs.
+/// group of `pairs`.
+/// in   fragment_starts, distance  as occupancy_forward
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma

@@ -33,12 +33,13 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 #endif
 }
 
-/// One work-item per pair.
-/// in   pair_face      uint[pair]
-/// in   pixels         uint[fragment]   x | y << 16
-/// in   distance       float[fragment]
-/// out  log_occupancy  float[fragment]  ln of the mean, DPR_LOG_ZERO where no sample covers
-/// out  occupancy      float[fragment]  the mean
+/// One work-item per pair of `pairs`. Deterministic.
+/// in   pair_face        uint[pair]       view * faces + face
+/// in   fragment_starts  uint[pair + 1]   runs of fragments
+/// in   pixels           uint[fragment]   x | y << 16
+/// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
+/// out  log_occupancy    float[fragment]  ln of the mean, DPR_LOG_ZERO where no sample covers
+/// out  occupancy        float[fragment]  the mean
 kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs, global const uint* restrict pair_face,
                                       global const uint* restrict fragment_starts, global const uint* restrict pixels,
                                       global const float* restrict distance, global float* restrict log_occupancy,
@@ -77,10 +78,10 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
   return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum), scale_estimate(p.sampling, sigma, y_sum));
 }
 
-/// One work-item per pair.
+/// One work-item per pair of `pairs`. Deterministic. Inputs, and the occupancy, as in occupancy_sampled_forward.
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
-/// out  grad_sigma          float[pair]
+/// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
 kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs,
                                        global const uint* restrict pair_face,
                                        global const uint* restrict fragment_starts,

@@ -20,7 +20,7 @@ static inline realn load_until(uint first, uint last, global const float* values
 /// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel, segment, vector of
 /// slots); `slots` is a multiple of the widest vector.
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
-/// in   values   float[channel][count]
+/// in   values   float[channel][count], of so many `channels` and `segments`
 /// out  partial  float[channel][segment][2][slot]  sums, and their compensations
 kernel void reduce_partial(const uint count, const uint channels, const uint segments, const uint stride,
                            const uint slots, global const uint* restrict starts, global const float* restrict values,
@@ -40,8 +40,9 @@ kernel void reduce_partial(const uint count, const uint channels, const uint seg
   store_n(error, slots, out);
 }
 
-/// Sums the slots in order. One work-item per (channel, segment).
-/// out  sums  float[channel][segment], from `first` on
+/// Sums the slots in order. One work-item per (channel, segment), `count` in all.
+/// in   partial  as reduce_partial left them, with its `slots`
+/// out  sums     float[channel][segment], from `first` on
 kernel void reduce_final(const uint count, const uint slots, const uint first, global const float* restrict partial,
                          global float* restrict sums) {
   const uint i = (uint)get_global_id(0);

@@ -2,7 +2,9 @@
 // as the largest number instead of wrapping around.
 #include "shared_types.h"
 
-/// Sums of chunks. One work-item per chunk.
+/// Sums of chunks. One work-item per chunk of DPR_SCAN_CHUNK elements.
+/// in   values  uint[count]
+/// out  sums    uint[chunk]
 kernel void scan_sum(const uint count, global const uint* restrict values, global uint* restrict sums) {
   const uint chunk = (uint)get_global_id(0);
   const uint first = chunk * DPR_SCAN_CHUNK;
@@ -14,6 +16,7 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
 }
 
 /// The scan itself, given the scan of the chunks' sums. One work-item per chunk; one where there is nothing to scan.
+/// in   values   uint[count]
 /// in   bases    uint[chunk]      exclusive scan of the chunks' sums
 /// out  offsets  uint[count + 1]  exclusive scan; the last is the total
 kernel void scan_apply(const uint count, global const uint* restrict values, global const uint* restrict bases,

@@ -18,7 +18,9 @@ static inline CornerColors load_colors(const FrameParams p, uint view_face, glob
   return c;
 }
 
-/// One work-item per group of pairs.
+/// One work-item per group of `pairs`. Deterministic.
+/// in   pair_face        uint[pair]      view * faces + face
+/// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// in   face_colors  uint4[face]         indices into colors, by corner
 /// in   colors       float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
 /// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
@@ -44,7 +46,7 @@ kernel void shade_forward(const FrameParams p, const uint2 pairs, global const u
   }
 }
 
-/// One work-item per group of pairs.
+/// One work-item per group of `pairs`. Deterministic. Inputs as shade_forward, and
 /// in   grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's fragments

@@ -78,7 +78,10 @@ static inline Shaded shade_fragment(const Surface s, const LightingParams lp, gl
   return f;
 }
 
-/// One work-item per pair, up to `last_pair`.
+/// One work-item per pair, up to `last_pair`. Deterministic. Pairs, fragments and colours as shade_forward, and
+/// in   views   ViewParams[view]
+/// in   lights  Light[light]
+/// in   faces   uint4[face]            vertex indices
 /// in   world, normals  float4[view][vertex]; normals are not read by flat shading
 /// out  red, green, blue  float[fragment]
 kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, const uint last_pair,
@@ -188,7 +191,8 @@ static inline void corners_backward(const Surface s, const LightingParams lp, gl
   }
 }
 
-/// One work-item per pair, up to `last_pair`.
+/// One work-item per pair, up to `last_pair`; there are `pairs` in the frame. Deterministic. Inputs as shade_lit_forward,
+/// and grad_red, grad_green, grad_blue as shade_backward.
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors, grad_positions, grad_normals  float[pair][9]  of the corners; positions in world space.
 ///      grad_normals is not written by flat shading
@@ -255,8 +259,8 @@ static inline void add_light_gradient(const LightingParams lp, const Light light
   sum[2] = mad3n(grad_specular, t.highlight, sum[2]);
 }
 
-/// Gradients of one light and of the ambient light, per pair. One work-item per pair, up to `last_pair`; one launch per
-/// light.
+/// Gradients of one `light` and of the ambient light, per pair. One work-item per pair, up to `last_pair`; one launch per
+/// light. Inputs as shade_lit_backward.
 /// out  channels  float[light][DPR_LIGHT_CHANNELS + 3][pair]  position, diffuse, specular, ambient
 kernel void shade_lit_backward_lights(const FrameParams p, const LightingParams lp, const uint pairs,
                                       const uint last_pair, const uint light,

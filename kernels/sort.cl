@@ -1,6 +1,6 @@
 // A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a tile, still by
 // face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on the device; the
-// host launches for as many as there is room for.
+// host launches for the capacity of the buffers.
 #include "shared_types.h"
 
 #define DPR_SORT_DIGITS 256
@@ -8,14 +8,20 @@
 static inline uint sort_digit(uint key, uint shift) { return (key >> shift) & (DPR_SORT_DIGITS - 1); }
 
 /// Work-items, and columns of the histogram.
-static inline uint sort_blocks(uint room) { return room / DPR_SORT_BLOCK + (room % DPR_SORT_BLOCK != 0); }
+static inline uint sort_blocks(uint capacity) {
+  return capacity / DPR_SORT_BLOCK + (capacity % DPR_SORT_BLOCK != 0);
+}
 
 /// Counts the digits of every block. One work-item per block.
+/// in   capacity   the largest number of elements
+/// in   shift      of the pass' digit: the lowest of its bits
+/// in   count      uint[1]                      the number of elements
+/// in   keys       uint[count]
 /// out  histogram  uint[DPR_SORT_DIGITS][block]
-kernel void sort_histogram(const uint room, const uint shift, global const uint* restrict count,
+kernel void sort_histogram(const uint capacity, const uint shift, global const uint* restrict count,
                            global const uint* restrict keys, global uint* restrict histogram) {
   const uint block = (uint)get_global_id(0);
-  const uint blocks = sort_blocks(room);
+  const uint blocks = sort_blocks(capacity);
   if (block >= blocks) return;
   uint counts[DPR_SORT_DIGITS];
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[d] = 0;
@@ -24,14 +30,16 @@ kernel void sort_histogram(const uint room, const uint shift, global const uint*
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) histogram[d * blocks + block] = counts[d];
 }
 
-/// Moves every element to its place. One work-item per block.
+/// Moves every element to its place. One work-item per block. Inputs as sort_histogram, and
+/// in   values   uint[count]                   move with their keys
 /// in   offsets  uint[DPR_SORT_DIGITS][block]  exclusive scan of the histogram
-kernel void sort_scatter(const uint room, const uint shift, global const uint* restrict count,
+/// out  sorted_keys, sorted_values  uint[count]
+kernel void sort_scatter(const uint capacity, const uint shift, global const uint* restrict count,
                          global const uint* restrict keys, global const uint* restrict values,
                          global const uint* restrict offsets, global uint* restrict sorted_keys,
                          global uint* restrict sorted_values) {
   const uint block = (uint)get_global_id(0);
-  const uint blocks = sort_blocks(room);
+  const uint blocks = sort_blocks(capacity);
   if (block >= blocks) return;
   uint next[DPR_SORT_DIGITS];
   for (uint d = 0; d < DPR_SORT_DIGITS; ++d) next[d] = offsets[d * blocks + block];
@@ -44,7 +52,10 @@ kernel void sort_scatter(const uint room, const uint shift, global const uint* r
 }
 
 /// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one more.
-/// out  starts  uint[keys + 1]
+/// in   keys         how many there are, from 0 on
+/// in   count        uint[1]         the number of elements
+/// in   sorted_keys  uint[count]
+/// out  starts       uint[keys + 1]
 kernel void sort_ranges(const uint keys, global const uint* restrict count, global const uint* restrict sorted_keys,
                         global uint* restrict starts) {
   const uint key = (uint)get_global_id(0);

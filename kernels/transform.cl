@@ -11,6 +11,7 @@ static inline float3 apply_transposed(float4 row0, float4 row1, float4 row2, flo
 }
 
 /// Projects vertices. One work-item per (view, vertex).
+/// in   views        ViewParams[view]
 /// in   models       float4[view][mesh][3]  rows of object to world
 /// in   positions    float4[vertex] or, with a stride, float4[view][vertex]  object space; w unused
 /// in   vertex_mesh  uint[vertex]
@@ -36,6 +37,7 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
 
 /// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that no kept
 /// triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
+/// in      views, models, vertex_mesh, world  as transform_forward
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
@@ -78,7 +80,8 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
 }
 
 /// Gradients of the object-space positions: the views' contributions in order, or, where every view has a shape of its
-/// own, its contribution alone. One work-item per vertex, or per (view, vertex).
+/// own, its contribution alone. One work-item per vertex, or per (view, vertex). Models and the vertices' meshes as
+/// transform_forward.
 /// in   grad_world      float4[view][vertex]
 /// out  grad_positions  float4[vertex] or, with a stride, float4[view][vertex]
 kernel void transform_backward_positions(const FrameParams p, global const float4* restrict models,
