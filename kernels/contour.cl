@@ -173,15 +173,36 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
   counts[i] = count;
 }
 
+/// The shortest contour whose ends' corners count, in samples: a line crosses it wherever it lies. Shorter ones miss lines,
+/// and what their ends would add to those, so no end of theirs counts, nor that of another in the same vertex.
+#define DPR_LEAST_CORNERED 2.5f
+
+/// Whether all contours that end in a vertex are that long.
+static inline int has_corner(const FrameParams p, uint first_edge, uint vertex, global const uint4* edges,
+                             global const uint* end_starts, global const uint* ends, global const uint* offsets,
+                             global const float4* ndc) {
+  const float least = DPR_LEAST_CORNERED * p.pixel_size;
+  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
+    const uint edge = ends[k] / 2;
+    if (offsets[first_edge + edge] == offsets[first_edge + edge + 1]) continue;
+    const float2 d = ndc[edges[edge].y].xy - ndc[edges[edge].x].xy;
+    if (!(dot(d, d) >= least * least)) return 0;
+  }
+  return 1;
+}
+
 /// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as above.
 /// in   room        places that there are
+/// in   end_starts  uint[vertex + 1]       runs of `ends`
+/// in   ends        uint[...]              edge * 2 + end, by vertex
 /// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
 /// out  pairs       uint[1]      how many there are; 0 where they do not fit
-/// out  place_contour  uint[place]  contour_number()
+/// out  place_contour  uint[place]  see DPR_CONTOUR_FLAGS
 /// out  place_tile     uint[place]  view * tiles + tile
 /// out  places         uint[place]  the place itself: what sorting permutes
 kernel void contour_fill(const FrameParams p, const ContourParams c, const uint room,
-                         global const uint4* restrict edges, global const uint* restrict facing,
+                         global const uint4* restrict edges, global const uint* restrict end_starts,
+                         global const uint* restrict ends, global const uint* restrict facing,
                          global const float4* restrict ndc, global const float4* restrict world,
                          global const uint4* restrict faces, global const uint4* restrict face_colors,
                          global const float4* restrict colors, global const uint* restrict offsets,
@@ -195,7 +216,11 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const uint view = i / c.edges;
   const uint4 edge = edges[i - view * c.edges];
   const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
-  const uint contour = contour_number(i, contour_kind(s, edge, c.shading));
+  const uint first_edge = view * c.edges;
+  uint contour = DPR_CONTOUR_FLAGS * i;
+  if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
+  if (has_corner(p, first_edge, edge.x, edges, end_starts, ends, offsets, s.ndc)) contour |= DPR_CONTOUR_FIRST_END;
+  if (has_corner(p, first_edge, edge.y, edges, end_starts, ends, offsets, s.ndc)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];

@@ -15,9 +15,6 @@
 #define DPR_OCCLUDES 1
 #define DPR_CREASE 2
 
-/// The number of a contour: 2 * (view * edges + edge), and 1 more for a crease.
-static inline uint contour_number(uint view_edge, int kind) { return 2 * view_edge + (kind == DPR_CREASE ? 1 : 0); }
-
 /// On which sides of an edge its faces lie: +1 to the left of first -> second end, -1 to the right, 0 where there is
 /// none, or a dropped one.
 typedef struct {
@@ -48,54 +45,6 @@ static inline int inner_side(EdgeSides s) { return s.own != 0 ? s.own : s.other;
 static inline uint corner_across(uint4 face, uint first, uint second) {
   const uint x_is_end = face.x == first || face.x == second, y_is_end = face.y == first || face.y == second;
   return !x_is_end ? face.x : !y_is_end ? face.y : face.z;
-}
-
-/// An edge on the raster, as the rows cross it or the columns.
-typedef struct {
-  float2 a, b;     // NDC
-  int is_by_rows;
-  int ascends;     // b is above a by rows, to the right of a by columns
-  float inverse;   // of the edge's extent across the lines
-  float slope;     // of its other coordinate by that across the lines
-} RasterEdge;
-
-static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
-  RasterEdge e;
-  e.a = a;
-  e.b = b;
-  e.is_by_rows = is_by_rows;
-  const float2 d = b - a;
-  const float across = is_by_rows ? d.y : d.x;
-  e.ascends = across > 0.0f;
-  e.inverse = across != 0.0f ? 1.0f / across : 0.0f;
-  e.slope = (is_by_rows ? d.x : d.y) * e.inverse;
-  return e;
-}
-
-/// The squared sine of an edge's angle to the rows below which the columns alone count it, and the width of the range in
-/// which both do: slopes of 1/2 to 2.
-#define DPR_FLATTEST_BY_ROWS 0.2f
-#define DPR_RANGE_BY_ROWS 0.6f
-
-static inline float range_by_rows(float2 d) {
-  const float length2 = dot(d, d);
-  return length2 > 0.0f ? clamp((d.y * d.y / length2 - DPR_FLATTEST_BY_ROWS) / DPR_RANGE_BY_ROWS, 0.0f, 1.0f) : 0.0f;
-}
-
-/// How much an edge counts by rows; by columns it counts the rest. A step function of the slope would leave out, or count
-/// twice, up to half a cell where a smooth contour passes 45 degrees.
-static inline float weight_by_rows(float2 d) {
-  const float x = range_by_rows(d);
-  return x * x * (3.0f - 2.0f * x);
-}
-
-/// Its gradient by d.
-static inline float2 weight_by_rows_gradient(float2 d) {
-  const float x = range_by_rows(d), length2 = dot(d, d);
-  if (!(x > 0.0f && x < 1.0f)) return (float2)(0.0f);
-  const float2 direction = d / length2;
-  const float by_sine2 = 6.0f * x * (1.0f - x) / DPR_RANGE_BY_ROWS;
-  return 2.0f * by_sine2 * direction.x * direction.y * (float2)(-d.y, d.x);
 }
 
 /// NDC to samples: the centre of column c or row r is at c or r.

@@ -17,7 +17,7 @@ static inline realn pixel_y(const FrameParams p, realn row) {
 #pragma OPENCL FP_CONTRACT OFF
   return (0.5f * (float)p.height - 0.5f - row) * p.pixel_size;
 }
-static inline float2 pixel_centre(const FrameParams p, uint column, uint row) {
+static inline float2 pixel_centre(const FrameParams p, int column, int row) {
 #pragma OPENCL FP_CONTRACT OFF
   return (float2)((float)column + 0.5f - 0.5f * (float)p.width, 0.5f * (float)p.height - 0.5f - (float)row) *
          p.pixel_size;

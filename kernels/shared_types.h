@@ -81,6 +81,13 @@ using float4 = cl_float4;
 /// colours or normals may jump there, in the other where it goes through the edge in the same direction.
 #define DPR_EDGE_FLAG 0x80000000u
 
+/// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of its ends have
+/// corners that count (CornerArea in crossing.h).
+#define DPR_CONTOUR_CREASE 1u
+#define DPR_CONTOUR_FIRST_END 2u
+#define DPR_CONTOUR_SECOND_END 4u
+#define DPR_CONTOUR_FLAGS 8u
+
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu
 

@@ -16,12 +16,12 @@ shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
 
 Antialias::Antialias(Device::Impl& device)
     : device_(device),
-      front_(device, "antialias.cl", "antialias_front"),
-      cross_(device, "antialias.cl", "antialias_cross"),
+      front_(device, "antialias_cross.cl", "antialias_front"),
+      cross_(device, "antialias_cross.cl", "antialias_cross"),
       forward_(device, "antialias.cl", "antialias_forward"),
       backward_(device, "antialias.cl", "antialias_backward"),
       backward_samples_(device, "antialias.cl", "antialias_backward_samples"),
-      backward_edges_(device, "antialias.cl", "antialias_backward_edges") {}
+      cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
 
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
   front.resize(device_, samples_of(p));
@@ -53,7 +53,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   grad_ends.resize(device_, contour.pairs);
   backward_(samples, in.p, winner, cut, raster, grad_blended, share_, grad_cut_);
   backward_samples_(samples, in.p, winner, cut, share_, grad_blended, grad_raster);
-  backward_edges_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
+  cross_backward_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
                   contour.facing, in.transform.ndc, contour.pair_contour, contour.pair_tile, winner, cut,
                   grad_cut_, grad_ends);
 }

@@ -42,7 +42,7 @@ class Antialias {
       backward_samples_;
   Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,
          In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<cl_float4>>
-      backward_edges_;
+      cross_backward_;
   Buffer<float> share_, grad_cut_;  // [2][view][height][width]
 };
 

@@ -116,7 +116,7 @@ std::size_t Contour::room_for(std::size_t count) const {
 
 void Contour::count(const ContourInputs& in) {
   const std::size_t faces = std::size_t{in.p.views} * in.p.faces;
-  if (view_edges(in) > std::numeric_limits<cl_uint>::max() / 2) {
+  if (view_edges(in) > std::numeric_limits<cl_uint>::max() / DPR_CONTOUR_FLAGS) {
     throw InvalidArgument("edges (frame)", std::to_string(view_edges(in)),
                           "fewer, so that they can be counted");
   }
@@ -133,9 +133,9 @@ void Contour::list(const ContourInputs& in, std::size_t room) {
   pair_count_.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
-  fill_(view_edges(in), in.p, params(in), index(room), in.edges.edges, facing, in.transform.ndc,
-        in.transform.world, in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
-        pair_starts_, pair_count_, place_contour_, pair_tile, places_);
+  fill_(view_edges(in), in.p, params(in), index(room), in.edges.edges, in.edges.end_starts, in.edges.ends,
+        facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.geometry.face_colors,
+        in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_, pair_tile, places_);
   sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
   link_(pairs, index(room), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);

@@ -57,7 +57,7 @@ class Contour {
 
   std::size_t pairs = 0;         ///< or how many there is room for, until it is known
   Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
-  Buffer<cl_uint> pair_contour;  ///< [pair] contour_number()
+  Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
   Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
   Buffer<cl_uint> tile_starts;   ///< [view * tile + 1] runs of pairs
 
@@ -72,9 +72,9 @@ class Contour {
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
          In<cl_uint4>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
       count_;
-  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,
-         In<cl_float4>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>,
-         Out<cl_uint>, Out<cl_uint>>
+  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_uint>,
+         In<cl_uint>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_uint>,
+         Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,

@@ -95,8 +95,8 @@ Found found_contours(const ContourFrame& frame, const Mesh& mesh) {
   const std::vector<cl_uint> contours = frame.contour.pair_contour.download(),
                              tiles = frame.contour.pair_tile.download();
   for (std::size_t i = 0; i < frame.contour.pairs; ++i) {
-    const cl_uint4 edge = edges[contours[i] / 2];
-    auto& list = contours[i] % 2 == 1 ? found.creases : found.occludes;
+    const cl_uint4 edge = edges[contours[i] / DPR_CONTOUR_FLAGS];
+    auto& list = (contours[i] & DPR_CONTOUR_CREASE) != 0 ? found.creases : found.occludes;
     const bool is_new =
         list[segment(mesh.positions[edge.s[0]], mesh.positions[edge.s[1]])].insert(tiles[i]).second;
     CHECK(is_new);  // one of two edges at the same place stands for both

@@ -1,0 +1,170 @@
+// Crossings of contours with the lines of samples: where a mesh edge passes between two neighbouring samples, and what it
+// takes of their cells.
+//
+// What an edge takes is the area between it and the staircase of the rigid samples' cells. A line adds the piece of that
+// area in its row or column of cells, by the edge's place on the line. An edge's ends lie between lines: there the area is
+// closed by the straight way from the end to the corner of the four cells around it, where the staircases of all edges
+// that meet in the end meet too. So the pieces of edges that meet add up, whatever their colours, and an end's gradient
+// is that of the area: along the edge too.
+#ifndef DPR_CROSSING_H
+#define DPR_CROSSING_H
+
+#include "contour.h"
+
+/// An edge on the raster, as the rows cross it or the columns.
+typedef struct {
+  float2 a, b;     // NDC
+  int is_by_rows;
+  int ascends;     // b is above a by rows, to the right of a by columns
+  float inverse;   // of the edge's extent across the lines
+  float slope;     // of its other coordinate by that across the lines
+} RasterEdge;
+
+static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
+  RasterEdge e;
+  e.a = a;
+  e.b = b;
+  e.is_by_rows = is_by_rows;
+  const float2 d = b - a;
+  const float across = is_by_rows ? d.y : d.x;
+  e.ascends = across > 0.0f;
+  e.inverse = across != 0.0f ? 1.0f / across : 0.0f;
+  e.slope = (is_by_rows ? d.x : d.y) * e.inverse;
+  return e;
+}
+
+/// The squared sine of an edge's angle to the rows below which the columns alone count it, and the width of the range in
+/// which both do: slopes of 1/2 to 2.
+#define DPR_FLATTEST_BY_ROWS 0.2f
+#define DPR_RANGE_BY_ROWS 0.6f
+
+static inline float range_by_rows(float2 d) {
+  const float length2 = dot(d, d);
+  return length2 > 0.0f ? clamp((d.y * d.y / length2 - DPR_FLATTEST_BY_ROWS) / DPR_RANGE_BY_ROWS, 0.0f, 1.0f) : 0.0f;
+}
+
+/// How much an edge counts by rows; by columns it counts the rest. A step function of the slope would leave out, or count
+/// twice, up to half a cell where a smooth contour passes 45 degrees.
+static inline float weight_by_rows(float2 d) {
+  const float x = range_by_rows(d);
+  return x * x * (3.0f - 2.0f * x);
+}
+
+/// Its gradient by d.
+static inline float2 weight_by_rows_gradient(float2 d) {
+  const float x = range_by_rows(d), length2 = dot(d, d);
+  if (!(x > 0.0f && x < 1.0f)) return (float2)(0.0f);
+  const float2 direction = d / length2;
+  const float by_sine2 = 6.0f * x * (1.0f - x) / DPR_RANGE_BY_ROWS;
+  return 2.0f * by_sine2 * direction.x * direction.y * (float2)(-d.y, d.x);
+}
+
+/// A crossing of an edge with a line of samples, a row or a column.
+typedef struct {
+  int exists;
+  int line;
+  int column, row;  // of the step's first sample
+  float position;   // on the line, in samples
+  float t;          // from the step's first sample to the next, in [0, 1]
+  float along;      // from the edge's first end to its second, in [0, 1]
+} Crossing;
+
+/// Whether a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles agree: see
+/// is_owned_at().
+static inline int is_behind(const RasterEdge e, float2 sample) {
+  int side = side_of_line(e.a, e.b, sample);
+  if (side == 0) side = e.b.y < e.a.y || (e.b.y == e.a.y && e.b.x < e.a.x) ? 1 : -1;
+  return (side < 0) == e.ascends;
+}
+
+/// Whether a point does not lie behind a line. One on the line belongs to its upper or right side, so that a chain of edges
+/// crosses it once.
+static inline int is_before_line(const FrameParams p, const RasterEdge e, float2 point, int line) {
+  const float2 at = pixel_centre(p, line, line);
+  return e.is_by_rows ? point.y >= at.y : point.x <= at.x;
+}
+
+/// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the triangles have
+/// them.
+static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
+  Crossing c;
+  const float2 at = pixel_centre(p, line, line);
+  const float2 crossing = e.is_by_rows ? (float2)(e.a.x + (at.y - e.a.y) * e.slope, at.y)
+                                       : (float2)(at.x, e.a.y + (at.x - e.a.x) * e.slope);
+  const float2 in_samples = to_samples(p, crossing);
+  c.exists = is_before_line(p, e, e.a, line) != is_before_line(p, e, e.b, line);
+  c.line = line;
+  c.position = e.is_by_rows ? in_samples.x : in_samples.y;
+  c.along = clamp((e.is_by_rows ? at.y - e.a.y : at.x - e.a.x) * e.inverse, 0.0f, 1.0f);
+  const float size = (float)(e.is_by_rows ? p.width : p.height);
+  int first = (int)floor(clamp(c.position, -2.0f, size));
+  if (c.exists) {
+    if (is_behind(e, e.is_by_rows ? pixel_centre(p, first, line) : pixel_centre(p, line, first))) {
+      --first;
+    } else if (!is_behind(e, e.is_by_rows ? pixel_centre(p, first + 1, line) : pixel_centre(p, line, first + 1))) {
+      ++first;
+    }
+  }
+  c.column = e.is_by_rows ? first : line;
+  c.row = e.is_by_rows ? line : first;
+  c.t = clamp(c.position - (float)first, 0.0f, 1.0f);
+  return c;
+}
+
+/// What an edge's end adds to the outermost crossing on its side: half of the way across the lines from the corner of the
+/// four cells to the end, times the way along them from the corner to the edge.
+typedef struct {
+  float area;
+  float along;   // where the edge's line is at the corner's height, from the first end to the second
+  float height;  // d area / d position of the edge at that height
+  float width;   // d area / d the end's way across the lines
+} CornerArea;
+
+/// 0 where the edge goes on to the next line on that side.
+static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, const Crossing x, float2 end) {
+  const int is_before = is_before_line(p, e, end, x.line), towards_end = is_before ? -1 : 1;
+  CornerArea c = {0.0f, 0.0f, 0.0f, 0.0f};
+  if (is_before_line(p, e, end, x.line + towards_end) == is_before) return c;
+  const float2 in_samples = to_samples(p, end);
+  const float across = e.is_by_rows ? in_samples.y : in_samples.x, position = e.is_by_rows ? in_samples.x : in_samples.y;
+  const float half_step = 0.5f * (float)towards_end, lines = e.is_by_rows ? -p.pixel_size : p.pixel_size;
+  c.along = x.along + half_step * lines * e.inverse;
+  c.height = half_step * (across - (float)x.line - half_step);
+  const float length = x.position - half_step * e.slope - floor(position) - 0.5f;
+  c.width = half_step * length;
+  c.area = c.height * length;
+  return c;
+}
+
+/// The part of a tile that lies on the raster, [first, last) columns and rows.
+typedef struct {
+  int first_column, last_column, first_row, last_row;
+} TileSamples;
+
+static inline TileSamples tile_samples(const FrameParams p, uint tile) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y);
+  TileSamples s;
+  s.first_column = (int)(in_view % p.tiles_x * DPR_TILE);
+  s.first_row = (int)(in_view / p.tiles_x * DPR_TILE);
+  s.last_column = min(s.first_column + DPR_TILE, (int)p.width);
+  s.last_row = min(s.first_row + DPR_TILE, (int)p.height);
+  return s;
+}
+
+/// The lines [x, y) of a tile that an edge may cross.
+static inline int2 lines_of_edge(const FrameParams p, const RasterEdge e, const TileSamples s) {
+  const float2 a = to_samples(p, e.a), b = to_samples(p, e.b);
+  const float low = e.is_by_rows ? fmin(a.y, b.y) : fmin(a.x, b.x);
+  const float high = e.is_by_rows ? fmax(a.y, b.y) : fmax(a.x, b.x);
+  const float first = (float)(e.is_by_rows ? s.first_row : s.first_column);
+  const float last = (float)(e.is_by_rows ? s.last_row : s.last_column);
+  return (int2)((int)clamp(floor(low), first, last), (int)clamp(ceil(high) + 1.0f, first, last));
+}
+
+/// Whether the tile owns the crossing's step, and the step has a second sample.
+static inline int is_step_of(const FrameParams p, const RasterEdge e, const Crossing c, const TileSamples s) {
+  return c.exists && c.column >= s.first_column && c.column < s.last_column && c.row >= s.first_row &&
+         c.row < s.last_row && (e.is_by_rows ? c.column + 1 < (int)p.width : c.row + 1 < (int)p.height);
+}
+
+#endif
