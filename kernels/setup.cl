@@ -17,15 +17,16 @@ static inline uint2 tile_range(float low, float high, uint size) {
 }
 
 /// Assembles the triangles. Dropped (orientation 0) is what reaches nearer than znear, lies wholly beyond zfar, has
-/// exactly no area, reaches beyond DPR_MAX_NDC, or whose blurred bounds miss the image. What is kept but has no sample
+/// exactly no area, reaches beyond DPR_MAX_NDC, cannot be seen, or whose blurred bounds miss the image. What is kept but has no sample
 /// within its bounds has no tiles. One work-item per (view, face).
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
+/// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
 /// out  triangles  Triangle[view][face]
 kernel void setup_forward(const FrameParams p, global const ViewParams* restrict views,
                           global const uint4* restrict faces, global const float4* restrict ndc,
-                          global Triangle* restrict triangles) {
+                          global const float* restrict hidden, global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
@@ -61,6 +62,7 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   t.z1 = b.z;
   t.z2 = c.z;
   t.orientation = in_range && in_view ? (float)side_of_line(a.xy, b.xy, c.xy) : 0.0f;
+  if (t.orientation == hidden[view * p.meshes + face.w]) t.orientation = 0.0f;
   t.first_tile = columns.x | rows.x << 16;
   t.last_tile = columns.y | rows.y << 16;
   triangles[i] = t;

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "renderer/back_faces.hpp"
 #include "stages/antialias.hpp"
 #include "stages/blur.hpp"
 #include "stages/contour.hpp"
@@ -33,6 +34,7 @@ class PixelNoise {
   Antialias antialias;
   Blur blur;
   std::optional<Edges> edges;                // of the scene; made for its first frame
+  BackFaces back_faces;                      // of the edges' meshes
   std::optional<std::size_t> last_contours;  // pairs of a frame like the next one
 
   /// From samples to the image, after the antialiasing's find_front() of all bands.

@@ -50,11 +50,10 @@ void Renderer::Impl::forward() {
   require_scene("Renderer::forward");
   rendered = false;
   transform.forward(frame, device_views, *geometry);
-  setup.forward(frame, device_views, *geometry, transform.ndc);
+  find_edges();
+  hide_back_faces();
+  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
   room.reset();
-  if (pixel_noise && !pixel_noise->edges) {
-    pixel_noise->edges.emplace(device.impl(), scene, shape_of_first_view());
-  }
   room = expected_room();
   if (room) {
     forward_within(*room);
@@ -63,6 +62,24 @@ void Renderer::Impl::forward() {
   }
   rendered = true;
   frame_number = ++frames_rendered;
+}
+
+void Renderer::Impl::find_edges() {
+  if (!pixel_noise || pixel_noise->edges) return;
+  pixel_noise->edges.emplace(device.impl(), scene, shape_of_first_view());
+  pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids), frame.position_stride == 0);
+}
+
+/// Of views with shapes of their own none are known to be hidden.
+void Renderer::Impl::hide_back_faces() {
+  std::vector<float> hidden(views.size() * scene.meshes.size());
+  if (pixel_noise && frame.position_stride == 0) {
+    hidden = pixel_noise->back_faces.hidden(scene, views, depth_reach(scene.smoothing));
+  }
+  if (hidden == uploaded_hidden_) return;
+  uploaded_hidden_.clear();
+  hidden_.upload(device.impl(), hidden);
+  uploaded_hidden_ = std::move(hidden);
 }
 
 std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
@@ -218,9 +235,10 @@ std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
          (aov ? aov->bytes() : 0) + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
-         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
-         grad_world.capacity_bytes() + grad_colors.capacity_bytes();
+         hidden_.capacity_bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
+         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
+         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
+         grad_colors.capacity_bytes();
 }
 
 }  // namespace dpr

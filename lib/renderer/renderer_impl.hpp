@@ -124,6 +124,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Blur::Size image_size() const;
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
+  void find_edges();
+  void hide_back_faces();
   std::vector<glm::vec3> shape_of_first_view() const;
   std::optional<FrameCounts> expected_room() const;
   void forward_within(const FrameCounts& expected);
@@ -141,6 +143,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void read_summed_gradients(SceneGradient& gradient);
   double read_sigma_gradient();
   const Buffer<cl_uint>& one_segment(std::size_t pixels);
+
+  Buffer<float> hidden_;  // [view][mesh] BackFaces::hidden()
+  std::vector<float> uploaded_hidden_;
 
   Buffer<cl_uint> all_pixels_;  // [2]: one segment
   std::size_t all_pixels_count_ = 0;

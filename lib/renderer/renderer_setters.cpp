@@ -224,6 +224,7 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
   replace(geometry->positions, geometry->meshes[mesh].first_vertex, positions);
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
+  if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
   rendered = false;
 }
 

@@ -2,8 +2,6 @@
 
 #include <limits>
 
-#include "mesh/welded_edges.hpp"
-
 namespace dpr {
 namespace {
 
@@ -31,10 +29,10 @@ Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3
   std::size_t first_vertex = 0, first_face = 0;
   for (const Instance& instance : scene.meshes) {
     const Mesh& mesh = instance.mesh;
-    for (const WeldedEdge& edge :
-         make_welded_edges(positions.subspan(first_vertex, mesh.positions.size()), mesh.faces)) {
-      rows.push_back(joined(mesh, edge, first_vertex, first_face));
-    }
+    const std::vector<WeldedEdge> welded =
+        make_welded_edges(positions.subspan(first_vertex, mesh.positions.size()), mesh.faces);
+    for (const WeldedEdge& edge : welded) rows.push_back(joined(mesh, edge, first_vertex, first_face));
+    solids.emplace_back(welded, mesh.faces.size());
     first_vertex += mesh.positions.size();
     first_face += mesh.faces.size();
   }

@@ -6,6 +6,7 @@
 
 #include "device/kernel.hpp"
 #include "dpr/light.hpp"
+#include "mesh/solid.hpp"
 #include "stages/geometry.hpp"
 #include "stages/scan.hpp"
 #include "stages/sort.hpp"
@@ -19,6 +20,7 @@ struct Edges {
   Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3> positions);
 
   std::size_t count = 0;
+  std::vector<Solid> solids;   ///< [mesh], for the first who wants them
   Buffer<cl_uint4> edges;      ///< [edge] ends, own face, other face: see DPR_EDGE_FLAG
   Buffer<cl_uint> end_starts;  ///< [vertex + 1] runs of `ends`
   Buffer<cl_uint> ends;        ///< edge * 2 + end, by vertex

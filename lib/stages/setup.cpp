@@ -5,10 +5,10 @@ namespace dpr {
 Setup::Setup(Device::Impl& device) : device_(device), forward_(device, "setup.cl", "setup_forward") {}
 
 void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                    const Buffer<cl_float4>& ndc) {
+                    const Buffer<cl_float4>& ndc, const Buffer<float>& hidden) {
   const std::size_t count = std::size_t{p.views} * p.faces;
   triangles.resize(device_, count);
-  forward_(count, p, views.cameras, geometry.face_vertices, ndc, triangles);
+  forward_(count, p, views.cameras, geometry.face_vertices, ndc, hidden, triangles);
 }
 
 }  // namespace dpr

@@ -11,8 +11,9 @@ class Setup {
  public:
   explicit Setup(Device::Impl& device);
 
+  /// `hidden` is [view][mesh], the orientation of faces that nothing can see; 0: all may be.
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-               const Buffer<cl_float4>& ndc);
+               const Buffer<cl_float4>& ndc, const Buffer<float>& hidden);
 
   Buffer<shared::Triangle> triangles;  ///< [view][face]
 
@@ -20,7 +21,8 @@ class Setup {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<shared::Triangle>>
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>,
+         Out<shared::Triangle>>
       forward_;
 };
 

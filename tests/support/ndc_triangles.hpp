@@ -65,6 +65,7 @@ class NdcStages {
     view.inverse_range = 1.0F / (frame.zfar - frame.znear);
     const std::vector<shared::ViewParams> cameras(frame.views, view);
     views_.cameras.upload(device_impl(), cameras);
+    hidden_.upload(device_impl(), std::vector<float>(frame.views));
     params.views = static_cast<cl_uint>(frame.views);
     params.meshes = 1;
     params.vertices = static_cast<cl_uint>(geometry_.vertices);
@@ -79,7 +80,7 @@ class NdcStages {
     params.perspective_correct = frame.perspective_correct ? 1 : 0;
   }
 
-  void set_up() { setup.forward(params, views_, geometry_, ndc_); }
+  void set_up() { setup.forward(params, views_, geometry_, ndc_, hidden_); }
   void list_pairs() {
     set_up();
     bin.forward(params, setup.triangles);
@@ -118,6 +119,7 @@ class NdcStages {
   Geometry geometry_;
   DeviceViews views_;
   Buffer<cl_float4> ndc_;
+  Buffer<float> hidden_;
 };
 
 /// A pixel of a view, row and column, and a face.

@@ -1,0 +1,51 @@
+#include "mesh/solid.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace dpr {
+namespace {
+
+/// The least of the faces joined to one so far; the way there is halved.
+std::uint32_t root_of(std::vector<std::uint32_t>& parents, std::uint32_t face) {
+  while (parents[face] != face) {
+    parents[face] = parents[parents[face]];
+    face = parents[face];
+  }
+  return face;
+}
+
+bool is_inner(const WeldedEdge& edge) { return edge.other && !edge.same_direction; }
+
+}  // namespace
+
+Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) {
+  is_closed_ = !edges.empty() && std::ranges::all_of(edges, is_inner);
+  if (!is_closed_) return;
+  is_closed_by_indices_ = std::ranges::all_of(edges, &WeldedEdge::shares_vertices);
+  std::vector<std::uint32_t> parents(faces);
+  std::iota(parents.begin(), parents.end(), 0U);
+  for (const WeldedEdge& edge : edges) {
+    const std::uint32_t a = root_of(parents, edge.face), b = root_of(parents, *edge.other);
+    parents[std::max(a, b)] = std::min(a, b);
+  }
+  part_of_face_.resize(faces);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    const std::uint32_t root = root_of(parents, face);
+    part_of_face_[face] = root == face ? static_cast<std::uint32_t>(parts_++) : part_of_face_[root];
+  }
+}
+
+int Solid::winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const {
+  if (!is_closed_) return 0;
+  const glm::dvec3 origin(positions[faces[0].x]);
+  std::vector<double> volumes(parts_);
+  for (std::size_t face = 0; face < faces.size(); ++face) {
+    const auto corner = [&](int i) { return glm::dvec3(positions[faces[face][i]]) - origin; };
+    volumes[part_of_face_[face]] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+  }
+  if (std::ranges::all_of(volumes, [](double volume) { return volume > 0; })) return 1;
+  return std::ranges::all_of(volumes, [](double volume) { return volume < 0; }) ? -1 : 0;
+}
+
+}  // namespace dpr

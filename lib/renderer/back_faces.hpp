@@ -1,0 +1,40 @@
+// Which faces nothing can see, because they are the far side of a solid.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "mesh/solid.hpp"
+
+namespace dpr {
+
+class BackFaces {
+ public:
+  BackFaces() = default;
+  /// Of the scene's meshes. `are_placed`: those that are closed because vertices coincide do so in the scene.
+  BackFaces(std::vector<Solid> solids, bool are_placed);
+
+  /// The mesh's positions are others than before.
+  void move(std::size_t mesh) noexcept;
+
+  /// [view][mesh] the orientation in NDC, +1 or -1, of faces that cannot be seen; 0: all may be. They may not
+  /// where the mesh bounds a solid that lies wholly behind the near plane, thicker by far than the depth
+  /// (normalised) by which the noise of the depths shows what lies behind. Where a mesh passes through itself
+  /// such that its inside is outside, its far side is seen there. O(faces of meshes moved + views * meshes).
+  std::vector<float> hidden(const Scene& scene, std::span<const View> views, float depth_reach);
+
+ private:
+  struct State {
+    Solid solid;
+    bool may_have_parted = false, is_measured = false;
+    int winding = 0;
+    std::vector<glm::dvec3> corners;  // of its box, object space
+  };
+  static void measure(State& state, const Mesh& mesh);
+  static float hidden_of(const State& state, const Camera& camera, const glm::mat4& model, float depth_reach);
+
+  std::vector<State> states_;
+};
+
+}  // namespace dpr
