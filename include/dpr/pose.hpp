@@ -40,7 +40,7 @@ enum class PoseLight {
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with Jacobians from differences of images rendered in the same
 /// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
-/// composition with a blur that follows the pixels; the scene's is not used. Levels whose pixels are much
+/// composition with a blur that follows the pixels; the scene's is not used. Levels whose pixels are
 /// larger than the mesh's triangles work on a coarser mesh.
 struct LeastSquares {
   /// Rotations tried at the coarsest level, spread evenly over all; 0: only the poses that solve() is given.
@@ -55,7 +55,7 @@ struct LeastSquares {
   /// on the way.
   bool robust = false;
   /// Of that: a colour difference; 0: four standard deviations of what the best hypotheses leave, from the
-  /// median of its size, but at least 0.1, anew at every level.
+  /// median of its size, but between 0.1 and 0.2, anew at every level.
   float robust_scale = 0;
   /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
   /// not explain the target.

@@ -14,6 +14,7 @@ constexpr double k_least_damping = 1e-7, k_most_damping = 10;
 
 constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches no further
 constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
+constexpr double k_still_deviations = 0.3;   // nor do steps shorter than this part of the pose's uncertainty
 
 /// The lower Cholesky factor of a symmetric matrix; false if it is not positive definite to rounding.
 bool factorize(PoseSpace::Matrix& a, std::size_t n) {
@@ -45,35 +46,57 @@ void substitute(const PoseSpace::Matrix& factor, std::size_t n, PoseSpace::Step&
   }
 }
 
-/// A candidate, its damping, and the step it tries.
-struct Trial {
-  Candidate* candidate;
-  double damping = k_first_damping;
-  bool still = false;
-};
+/// Whether the gradient is more than the pixels make by chance: the score test, g^T S^-1 g, S being the
+/// scatter of the pixels' gradients. What is elsewhere in the image, as clutter is, plays no part.
+bool is_significant(const NormalEquations& equations, std::size_t parameters) {
+  auto factor = equations.scatter;
+  if (!factorize(factor, parameters)) return true;
+  PoseSpace::Step x = equations.gradient;
+  substitute(factor, parameters, x);
+  double squared = 0;
+  for (std::size_t i = 0; i < parameters; ++i) squared += equations.gradient[i] * x[i];
+  return squared > k_still_deviations * k_still_deviations;
+}
 
 /// The step to try next, no longer than a linear model reaches; none if the candidate stands still.
-bool next_step(Trial& trial, const PoseSpace& space, double pixel_ndc, PoseSpace::Step& step) {
-  while (trial.damping < k_most_damping &&
-         !damped_step(trial.candidate->equations, space.size(), trial.damping, step)) {
-    trial.damping *= k_damping_rise;
+bool next_step(Candidate& candidate, const PoseSpace& space, double pixel_ndc, PoseSpace::Step& step) {
+  const NormalEquations& equations = candidate.equations;
+  while (candidate.damping < k_most_damping &&
+         !damped_step(equations, space.size(), candidate.damping, step)) {
+    candidate.damping *= k_damping_rise;
   }
   const double length = space.length(step);
-  trial.still = trial.still || trial.damping >= k_most_damping || length < k_still_pixels * pixel_ndc;
+  candidate.is_still = candidate.damping >= k_most_damping || length < k_still_pixels * pixel_ndc ||
+                       !is_significant(equations, space.size());
   if (length > k_longest_step_ndc) {
     for (double& s : step) s *= k_longest_step_ndc / length;
   }
-  return !trial.still;
+  return !candidate.is_still;
 }
 
-void judge(Trial& trial, const Hypothesis& hypothesis, const NormalEquations& equations) {
-  const double before = trial.candidate->equations.loss;
-  if (equations.loss < before) {
-    trial.candidate->hypothesis = hypothesis;
-    trial.candidate->equations = equations;
-    trial.damping = std::max(trial.damping * k_damping_fall, k_least_damping);
+void judge(Candidate& candidate, const Hypothesis& hypothesis, const NormalEquations& equations) {
+  if (equations.loss < candidate.equations.loss) {
+    candidate.hypothesis = hypothesis;
+    candidate.equations = equations;
+    candidate.damping = std::max(candidate.damping * k_damping_fall, k_least_damping);
   } else {
-    trial.damping *= k_damping_rise;
+    candidate.damping *= k_damping_rise;
+  }
+}
+
+/// Of those that came from another level.
+void linearize(PoseLevel& level, std::vector<Candidate>& candidates) {
+  std::vector<Candidate*> fresh;
+  std::vector<Hypothesis> hypotheses;
+  for (Candidate& candidate : candidates) {
+    if (candidate.damping > 0) continue;
+    fresh.push_back(&candidate);
+    hypotheses.push_back(candidate.hypothesis);
+  }
+  const std::vector<NormalEquations> equations = level.linearize(hypotheses);
+  for (std::size_t i = 0; i < fresh.size(); ++i) {
+    fresh[i]->equations = equations[i];
+    fresh[i]->damping = k_first_damping;
   }
 }
 
@@ -124,30 +147,22 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
 
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report) {
-  std::vector<Hypothesis> hypotheses;
-  std::vector<Trial> trials;
-  for (Candidate& candidate : candidates) {
-    hypotheses.push_back(candidate.hypothesis);
-    trials.push_back({&candidate});
-  }
-  std::vector<NormalEquations> equations = level.linearize(hypotheses);
-  for (std::size_t i = 0; i < trials.size(); ++i) candidates[i].equations = equations[i];
-
+  linearize(level, candidates);
   std::vector<double> losses;
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
     losses.push_back(least_loss(candidates));
     if (iteration >= turns.enough && !still_falls(losses)) break;
     if (!report()) return false;
-    std::vector<Trial*> moving;
-    hypotheses.clear();
-    for (Trial& trial : trials) {
+    std::vector<Candidate*> moving;
+    std::vector<Hypothesis> hypotheses;
+    for (Candidate& candidate : candidates) {
       PoseSpace::Step step{};
-      if (trial.still || !next_step(trial, space, level.pixel_ndc(), step)) continue;
-      moving.push_back(&trial);
-      hypotheses.push_back(space.moved(trial.candidate->hypothesis, step));
+      if (candidate.is_still || !next_step(candidate, space, level.pixel_ndc(), step)) continue;
+      moving.push_back(&candidate);
+      hypotheses.push_back(space.moved(candidate.hypothesis, step));
     }
     if (moving.empty()) break;
-    equations = level.linearize(hypotheses);
+    const std::vector<NormalEquations> equations = level.linearize(hypotheses);
     for (std::size_t i = 0; i < moving.size(); ++i) judge(*moving[i], hypotheses[i], equations[i]);
   }
   return true;

@@ -12,7 +12,12 @@ namespace dpr {
 struct Candidate {
   Hypothesis hypothesis;
   NormalEquations equations{};  ///< at the hypothesis, of the level worked on
+  double damping = 0;           ///< Marquardt's factor; 0: not linearized at this level yet
+  bool is_still = false;        ///< no step at this level gains anything
   bool is_initial = false;      ///< descends from the first pose that was given
+
+  /// For another level.
+  void restart() { damping = 0, is_still = false; }
 };
 
 /// How many times as often as asked the candidates are turned while the best one still falls.

@@ -11,6 +11,7 @@
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_descent.hpp"
+#include "solve/pose_pyramid.hpp"
 #include "solve/pose_search.hpp"
 
 namespace dpr {

@@ -56,9 +56,9 @@ double pixel_at_object(const Scene& scene, const PoseSpace& space) {
          object_scale(scene.meshes.front().mesh, space);
 }
 
-/// Triangles much smaller than the pixels cost time and show nothing.
+/// Triangles smaller than the pixels cost time and show little.
 void simplify(Scene& scene, const PoseSpace& space) {
-  constexpr double k_fine = 0.4, k_cell = 0.6;  // of a pixel
+  constexpr double k_fine = 0.8, k_cell = 1;  // of a pixel
   Mesh& mesh = scene.meshes.front().mesh;
   const double pixel = pixel_at_object(scene, space);
   if (mean_side(mesh) < k_fine * pixel) mesh = cluster_vertices(mesh, static_cast<float>(k_cell * pixel));

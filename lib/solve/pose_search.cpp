@@ -1,17 +1,13 @@
 // Hypotheses from a grid of rotations, halved from level to level.
 #include "solve/pose_search.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <iterator>
 #include <optional>
-#include <string>
 
-#include "base/require.hpp"
-#include "solve/levenberg_marquardt.hpp"
-#include "solve/polar.hpp"
+#include "solve/pose_candidates.hpp"
+#include "solve/pose_pyramid.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {
@@ -26,12 +22,7 @@ constexpr double k_same_pixels = 0.5;
 // Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the
 // pixels' grid makes that much of one pose or its symmetric twin.
 constexpr double k_equal_losses = 1e-3;
-
-// Hypotheses are given up where their loss is beyond this multiple of the best one and, besides, this part of
-// what a wrong pose leaves: the best may fit its pixels by luck. The last level changes little.
-struct Hope {
-  double ratio, part;
-};
+// The last level changes little.
 constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
 
 // Samples of a pixel whose mean is compared, on its side: less than a quarter of a pixel matters little, and
@@ -41,38 +32,6 @@ constexpr std::size_t k_most_samples = std::size_t{1} << 18;
 
 // Of the best hypotheses in a light of their own: so many are tried after half a turn too.
 constexpr std::size_t k_turned = 4;
-
-/// By half a turn about each of the object's axes of inertia, through its origin.
-std::array<glm::dmat3, 3> half_turns(const Instance& object) {
-  const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const glm::vec3& position : object.mesh.positions) {
-    const glm::dvec3 p = stretch * glm::dvec3(position);
-    const Eigen::Vector3d v(p.x, p.y, p.z);
-    spread += v * v.transpose();
-  }
-  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
-  std::array<glm::dmat3, 3> turns;
-  for (std::size_t i = 0; i < turns.size(); ++i) {
-    const auto column = static_cast<Eigen::Index>(i);
-    const glm::dvec3 axis(axes(0, column), axes(1, column), axes(2, column));
-    turns[i] = 2.0 * glm::outerProduct(axis, axis) - glm::dmat3(1.0);
-  }
-  return turns;
-}
-
-bool by_loss(const Candidate& a, const Candidate& b) { return a.equations.loss < b.equations.loss; }
-
-/// The resolution doubles; the last level is the finest once more, with the final blur.
-std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {
-  const int full = std::min(scene.width, scene.height);
-  std::vector<LevelShape> shapes{{full, options.blur}};
-  while (static_cast<unsigned>(shapes.front().short_side / 2) >= options.coarsest) {
-    shapes.insert(shapes.begin(), {(shapes.front().short_side + 1) / 2, options.blur});
-  }
-  shapes.push_back({full, options.blur_end});
-  return shapes;
-}
 
 /// One fit at work: the candidates on their way through the levels.
 class Fit {
@@ -107,15 +66,14 @@ class Fit {
   bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
   float light_gain(PoseLevel& level, const LevelShape& shape) const;
   void make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
-  std::vector<Hypothesis> hypotheses() const;
+  std::vector<Hypothesis> hypotheses() const { return hypotheses_of(candidates_); }
   std::vector<Hypothesis> grid(std::size_t rotations) const;
   /// Refines all candidates at a level and keeps the best distinct ones.
   void work(PoseLevel& level, std::size_t keep);
   void turn(PoseLevel& level, Turns turns);
   void keep_distinct(const PoseLevel& level, std::size_t count);
-  void drop_hopeless(std::size_t first, const Hope& hope);
-  void drop_hopeless(PoseLevel& level, std::size_t first, const Hope& hope);
-  void finish(PoseLevel& level, bool anywhere);
+  void drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope);
+  void finish(bool anywhere);
   void choose_equals(bool anywhere);
   double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
@@ -146,9 +104,13 @@ PoseResult Fit::run(bool anywhere) {
   }
   PoseLevel level = make_level(final_shape(shapes.back()), light_);
   make_robust(level, hypotheses());
-  drop_hopeless(level, 0, k_last_hope);
+  drop_hopeless_at(level, 0, k_last_hope);
   work(level, beam_.back());
-  finish(level, anywhere);
+  // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
+  PoseLevel sampled = make_level(shapes.back(), light_);
+  sampled.set_scale(level.scale());
+  wrong_ = wrong_loss(sampled);
+  finish(anywhere);
   return result_;
 }
 
@@ -187,7 +149,7 @@ void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
     }
   }
   candidates_.insert(candidates_.end(), found.begin(), found.end());
-  drop_hopeless(level, own, k_hope);
+  drop_hopeless_at(level, own, k_hope);
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
@@ -236,17 +198,12 @@ void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) 
   if (method_.robust_scale > 0) {
     level.set_scale(method_.robust_scale);
   } else {
-    // Tighter, the loss would see nothing but what hypotheses on their way hit by chance.
-    constexpr float k_least_scale = 0.1F;
+    // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
+    // residuals of wrong hypotheses have it, clutter would count.
+    constexpr float k_least_scale = 0.1F, k_most_scale = 0.2F;
     level.estimate_scale(hypotheses);
-    if (level.scale() > 0) level.set_scale(std::max(level.scale(), k_least_scale));
+    if (level.scale() > 0) level.set_scale(std::clamp(level.scale(), k_least_scale, k_most_scale));
   }
-}
-
-std::vector<Hypothesis> Fit::hypotheses() const {
-  std::vector<Hypothesis> result;
-  for (const Candidate& candidate : candidates_) result.push_back(candidate.hypothesis);
-  return result;
 }
 
 /// At the initial translation.
@@ -280,6 +237,7 @@ void Fit::start(PoseLevel& level) {
 void Fit::work(PoseLevel& level, std::size_t keep) {
   constexpr unsigned k_few = 4;  // within which many come to the same pose, or to none
   const unsigned enough = method_.iterations, few = std::min(k_few, enough);
+  for (Candidate& candidate : candidates_) candidate.restart();
   turn(level, {few, few});
   keep_distinct(level, candidates_.size());
   if (enough > few) turn(level, {enough - few, k_patience * enough - few});
@@ -292,37 +250,15 @@ void Fit::turn(PoseLevel& level, Turns turns) {
 }
 
 void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
-  std::ranges::stable_sort(candidates_, by_loss);
-  std::vector<Candidate> kept;
-  for (const Candidate& candidate : candidates_) {
-    const auto same = std::ranges::find_if(kept, [&](const Candidate& other) {
-      return space_.distance(candidate.hypothesis, other.hypothesis) < k_same_pixels * level.pixel_ndc();
-    });
-    if (same != kept.end()) {
-      same->is_initial = same->is_initial || candidate.is_initial;
-    } else if (kept.size() < count || candidate.is_initial) {  // which may be the nearest of many equals
-      kept.push_back(candidate);
-    }
-  }
-  candidates_ = std::move(kept);
-  drop_hopeless(0, k_hope);
-}
-
-/// Those from the `first` on, by their losses.
-void Fit::drop_hopeless(std::size_t first, const Hope& hope) {
-  const double least = std::ranges::min_element(candidates_, by_loss)->equations.loss;
-  const auto is_hopeless = [&](const Candidate& c) {
-    return c.equations.loss > hope.ratio * least + hope.part * wrong_;
-  };
-  const auto begin = candidates_.begin() + static_cast<std::ptrdiff_t>(first);
-  candidates_.erase(std::remove_if(begin, candidates_.end(), is_hopeless), candidates_.end());
+  candidates_ = distinct(std::move(candidates_), space_, k_same_pixels * level.pixel_ndc(), count);
+  drop_hopeless(candidates_, 0, k_hope, wrong_);
 }
 
 /// By what they leave at a level, as they are.
-void Fit::drop_hopeless(PoseLevel& level, std::size_t first, const Hope& hope) {
+void Fit::drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope) {
   const std::vector<double> losses = level.losses(hypotheses());
   for (std::size_t i = 0; i < losses.size(); ++i) candidates_[i].equations.loss = losses[i];
-  drop_hopeless(first, hope);
+  drop_hopeless(candidates_, first, hope, wrong_);
 }
 
 bool Fit::report(const PoseLevel& level) {
@@ -334,8 +270,7 @@ bool Fit::report(const PoseLevel& level) {
   return !callback_ || callback_(result_.history.back());
 }
 
-void Fit::finish(PoseLevel& level, bool anywhere) {
-  wrong_ = wrong_loss(level);
+void Fit::finish(bool anywhere) {
   choose_equals(anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = covariance(candidates_.front().equations, space_.size());
@@ -367,37 +302,6 @@ double Fit::wrong_loss(PoseLevel& level) const {
 }
 
 }  // namespace
-
-void validate(const LeastSquares& options, const Scene& scene) {
-  constexpr unsigned k_most_rotations = 1U << 24;
-  require(options.rotations <= k_most_rotations, "rotations (pose)", options.rotations, "at most 2^24");
-  require(options.coarsest > 0, "coarsest (pose)", options.coarsest, "at least 1");
-  require(options.iterations > 0, "iterations (pose)", options.iterations, "at least 1");
-  require(options.blur > 0 && std::isfinite(options.blur), "blur (pose)", options.blur,
-          "a finite number above 0");
-  require(options.blur_end > 0 && std::isfinite(options.blur_end), "blur_end (pose)", options.blur_end,
-          "a finite number above 0");
-  require(options.robust_scale >= 0 && std::isfinite(options.robust_scale), "robust_scale (pose)",
-          options.robust_scale, "a finite number, at least 0");
-  const Image& mask = options.mask;
-  if (mask.pixels.empty()) return;
-  if (mask.width != scene.width || mask.height != scene.height) {
-    throw InvalidArgument("size of the mask (pose)", checks::size(mask.width, mask.height),
-                          checks::size(scene.width, scene.height) + ", the scene's");
-  }
-  double sum = 0;
-  for (const glm::vec4& pixel : mask.pixels) {
-    require(pixel.x >= 0 && pixel.x <= 1, "pixel of the mask (pose)", pixel.x, "a number in [0, 1]");
-    sum += static_cast<double>(pixel.x);
-  }
-  require(sum > 0, "sum of the mask (pose)", sum, "a pixel above 0");
-}
-
-unsigned most_iterations(const LeastSquares& options, const Scene& scene) {
-  const auto levels = static_cast<unsigned>(level_shapes(scene, options).size());
-  const unsigned again = options.light == PoseLight::fixed ? 0 : levels - 1;  // in another light
-  return k_patience * options.iterations * (levels + again);
-}
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {

@@ -7,12 +7,6 @@
 
 namespace dpr {
 
-/// Throws InvalidArgument for options out of range; the mask must have the scene's size.
-void validate(const LeastSquares& options, const Scene& scene);
-
-/// Through all levels.
-unsigned most_iterations(const LeastSquares& options, const Scene& scene);
-
 /// From the initial poses and the options' rotations together. Of equally good poses the one nearest to the
 /// first initial pose is the result; with `anywhere`, the one of the smallest loss, and the initial pose only
 /// gives the translation.
