@@ -1,10 +1,15 @@
-// Samples blended across the contours between them. Where a contour crosses the step between two neighbouring samples, the
-// sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image follows the contour, and
-// its derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl finds.
+// Samples blended across the contours between them. Where a contour crosses the step between two neighbouring samples,
+// the sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image follows the contour,
+// and its derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl finds.
+//
+// Few steps are crossed: a work-item takes a vector of samples, and copies it where none of them is.
+#include "lanes.h"
 #include "shared_types.h"
 
-/// The steps that cut a sample's cell: to the right, down, from the left, from above.
+/// The steps that cut a sample's cell: to the right, down, from the left, from above; and the same step as the sample at its
+/// other end counts it.
 #define DPR_STEPS 4
+#define DPR_OPPOSITE(step) ((step) ^ 2)
 
 typedef struct {
   uint step[DPR_STEPS], other[DPR_STEPS];  // the step, and the sample at its other end
@@ -37,6 +42,13 @@ static inline Cell load_cell(const FrameParams p, uint pixel, uint pixels, globa
   return c;
 }
 
+/// False only if nothing crosses the steps of a vector of samples.
+static inline int may_be_crossed(const FrameParams p, uint pixel, uint pixels, global const uint* restrict winner) {
+  const uintn none = DPR_NO_CROSSING;
+  return any_lane(load_n(pixel, winner) != none || load_n(max(pixel, 1u) - 1, winner) != none ||
+                  load_n(pixels + pixel, winner) != none || load_n(pixels + pixel - p.width, winner) != none);
+}
+
 /// A cell's colour. `own` is its sample's.
 static inline float4 mixed_cell(const Cell c, float4 own, global const float4* restrict raster) {
   float4 sum = own;
@@ -47,58 +59,56 @@ static inline float4 mixed_cell(const Cell c, float4 own, global const float4* r
 }
 
 /// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it. One work-item
-/// per pixel. Deterministic.
+/// per vector of samples. Deterministic.
 /// in   winner, cut       [2][pixel]
 /// in   raster            float4[pixel]
 /// out  blended           float4[pixel]
 kernel void antialias_forward(const FrameParams p, global const uint* restrict winner,
                               global const float* restrict cut, global const float4* restrict raster,
                               global float4* restrict blended) {
-  const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
-  if (pixel >= pixels) return;
-  const Cell c = load_cell(p, pixel, pixels, winner, cut);
-  blended[pixel] = mixed_cell(c, raster[pixel], raster);
+  const uint first = (uint)get_global_id(0) * DPR_WIDTH, pixels = p.views * p.width * p.height;
+  if (first >= pixels) return;
+  const uint last = min(first + DPR_WIDTH, pixels);
+  const int is_crossed = may_be_crossed(p, first, pixels, winner);
+  for (uint pixel = first; pixel < last; ++pixel) {
+    blended[pixel] = raster[pixel];
+    if (is_crossed) blended[pixel] = mixed_cell(load_cell(p, pixel, pixels, winner, cut), raster[pixel], raster);
+  }
 }
 
-/// The gradients of the cuts, and every sample's part in its neighbour's cell. One work-item per pixel; each step
-/// cuts one cell, so no two write the same place.
+/// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its neighbours'.
+/// One work-item per vector of samples; each step cuts one cell, so no two write the same place. Deterministic.
 /// in   grad_blended   float4[pixel]
-/// out  share          float[2][pixel]  of the step's other sample in the cell that it cuts; not written where nothing
-///                                      crosses
-/// out  grad_cut       float[2][pixel]  the same
+/// out  grad_cut       float[2][pixel]  not written where nothing crosses
+/// out  grad_raster    float4[pixel]
 kernel void antialias_backward(const FrameParams p, global const uint* restrict winner,
                                global const float* restrict cut, global const float4* restrict raster,
-                               global const float4* restrict grad_blended, global float* restrict share,
-                               global float* restrict grad_cut) {
-  const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
-  if (pixel >= pixels) return;
-  const Cell c = load_cell(p, pixel, pixels, winner, cut);
-  const float4 own = raster[pixel], grad = grad_blended[pixel];
-  // Where the weights are scaled to add up to 1, so is what one of them changes.
-  const float4 from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (!(c.weight[k] > 0.0f)) continue;
-    share[c.step[k]] = c.weight[k] / c.total;
-    grad_cut[c.step[k]] = c.turn[k] * dot(grad, raster[c.other[k]] - from) / c.total;
+                               global const float4* restrict grad_blended, global float* restrict grad_cut,
+                               global float4* restrict grad_raster) {
+  const uint first = (uint)get_global_id(0) * DPR_WIDTH, pixels = p.views * p.width * p.height;
+  if (first >= pixels) return;
+  const uint last = min(first + DPR_WIDTH, pixels);
+  if (!may_be_crossed(p, first, pixels, winner)) {
+    for (uint pixel = first; pixel < last; ++pixel) grad_raster[pixel] = grad_blended[pixel];
+    return;
+  }
+  for (uint pixel = first; pixel < last; ++pixel) {
+    const Cell c = load_cell(p, pixel, pixels, winner, cut);
+    const float4 own = raster[pixel], grad = grad_blended[pixel];
+    // Where the weights are scaled to add up to 1, so is what one of them changes.
+    const float4 from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
+    float kept = 1.0f;
+    float4 given = 0.0f;
+    for (int k = 0; k < DPR_STEPS; ++k) {
+      if (c.weight[k] > 0.0f) {
+        kept -= c.weight[k] / c.total;
+        grad_cut[c.step[k]] = c.turn[k] * dot(grad, raster[c.other[k]] - from) / c.total;
+      }
+      if (c.cuts_other[k]) {
+        const Cell other = load_cell(p, c.other[k], pixels, winner, cut);
+        given += other.weight[DPR_OPPOSITE(k)] / other.total * grad_blended[c.other[k]];
+      }
+    }
+    grad_raster[pixel] = given + kept * grad;
   }
 }
-
-/// The gradients of the samples: each gathers what it gave to its neighbours. One work-item per pixel. Deterministic.
-/// in   share        float[2][pixel]
-/// out  grad_raster  float4[pixel]
-kernel void antialias_backward_samples(const FrameParams p, global const uint* restrict winner,
-                                       global const float* restrict cut, global const float* restrict share,
-                                       global const float4* restrict grad_blended,
-                                       global float4* restrict grad_raster) {
-  const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
-  if (pixel >= pixels) return;
-  const Cell c = load_cell(p, pixel, pixels, winner, cut);
-  float kept = 1.0f;
-  float4 sum = 0.0f;
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (c.weight[k] > 0.0f) kept -= c.weight[k] / c.total;
-    if (c.cuts_other[k]) sum += share[c.step[k]] * grad_blended[c.other[k]];
-  }
-  grad_raster[pixel] = sum + kept * grad_blended[pixel];
-}
-

@@ -20,8 +20,12 @@ Antialias::Antialias(Device::Impl& device)
       cross_(device, "antialias_cross.cl", "antialias_cross"),
       forward_(device, "antialias.cl", "antialias_forward"),
       backward_(device, "antialias.cl", "antialias_backward"),
-      backward_samples_(device, "antialias.cl", "antialias_backward_samples"),
       cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
+
+/// As kernels/antialias.cl has them.
+std::size_t Antialias::vectors_of(std::size_t samples) const {
+  return (samples + device_.info.lanes - 1) / device_.info.lanes;
+}
 
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
   front.resize(device_, samples_of(p));
@@ -41,18 +45,16 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
 void Antialias::forward(const shared::FrameParams& p, const Buffer<cl_float4>& raster,
                         Buffer<cl_float4>& blended) {
   blended.resize(device_, samples_of(p));
-  forward_(samples_of(p), p, winner, cut, raster, blended);
+  forward_(vectors_of(samples_of(p)), p, winner, cut, raster, blended);
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
                          const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster) {
   const std::size_t samples = samples_of(in.p);
-  share_.resize(device_, 2 * samples);
   grad_cut_.resize(device_, 2 * samples);
   grad_raster.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
-  backward_(samples, in.p, winner, cut, raster, grad_blended, share_, grad_cut_);
-  backward_samples_(samples, in.p, winner, cut, share_, grad_blended, grad_raster);
+  backward_(vectors_of(samples), in.p, winner, cut, raster, grad_blended, grad_cut_, grad_raster);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
                   contour.facing, in.transform.ndc, contour.pair_contour, contour.pair_tile, winner, cut,
                   grad_cut_, grad_ends);
@@ -60,7 +62,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
 
 std::size_t Antialias::bytes() const {
   std::size_t bytes = winner.capacity_bytes() + grad_ends.capacity_bytes();
-  for (const Buffer<float>* buffer : {&front, &cut, &share_, &grad_cut_}) bytes += buffer->capacity_bytes();
+  for (const Buffer<float>* buffer : {&front, &cut, &grad_cut_}) bytes += buffer->capacity_bytes();
   return bytes;
 }
 

@@ -30,20 +30,21 @@ class Antialias {
   std::size_t bytes() const;
 
  private:
+  std::size_t vectors_of(std::size_t samples) const;
+
   Device::Impl& device_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
          In<cl_uint>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, Out<cl_uint>, Out<float>>
       cross_;
   Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<cl_float4>, Out<cl_float4>> forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
+         Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<float>, In<cl_float4>, Out<cl_float4>>
-      backward_samples_;
   Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,
          In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<cl_float4>>
       cross_backward_;
-  Buffer<float> share_, grad_cut_;  // [2][view][height][width]
+  Buffer<float> grad_cut_;  // [2][view][height][width]
 };
 
 }  // namespace dpr
