@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
@@ -129,7 +130,11 @@ LoadedCheckpoint start(const NetworkOptions& architecture, const std::string& me
 }
 
 LoadedCheckpoint load_checkpoint(const std::filesystem::path& file, double learning_rate) {
-  if (!std::filesystem::is_regular_file(file)) throw IoError(file, "does not exist");
+  require_file(file);
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {  // torch reads it back and forth
+    throw IoError(file, "is a pipe or a device, expected a regular file");
+  }
   try {
     torch::serialize::InputArchive archive;
     archive.load_from(file.string());

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -31,16 +33,16 @@ constexpr const char* k_views = R"({
 
 struct Command {
   std::vector<std::string> arguments;
-  std::string output;
+  bool makes_folder = false;  ///< which may stay, with whole files alone
 };
 
 const std::vector<Command> k_commands{
-    {{"render", "--scene", "scene.json", "-o", "out.png"}, "out.png"},
-    {{"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "out.json"}, "out.json"},
+    {{"render", "--scene", "scene.json", "-o", "out.png"}},
+    {{"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "out.json"}},
     {{"pose", "--scene", "scene.json", "--target", "target.exr", "--initial-rotation", "0,0.2,0",
-      "--iterations", "2", "--quiet", "-o", "out.json"},
-     "out.json"},
-    {{"fit", "--views", "views.json", "--iterations", "2", "--quiet", "-o", "out.obj"}, "out.obj"},
+      "--iterations", "2", "--quiet", "-o", "out.json"}},
+    {{"fit", "--views", "views.json", "--iterations", "2", "--quiet", "-o", "out.obj"}},
+    {{"demo", "--size", "16x16", "--quiet", "-o", "out"}, true},
 };
 
 struct Calls {
@@ -74,30 +76,50 @@ Outcome run_with_fault(const TempDir& folder, const TempDir& log, const Command&
   return run_program("env", folder, arguments);
 }
 
-/// The text but for how long it took.
-std::string without_times(const std::string& text) {
-  return std::regex_replace(text, std::regex("\"seconds\": [0-9.e+-]+"), "");
+/// The files of a folder, by their paths in it, but for how long things took.
+std::map<std::string, std::string> contents(const TempDir& folder) {
+  static const std::regex times("\"seconds\": [0-9.e+-]+|[0-9.]+ seconds");
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path())) {
+    if (!entry.is_regular_file()) continue;
+    const std::string name = std::filesystem::relative(entry.path(), folder.path()).string();
+    files[name] = std::regex_replace(folder.read(name), times, "");
+  }
+  return files;
 }
 
-/// Either an error and nothing else, or, where nothing depends on what failed, the result as without a fault.
-void check_fault(const TempDir& folder, const Command& command, const std::string& function, std::size_t nth,
-                 const std::string& expected) {
+/// The inputs of the commands, their target rendered.
+void write_inputs(const TempDir& folder) {
+  folder.write("scene.json", k_scene);
+  folder.write("views.json", k_views);
+  REQUIRE(run_command(folder, {"render", "--scene", "scene.json", "-o", "target.exr"}).status == 0);
+}
+
+/// Either an error and no file that is not whole or, where nothing depends on what failed, the result as
+/// without a fault.
+void check_fault(const Command& command, const std::map<std::string, std::string>& inputs,
+                 const std::map<std::string, std::string>& expected, const std::string& function,
+                 std::size_t nth) {
   CAPTURE(function);
   CAPTURE(nth);
-  const TempDir log;
-  const std::size_t entries = folder.entries();
+  const TempDir folder, log;
+  for (const auto& [name, content] : inputs) folder.write(name, content);
   const Outcome outcome = run_with_fault(folder, log, command, function, nth);
   CAPTURE(outcome.err);
   const std::vector<Calls> calls = read_log(log.read("log"));
   CHECK(std::ranges::count(calls, true, &Calls::failed) == 1);
+  const std::map<std::string, std::string> found = contents(folder);
   if (outcome.status == 0) {
-    CHECK(without_times(folder.read(command.output)) == expected);
-    std::filesystem::remove(folder / command.output);
-  } else {
-    CHECK(outcome.status == 2);
-    CHECK(is_error_line(outcome.err));
+    CHECK(found == expected);
+    return;
   }
-  CHECK(folder.entries() == entries);
+  CHECK(outcome.status == 2);
+  CHECK(is_error_line(outcome.err));
+  if (command.makes_folder) {
+    CHECK(std::ranges::includes(expected, found));
+  } else {
+    CHECK(found == inputs);
+  }
 }
 
 }  // namespace
@@ -108,20 +130,19 @@ TEST_SUITE("robustness") {
     for (const Command& command : k_commands) {
       CAPTURE(command.arguments[0]);
       const TempDir folder, log;
-      folder.write("scene.json", k_scene);
-      folder.write("views.json", k_views);
-      REQUIRE(run_command(folder, {"render", "--scene", "scene.json", "-o", "target.exr"}).status == 0);
+      write_inputs(folder);
+      const std::map<std::string, std::string> inputs = contents(folder);
       const Outcome whole = run_with_fault(folder, log, command, "", 0);
       CAPTURE(whole.err);
       REQUIRE(whole.status == 0);
-      const std::string expected = without_times(folder.read(command.output));
-      REQUIRE(std::filesystem::remove(folder / command.output));
+      const std::map<std::string, std::string> expected = contents(folder);
+      REQUIRE(expected.size() > inputs.size());
       const std::vector<Calls> calls = read_log(log.read("log"));
       REQUIRE(calls.size() > 10);
       for (const Calls& c : calls) {
         // The first and the last: what is set up, and what comes when much has been done.
         for (const std::size_t n : std::set<std::size_t>{1, c.count})
-          check_fault(folder, command, c.function, n, expected);
+          check_fault(command, inputs, expected, c.function, n);
       }
     }
   }

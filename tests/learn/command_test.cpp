@@ -1,7 +1,11 @@
 // dpr learn as a user runs it.
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "support/command.hpp"
 #include "support/messages.hpp"
@@ -49,6 +53,16 @@ TEST_SUITE("robustness") {
     check_refused(learn(folder, {"eval", "--checkpoint", "run/checkpoint.pt", "--data", "data"}),
                   "02691156_test_images.npz");
     check_refused(with_data({"eval", "--checkpoint", "none.pt"}), "none.pt");
+    const std::vector<std::pair<std::string, std::string>> irregular{
+        {"data", "folder"}, {"/dev/zero", "regular file"}, {"pipe.pt", "regular file"}};
+    REQUIRE(mkfifo((folder / "pipe.pt").c_str(), 0600) == 0);
+    for (const auto& [file, part] : irregular) {
+      check_refused(with_data({"eval", "--checkpoint", file}), part);
+      check_refused(with_data({"show", "--checkpoint", file, "-o", "f.png"}), part);
+    }
+    REQUIRE(std::filesystem::create_directory(folder / "piped"));
+    std::filesystem::rename(folder / "pipe.pt", folder / "piped" / "checkpoint.pt");
+    check_refused(with_data({"train", "-o", "piped", "--steps", "1", "--batch", "2"}), "regular file");
     check_refused(with_data({"eval", "--checkpoint", "run/checkpoint.pt", "-o", "/proc/iou.json"}),
                   "cannot be written");
     check_refused(with_data({"train", "-o", "unwanted", "--method", "hard"}), "hard");
