@@ -55,7 +55,7 @@ struct LeastSquares {
   /// on the way.
   bool robust = false;
   /// Of that: a colour difference; 0: four standard deviations of what the best hypotheses leave, from the
-  /// median of its size, but between 0.1 and 0.2, anew at every level.
+  /// median of its size, but between 0.1 and 0.12, anew at every level.
   float robust_scale = 0;
   /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
   /// not explain the target.
