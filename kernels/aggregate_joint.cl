@@ -200,6 +200,17 @@ kernel void aggregate_joint_backward(
     return;
   }
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  if (starts[pixel] + 1 == starts[pixel + 1]) {  // most pixels of a sharp image: no cluster to look for
+    const uint k = list[starts[pixel]];
+    const float weight = occupancy[k], jump = dot(grad.xyz, fragment_color(f, k) - p.background.xyz);
+    grad_depth[k] = 0.0f;
+    grad_log_occupancy[k] = weight * (jump + grad.w);
+    grad_red[k] = weight * grad.x;
+    grad_green[k] = weight * grad.y;
+    grad_blue[k] = weight * grad.z;
+    write_channels(p, pixel, 0.0f, 0.0f, fragment_transparency(f, k), grad, channels);
+    return;
+  }
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
   const uint seen = slot_counts[pixel];
