@@ -15,14 +15,17 @@ struct DeviceInfo {
   unsigned compute_units = 0;
   std::size_t memory_bytes = 0;
   std::size_t max_allocation_bytes = 0;
-  unsigned lanes = 1;          ///< width of the vectors the kernels are built with
-  bool is_default = false;     ///< what open_device("") takes
-  std::string default_reason;  ///< why it is the default; empty for the others
+  unsigned lanes = 1;               ///< width of the vectors the kernels are built with
+  bool shares_host_memory = false;  ///< as CPUs and integrated GPUs do
+  bool is_default = false;          ///< what open_device("") takes, if it can be used
+  std::string default_reason;       ///< why it is the default; empty for the others
+  /// Of an opened default: what was preferred to it and could not be used, a sentence each with the reason.
+  std::vector<std::string> passed_over;
 };
 
-/// Every OpenCL device of every platform, in the order of the ICD loader; empty where there is none. Devices that
-/// do not say what they are, and those of platforms that do not answer, are left out. Throws DeviceError if for
-/// that reason no device is left.
+/// Every OpenCL device of every platform, in the order of the ICD loader; empty where there is none. Devices
+/// that do not say what they are, and those of platforms that do not answer, are left out. Throws DeviceError
+/// if for that reason no device is left.
 std::vector<DeviceInfo> list_devices();
 
 /// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them,
@@ -55,11 +58,13 @@ class Device {
   std::shared_ptr<Impl> impl_;
 };
 
-/// Opens a device: "" takes the environment variable DPR_DEVICE, or else the default: the first CPU, or else
-/// the first device; "cpu" and "gpu" the first of that type; a number the index in list_devices(); anything
-/// else the first whose platform or name contains it, ignoring case. Results are bitwise the same on one
-/// device only: others round differently. Throws InvalidArgument if none matches, DeviceError if none
-/// exists.
+/// Opens a device: "" takes the environment variable DPR_DEVICE, or else the best that can be used: a GPU,
+/// one with memory of its own before others, or else an accelerator, or else a CPU; "cpu" and "gpu" take the
+/// first of that type; a number the index in list_devices(); anything else the first whose platform, name or
+/// version contains it, ignoring case. Of several devices the best are tried with a small kernel first: one
+/// that cannot be used is passed over, and the DeviceInfo of the device opened says so. Results are bitwise
+/// the same on one device only: others round differently. Throws InvalidArgument if none matches, DeviceError
+/// if none exists.
 Device open_device(const std::string& selector = "");
 
 }  // namespace dpr

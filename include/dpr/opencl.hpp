@@ -1,25 +1,22 @@
-// For embedding: the only header with OpenCL types. Needs the OpenCL C++ bindings (CL/opencl.hpp).
+// For embedding with the OpenCL C++ bindings, of any version and with any CL_HPP_ setting of the caller's.
 #pragma once
 
 #include <CL/opencl.hpp>
-#include <cstddef>
 
-#include "dpr/device.hpp"
-#include "dpr/renderer.hpp"
+#include "dpr/opencl_handles.hpp"
 
 namespace dpr {
 
-/// Uses the caller's context and in-order queue instead of making its own. The objects are retained. Throws
-/// InvalidArgument for an out-of-order queue and for a queue of another context.
-Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue);
+/// adopt_device(), image_handle() and backward() of dpr/opencl_handles.hpp with the bindings' types.
+inline Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
+  return adopt_device(context(), queue());
+}
 
-/// The rendered images, float4 RGBA [view][height][width], as forward() leaves them on the device. Valid
-/// until the next forward() that needs a larger buffer. Work enqueued on the device's queue after forward()
-/// sees the finished image.
-cl::Buffer image_buffer(const Renderer& renderer);
+/// Retained: outlives the renderer's own use of it.
+inline cl::Buffer image_buffer(const Renderer& renderer) { return cl::Buffer(image_handle(renderer), true); }
 
-/// Runs the backward pass from a buffer of d loss / d image, float4 RGBA [view][height][width], on the
-/// device's context. Throws InvalidArgument for a buffer of another context.
-SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images);
+inline SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
+  return backward(renderer, grad_images());
+}
 
 }  // namespace dpr

@@ -75,7 +75,8 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
 
 void add_device_options(CLI::App& command, CommonOptions& options) {
   command
-      .add_option("--device", options.device, "Which OpenCL device (default: DPR_DEVICE, else the first CPU)")
+      .add_option("--device", options.device,
+                  "Which OpenCL device (default: DPR_DEVICE, else a GPU, else an accelerator, else a CPU)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
   command
       .add_option("--memory-budget", options.memory_budget,
@@ -97,6 +98,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
 Device open_device(const CommonOptions& options) {
   constexpr std::size_t k_mebibyte = 1024 * 1024;
   Device device = dpr::open_device(options.device);
+  print_notes(device.info().passed_over, options);
   if (options.memory_budget) device.set_memory_budget(*options.memory_budget * k_mebibyte);
   if (options.verbose) {
     const DeviceInfo& info = device.info();

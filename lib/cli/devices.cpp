@@ -20,6 +20,7 @@ Json to_json(const DeviceInfo& info) {
           {"compute_units", info.compute_units},
           {"memory_bytes", info.memory_bytes},
           {"max_allocation_bytes", info.max_allocation_bytes},
+          {"shares_host_memory", info.shares_host_memory},
           {"lanes", info.lanes},
           {"default", info.is_default},
           {"default_reason", info.default_reason}};

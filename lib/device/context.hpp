@@ -9,8 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include <CL/opencl.hpp>
-
+#include "device/opencl_bindings.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
 
@@ -63,7 +62,7 @@ struct Device::Impl {
 /// Describes a device of a platform; index, default and lanes are filled in by list_devices().
 DeviceInfo describe(const cl::Platform& platform, const cl::Device& device);
 
-/// A Device around the caller's own objects, see dpr/opencl.hpp.
+/// A Device around the caller's own objects, see dpr/opencl_handles.hpp.
 Device make_device(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& queue);
 
 }  // namespace dpr

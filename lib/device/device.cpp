@@ -2,14 +2,16 @@
 #include "dpr/device.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
+#include <array>
 #include <cstdlib>
 #include <optional>
+#include <span>
 
+#include "device/choose_device.hpp"
 #include "device/context.hpp"
 #include "device/info.hpp"
-#include "dpr/opencl.hpp"
+#include "device/kernel.hpp"
+#include "dpr/opencl_handles.hpp"
 
 namespace dpr {
 namespace {
@@ -27,11 +29,6 @@ struct FoundDevices {
 template <auto property>
 auto device_info(const cl::Device& device) {
   return cl_info<property>(device, "clGetDeviceInfo");
-}
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
 }
 
 std::string type_name(cl_device_type type) {
@@ -58,12 +55,16 @@ std::vector<cl::Device> devices_of(const cl::Platform& platform) {
   return devices;
 }
 
+std::vector<DeviceInfo> infos_of(const std::vector<FoundDevice>& found) {
+  std::vector<DeviceInfo> infos;
+  for (const FoundDevice& entry : found) infos.push_back(entry.info);
+  return infos;
+}
+
 void mark_default(std::vector<FoundDevice>& found) {
-  const auto cpu = std::ranges::find(found, "cpu", [](const FoundDevice& entry) { return entry.info.type; });
-  FoundDevice& preferred = cpu != found.end() ? *cpu : found.front();
-  preferred.info.is_default = true;
-  preferred.info.default_reason = cpu != found.end() ? "the first CPU: every machine has one"
-                                                     : "the first device: there is no CPU";
+  DeviceInfo& best = found[by_preference(infos_of(found)).front()].info;
+  best.is_default = true;
+  best.default_reason = reason_of_preference(best);
 }
 
 /// A platform or device that does not answer is passed over: the others can be used.
@@ -95,20 +96,6 @@ FoundDevices find_devices() {
   return found;
 }
 
-std::optional<std::size_t> parse_index(const std::string& text) {
-  std::size_t index = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return index;
-}
-
-bool matches(const DeviceInfo& info, const std::string& selector) {
-  if (selector.empty()) return info.is_default;
-  if (selector == "cpu" || selector == "gpu") return info.type == selector;
-  if (const auto index = parse_index(selector)) return info.index == *index;
-  return lower(info.platform + " " + info.name).find(lower(selector)) != std::string::npos;
-}
-
 std::string names(const std::vector<FoundDevice>& found) {
   std::string list;
   for (const FoundDevice& entry : found) {
@@ -131,6 +118,7 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
   info.compute_units = device_info<CL_DEVICE_MAX_COMPUTE_UNITS>(device);
   info.memory_bytes = device_info<CL_DEVICE_GLOBAL_MEM_SIZE>(device);
   info.max_allocation_bytes = device_info<CL_DEVICE_MAX_MEM_ALLOC_SIZE>(device);
+  info.shares_host_memory = device_info<CL_DEVICE_HOST_UNIFIED_MEMORY>(device) != CL_FALSE;
   info.lanes = choose_lanes(info, device);
   return info;
 }
@@ -138,9 +126,7 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
 std::vector<DeviceInfo> list_devices() {
   FoundDevices found = find_devices();
   if (found.devices.empty() && found.failure) throw DeviceError(*found.failure);
-  std::vector<DeviceInfo> infos;
-  for (FoundDevice& entry : found.devices) infos.push_back(std::move(entry.info));
-  return infos;
+  return infos_of(found.devices);
 }
 
 Device make_device(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& queue) {
@@ -153,30 +139,58 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   return Device(std::move(impl));
 }
 
+namespace {
+
+Device open_found(const FoundDevice& found) {
+  int error = CL_SUCCESS;
+  const cl::Context context(found.device, nullptr, nullptr, nullptr, &error);
+  check_cl(error, "clCreateContext");
+  const cl::CommandQueue queue(context, found.device, cl_command_queue_properties{0}, &error);
+  check_cl(error, "clCreateCommandQueue");
+  Device device = make_device(found.device, context, queue);
+  device.impl().info = found.info;
+  return device;
+}
+
+/// Builds and runs a small kernel. Throws DeviceError or BuildError where that fails, or gives what is wrong.
+void try_out(const Device& device) {
+  constexpr std::array<cl_uint, 4> k_values{1, 20, 300, 4000};
+  Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum(device.impl(), "scan.cl", "scan_sum");
+  const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values));
+  Buffer<cl_uint> sums(device.impl(), 1);
+  sum(1, static_cast<cl_uint>(k_values.size()), values, sums);
+  if (sums.download()[0] != 4321)
+    throw DeviceError(CL_INVALID_KERNEL, "a first kernel, which gives a wrong sum");
+}
+
+}  // namespace
+
 Device open_device(const std::string& selector) {
   const char* environment = std::getenv("DPR_DEVICE");
   const std::string wanted = selector.empty() && environment != nullptr ? environment : selector;
   const auto [found, failure] = find_devices();
+  if (wanted.empty() && !found.empty()) {
+    Device device = open_best(infos_of(found), [&](std::size_t position, bool is_tried) {
+      Device candidate = open_found(found[position]);
+      if (is_tried) try_out(candidate);
+      return candidate;
+    });
+    if (failure)
+      device.impl().info.passed_over.push_back(std::string("a device does not answer: ") + failure->what());
+    return device;
+  }
   const auto chosen =
       std::ranges::find_if(found, [&](const FoundDevice& entry) { return matches(entry.info, wanted); });
-  // What does not answer may be what is asked for; and no GPU takes the place of a default CPU in silence.
-  const bool is_certain = chosen != found.end() && (!wanted.empty() || chosen->info.type == "cpu");
-  if (failure && !is_certain) throw DeviceError(*failure);
+  if (chosen != found.end()) return open_found(*chosen);
+  if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
   if (found.empty())
     throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
-  if (chosen == found.end()) throw InvalidArgument("device", "'" + wanted + "'", "one of " + names(found));
-
-  int error = CL_SUCCESS;
-  const cl::Context context(chosen->device, nullptr, nullptr, nullptr, &error);
-  check_cl(error, "clCreateContext");
-  const cl::CommandQueue queue(context, chosen->device, cl_command_queue_properties{0}, &error);
-  check_cl(error, "clCreateCommandQueue");
-  Device device = make_device(chosen->device, context, queue);
-  device.impl().info = chosen->info;
-  return device;
+  throw InvalidArgument("device", "'" + wanted + "'", "one of " + names(found));
 }
 
-Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
+Device adopt_device(cl_context context_handle, cl_command_queue queue_handle) {
+  const cl::Context context(context_handle, true);
+  const cl::CommandQueue queue(queue_handle, true);
   const auto device = cl_info<CL_QUEUE_DEVICE>(queue, "clGetCommandQueueInfo");
   if (cl_info<CL_QUEUE_CONTEXT>(queue, "clGetCommandQueueInfo")() != context()) {
     throw InvalidArgument("queue (adopt_device)", "a queue of another context", "one of the context");

@@ -3,7 +3,7 @@
 
 #include "base/checks.hpp"
 #include "device/info.hpp"
-#include "dpr/opencl.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "renderer/finite.hpp"
@@ -188,12 +188,13 @@ RenderStatistics Renderer::statistics() const {
   return s;
 }
 
-cl::Buffer image_buffer(const Renderer& renderer) {
-  renderer.impl().require_forward("image_buffer");
-  return renderer.impl().image().cl_buffer();
+cl_mem image_handle(const Renderer& renderer) {
+  renderer.impl().require_forward("image_handle");
+  return renderer.impl().image().cl_buffer()();
 }
 
-SceneGradient backward(Renderer& renderer, const cl::Buffer& grad_images) {
+SceneGradient backward(Renderer& renderer, cl_mem grad_handle) {
+  const cl::Buffer grad_images(grad_handle, true);
   Renderer::Impl& m = renderer.impl();
   m.require_forward("backward");
   const std::size_t count = m.image().size();

@@ -2,13 +2,13 @@
 // target.
 #pragma once
 
-#include <CL/opencl.hpp>
 #include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "device/opencl_bindings.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/pose_light.hpp"

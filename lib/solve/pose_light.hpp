@@ -2,7 +2,6 @@
 // in closed form.
 #pragma once
 
-#include <CL/opencl.hpp>
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
@@ -10,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "device/opencl_bindings.hpp"
 #include "dpr/mesh.hpp"
 
 namespace dpr {

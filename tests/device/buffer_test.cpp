@@ -8,7 +8,8 @@
 using dpr::test::device_impl;
 
 TEST_SUITE("unit") {
-  TEST_CASE("buffer: a vector of the widest lanes fits behind the last element, whatever the buffer held before") {
+  TEST_CASE(
+      "buffer: a vector of the widest lanes fits behind the last element, whatever the buffer held before") {
     constexpr std::size_t k_widest = 16;
     for (std::size_t first = 1; first < 100; first += 7) {
       dpr::Buffer<float> buffer(device_impl(), first);

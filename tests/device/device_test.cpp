@@ -9,7 +9,7 @@
 
 #include "device/context.hpp"
 #include "dpr/dpr.hpp"
-#include "dpr/opencl.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
@@ -157,7 +157,7 @@ TEST_SUITE("pipeline") {
     own.forward();
 
     const Caller caller;
-    Renderer adopted(adopt_device(caller.context, caller.queue));
+    Renderer adopted(adopt_device(caller.context(), caller.queue()));
     CHECK(adopted.device().info().name == own.device().info().name);
     CHECK(adopted.device().info().lanes == own.device().info().lanes);
     adopted.set_scene(scene);
@@ -174,9 +174,9 @@ TEST_SUITE("pipeline") {
                                      cl_command_queue_properties{CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE},
                                      &error);
     if (error == CL_SUCCESS) {
-      DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context, unordered), "out-of-order");
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context(), unordered()), "out-of-order");
     }
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context, other.queue), "another context");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, adopt_device(caller.context(), other.queue()), "another context");
   }
 
   TEST_CASE("device: losses serve the renderers of their own device") {
@@ -200,7 +200,7 @@ TEST_SUITE("pipeline") {
     std::optional<Device> device;
     {
       const Caller caller;
-      device = adopt_device(caller.context, caller.queue);
+      device = adopt_device(caller.context(), caller.queue());
     }
     Renderer renderer(*device);
     renderer.set_scene(small_scene());
@@ -212,9 +212,9 @@ TEST_SUITE("pipeline") {
   TEST_CASE("device: the image is read, and the gradient given, in buffers of the caller") {
     const Scene scene = small_scene();
     const Caller caller;
-    Renderer renderer(adopt_device(caller.context, caller.queue));
+    Renderer renderer(adopt_device(caller.context(), caller.queue()));
     renderer.set_scene(scene);
-    CHECK_THROWS_AS(image_buffer(renderer), InvalidArgument);
+    CHECK_THROWS_AS(image_handle(renderer), InvalidArgument);
     std::vector<View> views(2, renderer.views()[0]);
     views[1].camera.fov_y_degrees *= 1.1F;
     renderer.set_views(views);
@@ -223,8 +223,8 @@ TEST_SUITE("pipeline") {
     const std::size_t pixels = static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
     std::vector<glm::vec4> read(2 * pixels, glm::vec4(-1));
     const std::size_t bytes = read.size() * sizeof(glm::vec4);
-    REQUIRE(caller.queue.enqueueReadBuffer(image_buffer(renderer), CL_TRUE, 0, bytes, read.data()) ==
-            CL_SUCCESS);
+    REQUIRE(caller.queue.enqueueReadBuffer(cl::Buffer(image_handle(renderer), true), CL_TRUE, 0, bytes,
+                                           read.data()) == CL_SUCCESS);
     CHECK(std::vector<glm::vec4>(read.begin(), read.begin() + static_cast<std::ptrdiff_t>(pixels)) ==
           renderer.image(0).pixels);
     CHECK(std::vector<glm::vec4>(read.begin() + static_cast<std::ptrdiff_t>(pixels), read.end()) ==
@@ -236,24 +236,23 @@ TEST_SUITE("pipeline") {
     joined.insert(joined.end(), grads[1].pixels.begin(), grads[1].pixels.end());
     const cl::Buffer buffer(caller.context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, bytes, joined.data());
     const std::vector<double> from_host = flat_values(renderer.backward(grads));
-    CHECK(flat_values(backward(renderer, buffer)) == from_host);
+    CHECK(flat_values(backward(renderer, buffer())) == from_host);
     // The order of the views matters: the comparison sees it.
     const std::vector<Image> swapped{grads[1], grads[0]};
     CHECK(flat_values(renderer.backward(swapped)) != from_host);
 
     const cl::Buffer short_buffer(caller.context, CL_MEM_READ_ONLY, bytes - sizeof(glm::vec4));
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, short_buffer), "grad_images");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, short_buffer()), "grad_images");
     const Caller stranger;
     const cl::Buffer foreign(stranger.context, CL_MEM_READ_ONLY, bytes);
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, foreign), "another context");
-    CHECK(flat_values(backward(renderer, buffer)) == from_host);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward(renderer, foreign()), "another context");
+    CHECK(flat_values(backward(renderer, buffer())) == from_host);
   }
 }
 
 TEST_SUITE("robustness") {
   TEST_CASE("an object that does not say what it is, is an error") {
-    DPR_CHECK_MESSAGE_HAS(DeviceError, adopt_device(cl::Context(), cl::CommandQueue()),
-                          "clGetCommandQueueInfo");
+    DPR_CHECK_MESSAGE_HAS(DeviceError, adopt_device(nullptr, nullptr), "clGetCommandQueueInfo");
     DPR_CHECK_MESSAGE_HAS(DeviceError, describe(cl::Platform::getDefault(), cl::Device()), "clGetDeviceInfo");
   }
 }

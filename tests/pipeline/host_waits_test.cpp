@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "dpr/dpr.hpp"
-#include "dpr/opencl.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
@@ -125,7 +125,7 @@ TEST_SUITE("pipeline") {
     Renderer embedded = grown();
     Image image(scene.width, scene.height);
     const std::size_t bytes = image.pixels.size() * sizeof(glm::vec4);
-    const cl::Buffer buffer = image_buffer(embedded);
+    const cl::Buffer buffer(image_handle(embedded), true);
     REQUIRE(device.impl().queue.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, image.pixels.data()) ==
             CL_SUCCESS);
     CHECK(same_bits(image, fresh.image()));

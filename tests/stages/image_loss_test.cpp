@@ -8,7 +8,7 @@
 #include "device/context.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image_loss.hpp"
-#include "dpr/opencl.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "dpr/renderer.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "reference/loss.hpp"
@@ -99,7 +99,7 @@ TEST_SUITE("robustness") {
     const std::vector<dpr::Image> empty(k_views, dpr::Image(width, height, glm::vec4(0)));
     dpr::ImageLoss loss(renderer.device(), {.silhouette = 1}, empty);
     const dpr::Device::Impl& device = renderer.device().impl();
-    const cl::Buffer image = dpr::image_buffer(renderer);
+    const dpr::cl::Buffer image(dpr::image_handle(renderer), true);
     for (const float alpha : {0.0F, 1e-40F, 1e-25F, 1e-12F}) {
       CAPTURE(alpha);
       const std::vector<cl_float4> pixels(k_views * empty[0].pixels.size(), {{0, 0, 0, alpha}});

@@ -1,0 +1,83 @@
+#include "device/choose_device.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <numeric>
+#include <optional>
+
+#include "device/context.hpp"
+
+namespace dpr {
+namespace {
+
+int rank(const DeviceInfo& info) {
+  if (info.type == "gpu") return info.shares_host_memory ? 1 : 0;
+  return info.type == "accelerator" ? 2 : 3;
+}
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+std::optional<std::size_t> parse_index(const std::string& text) {
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return index;
+}
+
+}  // namespace
+
+std::vector<std::size_t> by_preference(std::span<const DeviceInfo> devices) {
+  std::vector<std::size_t> order(devices.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return rank(devices[i]); });
+  return order;
+}
+
+std::string reason_of_preference(const DeviceInfo& info) {
+  switch (rank(info)) {
+    case 0:
+      return "the first GPU with memory of its own";
+    case 1:
+      return "the first GPU";
+    case 2:
+      return "the first accelerator: there is no GPU";
+    default:
+      return "the first CPU: there is no GPU or accelerator";
+  }
+}
+
+bool matches(const DeviceInfo& info, const std::string& selector) {
+  if (selector.empty()) return info.is_default;
+  if (selector == "cpu" || selector == "gpu") return info.type == selector;
+  if (const auto index = parse_index(selector)) return info.index == *index;
+  return lower(info.platform + " " + info.name + " " + info.version).find(lower(selector)) !=
+         std::string::npos;
+}
+
+Device open_best(std::span<const DeviceInfo> devices, const std::function<Device(std::size_t, bool)>& open) {
+  std::vector<std::string> passed_over;
+  const std::vector<std::size_t> order = by_preference(devices);
+  for (const std::size_t position : std::span(order).first(order.size() - 1)) {
+    const auto pass_over = [&](const Error& error) {
+      passed_over.push_back(devices[position].name + " is not used: " + error.what());
+    };
+    try {
+      Device device = open(position, true);
+      device.impl().info.passed_over = std::move(passed_over);
+      return device;
+    } catch (const DeviceError& error) {
+      pass_over(error);
+    } catch (const BuildError& error) {
+      pass_over(error);
+    }
+  }
+  Device device = open(order.back(), false);
+  device.impl().info.passed_over = std::move(passed_over);
+  return device;
+}
+
+}  // namespace dpr

@@ -1,0 +1,34 @@
+// Which device is taken: by the caller's word, or the best that can be used.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dpr/device.hpp"
+
+namespace dpr {
+
+/// Positions in `devices`, the best first: GPUs with memory of their own, other GPUs, accelerators, CPUs;
+/// among equals in their order.
+std::vector<std::size_t> by_preference(std::span<const DeviceInfo> devices);
+
+/// Why a device is preferred, e.g. "the first GPU with memory of its own".
+std::string reason_of_preference(const DeviceInfo& info);
+
+/// Whether a selector names the device: "cpu" and "gpu" its type, a number its index, anything else a part of
+/// its platform, name or version, ignoring case. Empty: whether it is the default.
+bool matches(const DeviceInfo& info, const std::string& selector);
+
+/// Opens the best device that can be used. Those that cannot, because `open` throws a DeviceError or a
+/// BuildError, are named with the reason in the `passed_over` of the one that is opened. What the last one
+/// throws is thrown.
+/// @param devices  at least one
+/// @param open     opens and tries the device at a position; the last one, after which there is no other, is
+/// not tried
+Device open_best(std::span<const DeviceInfo> devices,
+                 const std::function<Device(std::size_t, bool is_tried)>& open);
+
+}  // namespace dpr
