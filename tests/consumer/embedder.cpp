@@ -1,7 +1,7 @@
 // A program with OpenCL objects of its own, which uses the C++ bindings of OpenCL 3 with exceptions: the
 // library's own use of them is another one, and stays what it is.
 #define CL_HPP_TARGET_OPENCL_VERSION 300
-#define CL_HPP_MINIMUM_OPENCL_VERSION 120
+#define CL_HPP_MINIMUM_OPENCL_VERSION 200
 #define CL_HPP_ENABLE_EXCEPTIONS
 #include <dpr/dpr.hpp>
 #include <dpr/opencl.hpp>
