@@ -60,9 +60,9 @@ static inline float4 mixed_cell(const Cell c, float4 own, global const float4* r
 
 /// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it. One work-item
 /// per vector of samples. Deterministic.
-/// in   winner, cut       [2][pixel]
-/// in   raster            float4[pixel]
-/// out  blended           float4[pixel]
+/// in   winner, cut  as antialias_cross leaves them
+/// in   raster       float4[pixel]  the samples
+/// out  blended      float4[pixel]
 kernel void antialias_forward(const FrameParams p, global const uint* restrict winner,
                               global const float* restrict cut, global const float4* restrict raster,
                               global float4* restrict blended) {
@@ -78,6 +78,7 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict w
 
 /// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its neighbours'.
 /// One work-item per vector of samples; each step cuts one cell, so no two write the same place. Deterministic.
+/// Inputs as antialias_forward, and
 /// in   grad_blended   float4[pixel]
 /// out  grad_cut       float[2][pixel]  not written where nothing crosses
 /// out  grad_raster    float4[pixel]

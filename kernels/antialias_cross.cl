@@ -21,7 +21,8 @@
 /// Depths across a crease follow its faces up to this part of their change within a step.
 #define DPR_CREASE_SLACK 0.5f
 
-/// The depth of the front-most fragment of every sample, INFINITY where there is none. One work-item per pixel.
+/// The depth of the front-most fragment of every sample, INFINITY where there is none. One work-item per pixel, up to
+/// `last_pixel`. Deterministic.
 /// in   starts  uint[pixel + 1]  runs of `list`
 /// in   list    uint[...]        fragments, by pixel
 /// in   depth   float[fragment]  view depth
@@ -204,7 +205,9 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a, global
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps that it won.
 /// One work-item per pair. Deterministic.
-/// in   pairs, pair_contour, pair_tile  as in the forward pass
+/// in   edges, facing, ndc, winner, cut  as antialias_cross
+/// in   pair_contour   uint[pair]       of so many `pairs`
+/// in   pair_tile      uint[pair]       view * tiles + tile
 /// in   grad_cut       float[2][pixel]
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
 kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams a, const uint pairs,

@@ -1,7 +1,7 @@
 // (tile, triangle) pairs: counted, then listed in face order, sorted by tile (sort.cl), then linked. Pairs are numbered
 // by tile, so that what belongs to a tile lies together; faces list theirs, so that gradients are gathered in order.
-// The host launches for as many pairs as it has made room for; how many there are, the device alone need know. Where
-// they do not fit there are none, and the host, which learns it later, starts over.
+// The host launches for the capacity of the buffers; only the device knows how many pairs there are. Pairs that exceed
+// the capacity are all left out, and the host, which reads the count later, starts over.
 #include "shared_types.h"
 
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it can besides,
@@ -36,6 +36,7 @@ static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, 
 }
 
 /// Counts the pairs of every triangle. One work-item per (view, face).
+/// in   triangles  Triangle[view][face]
 /// out  counts  uint[view][face]
 kernel void bin_count(const FrameParams p, global const Triangle* restrict triangles, global uint* restrict counts) {
   const uint i = (uint)get_global_id(0);
@@ -51,21 +52,22 @@ kernel void bin_count(const FrameParams p, global const Triangle* restrict trian
 }
 
 /// Lists the tiles of every triangle, each at a place of its own. One work-item per (view, face).
-/// in   room        places that there are
+/// in   triangles   Triangle[view][face]
+/// in   capacity    places that there are
 /// in   offsets     uint[view * face + 1]  exclusive scan of the counts
 /// out  pairs       uint[1]               how many there are; 0 where they do not fit
 /// out  place_face  uint[place]           view * faces + face
 /// out  place_tile  uint[place]           view * tiles + tile
 /// out  places      uint[place]           the place itself: what sorting permutes
-kernel void bin_fill(const FrameParams p, const uint room, global const Triangle* restrict triangles,
+kernel void bin_fill(const FrameParams p, const uint capacity, global const Triangle* restrict triangles,
                      global const uint* restrict offsets, global uint* restrict pairs,
                      global uint* restrict place_face, global uint* restrict place_tile,
                      global uint* restrict places) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint total = offsets[p.views * p.faces];
-  if (i == 0) pairs[0] = total > room ? 0 : total;
-  if (total > room) return;
+  if (i == 0) pairs[0] = total > capacity ? 0 : total;
+  if (total > capacity) return;
   if (offsets[i] == offsets[i + 1]) return;
   const Triangle t = triangles[i];
   const uint first_tile = i / p.faces * p.tiles_x * p.tiles_y;
@@ -81,18 +83,18 @@ kernel void bin_fill(const FrameParams p, const uint room, global const Triangle
   }
 }
 
-/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item for every pair there is room
-/// for.
+/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item for every pair within the
+/// capacity.
 /// in   pairs       uint[1]
 /// in   places      uint[pair]   where the pair's face lists it
 /// in   place_face  uint[place]
-/// out  pair_face   uint[room]   view * faces + face; 0 where there is no pair
+/// out  pair_face   uint[capacity]  view * faces + face; 0 where there is no pair
 /// out  face_pairs  uint[place]  the pairs of every face, by tile
-kernel void bin_link(const uint room, global const uint* restrict pairs, global const uint* restrict places,
+kernel void bin_link(const uint capacity, global const uint* restrict pairs, global const uint* restrict places,
                      global const uint* restrict place_face, global uint* restrict pair_face,
                      global uint* restrict face_pairs) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= room) return;
+  if (pair >= capacity) return;
   if (pair >= pairs[0]) {
     pair_face[pair] = 0;
     return;

@@ -224,7 +224,7 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
   products[i / items * stride + first + i % items] = product;
 }
 
-/// The same along rows, of which each image has `rows`.
+/// The same along rows, of which each image has `rows`: as blur_columns_scale, with the NDRange of blur_rows.
 kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint first, const uint rows,
                             global const float* restrict weights, global const float4* restrict in,
                             global const float4* restrict grad, global float* restrict products) {

@@ -15,6 +15,7 @@
 #define DPR_LEAST_CREASE 1e-4f
 
 /// How faces look. Dropped is what setup drops for its depth or its area. One work-item per (view, face).
+/// in   views   ViewParams[view]
 /// in   faces   uint4[face]            vertex indices
 /// in   ndc     float4[view][vertex]
 /// out  facing  uint[view][face]
@@ -191,8 +192,9 @@ static inline int has_corner(const FrameParams p, uint first_edge, uint vertex, 
   return 1;
 }
 
-/// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as above.
-/// in   room        places that there are
+/// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as
+/// contour_count, and
+/// in   capacity    places that there are
 /// in   end_starts  uint[vertex + 1]       runs of `ends`
 /// in   ends        uint[...]              edge * 2 + end, by vertex
 /// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
@@ -200,7 +202,7 @@ static inline int has_corner(const FrameParams p, uint first_edge, uint vertex, 
 /// out  place_contour  uint[place]  see DPR_CONTOUR_FLAGS
 /// out  place_tile     uint[place]  view * tiles + tile
 /// out  places         uint[place]  the place itself: what sorting permutes
-kernel void contour_fill(const FrameParams p, const ContourParams c, const uint room,
+kernel void contour_fill(const FrameParams p, const ContourParams c, const uint capacity,
                          global const uint4* restrict edges, global const uint* restrict end_starts,
                          global const uint* restrict ends, global const uint* restrict facing,
                          global const float4* restrict ndc, global const float4* restrict world,
@@ -211,8 +213,8 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * c.edges) return;
   const uint total = offsets[p.views * c.edges];
-  if (i == 0) pairs[0] = total > room ? 0 : total;
-  if (total > room || offsets[i] == offsets[i + 1]) return;
+  if (i == 0) pairs[0] = total > capacity ? 0 : total;
+  if (total > capacity || offsets[i] == offsets[i + 1]) return;
   const uint view = i / c.edges;
   const uint4 edge = edges[i - view * c.edges];
   const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
@@ -235,18 +237,18 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   }
 }
 
-/// Links pairs, numbered by tile, and the places where edges list theirs. One work-item for every pair there is room
-/// for.
+/// Links pairs, numbered by tile, and the places where edges list theirs. One work-item for every pair within the
+/// capacity.
 /// in   pairs          uint[1]
 /// in   places         uint[pair]   where the pair's edge lists it
 /// in   place_contour  uint[place]
 /// out  pair_contour   uint[pair]
 /// out  edge_pairs     uint[place]  the pairs of every edge
-kernel void contour_link(const uint room, global const uint* restrict pairs, global const uint* restrict places,
+kernel void contour_link(const uint capacity, global const uint* restrict pairs, global const uint* restrict places,
                          global const uint* restrict place_contour, global uint* restrict pair_contour,
                          global uint* restrict edge_pairs) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= room || pair >= pairs[0]) return;
+  if (pair >= capacity || pair >= pairs[0]) return;
   pair_contour[pair] = place_contour[places[pair]];
   edge_pairs[places[pair]] = pair;
 }

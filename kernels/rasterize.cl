@@ -42,16 +42,19 @@ static uint owned_of(uint bits, const FrameParams p, const Triangle t, uint firs
 }
 
 /// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur distance.
-/// One work-item for every pair there is room for; where there is no pair, nothing is covered.
+/// One work-item for every pair within the capacity; where there is no pair, nothing is covered.
 /// in   pairs   uint[1]      how many there are
-/// out  masks   uint2[room]  bit 8 * row + column
-/// out  counts  uint[room]   covered pixels
-kernel void rasterize_cover(const FrameParams p, const uint room, global const uint* restrict pairs,
+/// in   triangles  Triangle[view][face]
+/// in   pair_face  uint[pair]  view * faces + face
+/// in   pair_tile  uint[pair]  view * tiles + tile
+/// out  masks   uint2[capacity]  bit 8 * row + column
+/// out  counts  uint[capacity]   covered pixels
+kernel void rasterize_cover(const FrameParams p, const uint capacity, global const uint* restrict pairs,
                             global const Triangle* restrict triangles, global const uint* restrict pair_face,
                             global const uint* restrict pair_tile, global uint2* restrict masks,
                             global uint* restrict counts) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= room) return;
+  if (pair >= capacity) return;
   if (pair >= pairs[0]) {
     masks[pair] = 0;
     counts[pair] = 0;
@@ -85,6 +88,7 @@ kernel void rasterize_cover(const FrameParams p, const uint room, global const u
 
 /// Counts the fragments of every pixel. One work-item per vector of pixels of a tile's row.
 /// in   tile_starts  uint[view * tile + 1]  runs of pairs
+/// in   masks        as rasterize_cover leaves them
 /// out  counts       uint[view][height][width]
 kernel void rasterize_count(const FrameParams p, global const uint* restrict tile_starts,
                             global const uint2* restrict masks, global uint* restrict counts) {
@@ -110,6 +114,7 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
 
 /// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
 /// more.
+/// in   tile_starts      uint[view * tile + 1]  runs of pairs
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// out  rows  uint4[view * tiles_y + 1]   the first pair and fragment; z = the number of pairs
@@ -122,14 +127,14 @@ kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile
   rows[row] = (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], 0);
 }
 
-/// Empties a frame whose fragments do not fit into the room made for them, so that no later kernel writes behind a
-/// buffer's end. Any number of work-items.
+/// Empties a frame of so many `pairs` and `pixels` whose fragments exceed the capacity of the buffers, so that no later
+/// kernel writes behind a buffer's end. Any number of work-items.
 /// in   rows  uint4[last_row + 1]  whose last has the totals
 /// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
-kernel void rasterize_fit(const uint pairs, const uint pixels, const uint room, const uint last_row,
+kernel void rasterize_fit(const uint pairs, const uint pixels, const uint capacity, const uint last_row,
                           global const uint4* restrict rows, global uint2* restrict masks,
                           global uint* restrict fragment_starts, global uint* restrict pixel_starts) {
-  if (rows[last_row].y <= room) return;
+  if (rows[last_row].y <= capacity) return;
   const uint first = (uint)get_global_id(0), step = (uint)get_global_size(0);
   for (uint i = first; i < pairs; i += step) masks[i] = 0;
   for (uint i = first; i <= pairs; i += step) fragment_starts[i] = 0;
@@ -152,6 +157,7 @@ kernel void rasterize_rebase(const uint first, const uint columns, const uint ro
 
 /// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of pixels of a
 /// tile's row, up to `last_vector`.
+/// in   tile_starts, masks  as rasterize_count
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixel_starts     uint[pixel + 1]  runs of the lists
 /// out  lists            uint[...]        fragments, by pixel
@@ -215,7 +221,9 @@ static inline realn signed_distance(const FrameParams p, const Triangle t, const
   return choose(inside, s, -s);
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per group of pairs.
+/// What a fragment is: distance, depth, barycentrics. One work-item per group of `pairs`. Deterministic.
+/// in   triangles, pair_face, pair_tile, masks  as rasterize_cover
+/// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
 /// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the triangle
@@ -333,6 +341,7 @@ static inline uintn load_pixels(intn in_run, uint first, global const uint* pixe
 }
 
 /// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
+/// in   triangles, pair_face, fragment_starts, pixels  as rasterize_forward
 /// in   distance       float[fragment]  whose sign says on which side the sample lies
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2

@@ -100,8 +100,8 @@ class Buffer {
     return length_.count;
   }
   Length length() const { return length_; }
-  /// Elements that it was made for at least, without the rounding.
-  std::size_t room() const { return capacity_ - std::min(capacity_, 2 * k_padding); }
+  /// How many elements fit without growing.
+  std::size_t capacity() const { return capacity_ - std::min(capacity_, 2 * k_padding); }
   std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
   const cl::Buffer& cl_buffer() const { return buffer_; }
   Device::Impl* device() const { return device_; }  ///< null while nothing is allocated

@@ -41,7 +41,7 @@ void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
   if (!aov) aov.emplace(device.impl());
   for (const Band& band : bands) {
-    if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
+    if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
   }
   if (pixel_noise) {

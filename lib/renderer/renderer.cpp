@@ -53,10 +53,10 @@ void Renderer::Impl::forward() {
   find_edges();
   hide_back_faces();
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
-  room.reset();
-  room = expected_room();
-  if (room) {
-    forward_within(*room);
+  capacity.reset();
+  capacity = expected_capacity();
+  if (capacity) {
+    forward_within(*capacity);
   } else {
     forward_measured();
   }
@@ -92,9 +92,9 @@ std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
 }
 
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
-std::optional<FrameCounts> Renderer::Impl::expected_room() const {
+std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts || (pixel_noise && !pixel_noise->last_contours)) return std::nullopt;
-  const FrameCounts expected = rasterize.room_for(*last_counts, bin);
+  const FrameCounts expected = rasterize.capacity_for(*last_counts, bin);
   if (with_headroom(expected.fragments) * k_fragment_bytes >= device.memory_budget()) return std::nullopt;
   return expected;
 }
@@ -109,12 +109,12 @@ Blur::Size Renderer::Impl::image_size() const {
   return {views.size(), static_cast<std::size_t>(scene.width), static_cast<std::size_t>(scene.height)};
 }
 
-/// Of noise on the pixel. With room for what is expected, or blocks to count.
+/// Of noise on the pixel. Within the capacity for what is expected, or blocks to count.
 void Renderer::Impl::find_contours(std::optional<std::size_t> expected) {
   if (!pixel_noise) return;
   Contour& contour = pixel_noise->contour;
   if (expected) {
-    contour.forward_within(contour_inputs(), contour.room_for(*expected));
+    contour.forward_within(contour_inputs(), contour.capacity_for(*expected));
   } else {
     contour.forward(contour_inputs());
     pixel_noise->last_contours = contour.pairs;
@@ -146,13 +146,13 @@ void Renderer::Impl::forward_measured() {
   if (bands.size() == 1) last_counts = rasterize.counted();
 }
 
-/// Learns whether the frame did fit into its room, and renders it again where it did not.
+/// Learns whether the frame has exceeded the capacity of its buffers, and renders it again if so.
 void Renderer::Impl::settle() {
-  if (!room) return;
+  if (!capacity) return;
   const FrameCounts found = rasterize.read_counts();
   const std::size_t contours = pixel_noise ? pixel_noise->contour.read_count() : 0;
-  const bool fits = found.fit(*room) && (!pixel_noise || contours <= pixel_noise->contour.pairs);
-  room.reset();
+  const bool fits = found.fit(*capacity) && (!pixel_noise || contours <= pixel_noise->contour.pairs);
+  capacity.reset();
   if (fits) {
     bin.settle(found.pairs);
     bands = {rasterize.settle(frame, found)};
@@ -189,7 +189,7 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
   }
   for (const Band& band : bands) {
-    if (bands.size() > 1) render(band);  // its fragments have made room for other bands'
+    if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     differentiate(pixel_noise ? pixel_noise->grad_raster : grad_images);
   }
   if (is_geometric(wanted)) {

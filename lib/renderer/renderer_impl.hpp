@@ -53,7 +53,7 @@ struct SmoothingSetting {
 using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad)>;
 
 /// Setters come in two halves: the first prepares everything that can fail beside what is in force, the
-/// second swaps it in and cannot fail. What it replaced is freed or kept as room for the next.
+/// second swaps it in and cannot fail. What it replaced is freed or kept for the next.
 struct Renderer::Impl : OnDevice, ViewSet {
   explicit Impl(Device device);
 
@@ -87,8 +87,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::size_t bytes() const;
 
   Scene scene;
-  bool rendered = false;            // the stages hold the frame of the current scene, or it is on the way
-  std::optional<FrameCounts> room;  // that it was given, until it is known to fit
+  bool rendered = false;                // the stages hold the frame of the current scene, or it is on the way
+  std::optional<FrameCounts> capacity;  // of the last frame, until it is known to fit
   std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
   std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
 
@@ -127,7 +127,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void find_edges();
   void hide_back_faces();
   std::vector<glm::vec3> shape_of_first_view() const;
-  std::optional<FrameCounts> expected_room() const;
+  std::optional<FrameCounts> expected_capacity() const;
   void forward_within(const FrameCounts& expected);
   void forward_measured();
   void settle();

@@ -18,9 +18,10 @@ void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& 
   settle(found);
 }
 
-void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room) {
+void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                  std::size_t capacity) {
   count(p, triangles);
-  list(p, triangles, room);
+  list(p, triangles, capacity);
 }
 
 void Bin::settle(std::size_t known_pairs) {
@@ -36,8 +37,9 @@ void Bin::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& tr
   scan_(faces, counts_, pair_starts);
 }
 
-void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room) {
-  pairs = room;
+void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+               std::size_t capacity) {
+  pairs = capacity;
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
     buffer->resize(device_, Length::at_most(pairs));

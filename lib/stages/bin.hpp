@@ -14,13 +14,12 @@ class Bin {
 
   /// Blocks to read the number of pairs.
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
-  /// With room for so many pairs, without waiting to learn how many there are. If they are more, there are
-  /// none.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room);
+  /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
+  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t capacity);
   /// Says how many pairs there are, after a forward() that did not wait for it.
   void settle(std::size_t known_pairs);
 
-  std::size_t pairs = 0;        ///< or how many there is room for, until it is known
+  std::size_t pairs = 0;        ///< or the capacity, until the number is known
   Buffer<cl_uint> pair_count;   ///< [1] how many there are, 0 where they do not fit
   Buffer<cl_uint> pair_face;    ///< [pair] view * faces + face
   Buffer<cl_uint> pair_tile;    ///< [pair] view * tiles + tile
@@ -32,7 +31,7 @@ class Bin {
 
  private:
   void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
-  void list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t room);
+  void list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t capacity);
 
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::Triangle>, Out<cl_uint>> count_;

@@ -90,10 +90,10 @@ void Contour::forward(const ContourInputs& in) {
   settle(found);
 }
 
-void Contour::forward_within(const ContourInputs& in, std::size_t room) {
+void Contour::forward_within(const ContourInputs& in, std::size_t capacity) {
   count(in);
   total_.start(pair_starts_, view_edges(in));
-  list(in, room);
+  list(in, capacity);
 }
 
 std::size_t Contour::read_count() {
@@ -108,8 +108,8 @@ void Contour::settle(std::size_t known_pairs) {
     buffer->settle(known_pairs);
 }
 
-std::size_t Contour::room_for(std::size_t count) const {
-  return std::min(with_headroom(count), std::max(count, pair_contour.room()));
+std::size_t Contour::capacity_for(std::size_t count) const {
+  return std::min(with_headroom(count), std::max(count, pair_contour.capacity()));
 }
 
 void Contour::count(const ContourInputs& in) {
@@ -126,17 +126,17 @@ void Contour::count(const ContourInputs& in) {
   scan_(view_edges(in), counts_, pair_starts_);
 }
 
-void Contour::list(const ContourInputs& in, std::size_t room) {
-  pairs = room;
+void Contour::list(const ContourInputs& in, std::size_t capacity) {
+  pairs = capacity;
   pair_count_.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
-  fill_(view_edges(in), in.p, params(in), index(room), in.edges.edges, in.edges.end_starts, in.edges.ends,
+  fill_(view_edges(in), in.p, params(in), index(capacity), in.edges.edges, in.edges.end_starts, in.edges.ends,
         facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.geometry.face_colors,
         in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_, pair_tile, places_);
   sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
-  link_(pairs, index(room), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
+  link_(pairs, index(capacity), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
 }
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends,

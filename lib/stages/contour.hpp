@@ -44,20 +44,19 @@ class Contour {
 
   /// Blocks to read the number of pairs.
   void forward(const ContourInputs& in);
-  /// With room for so many pairs, without waiting to learn how many there are. If they are more, there are
-  /// none.
-  void forward_within(const ContourInputs& in, std::size_t room);
+  /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
+  void forward_within(const ContourInputs& in, std::size_t capacity);
   /// How many there are, after forward_within(). Blocks until the device has counted, not until it has
   /// rendered.
   std::size_t read_count();
-  /// Says how many pairs there are, after a forward_within() whose room was enough.
+  /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
   /// Room for so many and a few more, in the buffers that are there.
-  std::size_t room_for(std::size_t count) const;
+  std::size_t capacity_for(std::size_t count) const;
   /// Adds the gradients of the pairs' ends to those of the vertices.
   void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc);
 
-  std::size_t pairs = 0;         ///< or how many there is room for, until it is known
+  std::size_t pairs = 0;         ///< or the capacity, until the number is known
   Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
   Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
   Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
@@ -67,7 +66,7 @@ class Contour {
 
  private:
   void count(const ContourInputs& in);
-  void list(const ContourInputs& in, std::size_t room);
+  void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>> facing_;

@@ -190,17 +190,17 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
   forward(p, triangles, bin, whole_frame(p, counted()));
 }
 
-void Rasterize::forward_within(const FrameCounts& room, const shared::FrameParams& p,
+void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
                                const Buffer<shared::Triangle>& triangles, const Bin& bin) {
   counted_ = false;
   count(p, triangles, bin);
   const std::size_t last_row = device_rows_.size() - 1;
   last_row_.start(device_rows_, last_row);
   fit_(device_.local_size() * device_.info.compute_units, static_cast<cl_uint>(bin.pairs),
-       static_cast<cl_uint>(pixels_of(p)), static_cast<cl_uint>(room.fragments),
+       static_cast<cl_uint>(pixels_of(p)), static_cast<cl_uint>(capacity.fragments),
        static_cast<cl_uint>(last_row), device_rows_, masks, fragment_starts, pixel_starts);
-  frame_fragments = room.fragments;
-  forward(p, triangles, bin, whole_frame(p, room));
+  frame_fragments = capacity.fragments;
+  forward(p, triangles, bin, whole_frame(p, capacity));
 }
 
 FrameCounts Rasterize::read_counts() {
@@ -219,11 +219,11 @@ Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) 
   return *band;
 }
 
-FrameCounts Rasterize::room_for(const FrameCounts& counts, const Bin& bin) const {
-  const auto room = [](std::size_t count, std::size_t made_for) {
+FrameCounts Rasterize::capacity_for(const FrameCounts& counts, const Bin& bin) const {
+  const auto capacity = [](std::size_t count, std::size_t made_for) {
     return std::min(with_headroom(count), std::max(count, made_for));
   };
-  return {room(counts.pairs, bin.pair_face.room()), room(counts.fragments, distance.room())};
+  return {capacity(counts.pairs, bin.pair_face.capacity()), capacity(counts.fragments, distance.capacity())};
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,

@@ -11,11 +11,13 @@
 
 namespace dpr {
 
-/// How many of what grows and shrinks a frame holds, or has room for.
+/// How many pairs and fragments a frame holds, or its buffers can hold.
 struct FrameCounts {
   std::size_t pairs = 0, fragments = 0;
 
-  bool fit(const FrameCounts& room) const { return pairs <= room.pairs && fragments <= room.fragments; }
+  bool fit(const FrameCounts& capacity) const {
+    return pairs <= capacity.pairs && fragments <= capacity.fragments;
+  }
 };
 
 /// Rows of as many pixels of the frame.
@@ -48,18 +50,19 @@ class Rasterize {
   /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
   void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
   /// The same and forward() of the whole frame without waiting to learn how many fragments there are. If
-  /// they, or the pairs, are more than there is room for, there are none.
-  void forward_within(const FrameCounts& room, const shared::FrameParams& p,
+  /// this exceeds the capacity the frame is emptied; read_counts() returns the true counts, so that the
+  /// caller can retry.
+  void forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
                       const Buffer<shared::Triangle>& triangles, const Bin& bin);
   /// What forward_within() found. Blocks until the device has counted, not until it has rendered.
   FrameCounts read_counts();
-  /// Says what the counts are, after a forward_within() whose room was enough. Returns the whole frame as the
-  /// band whose fragments these are.
+  /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
+  /// the band whose fragments these are.
   Band settle(const shared::FrameParams& p, const FrameCounts& counts);
   /// Of a frame that cover() counted.
   FrameCounts counted() const;
-  /// Room for so much and a little more, in the buffers that are there.
-  FrameCounts room_for(const FrameCounts& counts, const Bin& bin) const;
+  /// For so much and a little more, but no more than the buffers have.
+  FrameCounts capacity_for(const FrameCounts& counts, const Bin& bin) const;
   /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
   /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
   std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
@@ -87,7 +90,7 @@ class Rasterize {
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
 
   std::optional<Band> band;                     ///< whose fragments these are
-  std::size_t fragments = 0;                    ///< of the band; or room for them
+  std::size_t fragments = 0;                    ///< of the band; or the capacity
   std::size_t frame_fragments = 0;              ///< of all bands
   Buffer<cl_uint2> masks;                       ///< [pair] pixels of its tile that a pair covers
   Buffer<cl_uint> fragment_starts;              ///< [pair + 1]
@@ -133,7 +136,7 @@ class Rasterize {
   Buffer<cl_uint4> device_rows_;
   PendingRead<cl_uint4> last_row_;
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
-  bool counted_ = true;                // the counts are the frame's, not the room for them
+  bool counted_ = true;                // the counts are the frame's, not the capacity
   bool in_bands_ = false;              // the starts above are a band's, those below the frame's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };

@@ -17,14 +17,15 @@ Sort::Sort(Device::Impl& device)
       scatter_(device, "sort.cl", "sort_scatter"),
       ranges_(device, "sort.cl", "sort_ranges") {}
 
-void Sort::operator()(std::size_t room, const Buffer<cl_uint>& count, std::size_t key_count,
+void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::size_t key_count,
                       Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
-  const std::size_t blocks = (room + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
-  const auto n = static_cast<cl_uint>(room);
+  const std::size_t blocks = (capacity + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
+  const auto n = static_cast<cl_uint>(capacity);
   counts_.resize(device_, k_digits * blocks);
   other_keys_.resize(device_, keys.length());
   other_values_.resize(device_, values.length());
-  for (unsigned shift = 0; room > 0 && shift < 32 && (key_count - 1) >> shift != 0; shift += k_digit_bits) {
+  for (unsigned shift = 0; capacity > 0 && shift < 32 && (key_count - 1) >> shift != 0;
+       shift += k_digit_bits) {
     histogram_(blocks, n, shift, count, keys, counts_);
     scan_(k_digits * blocks, counts_, offsets_);
     scatter_(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);

@@ -10,9 +10,9 @@ class Sort {
  public:
   explicit Sort(Device::Impl& device);
 
-  /// Sorts the first `count[0]` keys, all below `key_count`, and values with them, in place; `room` is what
-  /// they are at most. `starts` gets the run of every key: [key_count + 1].
-  void operator()(std::size_t room, const Buffer<cl_uint>& count, std::size_t key_count,
+  /// Sorts the first `count[0]` keys, all below `key_count`, and values with them, in place; `capacity` is
+  /// what they are at most. `starts` gets the run of every key: [key_count + 1].
+  void operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::size_t key_count,
                   Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts);
 
   std::size_t bytes() const;
