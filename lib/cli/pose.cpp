@@ -98,8 +98,8 @@ void print(const std::string& file, const PoseResult& result) {
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
-        "be "
-        "wrong, or colours, lights, clutter or occlusion may differ from the scene's.\n");
+        "be wrong: --search tries all rotations, --translation and --focal find what else is not known. Or "
+        "colours, clutter or occlusion differ from the scene's.\n");
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }

@@ -58,7 +58,7 @@ void add_learn_command(CLI::App& application) {
   add(application, {"learn",
                     "Trains and evaluates single-image reconstruction (needs libtorch)",
                     "a build without libtorch",
-                    "one with it: libtorch-dev, then cmake again",
+                    "one with it: libtorch-dev, and cmake --preset release, which builds dpr-learn",
                     // OpenBLAS' threads sleep at once instead of waiting busily while the renderer works, and
                     // freed memory is kept: a step's tensors take the pages of the last one's.
                     {{"OPENBLAS_THREAD_TIMEOUT", "4"},
@@ -68,7 +68,7 @@ void add_learn_command(CLI::App& application) {
 
 void add_bench_command(CLI::App& application) {
   add(application, {"bench", "Measures forward and backward passes, compares results, draws them",
-                    "an installation without the program dpr-bench", "one with dpr-bench beside dpr"});
+                    "a build without the program dpr-bench", "that of cmake --preset release"});
 }
 
 void print_entries_of_programs() {

@@ -104,6 +104,11 @@ void run(const RenderOptions& options, CommonOptions& common) {
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image));
   aovs.write(renderer);
+  if (statistics.fragments == 0) {
+    print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
+                 "znear and zfar"},
+                common);
+  }
   if (!common.quiet) {
     std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,
                 statistics.faces);

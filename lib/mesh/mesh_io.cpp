@@ -87,8 +87,9 @@ Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& not
 Mesh read_mesh(const std::filesystem::path& file, Notes& notes) {
   const std::string extension = lower_case_extension(file);
   if (!is_known(extension)) {
-    throw IoError(file,
-                  "got the extension " + scan::quoted(extension) + ", expected .obj, .ply, .off or .stl");
+    throw IoError(file, "got the extension " + scan::quoted(extension) +
+                            ", expected .obj, .ply, .off or .stl" +
+                            (extension == ".json" ? "; a scene is given by --scene" : ""));
   }
   return parse_mesh(file, read_file(file), notes);
 }

@@ -1,4 +1,5 @@
 // The views format: images with their cameras.
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -17,12 +18,19 @@ int parse_side(const JsonNode& node) {
   return side;
 }
 
+/// Whether an image's alpha tells the object from what is around it. Programs that know no transparency
+/// write 1.
+bool shows_silhouette(const Image& image) {
+  return std::ranges::any_of(image.pixels, [](const glm::vec4& pixel) { return pixel.a < 1; });
+}
+
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views) {
   node.require_keys({"image", "camera"});
   ShapeView view;
   const std::filesystem::path file = folder / node.at("image").string();
   view.image = read_image(file, &view.has_alpha);
+  view.has_alpha = view.has_alpha && shows_silhouette(view.image);
   if (view.image.width != views.width || view.image.height != views.height) {
     throw InvalidArgument("size (" + file.string() + ")", checks::size(view.image.width, view.image.height),
                           checks::size(views.width, views.height) + ", the views'");

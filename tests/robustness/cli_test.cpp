@@ -78,6 +78,15 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_image(folder / "a.png").width == 16);
     CHECK(dpr::read_image(folder / "b.exr").height == 12);
     CHECK(run_command(folder, {"--help"}).status == 0);
+    const Outcome bare = run_command(folder, {});
+    CHECK(bare.status == 1);
+    CHECK(bare.err.find("Usage: ") != std::string::npos);
+    folder.write("behind.json",
+                 R"({"width": 16, "height": 12, "camera": {"view": [[1,0,0,0],[0,1,0,0],[0,0,1,6.7],
+      [0,0,0,1]]}, "meshes": [{"file": "cube.ply"}]})");
+    const Outcome empty = run_command(folder, {"render", "--scene", "behind.json", "-o", "empty.png"});
+    CHECK(empty.status == 0);
+    CHECK(empty.err.find("the picture is empty") != std::string::npos);
     CHECK(run_command(folder, {"render", "--help"}).status == 0);
     CHECK(run_command(folder, {"devices"}).status == 0);
     // An existing output is replaced.
@@ -204,6 +213,7 @@ TEST_SUITE("robustness") {
     };
     check_fails(folder, 1, "no such device", render({"--device", "no such device"}));
     check_fails(folder, 1, "no such device", render({}), "DPR_DEVICE=no such device");
+    check_fails(folder, 1, "a scene is given by --scene", {"render", "scene.json", "-o", "o.png"});
     check_fails(folder, 1, "samples", render({"--samples", "0"}));
     check_fails(folder, 1, "--draws", render({"--draws", "mirrored"}));
     check_fails(folder, 1, "even number",
