@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "mesh/cluster_vertices.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/frame.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
@@ -174,9 +174,8 @@ void PoseLevel::render_batch(Renderer& renderer, std::span<const View> views,
                              std::vector<cl_float4>& images) {
   renderer.set_views(views);
   renderer.forward();
-  renderer.impl().require_forward("PoseLevel");
   drawn_.resize(views.size() * pixels_of(scene_));
-  renderer.impl().image().download(drawn_);
+  last_frame(renderer, "PoseLevel").image.download(drawn_);
   if (samples_ == 1) {
     images.swap(drawn_);
   } else {
