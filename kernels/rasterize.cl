@@ -128,7 +128,8 @@ kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile
 }
 
 /// Empties a frame of so many `pairs` and `pixels` whose fragments exceed the capacity of the buffers, so that no later
-/// kernel writes behind a buffer's end. Any number of work-items.
+/// kernel writes behind a buffer's end. A work-item takes every N-th element, where N is the size of the
+/// launch.
 /// in   rows  uint4[last_row + 1]  whose last has the totals
 /// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
 kernel void rasterize_fit(const uint pairs, const uint pixels, const uint capacity, const uint last_row,

@@ -36,11 +36,6 @@ int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
   const bool is_unknown = name == application.get_name() && !unknown.empty();
   // --help and --version arrive as errors too.
   if (error.get_exit_code() == 0 && !is_unknown) return application.exit(error);
-  if (name == application.get_name() && !is_unknown && application.get_subcommands().empty() &&
-      error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError)) {
-    std::fprintf(stderr, "%s", application.help().c_str());
-    return k_wrong_input;
-  }
   const std::string problem = is_unknown ? "no such command: " + unknown.front() : std::string(error.what());
   return fail(
       "arguments (" + name + "): got \"" + problem + "\", expected what \"" + name + " --help\" describes",
