@@ -17,8 +17,8 @@ static inline uint2 tile_range(float low, float high, uint size) {
 }
 
 /// Assembles the triangles. Dropped (orientation 0) is what reaches nearer than znear, lies wholly beyond zfar, has
-/// exactly no area, reaches beyond DPR_MAX_NDC, cannot be seen, or whose blurred bounds miss the image. What is kept but has no sample
-/// within its bounds has no tiles. One work-item per (view, face).
+/// exactly no area, reaches beyond DPR_MAX_NDC, cannot be seen, or whose blurred bounds miss the image. What is kept but
+/// has no sample within its bounds has no tiles. One work-item per (view, face).
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
