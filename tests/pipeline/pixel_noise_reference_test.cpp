@@ -131,7 +131,7 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
 /// Where a crease ends in a silhouette, both cross the same step at last, and the silhouette takes it: of the
 /// geometry's gradients a share that falls as the resolution grows. A silhouette alone has no such steps.
 double tolerance_of(const Direction& d, bool has_creases) {
-  if (d.name == "sigma" || d.name == "background") return 5e-3;
+  if (d.name == "sigma" || d.name == "background") return 0.1 / reduced(k_width, 8);
   return (has_creases ? 1.8 : 0.2) / reduced(k_width, 8);
 }
 
