@@ -16,15 +16,16 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
 }
 
 /// The scan itself, given the scan of the chunks' sums. One work-item per chunk; one where there is nothing to scan.
+/// in   size     elements of a chunk: DPR_SCAN_CHUNK, or of the only one all
 /// in   values   uint[count]
 /// in   bases    uint[chunk]      exclusive scan of the chunks' sums
 /// out  offsets  uint[count + 1]  exclusive scan; the last is the total
-kernel void scan_apply(const uint count, global const uint* restrict values, global const uint* restrict bases,
-                       global uint* restrict offsets) {
+kernel void scan_apply(const uint count, const uint size, global const uint* restrict values,
+                       global const uint* restrict bases, global uint* restrict offsets) {
   const uint chunk = (uint)get_global_id(0);
-  const uint first = chunk * DPR_SCAN_CHUNK;
+  const uint first = chunk * size;
   if (first >= count && chunk != 0) return;
-  const uint last = min(count, first + DPR_SCAN_CHUNK);
+  const uint last = min(count, first + size);
   uint sum = bases[chunk];
   for (uint i = first; i < last; ++i) {
     offsets[i] = sum;

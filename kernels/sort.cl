@@ -1,6 +1,6 @@
 // A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a tile, still by
 // face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on the device; the
-// host launches for the capacity of the buffers.
+// host launches for the capacity of the buffers. Few elements are sorted by one work-item instead, to the same order.
 #include "shared_types.h"
 
 #define DPR_SORT_DIGITS 256
@@ -49,6 +49,32 @@ kernel void sort_scatter(const uint capacity, const uint shift, global const uin
     sorted_keys[target] = keys[i];
     sorted_values[target] = values[i];
   }
+}
+
+/// Sorts few elements of few keys by counting. One work-item.
+/// in   last_key  the number of keys, from 0 on
+/// in   count     uint[1]       the number of elements
+/// in   keys      uint[count]
+/// in   values    uint[count]   move with their keys
+/// out  sorted_keys, sorted_values  uint[count]
+/// out  starts    uint[last_key + 1]  where each key's run begins in the sorted list
+kernel void sort_serial(const uint last_key, global const uint* restrict count, global const uint* restrict keys,
+                        global const uint* restrict values, global uint* restrict sorted_keys,
+                        global uint* restrict sorted_values, global uint* restrict starts) {
+  if (get_global_id(0) != 0) return;
+  const uint elements = count[0];
+  for (uint key = 0; key <= last_key; ++key) starts[key] = 0;
+  for (uint i = 0; i < elements; ++i) ++starts[keys[i]];
+  uint end = elements;
+  for (uint key = last_key + 1; key-- > 0;) starts[key] = end -= starts[key];
+  for (uint i = 0; i < elements; ++i) {
+    const uint target = starts[keys[i]]++;
+    sorted_keys[target] = keys[i];
+    sorted_values[target] = values[i];
+  }
+  // Every start has become its run's end, the next run's start.
+  for (uint key = last_key; key > 0; --key) starts[key] = starts[key - 1];
+  starts[0] = 0;
 }
 
 /// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one more.

@@ -7,6 +7,10 @@
 
 namespace dpr {
 
+/// So many elements one work-item scans or sorts sooner than the many that share them can be launched. On
+/// GPUs, whose work-items are slow by themselves, a chunk of a scan.
+std::size_t serial_elements(const Device::Impl& device);
+
 class Scan {
  public:
   explicit Scan(Device::Impl& device);
@@ -27,7 +31,7 @@ class Scan {
 
   Device::Impl& device_;
   Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> apply_;
+  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> apply_;
   Buffer<cl_uint> zero_;
   std::vector<Level> levels_;
 };

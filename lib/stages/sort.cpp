@@ -15,25 +15,40 @@ Sort::Sort(Device::Impl& device)
       scan_(device),
       histogram_(device, "sort.cl", "sort_histogram"),
       scatter_(device, "sort.cl", "sort_scatter"),
-      ranges_(device, "sort.cl", "sort_ranges") {}
+      ranges_(device, "sort.cl", "sort_ranges"),
+      serial_(device, "sort.cl", "sort_serial") {}
 
 void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::size_t key_count,
                       Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
+  const auto last_key = static_cast<cl_uint>(key_count);
+  other_keys_.resize(device_, keys.length());
+  other_values_.resize(device_, values.length());
+  starts.resize(device_, key_count + 1);
+  const auto exchange = [&] {
+    std::swap(keys, other_keys_);
+    std::swap(values, other_values_);
+  };
+  if (capacity > 0 && capacity + key_count <= serial_elements(device_)) {
+    serial_(1, last_key, count, keys, values, other_keys_, other_values_, starts);
+    exchange();
+    return;
+  }
+  for (unsigned shift = 0; capacity > 0 && shift < 32 && (key_count - 1) >> shift != 0;
+       shift += k_digit_bits) {
+    pass(capacity, shift, count, keys, values);
+    exchange();
+  }
+  ranges_(key_count + 1, last_key, count, keys, starts);
+}
+
+void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count,
+                const Buffer<cl_uint>& keys, const Buffer<cl_uint>& values) {
   const std::size_t blocks = (capacity + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
   const auto n = static_cast<cl_uint>(capacity);
   counts_.resize(device_, k_digits * blocks);
-  other_keys_.resize(device_, keys.length());
-  other_values_.resize(device_, values.length());
-  for (unsigned shift = 0; capacity > 0 && shift < 32 && (key_count - 1) >> shift != 0;
-       shift += k_digit_bits) {
-    histogram_(blocks, n, shift, count, keys, counts_);
-    scan_(k_digits * blocks, counts_, offsets_);
-    scatter_(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
-    std::swap(keys, other_keys_);
-    std::swap(values, other_values_);
-  }
-  starts.resize(device_, key_count + 1);
-  ranges_(key_count + 1, static_cast<cl_uint>(key_count), count, keys, starts);
+  histogram_(blocks, n, shift, count, keys, counts_);
+  scan_(k_digits * blocks, counts_, offsets_);
+  scatter_(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
 }
 
 std::size_t Sort::bytes() const {

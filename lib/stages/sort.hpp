@@ -18,12 +18,17 @@ class Sort {
   std::size_t bytes() const;
 
  private:
+  /// A stable pass by eight bits.
+  void pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count, const Buffer<cl_uint>& keys,
+            const Buffer<cl_uint>& values);
+
   Device::Impl& device_;
   Scan scan_;
   Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> histogram_;
   Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       scatter_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> ranges_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> serial_;
   Buffer<cl_uint> counts_, offsets_, other_keys_, other_values_;
 };
 

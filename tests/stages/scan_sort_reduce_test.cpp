@@ -54,10 +54,11 @@ std::vector<cl_uint> serial_scan(const std::vector<cl_uint>& values) {
   return offsets;
 }
 
-/// Around a chunk of 256, its square, and more; under a simulator only the first of them.
+/// Around a chunk of 256, its square, what one work-item takes, and more; under a simulator few of them.
 std::vector<std::size_t> sizes() {
-  if (dpr::test::is_reduced()) return {0, 1, 257};
-  return {0, 1, 2, 255, 256, 257, 511, 65535, 65536, 65537, 70000};
+  const std::size_t serial = dpr::serial_elements(device_impl());
+  if (dpr::test::is_reduced()) return {0, 1, 257, serial + 1};
+  return {0, 1, 2, 255, 256, 257, 511, serial, serial + 1, 65535, 65536, 65537, 5000000};
 }
 
 struct Sorted {
@@ -173,8 +174,8 @@ TEST_SUITE("unit") {
                                        ? std::vector<std::size_t>{0, 1, 40}
                                        : std::vector<std::size_t>{0, 1, 1023, 1024, 1025, 5000}) {
       for (const std::size_t key_count : dpr::test::is_reduced()
-                                             ? std::vector<std::size_t>{1, 257}
-                                             : std::vector<std::size_t>{1, 2, 255, 256, 257, 70000}) {
+                                             ? std::vector<std::size_t>{1, 257, 16384}
+                                             : std::vector<std::size_t>{1, 2, 255, 256, 257, 16384, 70000}) {
         CAPTURE(count);
         CAPTURE(key_count);
         const auto keys = random_values(count, static_cast<cl_uint>(key_count), static_cast<unsigned>(count));
@@ -198,6 +199,15 @@ TEST_SUITE("unit") {
     CHECK(sorted.starts[299] == 0);
     CHECK(sorted.starts[300] == 10);
     CHECK(sort({}, 4).starts == std::vector<cl_uint>(5, 0));
+  }
+
+  TEST_CASE("sort: one work-item sorts as many do") {
+    const auto count = static_cast<std::size_t>(reduced(3000, 40));
+    const std::vector<cl_uint> keys = random_values(count, 500, 7);
+    const Sorted serial = sort(keys, 500), parallel = sort(keys, 500, dpr::serial_elements(device_impl()));
+    CHECK(serial.keys == parallel.keys);
+    CHECK(serial.values == parallel.values);
+    CHECK(serial.starts == parallel.starts);
   }
 
   TEST_CASE("sort: two equal keys that changed places are found out") {
