@@ -114,18 +114,10 @@ static inline ContourScene scene_of_view(const FrameParams p, uint view, global 
   return s;
 }
 
-/// The tiles [x, y) along one axis with a sample from which a step may cross the edge's extent on it.
-static inline uint2 crossed_tiles(float low, float high, uint size) {
-  const float last = (float)size - 1.0f;
-  const float first = fmax(floor(low - DPR_CROSSING_SLACK), 0.0f), end = fmin(floor(high + DPR_CROSSING_SLACK), last);
-  if (!(first <= end)) return (uint2)(0u, 0u);
-  return (uint2)((uint)first / DPR_TILE, (uint)end / DPR_TILE + 1);
-}
-
 /// An edge over tiles.
 typedef struct {
   float2 a, d;         // an end and the way to the other, in samples
-  uint2 columns, rows; // of tiles, [x, y)
+  uint2 columns, rows; // of tiles, [x, y]: those with a sample from which a step may cross the edge's extent
 } TiledEdge;
 
 static inline TiledEdge tiled_edge(const FrameParams p, float2 a, float2 b) {
@@ -133,8 +125,8 @@ static inline TiledEdge tiled_edge(const FrameParams p, float2 a, float2 b) {
   e.a = to_samples(p, a);
   const float2 end = to_samples(p, b);
   e.d = end - e.a;
-  e.columns = crossed_tiles(fmin(e.a.x, end.x), fmax(e.a.x, end.x), p.width);
-  e.rows = crossed_tiles(fmin(e.a.y, end.y), fmax(e.a.y, end.y), p.height);
+  e.columns = samples_within(fmin(e.a.x, end.x) - 1.0f, fmax(e.a.x, end.x), p.width) / DPR_TILE;
+  e.rows = samples_within(fmin(e.a.y, end.y) - 1.0f, fmax(e.a.y, end.y), p.height) / DPR_TILE;
   return e;
 }
 
@@ -167,8 +159,8 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
   uint count = 0;
   if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
     const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
-    for (uint row = t.rows.x; row < t.rows.y; ++row) {
-      for (uint column = t.columns.x; column < t.columns.y; ++column) count += line_meets_tile(t, column, row) ? 1 : 0;
+    for (uint row = t.rows.x; row <= t.rows.y; ++row) {
+      for (uint column = t.columns.x; column <= t.columns.y; ++column) count += line_meets_tile(t, column, row) ? 1 : 0;
     }
   }
   counts[i] = count;
@@ -226,8 +218,8 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
-  for (uint row = t.rows.x; row < t.rows.y; ++row) {
-    for (uint column = t.columns.x; column < t.columns.y; ++column) {
+  for (uint row = t.rows.x; row <= t.rows.y; ++row) {
+    for (uint column = t.columns.x; column <= t.columns.y; ++column) {
       if (!line_meets_tile(t, column, row)) continue;
       place_contour[place] = contour;
       place_tile[place] = first_tile + row * p.tiles_x + column;

@@ -3,12 +3,11 @@
 #ifndef DPR_GEOMETRY_H
 #define DPR_GEOMETRY_H
 
-#include "ownership.h"
 #include "shared_types.h"
 #include "tile_lanes.h"
+#include "tiles.h"
 
-/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up. Not contracted into what uses it, so
-/// that a pixel has one centre for all triangles.
+/// pixel_centre() of lanes.
 static inline realn pixel_x(const FrameParams p, realn column) {
 #pragma OPENCL FP_CONTRACT OFF
   return (column + 0.5f - 0.5f * (float)p.width) * p.pixel_size;
@@ -16,11 +15,6 @@ static inline realn pixel_x(const FrameParams p, realn column) {
 static inline realn pixel_y(const FrameParams p, realn row) {
 #pragma OPENCL FP_CONTRACT OFF
   return (0.5f * (float)p.height - 0.5f - row) * p.pixel_size;
-}
-static inline float2 pixel_centre(const FrameParams p, int column, int row) {
-#pragma OPENCL FP_CONTRACT OFF
-  return (float2)((float)column + 0.5f - 0.5f * (float)p.width, 0.5f * (float)p.height - 0.5f - (float)row) *
-         p.pixel_size;
 }
 
 /// One edge a -> b seen from pixels: the pixel relative to a, and the edge function cross(b - a, pixel - a).

@@ -67,6 +67,14 @@ static inline int is_owned_at(float2 a, float2 b, float2 p, float orientation) {
   return (float)side * orientation > 0.0f;
 }
 
+/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up. Not contracted into what uses it, so
+/// that a pixel has one centre for all triangles.
+static inline float2 pixel_centre(const FrameParams p, int column, int row) {
+#pragma OPENCL FP_CONTRACT OFF
+  return (float2)((float)column + 0.5f - 0.5f * (float)p.width, 0.5f * (float)p.height - 0.5f - (float)row) *
+         p.pixel_size;
+}
+
 static inline int owns_sample(const Triangle t, float2 p) {
   const float2 a = (float2)(t.x0, t.y0), b = (float2)(t.x1, t.y1), c = (float2)(t.x2, t.y2);
   return is_owned_at(a, b, p, t.orientation) && is_owned_at(b, c, p, t.orientation) &&

@@ -22,16 +22,6 @@ static inline uint lane_bits(intn condition) {
 #endif
 }
 
-/// The rows [x, y) of a tile that have samples within the triangle's blurred bounds.
-static inline uint2 blurred_rows(const FrameParams p, const Triangle t, uint first_row) {
-  const float high = fmax(fmax(t.y0, t.y1), t.y2) + p.blur_distance, low = fmin(fmin(t.y0, t.y1), t.y2) - p.blur_distance;
-  const float centre = 0.5f * (float)p.height - 0.5f - (float)first_row;
-  const float end = min((float)DPR_TILE, (float)(p.height - first_row));
-  const float first = clamp(ceil(centre - high / p.pixel_size - DPR_BOUNDS_SLACK), 0.0f, end);
-  const float last = clamp(floor(centre - low / p.pixel_size + DPR_BOUNDS_SLACK) + 1.0f, 0.0f, end);
-  return (uint2)((uint)first, (uint)last);
-}
-
 /// Those of the given pixels of a row that a triangle owns; bit k is `first_column` + k.
 static uint owned_of(uint bits, const FrameParams p, const Triangle t, uint first_column, uint row) {
   uint owned = 0;
@@ -64,10 +54,10 @@ kernel void rasterize_cover(const FrameParams p, const uint capacity, global con
   const uint tile = pair_tile[pair] % (p.tiles_x * p.tiles_y);
   const uint first_column = tile % p.tiles_x * DPR_TILE, first_row = tile / p.tiles_x * DPR_TILE;
   const float limit = is_sliver(t) ? 0.0f : p.blur_distance * p.blur_distance;
-  const uint2 rows = blurred_rows(p, t, first_row);
+  const uint2 rows = samples_of_tile(rows_of(t), first_row / DPR_TILE) - first_row;
   const float error = side_error(p, t);
   uint halves[2] = {0, 0};
-  for (uint row = rows.x; row < rows.y; ++row) {
+  for (uint row = rows.x; row <= rows.y; ++row) {
     const realn y = pixel_y(p, (realn)((float)(first_row + row)));
     for (uint part = 0; part < DPR_TILE; part += DPR_WIDTH) {
       const intn column = (int)(first_column + part) + DPR_LANE_INDEX;

@@ -122,13 +122,13 @@ typedef struct ViewParams {
   float unused;
 } ViewParams;
 
-/// A triangle of a view after projection.
+/// A triangle of a view after projection, if it is not dropped.
 typedef struct Triangle {
   DPR_SHARED_NAME(Triangle)
   float x0, y0, x1, y1, x2, y2; /* NDC */
   float z0, z1, z2;             /* view depth, positive in front */
-  float orientation;            /* +1 counter-clockwise, -1 clockwise, 0: dropped */
-  uint first_tile, last_tile;   /* x | y << 16, inclusive; of the blurred bounding box */
+  float orientation;            /* +1 counter-clockwise, -1 clockwise */
+  uint first_sample, last_sample; /* column | row << 16, inclusive; of the blurred bounding box */
 } Triangle;
 
 /// The light that all shading models share.

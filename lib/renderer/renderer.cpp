@@ -129,7 +129,7 @@ void Renderer::Impl::finish_image() {
 
 void Renderer::Impl::forward_within(const FrameCounts& expected) {
   if (pixel_noise) find_contours(pixel_noise->last_contours);
-  bin.forward(frame, setup.triangles, expected.pairs);
+  bin.forward(frame, setup, expected.pairs);
   rasterize.forward_within(expected, frame, setup.triangles, bin);
   shade_and_aggregate();
   finish_image();
@@ -138,7 +138,7 @@ void Renderer::Impl::forward_within(const FrameCounts& expected) {
 void Renderer::Impl::forward_measured() {
   last_counts.reset();
   find_contours(std::nullopt);
-  bin.forward(frame, setup.triangles);
+  bin.forward(frame, setup);
   rasterize.cover(frame, setup.triangles, bin);
   bands = rasterize.cut(frame, bin, device.memory_budget(), k_fragment_bytes);
   for (const Band& band : bands) render(band);

@@ -4,24 +4,22 @@ namespace dpr {
 
 Bin::Bin(Device::Impl& device)
     : device_(device),
-      count_(device, "bin.cl", "bin_count"),
       fill_(device, "bin.cl", "bin_fill"),
       link_(device, "bin.cl", "bin_link"),
       scan_(device),
       sort_(device) {}
 
-void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
-  count(p, triangles);
-  const std::size_t found =
-      read_total(pair_starts, std::size_t{p.views} * p.faces, "pairs of tiles and triangles (frame)");
-  list(p, triangles, found);
+void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
+  const std::size_t faces = setup.counts.size();
+  scan_(faces, setup.counts, pair_starts);
+  const std::size_t found = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
+  list(p, setup, found);
   settle(found);
 }
 
-void Bin::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                  std::size_t capacity) {
-  count(p, triangles);
-  list(p, triangles, capacity);
+void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
+  scan_(setup.counts.size(), setup.counts, pair_starts);
+  list(p, setup, capacity);
 }
 
 void Bin::settle(std::size_t known_pairs) {
@@ -30,22 +28,13 @@ void Bin::settle(std::size_t known_pairs) {
     buffer->settle(known_pairs);
 }
 
-void Bin::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles) {
-  const std::size_t faces = std::size_t{p.views} * p.faces;
-  counts_.resize(device_, faces);
-  count_(faces, p, triangles, counts_);
-  scan_(faces, counts_, pair_starts);
-}
-
-void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-               std::size_t capacity) {
+void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
   pairs = capacity;
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
-  fill_(std::size_t{p.views} * p.faces, p, n, triangles, pair_starts, pair_count, place_face_, pair_tile,
-        places_);
+  fill_(setup.counts.size(), p, n, setup.triangles, pair_starts, pair_count, place_face_, pair_tile, places_);
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places_, tile_starts);
   link_(pairs, n, pair_count, places_, place_face_, pair_face, face_pairs);
 }
@@ -53,7 +42,7 @@ void Bin::list(const shared::FrameParams& p, const Buffer<shared::Triangle>& tri
 std::size_t Bin::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
   for (const Buffer<cl_uint>* buffer : {&pair_count, &pair_face, &pair_tile, &tile_starts, &face_pairs,
-                                        &pair_starts, &counts_, &place_face_, &places_}) {
+                                        &pair_starts, &place_face_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

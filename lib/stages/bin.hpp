@@ -4,6 +4,7 @@
 
 #include "device/kernel.hpp"
 #include "stages/scan.hpp"
+#include "stages/setup.hpp"
 #include "stages/sort.hpp"
 
 namespace dpr {
@@ -13,9 +14,9 @@ class Bin {
   explicit Bin(Device::Impl& device);
 
   /// Blocks to read the number of pairs.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
+  void forward(const shared::FrameParams& p, const Setup& setup);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t capacity);
+  void forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
   /// Says how many pairs there are, after a forward() that did not wait for it.
   void settle(std::size_t known_pairs);
 
@@ -30,18 +31,15 @@ class Bin {
   std::size_t bytes() const;
 
  private:
-  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles);
-  void list(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, std::size_t capacity);
+  void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::Triangle>, Out<cl_uint>> count_;
   Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>,
          Out<cl_uint>, Out<cl_uint>>
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Scan scan_;
   Sort sort_;
-  Buffer<cl_uint> counts_;               // [view * face]
   Buffer<cl_uint> place_face_, places_;  // [pair] before sorting, in face order; and what sorting permutes
 };
 

@@ -8,7 +8,8 @@ void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, cons
                     const Buffer<cl_float4>& ndc, const Buffer<float>& hidden) {
   const std::size_t count = std::size_t{p.views} * p.faces;
   triangles.resize(device_, count);
-  forward_(count, p, views.cameras, geometry.face_vertices, ndc, hidden, triangles);
+  counts.resize(device_, count);
+  forward_(count, p, views.cameras, geometry.face_vertices, ndc, hidden, triangles, counts);
 }
 
 }  // namespace dpr

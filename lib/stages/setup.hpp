@@ -1,4 +1,4 @@
-// Triangles of every view: assembled, culled, bounded.
+// Triangles of every view: assembled, culled, bounded, and the tiles of each counted.
 #pragma once
 
 #include "device/kernel.hpp"
@@ -15,14 +15,15 @@ class Setup {
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                const Buffer<cl_float4>& ndc, const Buffer<float>& hidden);
 
-  Buffer<shared::Triangle> triangles;  ///< [view][face]
+  Buffer<shared::Triangle> triangles;  ///< [view][face] of those that have tiles
+  Buffer<cl_uint> counts;              ///< [view][face] tiles that are listed for a triangle
 
-  std::size_t bytes() const { return triangles.capacity_bytes(); }
+  std::size_t bytes() const { return triangles.capacity_bytes() + counts.capacity_bytes(); }
 
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>,
-         Out<shared::Triangle>>
+         Out<shared::Triangle>, Out<cl_uint>>
       forward_;
 };
 

@@ -62,12 +62,12 @@ TEST_SUITE("unit") {
     DPR_CHECK_MESSAGE_HAS(std::logic_error, value(),
                           "argument 1: the source says const uint*, the signature uint");
     const auto other_struct = [] {
-      const Kernel<dpr::shared::ViewParams, In<dpr::shared::Triangle>, Out<cl_uint>> kernel(
-          device_impl(), "bin.cl", "bin_count");
+      const Kernel<dpr::shared::ViewParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> kernel(
+          device_impl(), "rasterize.cl", "rasterize_count");
     };
     DPR_CHECK_MESSAGE_HAS(
         std::logic_error, other_struct(),
-        "kernel bin_count, argument 0: the source says FrameParams, the signature ViewParams");
+        "kernel rasterize_count, argument 0: the source says FrameParams, the signature ViewParams");
   }
 
   TEST_CASE("a kernel that the program does not have fails by name") {

@@ -67,14 +67,17 @@ std::vector<NdcFrame> frames() {
 
 constexpr NdcTriangle k_good{{{-0.5F, -0.5F, 5.0F}, {0.5F, -0.5F, 5.0F}, {0.0F, 0.5F, 5.0F}}};
 
-/// The orientation that setup gives a triangle.
+/// The orientation that setup gives a triangle; 0 where it drops it, and leaves it unwritten.
 float orientation(const NdcTriangle& t, const NdcFrame& frame = {}) {
   NdcStages s(frame, {t});
   dpr::shared::Triangle poison{};
   poison.orientation = dpr::test::k_poison;
   s.setup.triangles.upload(dpr::test::device_impl(), std::span(&poison, 1));
   s.set_up();
-  return s.setup.triangles.download()[0].orientation;
+  const float found = s.setup.triangles.download()[0].orientation;
+  const bool is_dropped = s.setup.counts.download()[0] == 0;
+  CHECK(is_dropped == std::isnan(found));
+  return is_dropped ? 0 : found;
 }
 
 NdcTriangle with_depths(float a, float b, float c) {
@@ -107,8 +110,9 @@ TEST_SUITE("unit") {
     CHECK(t.x1 == k_good[1].x);
     CHECK(t.y2 == k_good[2].y);
     CHECK(t.z2 == k_good[2].z);
-    CHECK(t.first_tile == 0U);
-    CHECK(t.last_tile == (1U | 1U << 16U));
+    CHECK(t.first_sample == (4U | 4U << 16U));
+    CHECK(t.last_sample == (11U | 11U << 16U));
+    CHECK(s.setup.counts.download()[0] == 4);
   }
 
   TEST_CASE("setup: what reaches nearer than znear, or lies wholly beyond zfar, is dropped") {

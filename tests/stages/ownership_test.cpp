@@ -121,6 +121,49 @@ float next_float(float x, int steps) {
   return x;
 }
 
+struct OnGrid {
+  std::size_t owned, pairs;
+};
+
+/// So many random triangles with vertices on a grid of `step` parts of a pixel, `reach` pixels from their
+/// middle at the most, against whole numbers.
+OnGrid check_on_grid(int size, int count, int step, glm::vec2 reach, RandomFloat& random) {
+  const float side = static_cast<float>(size), parts = static_cast<float>(dpr::test::k_subpixels);
+  std::vector<GridTriangle> on_grid;
+  std::vector<NdcTriangle> triangles;
+  for (int i = 0; i < count; ++i) {
+    GridTriangle g;
+    NdcTriangle t{};
+    const float its_reach = random(reach.x, reach.y);
+    const glm::vec2 middle(random(-0.55F, 0.55F) * side, random(-0.55F, 0.55F) * side);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto snapped = [&](float at) {
+        return step * std::lround((at + its_reach * random(-1, 1)) * parts / static_cast<float>(step));
+      };
+      g[k] = {snapped(middle.x), snapped(middle.y)};
+      const float scale = 2.0F / (parts * side);
+      t[k] = {static_cast<float>(g[k].x) * scale, static_cast<float>(g[k].y) * scale, 5.0F};
+    }
+    on_grid.push_back(g);
+    triangles.push_back(t);
+  }
+  NdcStages s({size, size}, triangles);
+  s.forward();
+  const FoundFragments found = dpr::test::read_fragments(s);
+  std::size_t differing = 0, owned = 0;
+  for (std::size_t f = 0; f < triangles.size(); ++f) {
+    for (int row = 0; row < size; ++row) {
+      for (int column = 0; column < size; ++column) {
+        const bool is_owned = dpr::test::owns(on_grid[f], dpr::test::sample_of(column, row, size, size));
+        differing += is_owned != found.all.contains({0, row, column, f});
+        owned += is_owned;
+      }
+    }
+  }
+  CHECK(differing == 0);
+  return {owned, s.bin.pairs};
+}
+
 }  // namespace
 
 TEST_SUITE("unit") {
@@ -240,46 +283,32 @@ TEST_SUITE("unit") {
   TEST_CASE("ownership: triangles on a grid own what whole numbers say") {
     at_every_width([] {
       const int size = reduced(64, 16);
-      const NdcFrame frame{size, size};
       RandomFloat random(5);
       for (int round = 0; round < reduced(12, 2); ++round) {
-        std::vector<GridTriangle> grid_triangles;
-        std::vector<NdcTriangle> triangles;
         const int step = round % 2 == 0 ? 8 : 1;  // half pixels, so that samples are hit; or sixteenths
-        for (int i = 0; i < size; ++i) {
-          GridTriangle g;
-          NdcTriangle t{};
-          const float side = static_cast<float>(size), reach = random(1, 0.6F * side);
-          const glm::vec2 centre(random(-0.55F, 0.55F) * side, random(-0.55F, 0.55F) * side);
-          for (std::size_t k = 0; k < 3; ++k) {
-            const auto snapped = [&](float at) {
-              const float pixels = at + reach * random(-1, 1);
-              return step * std::lround(pixels * static_cast<float>(dpr::test::k_subpixels) /
-                                        static_cast<float>(step));
-            };
-            g[k] = {snapped(centre.x), snapped(centre.y)};
-            const float scale = 2.0F / (static_cast<float>(dpr::test::k_subpixels) * side);
-            t[k] = {static_cast<float>(g[k].x) * scale, static_cast<float>(g[k].y) * scale, 5.0F};
-          }
-          grid_triangles.push_back(g);
-          triangles.push_back(t);
-        }
-        NdcStages s(frame, triangles);
-        s.forward();
-        const FoundFragments found = dpr::test::read_fragments(s);
-        std::size_t differing = 0, expected = 0;
-        for (std::size_t f = 0; f < triangles.size(); ++f) {
-          for (int row = 0; row < size; ++row) {
-            for (int column = 0; column < size; ++column) {
-              const bool is_owned =
-                  dpr::test::owns(grid_triangles[f], dpr::test::sample_of(column, row, size, size));
-              differing += is_owned != found.all.contains({0, row, column, f});
-              expected += is_owned;
-            }
-          }
-        }
-        CHECK(differing == 0);
-        CHECK(expected > 100);
+        CHECK(check_on_grid(size, size, step, {1, 0.6F * static_cast<float>(size)}, random).owned > 100);
+      }
+    });
+  }
+
+  TEST_CASE("ownership: triangles of a few samples own what whole numbers say, across tiles too") {
+    at_every_width([] {
+      const int size = reduced(64, 16);
+      RandomFloat random(6);
+      for (const int step : {8, 4, 1}) {
+        CHECK(check_on_grid(size, 10 * size, step, {0.5F, 3}, random).owned > 100);
+      }
+    });
+  }
+
+  TEST_CASE("ownership: triangles smaller than a pixel are paired with the tile of what they own, or none") {
+    at_every_width([] {
+      const int size = reduced(64, 16);
+      RandomFloat random(7);
+      for (const int step : {4, 2, 1}) {
+        const OnGrid found = check_on_grid(size, 40 * size, step, {0.4F, 0.45F}, random);
+        CHECK(found.owned > 20);
+        CHECK(found.pairs == found.owned);
       }
     });
   }

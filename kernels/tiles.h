@@ -1,0 +1,78 @@
+// The samples and tiles that an extent on the raster holds, and those that are listed for a triangle.
+#ifndef DPR_TILES_H
+#define DPR_TILES_H
+
+#include "ownership.h"
+#include "shared_types.h"
+
+/// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it can besides,
+/// of the largest coordinate.
+#define DPR_BIN_SLACK 1e-5f
+#define DPR_BIN_RELATIVE_SLACK 2e-6f
+
+/// Where the bounds of a triangle without blur hold no more samples of a tile, whether it owns one of them is found out at
+/// once: that takes less than a pair that covers nothing.
+#define DPR_FEW_SAMPLES 2
+
+/// The samples [x, y] along one axis within [low, high], in samples; x > y, and so for their tiles, if there is none. By
+/// conversions: PoCL's ceil() and floor() branch.
+static inline uint2 samples_within(float low, float high, uint size) {
+  const uint2 none = (uint2)(DPR_TILE, 0u);
+  const float from = fmin(fmax(low - DPR_BOUNDS_SLACK, 0.0f), (float)size);
+  const float to = fmin(high + DPR_BOUNDS_SLACK, (float)size - 1.0f);
+  if (!(to >= 0.0f)) return none;
+  const uint2 truncated = (uint2)((uint)from, (uint)to);
+  const uint first = truncated.x + ((float)truncated.x < from ? 1 : 0);
+  return first <= truncated.y ? (uint2)(first, truncated.y) : none;
+}
+
+/// The columns or rows [x, y] of a triangle's bounds.
+static inline uint2 columns_of(const Triangle t) { return (uint2)(t.first_sample & 0xffffu, t.last_sample & 0xffffu); }
+static inline uint2 rows_of(const Triangle t) { return (uint2)(t.first_sample >> 16, t.last_sample >> 16); }
+
+/// Those of a tile's samples [x, y] along one axis that are within others.
+static inline uint2 samples_of_tile(uint2 samples, uint tile) {
+  return (uint2)(max(samples.x, tile * DPR_TILE), min(samples.y, tile * DPR_TILE + DPR_TILE - 1));
+}
+
+/// False only if no pixel centre of the tile is within the blur distance of the triangle. Either one of the edges, pushed
+/// out by the blur, has the whole tile outside; or a vertex v is the triangle's nearest point: with n from v to the
+/// nearest point of the tile, further than the blur, and dot(n, y - v) <= 0 for the other vertices y, every point x of
+/// the tile has dot(n, x - y) >= |n|^2, hence |x - y| >= |n|.
+static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
+  const float half_extent = 0.5f * (DPR_TILE - 1) * p.pixel_size;
+  const float cx = ((float)(tile_x * DPR_TILE) + 0.5f * DPR_TILE - 0.5f * (float)p.width) * p.pixel_size;
+  const float cy = (0.5f * (float)p.height - (float)(tile_y * DPR_TILE) - 0.5f * DPR_TILE) * p.pixel_size;
+  const float4 ax = (float4)(t.x0, t.x1, t.x2, 0.0f), ay = (float4)(t.y0, t.y1, t.y2, 0.0f);
+  const float4 ex = ax.yzxw - ax, ey = ay.yzxw - ay;
+  const float4 inside = (ex * (cy - ay) - ey * (cx - ax)) * t.orientation;
+  const float4 reach = half_extent * (fabs(ex) + fabs(ey));
+  const float4 far = fmax(fmax(fabs(ax), fabs(ay)), fmax(fabs(cx), fabs(cy)));
+  const float blur = p.blur_distance + DPR_BIN_SLACK + DPR_BIN_RELATIVE_SLACK * fmax(fmax(far.x, far.y), far.z);
+  if (any((inside + reach < -blur * sqrt(ex * ex + ey * ey)).xyz)) return 0;
+  const float4 nx = clamp(ax, cx - half_extent, cx + half_extent) - ax;
+  const float4 ny = clamp(ay, cy - half_extent, cy + half_extent) - ay;
+  const int4 behind = nx * ex + ny * ey <= 0.0f && nx * ex.zxyw + ny * ey.zxyw >= 0.0f;
+  return !any((behind && nx * nx + ny * ny > blur * blur).xyz);
+}
+
+static inline int owns_any(const FrameParams p, const Triangle t, uint2 columns, uint2 rows) {
+  for (uint row = rows.x; row <= rows.y; ++row) {
+    for (uint column = columns.x; column <= columns.y; ++column) {
+      if (owns_sample(t, pixel_centre(p, (int)column, (int)row))) return 1;
+    }
+  }
+  return 0;
+}
+
+/// Whether a tile that the triangle's bounds meet is listed for it.
+static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
+  const uint2 columns = samples_of_tile(columns_of(t), tile_x), rows = samples_of_tile(rows_of(t), tile_y);
+  const uint samples = (columns.y - columns.x + 1) * (rows.y - rows.x + 1);
+  if (p.blur_distance == 0.0f && samples <= DPR_FEW_SAMPLES) return owns_any(p, t, columns, rows);
+  const uint2 all_columns = columns_of(t) / DPR_TILE, all_rows = rows_of(t) / DPR_TILE;
+  const int is_only = all_columns.x == all_columns.y && all_rows.x == all_rows.y;
+  return is_only || tile_overlaps(p, t, tile_x, tile_y);
+}
+
+#endif
