@@ -16,15 +16,23 @@ static inline int orientation_of(float3 a, float3 b, float3 c, float znear, floa
   return in_range && in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
 }
 
-/// A triangle that is not dropped.
-static inline Triangle make_triangle(const FrameParams p, float3 a, float3 b, float3 c, int orientation) {
-  // In pixels; a centre lies half a pixel from its corner.
-  const float2 scale = (float2)(1.0f, -1.0f) / p.pixel_size;
-  const float2 centre = 0.5f * (float2)((float)p.width, (float)p.height) - 0.5f;
+/// Blurred bounds in pixels: left, top, right, bottom.
+static inline float4 bounds_of(const FrameParams p, float3 a, float3 b, float3 c) {
   const float2 low = fmin(fmin(a.xy, b.xy), c.xy) - p.blur_distance;
   const float2 high = fmax(fmax(a.xy, b.xy), c.xy) + p.blur_distance;
-  const uint2 columns = samples_within(low.x * scale.x + centre.x, high.x * scale.x + centre.x, p.width);
-  const uint2 rows = samples_within(high.y * scale.y + centre.y, low.y * scale.y + centre.y, p.height);
+  const float2 scale = (float2)(1.0f, -1.0f) / p.pixel_size;
+  // A centre lies half a pixel from its corner.
+  const float2 centre = 0.5f * (float2)((float)p.width, (float)p.height) - 0.5f;
+  return (float4)((float2)(low.x, high.y) * scale + centre, (float2)(high.x, low.y) * scale + centre);
+}
+
+/// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does not.
+static inline int meets_image(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
+
+static inline Triangle make_triangle(const FrameParams p, float3 a, float3 b, float3 c, int orientation,
+                                     float4 bounds) {
+  const uint2 columns = samples_within(bounds.x, bounds.z, p.width);
+  const uint2 rows = samples_within(bounds.y, bounds.w, p.height);
   const Triangle t = {a.x, a.y, b.x, b.y, c.x, c.y, a.z, b.z, c.z, (float)orientation,
                       columns.x | rows.x << 16, columns.y | rows.y << 16};
   return t;
@@ -39,28 +47,34 @@ static inline uint count_tiles(const FrameParams p, const Triangle t) {
   return count;
 }
 
-/// Assembles the triangles, and counts the tiles of each: none of those that are dropped, cannot be seen, have no sample
-/// within their blurred bounds, or are small and own none. One work-item per (view, face).
+/// Assembles the triangles, and counts the tiles of each. Dropped is what orientation_of() drops, cannot be seen, or whose
+/// blurred bounds miss the image; what is kept has no tile where its bounds hold no sample, or it is small and owns none.
+/// One work-item per (view, face).
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
 /// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
-/// out  triangles  Triangle[view][face]    not written where there is no tile
+/// out  kept       uint[view][face]        0 or 1
 /// out  counts     uint[view][face]        tiles that are listed for it
+/// out  triangles  Triangle[view][face]    not written where there is no tile
 kernel void setup_forward(const FrameParams p, global const ViewParams* restrict views,
                           global const uint4* restrict faces, global const float4* restrict ndc,
-                          global const float* restrict hidden, global Triangle* restrict triangles,
-                          global uint* restrict counts) {
+                          global const float* restrict hidden, global uint* restrict kept,
+                          global uint* restrict counts, global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
   const uint4 face = faces[i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
   const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
-  counts[i] = 0;
   const int orientation = orientation_of(a, b, c, views[view].znear, views[view].zfar);
-  if (orientation == 0 || (float)orientation == hidden[view * p.meshes + face.w]) return;
-  const Triangle t = make_triangle(p, a, b, c, orientation);
+  const float4 bounds = bounds_of(p, a, b, c);
+  const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
+                      meets_image(bounds.x, bounds.z, p.width) && meets_image(bounds.y, bounds.w, p.height);
+  kept[i] = is_kept ? 1 : 0;
+  counts[i] = 0;
+  if (!is_kept) return;
+  const Triangle t = make_triangle(p, a, b, c, orientation, bounds);
   const uint count = count_tiles(p, t);
   if (count == 0) return;
   counts[i] = count;

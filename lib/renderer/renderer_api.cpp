@@ -1,6 +1,8 @@
 // The public face of the renderer: checks what it is given and hands it to the pipeline.
 #include "dpr/renderer.hpp"
 
+#include <algorithm>
+
 #include "base/checks.hpp"
 #include "device/info.hpp"
 #include "dpr/opencl_handles.hpp"
@@ -178,9 +180,7 @@ RenderStatistics Renderer::statistics() const {
   m.require_forward("Renderer::statistics");
   RenderStatistics s;
   s.faces = std::size_t{m.frame.views} * m.frame.faces;
-  for (const shared::Triangle& triangle : m.setup.triangles.download()) {
-    if (triangle.orientation == 0.0F) ++s.faces_dropped;
-  }
+  s.faces_dropped = static_cast<std::size_t>(std::ranges::count(m.setup.kept.download(), 0U));
   s.pairs = m.bin.pairs;
   s.fragments = m.rasterize.frame_fragments;
   s.bands = m.bands.size();

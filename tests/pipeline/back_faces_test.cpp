@@ -42,8 +42,7 @@ Mesh inside_out(Mesh mesh) {
 }
 
 std::ptrdiff_t kept_faces(const Renderer& renderer) {
-  return std::ranges::count_if(renderer.impl().setup.triangles.download(),
-                               [](const shared::Triangle& t) { return t.orientation != 0.0F; });
+  return std::ranges::count(renderer.impl().setup.kept.download(), 1U);
 }
 
 struct Seen {

@@ -75,7 +75,7 @@ float orientation(const NdcTriangle& t, const NdcFrame& frame = {}) {
   s.setup.triangles.upload(dpr::test::device_impl(), std::span(&poison, 1));
   s.set_up();
   const float found = s.setup.triangles.download()[0].orientation;
-  const bool is_dropped = s.setup.counts.download()[0] == 0;
+  const bool is_dropped = s.setup.kept.download()[0] == 0;
   CHECK(is_dropped == std::isnan(found));
   return is_dropped ? 0 : found;
 }
