@@ -1,6 +1,7 @@
 // The pipeline: the stages in order, then in reverse.
 #include "dpr/renderer.hpp"
 
+#include <algorithm>
 #include <atomic>
 
 #include "dpr/error.hpp"
@@ -72,10 +73,13 @@ void Renderer::Impl::find_edges() {
 
 /// Of views with shapes of their own none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
-  std::vector<float> hidden(views.size() * scene.meshes.size());
-  if (pixel_noise && frame.position_stride == 0) {
-    hidden = pixel_noise->back_faces.hidden(scene, views, depth_reach(scene.smoothing));
-  }
+  const std::size_t count = views.size() * scene.meshes.size();
+  const bool may_hide = pixel_noise && frame.position_stride == 0;
+  const auto hides_none = [](float orientation) { return orientation == 0; };
+  if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
+    return;
+  std::vector<float> hidden(count);
+  if (may_hide) hidden = pixel_noise->back_faces.hidden(scene, views, depth_reach(scene.smoothing));
   if (hidden == uploaded_hidden_) return;
   uploaded_hidden_.clear();
   hidden_.upload(device.impl(), hidden);
