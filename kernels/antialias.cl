@@ -2,9 +2,8 @@
 // the sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image follows the contour,
 // and its derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl finds.
 //
-// Few steps are crossed: a work-item takes a vector of samples, and copies it where none of them is.
-#include "lanes.h"
-#include "shared_types.h"
+// Few steps are crossed: a work-item takes a row of a tile, and copies it where no contour is near.
+#include "contour.h"
 
 /// The steps that cut a sample's cell: to the right, down, from the left, from above; and the same step as the sample at its
 /// other end counts it.
@@ -42,11 +41,23 @@ static inline Cell load_cell(const FrameParams p, uint pixel, uint pixels, globa
   return c;
 }
 
-/// False only if nothing crosses the steps of a vector of samples.
-static inline int may_be_crossed(const FrameParams p, uint pixel, uint pixels, global const uint* restrict winner) {
-  const uintn none = DPR_NO_CROSSING;
-  return any_lane(load_n(pixel, winner) != none || load_n(max(pixel, 1u) - 1, winner) != none ||
-                  load_n(pixels + pixel, winner) != none || load_n(pixels + pixel - p.width, winner) != none);
+/// A row of a tile: `count` samples from `first` on; none below the raster.
+typedef struct {
+  uint tile, first, count;
+} TileRow;
+
+static inline TileRow tile_row(const FrameParams p, uint i) {
+  TileRow r;
+  r.tile = i / DPR_TILE;
+  const TileSamples s = tile_samples(p, r.tile);
+  const uint row = (uint)s.first_row + i % DPR_TILE, view = r.tile / (p.tiles_x * p.tiles_y);
+  r.first = (view * p.height + row) * p.width + (uint)s.first_column;
+  r.count = view < p.views && row < p.height ? (uint)(s.last_column - s.first_column) : 0;
+  return r;
+}
+
+static inline void copy_row(TileRow r, global const float4* restrict from, global float4* restrict to) {
+  for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
 /// A cell's colour. `own` is its sample's.
@@ -59,41 +70,44 @@ static inline float4 mixed_cell(const Cell c, float4 own, global const float4* r
 }
 
 /// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it. One work-item
-/// per vector of samples. Deterministic.
+/// per row of a tile. Deterministic.
+/// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   winner, cut  as antialias_cross leaves them
 /// in   raster       float4[pixel]  the samples
 /// out  blended      float4[pixel]
-kernel void antialias_forward(const FrameParams p, global const uint* restrict winner,
-                              global const float* restrict cut, global const float4* restrict raster,
-                              global float4* restrict blended) {
-  const uint first = (uint)get_global_id(0) * DPR_WIDTH, pixels = p.views * p.width * p.height;
-  if (first >= pixels) return;
-  const uint last = min(first + DPR_WIDTH, pixels);
-  const int is_crossed = may_be_crossed(p, first, pixels, winner);
-  for (uint pixel = first; pixel < last; ++pixel) {
-    blended[pixel] = raster[pixel];
-    if (is_crossed) blended[pixel] = mixed_cell(load_cell(p, pixel, pixels, winner, cut), raster[pixel], raster);
+kernel void antialias_forward(const FrameParams p, global const uint* restrict tile_starts,
+                              global const uint* restrict winner, global const float* restrict cut,
+                              global const float4* restrict raster, global float4* restrict blended) {
+  const TileRow r = tile_row(p, (uint)get_global_id(0));
+  if (r.count == 0) return;
+  if (!may_be_crossed(p, r.tile, tile_starts)) {
+    copy_row(r, raster, blended);
+    return;
+  }
+  const uint pixels = p.views * p.width * p.height;
+  for (uint pixel = r.first; pixel < r.first + r.count; ++pixel) {
+    blended[pixel] = mixed_cell(load_cell(p, pixel, pixels, winner, cut), raster[pixel], raster);
   }
 }
 
 /// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its neighbours'.
-/// One work-item per vector of samples; each step cuts one cell, so no two write the same place. Deterministic.
+/// One work-item per row of a tile; each step cuts one cell, so no two write the same place. Deterministic.
 /// Inputs as antialias_forward, and
 /// in   grad_blended   float4[pixel]
 /// out  grad_cut       float[2][pixel]  not written where nothing crosses
 /// out  grad_raster    float4[pixel]
-kernel void antialias_backward(const FrameParams p, global const uint* restrict winner,
-                               global const float* restrict cut, global const float4* restrict raster,
-                               global const float4* restrict grad_blended, global float* restrict grad_cut,
-                               global float4* restrict grad_raster) {
-  const uint first = (uint)get_global_id(0) * DPR_WIDTH, pixels = p.views * p.width * p.height;
-  if (first >= pixels) return;
-  const uint last = min(first + DPR_WIDTH, pixels);
-  if (!may_be_crossed(p, first, pixels, winner)) {
-    for (uint pixel = first; pixel < last; ++pixel) grad_raster[pixel] = grad_blended[pixel];
+kernel void antialias_backward(const FrameParams p, global const uint* restrict tile_starts,
+                               global const uint* restrict winner, global const float* restrict cut,
+                               global const float4* restrict raster, global const float4* restrict grad_blended,
+                               global float* restrict grad_cut, global float4* restrict grad_raster) {
+  const TileRow r = tile_row(p, (uint)get_global_id(0));
+  if (r.count == 0) return;
+  if (!may_be_crossed(p, r.tile, tile_starts)) {
+    copy_row(r, grad_blended, grad_raster);
     return;
   }
-  for (uint pixel = first; pixel < last; ++pixel) {
+  const uint pixels = p.views * p.width * p.height;
+  for (uint pixel = r.first; pixel < r.first + r.count; ++pixel) {
     const Cell c = load_cell(p, pixel, pixels, winner, cut);
     const float4 own = raster[pixel], grad = grad_blended[pixel];
     // Where the weights are scaled to add up to 1, so is what one of them changes.

@@ -155,7 +155,8 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
 /// in   tile_starts   uint[view * tile + 1] runs of pairs
 /// in   pair_contour  uint[pair]            see DPR_CONTOUR_FLAGS, ascending within a tile
 /// in   front         float[pixel]
-/// out  winner        uint[2][pixel]        the contour that crosses a step, or DPR_NO_CROSSING
+/// out  winner        uint[2][pixel]        the contour that crosses a step, or DPR_NO_CROSSING. Not written in tiles that
+///                                          are not near a contour: is_near_contour()
 /// out  cut           float[2][pixel]       what it takes of a cell: of the first sample's where negative, else of the
 ///                                          second's. Not written where nothing crosses
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a, global const ViewParams* restrict views,
@@ -166,7 +167,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a, global
                             global float* restrict cut) {
   const uint tile = (uint)get_global_id(0);
   const uint tiles = p.tiles_x * p.tiles_y, view = tile / tiles;
-  if (view >= p.views) return;
+  if (view >= p.views || !is_near_contour(p, tile, tile_starts)) return;
   const uint pixels = p.views * p.width * p.height, first_pixel = view * p.width * p.height;
   const TileSamples s = tile_samples(p, tile);
   for (int row = s.first_row; row < s.last_row; ++row) {

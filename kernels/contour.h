@@ -53,4 +53,43 @@ static inline float2 to_samples(const FrameParams p, float2 ndc) {
   return (float2)(ndc.x * inverse + 0.5f * (float)p.width - 0.5f, 0.5f * (float)p.height - 0.5f - ndc.y * inverse);
 }
 
+/// The part of a tile that lies on the raster, [first, last) columns and rows.
+typedef struct {
+  int first_column, last_column, first_row, last_row;
+} TileSamples;
+
+static inline TileSamples tile_samples(const FrameParams p, uint tile) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y);
+  TileSamples s;
+  s.first_column = (int)(in_view % p.tiles_x * DPR_TILE);
+  s.first_row = (int)(in_view / p.tiles_x * DPR_TILE);
+  s.last_column = min(s.first_column + DPR_TILE, (int)p.width);
+  s.last_row = min(s.first_row + DPR_TILE, (int)p.height);
+  return s;
+}
+
+/// Whether a contour lies in one of the tiles [first, last] of a row; `tile_starts` are runs of pairs.
+static inline int have_contours(global const uint* tile_starts, uint first, uint last) {
+  return tile_starts[last + 1] > tile_starts[first];
+}
+
+/// Whether a contour may cross a step of a tile's cells: it lies there, or in the tiles to the left and above, whose steps
+/// reach into it.
+static inline int may_be_crossed(const FrameParams p, uint tile, global const uint* tile_starts) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), left = in_view % p.tiles_x > 0 ? 1 : 0;
+  if (have_contours(tile_starts, tile - left, tile)) return 1;
+  return in_view >= p.tiles_x && have_contours(tile_starts, tile - p.tiles_x, tile - p.tiles_x);
+}
+
+/// Whether a contour lies in a tile or beside it: further away nothing asks for the steps of its samples.
+static inline int is_near_contour(const FrameParams p, uint tile, global const uint* tile_starts) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x, row = in_view / p.tiles_x;
+  const uint left = column > 0 ? 1 : 0, right = column + 1 < p.tiles_x ? 1 : 0;
+  const uint first = row > 0 ? tile - p.tiles_x : tile, last = row + 1 < p.tiles_y ? tile + p.tiles_x : tile;
+  for (uint middle = first; middle <= last; middle += p.tiles_x) {
+    if (have_contours(tile_starts, middle - left, middle + right)) return 1;
+  }
+  return 0;
+}
+
 #endif

@@ -136,21 +136,6 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
   return c;
 }
 
-/// The part of a tile that lies on the raster, [first, last) columns and rows.
-typedef struct {
-  int first_column, last_column, first_row, last_row;
-} TileSamples;
-
-static inline TileSamples tile_samples(const FrameParams p, uint tile) {
-  const uint in_view = tile % (p.tiles_x * p.tiles_y);
-  TileSamples s;
-  s.first_column = (int)(in_view % p.tiles_x * DPR_TILE);
-  s.first_row = (int)(in_view / p.tiles_x * DPR_TILE);
-  s.last_column = min(s.first_column + DPR_TILE, (int)p.width);
-  s.last_row = min(s.first_row + DPR_TILE, (int)p.height);
-  return s;
-}
-
 /// The lines [x, y) of a tile that an edge may cross.
 static inline int2 lines_of_edge(const FrameParams p, const RasterEdge e, const TileSamples s) {
   const float2 a = to_samples(p, e.a), b = to_samples(p, e.b);

@@ -24,14 +24,14 @@ PixelNoise::PixelNoise(Device::Impl& device)
 void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
                          float reach) {
   antialias.cross(in, contour, reach);
-  antialias.forward(in.p, raster, blended_);
+  antialias.forward(in.p, contour, raster, blended_);
   image.resize(device_, size.views * size.width * size.height);
   blur.forward(size, blended_, image);
 }
 
 void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
                         Buffer<cl_float4>& pixels) {
-  antialias.forward(in.p, samples, other_blended_);
+  antialias.forward(in.p, contour, samples, other_blended_);
   pixels.resize(device_, size.views * size.width * size.height);
   blur.forward(size, other_blended_, pixels);
   blur.forward(size, blended_, image);  // which leaves what the backward pass needs

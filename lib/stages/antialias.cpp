@@ -5,6 +5,8 @@ namespace {
 
 std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
 
+std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
+
 shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
   shared::AntialiasParams a{};
   a.edges = static_cast<cl_uint>(in.edges.count);
@@ -22,11 +24,6 @@ Antialias::Antialias(Device::Impl& device)
       backward_(device, "antialias.cl", "antialias_backward"),
       cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
 
-/// As kernels/antialias.cl has them.
-std::size_t Antialias::vectors_of(std::size_t samples) const {
-  return (samples + device_.info.lanes - 1) / device_.info.lanes;
-}
-
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
   front.resize(device_, samples_of(p));
   for (const Range& run : rasterize.pixels(p)) {
@@ -37,15 +34,15 @@ void Antialias::find_front(const shared::FrameParams& p, const Rasterize& raster
 void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
-  cross_(std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, in.p, params(in, depth_reach),
-         in.views.cameras, in.edges.edges, in.geometry.face_vertices, contour.facing, in.transform.ndc,
-         contour.tile_starts, contour.pair_contour, front, winner, cut);
+  cross_(tiles_of(in.p), in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
+         in.geometry.face_vertices, contour.facing, in.transform.ndc, contour.tile_starts,
+         contour.pair_contour, front, winner, cut);
 }
 
-void Antialias::forward(const shared::FrameParams& p, const Buffer<cl_float4>& raster,
+void Antialias::forward(const shared::FrameParams& p, const Contour& contour, const Buffer<cl_float4>& raster,
                         Buffer<cl_float4>& blended) {
   blended.resize(device_, samples_of(p));
-  forward_(vectors_of(samples_of(p)), p, winner, cut, raster, blended);
+  forward_(tiles_of(p) * DPR_TILE, p, contour.tile_starts, winner, cut, raster, blended);
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
@@ -54,7 +51,8 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   grad_cut_.resize(device_, 2 * samples);
   grad_raster.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
-  backward_(vectors_of(samples), in.p, winner, cut, raster, grad_blended, grad_cut_, grad_raster);
+  backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
+            grad_cut_, grad_raster);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
                   contour.facing, in.transform.ndc, contour.pair_contour, contour.pair_tile, winner, cut,
                   grad_cut_, grad_ends);

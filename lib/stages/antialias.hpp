@@ -17,28 +17,28 @@ class Antialias {
   /// (normalised depth) behind the nearest count as seen.
   void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
   /// Blends the samples of [view][height][width].
-  void forward(const shared::FrameParams& p, const Buffer<cl_float4>& raster, Buffer<cl_float4>& blended);
+  void forward(const shared::FrameParams& p, const Contour& contour, const Buffer<cl_float4>& raster,
+               Buffer<cl_float4>& blended);
   /// From the gradients of the blended samples to those of the samples, and to `grad_ends`.
   void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
                 const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster);
 
   Buffer<float> front;          ///< [view][height][width] view depth, infinite where nothing is
-  Buffer<cl_uint> winner;       ///< [2][view][height][width] what crosses the steps to the right, and down
+  Buffer<cl_uint> winner;       ///< [2][view][height][width] what crosses the steps to the right, and down;
+                                ///< only near contours
   Buffer<float> cut;            ///< [2][view][height][width] of a cell: of the first sample's where negative
   Buffer<cl_float4> grad_ends;  ///< [pair] of the contour's two ends, NDC
 
   std::size_t bytes() const;
 
  private:
-  std::size_t vectors_of(std::size_t samples) const;
-
   Device::Impl& device_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
          In<cl_uint>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, Out<cl_uint>, Out<float>>
       cross_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<cl_float4>, Out<cl_float4>> forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, Out<cl_float4>> forward_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
          Out<cl_float4>>
       backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "dpr/image.hpp"
@@ -52,17 +53,22 @@ Samples rigid_samples(const ContourFrame& frame, const Mesh& mesh) {
   return samples;
 }
 
-std::vector<cl_float4> blend(ContourFrame& frame, const Samples& samples) {
+/// `unknown` is in the steps before they are looked at.
+std::vector<cl_float4> blend(ContourFrame& frame, const Samples& samples, cl_uint unknown = 0xdeadbeefU) {
   frame.contour.forward(frame.inputs());
   frame.antialias.front.upload(device_impl(), samples.front);
-  test::poison(frame.antialias.winner, 2 * frame.samples(), 0xdeadbeefU);
+  test::poison(frame.antialias.winner, 2 * frame.samples(), unknown);
   frame.antialias.cross(frame.inputs(), frame.contour, 0.0F);
   const Buffer<cl_float4> raster(device_impl(), samples.colors);
   Buffer<cl_float4> blended;
   test::poison(blended, frame.samples(),
                cl_float4{{test::k_poison, test::k_poison, test::k_poison, test::k_poison}});
-  frame.antialias.forward(frame.p, raster, blended);
+  frame.antialias.forward(frame.p, frame.contour, raster, blended);
   return blended.download();
+}
+
+bool has_same_bits(const std::vector<cl_float4>& a, const std::vector<cl_float4>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(cl_float4)) == 0;
 }
 
 double sum_of(const std::vector<cl_float4>& image, int channel) {
@@ -207,6 +213,28 @@ TEST_SUITE("unit") {
     CHECK(frame.antialias.winner.download() != before);
     frame.antialias.cross(frame.inputs(), frame.contour, 0.9F / 99);
     CHECK(frame.antialias.winner.download() == before);
+  }
+
+  TEST_CASE("antialias: steps away from contours are not looked at, and samples there stay as they are") {
+    Random random(12);
+    for (int i = 0; i < reduced(40, 3); ++i) {
+      const glm::vec2 middle(random(-1.1F, 1.1F), random(-0.9F, 0.9F));
+      const Mesh mesh = fan(circle(middle, random(0.02F, 0.3F), 5), 5);
+      ContourFrame frame(mesh, 75, 60);
+      const Samples samples = rigid_samples(frame, mesh);
+      const Buffer<cl_float4> raster(device_impl(), samples.colors),
+          grad_blended(device_impl(), smooth_values(frame, 1));
+      const auto passes = [&](cl_uint unknown) {
+        std::vector<std::vector<cl_float4>> results{blend(frame, samples, unknown)};
+        Buffer<cl_float4> grad_raster;
+        frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
+        results.push_back(grad_raster.download());
+        results.push_back(frame.antialias.grad_ends.download());
+        return results;
+      };
+      const auto found = passes(0xdeadbeefU), expected = passes(DPR_NO_CROSSING);
+      for (std::size_t k = 0; k < found.size(); ++k) CHECK(has_same_bits(found[k], expected[k]));
+    }
   }
 
   TEST_CASE("antialias: what is cut on all sides is shared by its neighbours") {
