@@ -27,6 +27,7 @@ void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raste
   antialias.forward(in.p, contour, raster, blended_);
   image.resize(device_, size.views * size.width * size.height);
   blur.forward(size, blended_, image);
+  blur_holds_image_ = true;
 }
 
 void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
@@ -34,13 +35,17 @@ void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& sample
   antialias.forward(in.p, contour, samples, other_blended_);
   pixels.resize(device_, size.views * size.width * size.height);
   blur.forward(size, other_blended_, pixels);
-  blur.forward(size, blended_, image);  // which leaves what the backward pass needs
+  blur_holds_image_ = false;
 }
 
 void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
                           const Buffer<cl_float4>& grad_image, bool by_scale) {
   blur.backward(size, grad_image, grad_blended_);
-  if (by_scale) blur.backward_scale(size, blended_, grad_image);
+  if (by_scale) {
+    if (!blur_holds_image_) blur.forward(size, blended_, image);
+    blur_holds_image_ = true;
+    blur.backward_scale(size, blended_, grad_image);
+  }
   antialias.backward(in, contour, raster, grad_blended_, grad_raster);
 }
 

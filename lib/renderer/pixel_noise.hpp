@@ -54,6 +54,7 @@ class PixelNoise {
 
  private:
   Buffer<cl_float4> blended_, grad_blended_, other_blended_;
+  bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;
 };
 
