@@ -18,13 +18,21 @@ typedef struct {
   float total;                             // of the weights, or 1 if that is less
 } Cell;
 
-static inline Cell load_cell(const FrameParams p, uint pixel, uint pixels, global const uint* restrict winner,
-                             global const float* restrict cut) {
-  const int has[DPR_STEPS] = {1, 1, pixel % p.width > 0, pixel / p.width % p.height > 0};
+/// Whether anything crosses a step of the cell of a sample, in column and row `at` of its view.
+static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pixels, global const uint* restrict winner) {
+  const uint left = at.x > 0 ? winner[pixel - 1] : DPR_NO_CROSSING;
+  const uint above = at.y > 0 ? winner[pixels + pixel - p.width] : DPR_NO_CROSSING;
+  return (winner[pixel] & winner[pixels + pixel] & left & above) != DPR_NO_CROSSING;
+}
+
+static inline Cell load_cell(const FrameParams p, uint pixel, uint2 at, uint pixels,
+                             global const uint* restrict winner, global const float* restrict cut) {
+  const int has[DPR_STEPS] = {1, 1, at.x > 0, at.y > 0};
   const uint first[DPR_STEPS] = {pixel, pixels + pixel, pixel - 1, pixels + pixel - p.width};
   const uint other[DPR_STEPS] = {pixel + 1, pixel + p.width, pixel - 1, pixel - p.width};
   Cell c;
   float sum = 0.0f;
+#pragma unroll
   for (int k = 0; k < DPR_STEPS; ++k) {
     c.step[k] = first[k];
     c.other[k] = other[k];
@@ -41,28 +49,38 @@ static inline Cell load_cell(const FrameParams p, uint pixel, uint pixels, globa
   return c;
 }
 
-/// A row of a tile: `count` samples from `first` on; none below the raster.
+/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view; none below the raster.
 typedef struct {
   uint tile, first, count;
+  uint2 at;
 } TileRow;
 
 static inline TileRow tile_row(const FrameParams p, uint i) {
   TileRow r;
   r.tile = i / DPR_TILE;
   const TileSamples s = tile_samples(p, r.tile);
-  const uint row = (uint)s.first_row + i % DPR_TILE, view = r.tile / (p.tiles_x * p.tiles_y);
-  r.first = (view * p.height + row) * p.width + (uint)s.first_column;
-  r.count = view < p.views && row < p.height ? (uint)(s.last_column - s.first_column) : 0;
+  const uint view = r.tile / (p.tiles_x * p.tiles_y);
+  r.at = (uint2)((uint)s.first_column, (uint)s.first_row + i % DPR_TILE);
+  r.first = (view * p.height + r.at.y) * p.width + r.at.x;
+  r.count = view < p.views && r.at.y < p.height ? (uint)(s.last_column - s.first_column) : 0;
   return r;
 }
 
 static inline void copy_row(TileRow r, global const float4* restrict from, global float4* restrict to) {
+  if (r.count == DPR_TILE) {
+    global const float* first = (global const float*)(from + r.first);
+    const float16 low = vload16(0, first), high = vload16(1, first);
+    vstore16(low, 0, (global float*)(to + r.first));
+    vstore16(high, 1, (global float*)(to + r.first));
+    return;
+  }
   for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
 /// A cell's colour. `own` is its sample's.
 static inline float4 mixed_cell(const Cell c, float4 own, global const float4* restrict raster) {
   float4 sum = own;
+#pragma unroll
   for (int k = 0; k < DPR_STEPS; ++k) {
     if (c.weight[k] > 0.0f) sum += c.weight[k] / c.total * (raster[c.other[k]] - own);
   }
@@ -85,8 +103,12 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
     return;
   }
   const uint pixels = p.views * p.width * p.height;
-  for (uint pixel = r.first; pixel < r.first + r.count; ++pixel) {
-    blended[pixel] = mixed_cell(load_cell(p, pixel, pixels, winner, cut), raster[pixel], raster);
+  for (uint k = 0; k < r.count; ++k) {
+    const uint pixel = r.first + k;
+    const uint2 at = r.at + (uint2)(k, 0u);
+    blended[pixel] = is_crossed(p, pixel, at, pixels, winner)
+                         ? mixed_cell(load_cell(p, pixel, at, pixels, winner, cut), raster[pixel], raster)
+                         : raster[pixel];
   }
 }
 
@@ -107,11 +129,19 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
     return;
   }
   const uint pixels = p.views * p.width * p.height;
-  for (uint pixel = r.first; pixel < r.first + r.count; ++pixel) {
-    const Cell c = load_cell(p, pixel, pixels, winner, cut);
+  for (uint i = 0; i < r.count; ++i) {
+    const uint pixel = r.first + i;
+    const uint2 at = r.at + (uint2)(i, 0u);
     const float4 own = raster[pixel], grad = grad_blended[pixel];
+    if (!is_crossed(p, pixel, at, pixels, winner)) {
+      grad_raster[pixel] = grad;
+      continue;
+    }
+    const Cell c = load_cell(p, pixel, at, pixels, winner, cut);
     // Where the weights are scaled to add up to 1, so is what one of them changes.
     const float4 from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
+    const uint2 beside[DPR_STEPS] = {at + (uint2)(1u, 0u), at + (uint2)(0u, 1u), at - (uint2)(1u, 0u),
+                                     at - (uint2)(0u, 1u)};
     float kept = 1.0f;
     float4 given = 0.0f;
     for (int k = 0; k < DPR_STEPS; ++k) {
@@ -120,7 +150,7 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
         grad_cut[c.step[k]] = c.turn[k] * dot(grad, raster[c.other[k]] - from) / c.total;
       }
       if (c.cuts_other[k]) {
-        const Cell other = load_cell(p, c.other[k], pixels, winner, cut);
+        const Cell other = load_cell(p, c.other[k], beside[k], pixels, winner, cut);
         given += other.weight[DPR_OPPOSITE(k)] / other.total * grad_blended[c.other[k]];
       }
     }
