@@ -34,7 +34,9 @@ kernel void image_loss_backward(const uint views, const uint pixels_per_view, gl
   for (uint k = 0; k < DPR_LOSS_SUMS; ++k) of_view[k] = sums[k * views + view];
   global const float* weight = weights + view * DPR_LOSS_COUNT;
   float4 grad = 0.0f;
-#define DPR_ADD_GRADIENT(name) grad += name##_gradient(weight[name##_number], image[i], target[i], of_view + name##_first);
+#define DPR_ADD_GRADIENT(name)     \
+  if (weight[name##_number] != 0.0f) \
+    grad += name##_gradient(weight[name##_number], image[i], target[i], of_view + name##_first);
   DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
   const float mean = 1.0f / (3.0f * (float)pixels_per_view);
   grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)views;
