@@ -39,22 +39,22 @@ kernel void bin_fill(const FrameParams p, const uint capacity, global const Tria
   }
 }
 
-/// Links pairs, numbered by tile, and the places where faces list theirs. One work-item for every pair within the
-/// capacity.
-/// in   pairs       uint[1]
-/// in   places      uint[pair]   where the pair's face lists it
-/// in   place_face  uint[place]
-/// out  pair_face   uint[capacity]  view * faces + face; 0 where there is no pair
-/// out  face_pairs  uint[place]  the pairs of every face, by tile
+/// Links pairs, numbered by tile, and the places where owners list theirs: faces, or contours. One work-item for every pair
+/// within the capacity.
+/// in   pairs        uint[1]
+/// in   places       uint[pair]      where the pair's owner lists it
+/// in   place_owner  uint[place]     view * faces + face, or the contour
+/// out  pair_owner   uint[capacity]  0 where there is no pair
+/// out  owner_pairs  uint[place]     the pairs of every owner, by tile
 kernel void bin_link(const uint capacity, global const uint* restrict pairs, global const uint* restrict places,
-                     global const uint* restrict place_face, global uint* restrict pair_face,
-                     global uint* restrict face_pairs) {
+                     global const uint* restrict place_owner, global uint* restrict pair_owner,
+                     global uint* restrict owner_pairs) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= capacity) return;
   if (pair >= pairs[0]) {
-    pair_face[pair] = 0;
+    pair_owner[pair] = 0;
     return;
   }
-  pair_face[pair] = place_face[places[pair]];
-  face_pairs[places[pair]] = pair;
+  pair_owner[pair] = place_owner[places[pair]];
+  owner_pairs[places[pair]] = pair;
 }

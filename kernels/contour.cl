@@ -229,22 +229,6 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   }
 }
 
-/// Links pairs, numbered by tile, and the places where edges list theirs. One work-item for every pair within the
-/// capacity.
-/// in   pairs          uint[1]
-/// in   places         uint[pair]   where the pair's edge lists it
-/// in   place_contour  uint[place]
-/// out  pair_contour   uint[pair]
-/// out  edge_pairs     uint[place]  the pairs of every edge
-kernel void contour_link(const uint capacity, global const uint* restrict pairs, global const uint* restrict places,
-                         global const uint* restrict place_contour, global uint* restrict pair_contour,
-                         global uint* restrict edge_pairs) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= capacity || pair >= pairs[0]) return;
-  pair_contour[pair] = place_contour[places[pair]];
-  edge_pairs[places[pair]] = pair;
-}
-
 /// Adds the gradients of contours' ends to those of the vertices: each vertex its edges in order, each edge its pairs.
 /// One work-item per (view, vertex). Deterministic.
 /// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`

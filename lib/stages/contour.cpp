@@ -63,7 +63,7 @@ Contour::Contour(Device::Impl& device)
       facing_(device, "contour.cl", "contour_facing"),
       count_(device, "contour.cl", "contour_count"),
       fill_(device, "contour.cl", "contour_fill"),
-      link_(device, "contour.cl", "contour_link"),
+      link_(device, "bin.cl", "bin_link"),
       gather_(device, "contour.cl", "contour_gather"),
       scan_(device),
       sort_(device) {}
