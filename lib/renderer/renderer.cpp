@@ -219,13 +219,16 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
   const bool sampled_jointly = aggregate.perturbs_distances();
-  if ((geometric || wanted.smoothing) && !sampled_jointly) {
+  // Distances without noise have no gradient, and rasterization does not read one.
+  if ((geometric || wanted.smoothing) && !sampled_jointly && !pixel_noise) {
     occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
   }
   if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
   if (geometric) {
     rasterize.backward(frame, setup.triangles, bin,
-                       sampled_jointly ? aggregate.grad_distance : occupancy.grad_distance,
+                       pixel_noise       ? aggregate.grad_depth
+                       : sampled_jointly ? aggregate.grad_distance
+                                         : occupancy.grad_distance,
                        aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
   }
   if (wanted.lights && shade.lit()) {
