@@ -1,9 +1,9 @@
 // The perturbed arg-max over a pixel's fragments and the background, exactly, for the barrier composition:
 // w = E[argmax <beta + Z, y>] with beta = b / gamma, b = zeta + (gamma / alpha) ln p, eq. (7), (9), (10).
 //
-// The forward pass gathers the slots that count, and integrates (integrate.h). The weights sum to 1, so dividing by the
-// quadrature's own sum removes most of its error. A slot alone needs no integral, nor does the Gumbel prior, whose
-// weights are the softmax (40). Errors: tests/stages/aggregate_test.cpp.
+// The forward pass gathers the slots that count, and integrates (integrate.h). The weights sum to 1, so
+// dividing by the quadrature's own sum removes most of its error. A slot alone needs no integral, nor does
+// the Gumbel prior, whose weights are the softmax (40). Errors: tests/stages/aggregate_test.cpp.
 #ifndef DPR_LANES
 #define DPR_LANES 8
 #endif
@@ -14,8 +14,9 @@
 #endif
 #include "integrate.h"
 
-/// The slots that count, the largest first; betas relative to it. Slots further below than the prior reaches have no
-/// weight, and change no other's. Everything is written, and what does not count written over: no branch to mispredict.
+/// The slots that count, the largest first; betas relative to it. Slots further below than the prior reaches
+/// have no weight, and change no other's. Everything is written, and what does not count written over: no
+/// branch to mispredict.
 static inline Slots gather_slots(const BarrierPixel q, const Fragments f, global Slot* slots) {
   float largest = q.background;
   const Slot background = {q.background, 1.0f, 0.0f, DPR_BACKGROUND_SLOT};
@@ -85,7 +86,9 @@ static inline float4 weigh_colors(const Slots run, const Fragments f, float3 bac
   return integrate_colors(run, f, background);
 }
 
-static inline float weigh_gradients(const Slots run, SlotGradients* out) { return integrate_gradients(run, out).x; }
+static inline float weigh_gradients(const Slots run, SlotGradients* out) {
+  return integrate_gradients(run, out).x;
+}
 
 #endif
 
@@ -113,7 +116,8 @@ static inline float slot_log(const Slot s, const Fragments f) {
 /// in   starts  uint[pixel + 1]  runs of `list`
 /// in   list    uint[...]        fragments, by pixel
 /// in   depth, log_occupancy, occupancy, red, green, blue  float[fragment]
-/// out  slots       Slot[length of list + pixels]  for the backward pass; a pixel's begin at starts[pixel] + pixel
+/// out  slots       Slot[length of list + pixels]  for the backward pass; a pixel's begin at
+///                                                 starts[pixel] + pixel
 /// out  slot_counts uint[pixel]
 /// out  image       float4[pixel]    colour, and alpha = 1 - prod (1 - p)
 kernel void aggregate_forward(const AggregateParams p, global const ViewParams* restrict views,
@@ -144,8 +148,9 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
 
 /// Clears a pixel's gradients, but for what alpha adds to those of ln p.
 static inline void clear_gradients(const Fragments f, uint first, uint last, float grad_alpha_channel,
-                                   global float* grad_depth, global float* grad_log_occupancy, global float* grad_red,
-                                   global float* grad_green, global float* grad_blue) {
+                                   global float* grad_depth, global float* grad_log_occupancy,
+                                   global float* grad_red, global float* grad_green,
+                                   global float* grad_blue) {
   const float transparency = run_transparency(f, first, last);
   for (uint i = first; i < last; ++i) {
     const uint k = f.list[i];
@@ -154,11 +159,13 @@ static inline void clear_gradients(const Fragments f, uint first, uint last, flo
   }
 }
 
-/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic.
+/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
+/// Deterministic.
 /// in   slots, slot_counts   as aggregate_forward left them; changed. The other inputs as there
 /// in   grad_image  float4[pixel]
 /// out  grad_depth, grad_log_occupancy, grad_red, grad_green, grad_blue  float[fragment]
-/// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma, alpha and the background colour
+/// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma, alpha and the background
+///                                                    colour
 kernel void aggregate_backward(const AggregateParams p, global const ViewParams* restrict views,
                                global const uint* restrict starts, global const uint* restrict list,
                                global const float* restrict depth, global const float* restrict log_occupancy,
@@ -189,15 +196,16 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
     global const ViewParams* view = views + pixel / p.pixels_per_view;
     const float depth_scale = view->inverse_range / p.gamma, inverse_alpha = 1.0f / p.alpha;
     const float background_depth = view->zfar - p.background_depth / view->inverse_range;
-    const float depth_origin = slot_depth(run.slot[0], f, background_depth), log_origin = slot_log(run.slot[0], f);
+    const float depth_origin = slot_depth(run.slot[0], f, background_depth),
+                log_origin = slot_log(run.slot[0], f);
     for (uint i = 0; i < run.count; ++i) {
       const Slot s = run.slot[i];
       const uint k = s.fragment;
       const int is_background = k == DPR_BACKGROUND_SLOT;
       const float grad_beta = scale * (is_background ? sums.background_beta : grad_depth[k]);
-      // d beta / d gamma = -(beta by depth) / gamma; d beta / d alpha = -ln p / alpha^2. Shifting all betas changes
-      // nothing, so both count from the largest slot, where the gradients are: from elsewhere their errors would be
-      // multiplied by the distance.
+      // d beta / d gamma = -(beta by depth) / gamma; d beta / d alpha = -ln p / alpha^2. Shifting all betas
+      // changes nothing, so both count from the largest slot, where the gradients are: from elsewhere their
+      // errors would be multiplied by the distance.
       grad_gamma += grad_beta * (slot_depth(s, f, background_depth) - depth_origin) * depth_scale / p.gamma;
       grad_alpha -= grad_beta * (slot_log(s, f) - log_origin) * inverse_alpha * inverse_alpha;
       if (is_background) continue;

@@ -1,15 +1,18 @@
-// The joint composition by Monte Carlo: every sample perturbs the distances and the depths of all of a pixel's
-// fragments and renders them rigidly. A fragment covers if s / sigma + X > 0; of those that cover, the largest
-// zeta / gamma + Z wins; where none does, the background is seen. The image is the mean of the samples, eq. (11).
+// The joint composition by Monte Carlo: every sample perturbs the distances and the depths of all of a
+// pixel's fragments and renders them rigidly. A fragment covers if s / sigma + X > 0; of those that cover,
+// the largest zeta / gamma + Z wins; where none does, the background is seen. The image is the mean of the
+// samples, eq. (11).
 //
-// Gradients are score estimates with the baselines of noise.h, eq. (12)-(16), of y = <dL/dRGBA, RGBA of the sample>:
+// Gradients are score estimates with the baselines of noise.h, eq. (12)-(16), of y = <dL/dRGBA, RGBA of the
+// sample>:
 //
 //   dL/ds_k     = 1/M sum_m (y_m - b_m) nu'(X_km) / sigma           samples where k wins if it covers
 //   dL/dzeta_k  = 1/M sum_m (y_m - b_m) nu'(Z_km) / gamma           samples where k covers, and could win
-//   dL/dsigma   = 1/M sum_m (y_m - b_m) sum_k (nu'(X_km) X_km - 1) / sigma, and gamma's with Z, over the same samples
+//   dL/dsigma   = 1/M sum_m (y_m - b_m) sum_k (nu'(X_km) X_km - 1) / sigma, and gamma's with Z, over the same
+//               samples
 //
-// y depends on X_k, given all the other noise, only where k would win, and on Z_k only where k covers: the rest has
-// mean zero. A fragment so far inside or outside that no noise changes its sign draws no X.
+// y depends on X_k, given all the other noise, only where k would win, and on Z_k only where k covers: the
+// rest has mean zero. A fragment so far inside or outside that no noise changes its sign draws no X.
 #include "sampled_pixel.h"
 
 #ifndef DPR_OCCUPANCY_PRIOR
@@ -33,8 +36,9 @@ typedef struct {
   float depth_scale;  // d beta / d (nearest - depth)
 } Pixel;
 
-static inline Layers make_layers(global const uint* list, global const float* distance, global const float* depth,
-                                 global const float* red, global const float* green, global const float* blue,
+static inline Layers make_layers(global const uint* list, global const float* distance,
+                                 global const float* depth, global const float* red,
+                                 global const float* green, global const float* blue,
                                  global const uint* fragment_pair, global const uint* pair_face) {
   Layers f;
   f.fragments = make_fragments(list, depth, 0, 0, red, green, blue);
@@ -76,10 +80,15 @@ static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, 
   return c;
 }
 
-static inline int never_covers(const Coordinates c) { return c.x + highest_noise(DPR_OCCUPANCY_PRIOR) <= 0.0f; }
-static inline int always_covers(const Coordinates c) { return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f; }
+static inline int never_covers(const Coordinates c) {
+  return c.x + highest_noise(DPR_OCCUPANCY_PRIOR) <= 0.0f;
+}
+static inline int always_covers(const Coordinates c) {
+  return c.x + lowest_noise(DPR_OCCUPANCY_PRIOR) > 0.0f;
+}
 
-DPR_ALWAYS_INLINE realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c, uint block) {
+DPR_ALWAYS_INLINE realn draw_distance(const AggregateParams p, const Pixel q, const Coordinates c,
+                                      uint block) {
   const NoiseName name = name_of_noise(p, q.run, c.face, DPR_STAGE_OCCUPANCY);
   return draw_noise(p.sampling, DPR_OCCUPANCY_PRIOR, name, block);
 }
@@ -136,13 +145,12 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
 /// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 /// out  image          float4[pixel]    means over the samples; alpha: the share in which any fragment covers
-kernel void aggregate_joint_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
-                                            global const uint* restrict starts, global const uint* restrict list,
-                                            global const float* restrict distance, global const float* restrict depth,
-                                            global const float* restrict red, global const float* restrict green,
-                                            global const float* restrict blue,
-                                            global const uint* restrict fragment_pair,
-                                            global const uint* restrict pair_face, global float4* restrict image) {
+kernel void aggregate_joint_sampled_forward(
+    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
+    global const uint* restrict list, global const float* restrict distance,
+    global const float* restrict depth, global const float* restrict red, global const float* restrict green,
+    global const float* restrict blue, global const uint* restrict fragment_pair,
+    global const uint* restrict pair_face, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
@@ -159,7 +167,8 @@ kernel void aggregate_joint_sampled_forward(const AggregateParams p, global cons
   image[pixel] = sum / (float)p.sampling.samples;
 }
 
-/// Where a pixel's fragments collect: wins, and the sums of add_scores for distance and depth. float[fragment]
+/// Where a pixel's fragments collect: wins, and the sums of add_scores for distance and depth.
+/// float[fragment]
 typedef struct {
   global float *wins, *by_distance, *distance_scores, *by_depth, *depth_scores;
 } FragmentSums;
@@ -171,9 +180,9 @@ typedef struct {
 } PixelSums;
 
 /// Adds a block's scores of one fragment.
-DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block, int place,
-                                    const Lead lead, const NoiseCache* cache, realn grouped, const FragmentSums out,
-                                    PixelSums* sums) {
+DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, const Layers f, uint block,
+                                    int place, const Lead lead, const NoiseCache* cache, realn grouped,
+                                    const FragmentSums out, PixelSums* sums) {
   const uint k = fragment_at(q.run, f.fragments, place);
   const Coordinates c = load_fragment(p, q, f, k);
   if (never_covers(c) || !any_lane(could_win(lead, c))) return;
@@ -188,13 +197,13 @@ DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, cons
   const realn z = is_kept && any_lane(covers) ? cache->depth[place] : draw_depth(p, q, c, block);
   if (!always_covers(c)) {
     const intn wins_if_it_covers = c.beta + z >= lead.largest;
-    const float2 scores =
-        add_scores(x, noise_score(DPR_OCCUPANCY_PRIOR, x), counts && wins_if_it_covers, grouped, &sums->sigma);
+    const float2 scores = add_scores(x, noise_score(DPR_OCCUPANCY_PRIOR, x), counts && wins_if_it_covers,
+                                     grouped, &sums->sigma);
     out.by_distance[k] += scores.x;
     out.distance_scores[k] += scores.y;
   }
-  const float2 scores =
-      add_scores(z, noise_score(DPR_DEPTH_PRIOR, z), counts && covers && could_win(lead, c), grouped, &sums->gamma);
+  const float2 scores = add_scores(z, noise_score(DPR_DEPTH_PRIOR, z), counts && covers && could_win(lead, c),
+                                   grouped, &sums->gamma);
   out.by_depth[k] += scores.x;
   out.depth_scores[k] += scores.y;
 }
@@ -222,20 +231,21 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
   return sums;
 }
 
-/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place. Deterministic. Inputs
-/// as aggregate_joint_sampled_forward, and
+/// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
+/// Deterministic. Inputs as aggregate_joint_sampled_forward, and
 /// in   grad_image  float4[pixel]
 /// out  grad_distance, grad_depth, grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_sigma  float[pixel]                      what the pixel adds to dL/dsigma
 /// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma and the background colour
 kernel void aggregate_joint_sampled_backward(
     const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
-    global const uint* restrict list, global const float* restrict distance, global const float* restrict depth,
-    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
-    global const uint* restrict fragment_pair, global const uint* restrict pair_face,
-    global const float4* restrict grad_image, global float* restrict grad_distance, global float* restrict grad_depth,
-    global float* restrict grad_red, global float* restrict grad_green, global float* restrict grad_blue,
-    global float* restrict grad_sigma, global float* restrict channels) {
+    global const uint* restrict list, global const float* restrict distance,
+    global const float* restrict depth, global const float* restrict red, global const float* restrict green,
+    global const float* restrict blue, global const uint* restrict fragment_pair,
+    global const uint* restrict pair_face, global const float4* restrict grad_image,
+    global float* restrict grad_distance, global float* restrict grad_depth, global float* restrict grad_red,
+    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict grad_sigma,
+    global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);

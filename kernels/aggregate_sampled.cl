@@ -1,12 +1,13 @@
-// The perturbed arg-max by Monte Carlo with a control variate, for the barrier composition: eq. (9)-(16). Each sample
-// perturbs every slot's beta, the largest wins, the pixel takes its colour. A fragment with p = 0 is no slot.
+// The perturbed arg-max by Monte Carlo with a control variate, for the barrier composition: eq. (9)-(16).
+// Each sample perturbs every slot's beta, the largest wins, the pixel takes its colour. A fragment with p = 0
+// is no slot.
 //
 //   dL/dbeta_k       = 1/M sum_m (y_m - b_m) nu'(Z_km)                                          (12), (14)
 //   dL/dgamma at b   = 1/M sum_m (y_m - b_m) sum_k (nu'(Z_km) Z_km - 1) / gamma                 (15), (16)
 //
-// with y = <dL/dcolour, colour of the winner>, the baselines b of noise.h, and the sums over the slots that could have
-// won in the sample's block, given the noise of the others: y does not depend on the rest. The sum over all d of them
-// has the constant d: the change of variables has the determinant gamma^-d.
+// with y = <dL/dcolour, colour of the winner>, the baselines b of noise.h, and the sums over the slots that
+// could have won in the sample's block, given the noise of the others: y does not depend on the rest. The sum
+// over all d of them has the constant d: the change of variables has the determinant gamma^-d.
 #include "sampled_pixel.h"
 
 /// What a pixel's slots have in common. A slot is a place in the pixel's run, or -1 for the background.
@@ -38,8 +39,8 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   return q;
 }
 
-static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                   int slot) {
+static inline NoiseName slot_noise(const AggregateParams p, const Pixel q, const Fragments f,
+                                   const FaceOf face, int slot) {
   const uint index =
       slot < 0 ? DPR_BACKGROUND_FACE : face_of_fragment(p, q.run, face, fragment_at(q.run, f, slot));
   return name_of_noise(p, q.run, index, DPR_STAGE_AGGREGATE);
@@ -56,8 +57,8 @@ static inline int could_win(const Lead lead, float beta) {
   return beta > DPR_LOG_ZERO && any_lane(beta + highest_noise(DPR_PRIOR) >= lead.largest);
 }
 
-/// A block's winners. The rigid one goes first: beside it most of the others need no noise. What is drawn for slot k
-/// stays in cache[k + 1], as far as it reaches.
+/// A block's winners. The rigid one goes first: beside it most of the others need no noise. What is drawn for
+/// slot k stays in cache[k + 1], as far as it reaches.
 static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
                                 uint block, realn cache[DPR_NOISE_CACHE]) {
   Lead lead;
@@ -81,11 +82,13 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 kernel void aggregate_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
                                       global const uint* restrict starts, global const uint* restrict list,
-                                      global const float* restrict depth, global const float* restrict log_occupancy,
-                                      global const float* restrict occupancy, global const float* restrict red,
-                                      global const float* restrict green, global const float* restrict blue,
-                                      global const uint* restrict fragment_pair, global const uint* restrict pair_face,
-                                      global float4* restrict image) {
+                                      global const float* restrict depth,
+                                      global const float* restrict log_occupancy,
+                                      global const float* restrict occupancy,
+                                      global const float* restrict red, global const float* restrict green,
+                                      global const float* restrict blue,
+                                      global const uint* restrict fragment_pair,
+                                      global const uint* restrict pair_face, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
@@ -103,11 +106,11 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
   image[pixel] = (float4)(sum.xyz / (float)p.sampling.samples, 1.0f - q.barrier.transparency);
 }
 
-/// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every slot.
-/// Returns sum y.
+/// Collects the scores of all samples: in `weight` the numbers of wins, in the other two the sums of every
+/// slot. Returns sum y.
 static inline float add_samples(const AggregateParams p, const Pixel q, const Fragments f, const FaceOf face,
-                                float4 grad, global float* weight, global float* by_score, global float* score_sum,
-                                ScaleSums* gamma) {
+                                float4 grad, global float* weight, global float* by_score,
+                                global float* score_sum, ScaleSums* gamma) {
   float y_sum = 0.0f;
   for (uint i = q.run.first; i < q.run.last; ++i) {
     weight[f.list[i]] = by_score[f.list[i]] = score_sum[f.list[i]] = 0.0f;
@@ -135,17 +138,17 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
   return y_sum;
 }
 
-/// One work-item per pixel. Deterministic. Inputs as aggregate_sampled_forward, gradients as aggregate_backward.
-kernel void aggregate_sampled_backward(const AggregateParams p, global const ViewParams* restrict views,
-                                       global const uint* restrict starts, global const uint* restrict list,
-                                       global const float* restrict depth, global const float* restrict log_occupancy,
-                                       global const float* restrict occupancy, global const float* restrict red,
-                                       global const float* restrict green, global const float* restrict blue,
-                                       global const uint* restrict fragment_pair, global const uint* restrict pair_face,
-                                       global const float4* restrict grad_image, global float* restrict grad_depth,
-                                       global float* restrict grad_log_occupancy, global float* restrict grad_red,
-                                       global float* restrict grad_green, global float* restrict grad_blue,
-                                       global float* restrict channels) {
+/// One work-item per pixel. Deterministic. Inputs as aggregate_sampled_forward, gradients as
+/// aggregate_backward.
+kernel void aggregate_sampled_backward(
+    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
+    global const uint* restrict list, global const float* restrict depth,
+    global const float* restrict log_occupancy, global const float* restrict occupancy,
+    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
+    global const uint* restrict fragment_pair, global const uint* restrict pair_face,
+    global const float4* restrict grad_image, global float* restrict grad_depth,
+    global float* restrict grad_log_occupancy, global float* restrict grad_red,
+    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
@@ -157,7 +160,8 @@ kernel void aggregate_sampled_backward(const AggregateParams p, global const Vie
     ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
     // The alpha is not sampled: y is of the colour alone.
     const float4 grad_color = (float4)(grad.xyz, 0.0f);
-    const float y_sum = add_samples(p, q, f, face, grad_color, grad_red, grad_depth, grad_log_occupancy, &gamma);
+    const float y_sum =
+        add_samples(p, q, f, face, grad_color, grad_red, grad_depth, grad_log_occupancy, &gamma);
     grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
     for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];

@@ -1,12 +1,13 @@
-// Samples blended across the contours between them. Where a contour crosses the step between two neighbouring samples,
-// the sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image follows the contour,
-// and its derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl finds.
+// Samples blended across the contours between them. Where a contour crosses the step between two neighbouring
+// samples, the sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image
+// follows the contour, and its derivative by what is cut is the jump across it. What crosses, and how much it
+// cuts, antialias_cross.cl finds.
 //
 // Few steps are crossed: a work-item takes a row of a tile, and copies it where no contour is near.
 #include "contour.h"
 
-/// The steps that cut a sample's cell: to the right, down, from the left, from above; and the same step as the sample at its
-/// other end counts it.
+/// The steps that cut a sample's cell: to the right, down, from the left, from above; and the same step as
+/// the sample at its other end counts it.
 #define DPR_STEPS 4
 #define DPR_OPPOSITE(step) ((step) ^ 2)
 
@@ -19,7 +20,8 @@ typedef struct {
 } Cell;
 
 /// Whether anything crosses a step of the cell of a sample, in column and row `at` of its view.
-static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pixels, global const uint* restrict winner) {
+static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pixels,
+                             global const uint* restrict winner) {
   const uint left = at.x > 0 ? winner[pixel - 1] : DPR_NO_CROSSING;
   const uint above = at.y > 0 ? winner[pixels + pixel - p.width] : DPR_NO_CROSSING;
   return (winner[pixel] & winner[pixels + pixel] & left & above) != DPR_NO_CROSSING;
@@ -49,7 +51,8 @@ static inline Cell load_cell(const FrameParams p, uint pixel, uint2 at, uint pix
   return c;
 }
 
-/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view; none below the raster.
+/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view; none below the
+/// raster.
 typedef struct {
   uint tile, first, count;
   uint2 at;
@@ -87,8 +90,8 @@ static inline float4 mixed_cell(const Cell c, float4 own, global const float4* r
   return sum;
 }
 
-/// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it. One work-item
-/// per row of a tile. Deterministic.
+/// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it.
+/// One work-item per row of a tile. Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   winner, cut  as antialias_cross leaves them
 /// in   raster       float4[pixel]  the samples
@@ -112,16 +115,17 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
   }
 }
 
-/// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its neighbours'.
-/// One work-item per row of a tile; each step cuts one cell, so no two write the same place. Deterministic.
-/// Inputs as antialias_forward, and
+/// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its
+/// neighbours'. One work-item per row of a tile; each step cuts one cell, so no two write the same place.
+/// Deterministic. Inputs as antialias_forward, and
 /// in   grad_blended   float4[pixel]
 /// out  grad_cut       float[2][pixel]  not written where nothing crosses
 /// out  grad_raster    float4[pixel]
 kernel void antialias_backward(const FrameParams p, global const uint* restrict tile_starts,
                                global const uint* restrict winner, global const float* restrict cut,
-                               global const float4* restrict raster, global const float4* restrict grad_blended,
-                               global float* restrict grad_cut, global float4* restrict grad_raster) {
+                               global const float4* restrict raster,
+                               global const float4* restrict grad_blended, global float* restrict grad_cut,
+                               global float4* restrict grad_raster) {
   const TileRow r = tile_row(p, (uint)get_global_id(0));
   if (r.count == 0) return;
   if (!may_be_crossed(p, r.tile, tile_starts)) {

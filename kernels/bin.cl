@@ -1,7 +1,8 @@
-// (tile, triangle) pairs: counted (setup.cl), then listed in face order, sorted by tile (sort.cl), then linked. Pairs are
-// numbered by tile, so that what belongs to a tile lies together; faces list theirs, so that gradients are gathered in order.
-// The host launches for the capacity of the buffers; only the device knows how many pairs there are. Pairs that exceed
-// the capacity are all left out, and the host, which reads the count later, starts over.
+// (tile, triangle) pairs: counted (setup.cl), then listed in face order, sorted by tile (sort.cl), then
+// linked. Pairs are numbered by tile, so that what belongs to a tile lies together; faces list theirs, so
+// that gradients are gathered in order. The host launches for the capacity of the buffers; only the device
+// knows how many pairs there are. Pairs that exceed the capacity are all left out, and the host, which reads
+// the count later, starts over.
 #include "tiles.h"
 
 /// Lists the tiles of every triangle, each at a place of its own. One work-item per (view, face).
@@ -39,16 +40,16 @@ kernel void bin_fill(const FrameParams p, const uint capacity, global const Tria
   }
 }
 
-/// Links pairs, numbered by tile, and the places where owners list theirs: faces, or contours. One work-item for every pair
-/// within the capacity.
+/// Links pairs, numbered by tile, and the places where owners list theirs: faces, or contours. One work-item
+/// for every pair within the capacity.
 /// in   pairs        uint[1]
 /// in   places       uint[pair]      where the pair's owner lists it
 /// in   place_owner  uint[place]     view * faces + face, or the contour
 /// out  pair_owner   uint[capacity]  0 where there is no pair
 /// out  owner_pairs  uint[place]     the pairs of every owner, by tile
-kernel void bin_link(const uint capacity, global const uint* restrict pairs, global const uint* restrict places,
-                     global const uint* restrict place_owner, global uint* restrict pair_owner,
-                     global uint* restrict owner_pairs) {
+kernel void bin_link(const uint capacity, global const uint* restrict pairs,
+                     global const uint* restrict places, global const uint* restrict place_owner,
+                     global uint* restrict pair_owner, global uint* restrict owner_pairs) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= capacity) return;
   if (pair >= pairs[0]) {

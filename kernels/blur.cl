@@ -1,9 +1,10 @@
-// Blur of the rigid image by the noise of the pixel's position, I(x) = E[R(x + s Z)]: passes along columns and rows, all of
-// one form (BlurPass). The transpose is a pass too, so backward needs no kernels of its own. The order of additions is
-// fixed.
+// Blur of the rigid image by the noise of the pixel's position, I(x) = E[R(x + s Z)]: passes along columns
+// and rows, all of one form (BlurPass). The transpose is a pass too, so backward needs no kernels of its own.
+// The order of additions is fixed.
 #include "shared_types.h"
 
-/// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each other.
+/// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each
+/// other.
 #define DPR_BLUR_BLOCK 4
 
 #ifndef DPR_LANES
@@ -35,12 +36,12 @@ typedef float4 pixels_n;
 typedef struct {
   size_t in, out; /* first pixel of the column's or row's input; first output pixel */
   int at;         /* place of the first output along the pass */
-  int steps;      /* outputs along the pass: at most DPR_BLUR_BLOCK along columns, that times DPR_BLUR_PIXELS along rows */
+  int steps;      /* outputs along the pass: at most DPR_BLUR_BLOCK along columns, DPR_BLUR_ROW along rows */
   int count;      /* along columns: neighbours in a row, at most DPR_BLUR_PIXELS */
 } BlurPlace;
 
-/// Inputs [from, to) that count for a block of outputs; `last` is the tap of input 0 for the first of them. Beyond its taps
-/// the table holds as many zeros as the block's other outputs are away.
+/// Inputs [from, to) that count for a block of outputs; `last` is the tap of input 0 for the first of them.
+/// Beyond its taps the table holds as many zeros as the block's other outputs are away.
 typedef struct {
   int from, to, last;
 } BlurTaps;
@@ -89,7 +90,8 @@ static inline BlurPlace row_place(const BlurPass p, uint i) {
   return place;
 }
 
-/// Sums of a block of rows. Lanes from the place's count on hold nothing of use, as do rows from its steps on.
+/// Sums of a block of rows. Lanes from the place's count on hold nothing of use, as do rows from its steps
+/// on.
 static inline void column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
                                global const float4* restrict in, pixels_n* sums) {
   const BlurTaps t = block_taps(p, place.at);
@@ -108,10 +110,11 @@ static inline void column_sums(const BlurPass p, const BlurPlace place, global c
   sums[3] = sum3;
 }
 
-/// Sums of DPR_BLUR_ROW pixels of a row, by blocks that share what they read. Those from the place's steps on hold nothing of
-/// use.
-static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place, global const float* restrict weights,
-                                     global const float4* restrict in, float4* sums) {
+/// Sums of DPR_BLUR_ROW pixels of a row, by blocks that share what they read. Those from the place's steps on
+/// hold nothing of use.
+static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place,
+                                     global const float* restrict weights, global const float4* restrict in,
+                                     float4* sums) {
   for (int first = 0; first < place.steps; first += DPR_BLUR_BLOCK) {
     const BlurTaps t = block_taps(p, place.at + first);
     float4 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
@@ -131,8 +134,9 @@ static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place, gl
 }
 
 /// The same where neighbouring outputs read neighbouring inputs, all of which are there: by vectors.
-static inline void row_sums_by_vector(const BlurPass p, const BlurPlace place, global const float* restrict weights,
-                                      global const float4* restrict in, float4* sums) {
+static inline void row_sums_by_vector(const BlurPass p, const BlurPlace place,
+                                      global const float* restrict weights, global const float4* restrict in,
+                                      float4* sums) {
   global const float4* last = in + place.in + (place.at + p.offset);
   global const float* w = weights + blur_padding(p);
   pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
@@ -169,8 +173,8 @@ static inline float dot_pixels(const float4* a, global const float4* restrict b,
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[image][in_length][width]
 /// out  out      float4[image][out_length][width]
-kernel void blur_columns(const BlurPass p, global const float* restrict weights, global const float4* restrict in,
-                         global float4* restrict out) {
+kernel void blur_columns(const BlurPass p, global const float* restrict weights,
+                         global const float4* restrict in, global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.lines * column_items_per_image(p)) return;
   const BlurPlace place = column_place(p, i);
@@ -192,8 +196,8 @@ kernel void blur_columns(const BlurPass p, global const float* restrict weights,
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[row][in_length]
 /// out  out      float4[row][out_length]
-kernel void blur_rows(const BlurPass p, global const float* restrict weights, global const float4* restrict in,
-                      global float4* restrict out) {
+kernel void blur_rows(const BlurPass p, global const float* restrict weights,
+                      global const float4* restrict in, global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
@@ -202,8 +206,8 @@ kernel void blur_rows(const BlurPass p, global const float* restrict weights, gl
   for (int k = 0; k < place.steps; ++k) out[place.out + (size_t)k] = sums[k];
 }
 
-/// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the gradient of the
-/// output. NDRange as blur_columns.
+/// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the
+/// gradient of the output. NDRange as blur_columns.
 /// in   weights  float[tap]  derivative, between zeros
 /// in   in, grad            as in and out of blur_columns
 /// out  products  float      that of work-item i of image v: [v * stride + first + i]

@@ -1,11 +1,11 @@
-// Contours of a view: the edges where its rigid image may jump. An edge is one if both of its faces lie on the same side
-// of it in the image (facing changes, or there is one face only), or if its faces' colours or normals differ there.
-// Listed by tile, like triangles: pairs of tile and contour, counted, listed in the order of the edges, sorted by tile,
-// linked.
+// Contours of a view: the edges where its rigid image may jump. An edge is one if both of its faces lie on
+// the same side of it in the image (facing changes, or there is one face only), or if its faces' colours or
+// normals differ there. Listed by tile, like triangles: pairs of tile and contour, counted, listed in the
+// order of the edges, sorted by tile, linked.
 //
-// Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once. Where both
-// faces have vertices of their own, there are two edges, one on each face's: as long as they coincide one of them stands
-// for both, and when they part each is a boundary.
+// Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once.
+// Where both faces have vertices of their own, there are two edges, one on each face's: as long as they
+// coincide one of them stands for both, and when they part each is a boundary.
 #include "contour.h"
 
 /// What rounding may move a crossing by, in samples.
@@ -29,7 +29,8 @@ kernel void contour_facing(const FrameParams p, global const ViewParams* restric
   global const float4* vertices = ndc + view * p.vertices;
   const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
   // Written so that a NaN fails.
-  const int in_view = fmin(fmin(a.z, b.z), c.z) >= views[view].znear && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY;
+  const int in_view =
+      fmin(fmin(a.z, b.z), c.z) >= views[view].znear && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY;
   const int side = in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
   facing[i] = side > 0 ? DPR_FACE_FRONT : side < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
 }
@@ -55,8 +56,10 @@ static inline uint component(uint4 v, uint k) { return k == 0 ? v.x : k == 1 ? v
 /// Whether the faces' colours differ at an end of the edge.
 static inline int color_jumps(const ContourScene s, uint4 edge, uint vertex) {
   const uint own = own_face(edge), other = other_face(edge);
-  const uint in_own = corner_at(s.faces[own], vertex, s.ndc), in_other = corner_at(s.faces[other], vertex, s.ndc);
-  return !is_same(s.colors[component(s.face_colors[own], in_own)], s.colors[component(s.face_colors[other], in_other)]);
+  const uint in_own = corner_at(s.faces[own], vertex, s.ndc),
+             in_other = corner_at(s.faces[other], vertex, s.ndc);
+  return !is_same(s.colors[component(s.face_colors[own], in_own)],
+                  s.colors[component(s.face_colors[other], in_other)]);
 }
 
 static inline float3 winding_normal(const ContourScene s, uint face) {
@@ -71,7 +74,8 @@ static inline int normals_differ(const ContourScene s, uint4 edge) {
   return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
 }
 
-/// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is in front.
+/// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is
+/// in front.
 static inline int stands_for_both(uint4 edge, global const uint* facing) {
   const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
   const int own_rank = own == DPR_FACE_DROPPED ? 0 : own == DPR_FACE_BACK ? 1 : 2;
@@ -130,8 +134,8 @@ static inline TiledEdge tiled_edge(const FrameParams p, float2 a, float2 b) {
   return e;
 }
 
-/// False only if the line misses every step from a sample of the tile: those reach from its first sample to one behind
-/// its last.
+/// False only if the line misses every step from a sample of the tile: those reach from its first sample to
+/// one behind its last.
 static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
   const float half_extent = 0.5f * DPR_TILE;
   const float2 centre = (float2)((float)(column * DPR_TILE), (float)(row * DPR_TILE)) + half_extent;
@@ -160,20 +164,22 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
   if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
     const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
     for (uint row = t.rows.x; row <= t.rows.y; ++row) {
-      for (uint column = t.columns.x; column <= t.columns.y; ++column) count += line_meets_tile(t, column, row) ? 1 : 0;
+      for (uint column = t.columns.x; column <= t.columns.y; ++column)
+        count += line_meets_tile(t, column, row) ? 1 : 0;
     }
   }
   counts[i] = count;
 }
 
-/// The shortest contour whose ends' corners count, in samples: a line crosses it wherever it lies. Shorter ones miss lines,
-/// and what their ends would add to those, so no end of theirs counts, nor that of another in the same vertex.
+/// The shortest contour whose ends' corners count, in samples: a line crosses it wherever it lies. Shorter
+/// ones miss lines, and what their ends would add to those, so no end of theirs counts, nor that of another
+/// in the same vertex.
 #define DPR_LEAST_CORNERED 2.5f
 
 /// Whether all contours that end in a vertex are that long.
 static inline int has_corner(const FrameParams p, uint first_edge, uint vertex, global const uint4* edges,
-                             global const uint* end_starts, global const uint* ends, global const uint* offsets,
-                             global const float4* ndc) {
+                             global const uint* end_starts, global const uint* ends,
+                             global const uint* offsets, global const float4* ndc) {
   const float least = DPR_LEAST_CORNERED * p.pixel_size;
   for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
     const uint edge = ends[k] / 2;
@@ -213,8 +219,10 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const uint first_edge = view * c.edges;
   uint contour = DPR_CONTOUR_FLAGS * i;
   if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
-  if (has_corner(p, first_edge, edge.x, edges, end_starts, ends, offsets, s.ndc)) contour |= DPR_CONTOUR_FIRST_END;
-  if (has_corner(p, first_edge, edge.y, edges, end_starts, ends, offsets, s.ndc)) contour |= DPR_CONTOUR_SECOND_END;
+  if (has_corner(p, first_edge, edge.x, edges, end_starts, ends, offsets, s.ndc))
+    contour |= DPR_CONTOUR_FIRST_END;
+  if (has_corner(p, first_edge, edge.y, edges, end_starts, ends, offsets, s.ndc))
+    contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
@@ -229,18 +237,18 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   }
 }
 
-/// Adds the gradients of contours' ends to those of the vertices: each vertex its edges in order, each edge its pairs.
-/// One work-item per (view, vertex). Deterministic.
+/// Adds the gradients of contours' ends to those of the vertices: each vertex its edges in order, each edge
+/// its pairs. One work-item per (view, vertex). Deterministic.
 /// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`
 /// in      edge_pairs    uint[...]
 /// in      end_starts    uint[vertex + 1]       runs of `ends`
 /// in      ends          uint[...]              edge * 2 + end, by vertex
 /// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
 /// in out  grad_ndc      float4[view][vertex]
-kernel void contour_gather(const FrameParams p, const ContourParams c, global const uint* restrict pair_starts,
-                           global const uint* restrict edge_pairs, global const uint* restrict end_starts,
-                           global const uint* restrict ends, global const float4* restrict grad_ends,
-                           global float4* restrict grad_ndc) {
+kernel void contour_gather(const FrameParams p, const ContourParams c,
+                           global const uint* restrict pair_starts, global const uint* restrict edge_pairs,
+                           global const uint* restrict end_starts, global const uint* restrict ends,
+                           global const float4* restrict grad_ends, global float4* restrict grad_ndc) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;

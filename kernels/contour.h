@@ -1,5 +1,5 @@
-// Contours: the mesh edges at which a view's rigid image may jump. Shared by the stage that finds them and the one that
-// blends samples across them.
+// Contours: the mesh edges at which a view's rigid image may jump. Shared by the stage that finds them and
+// the one that blends samples across them.
 #ifndef DPR_CONTOUR_H
 #define DPR_CONTOUR_H
 
@@ -15,13 +15,15 @@
 #define DPR_OCCLUDES 1
 #define DPR_CREASE 2
 
-/// On which sides of an edge its faces lie: +1 to the left of first -> second end, -1 to the right, 0 where there is
-/// none, or a dropped one.
+/// On which sides of an edge its faces lie: +1 to the left of first -> second end, -1 to the right, 0 where
+/// there is none, or a dropped one.
 typedef struct {
   int own, other;
 } EdgeSides;
 
-static inline int side_of_face(uint facing) { return facing == DPR_FACE_DROPPED ? 0 : facing == DPR_FACE_FRONT ? 1 : -1; }
+static inline int side_of_face(uint facing) {
+  return facing == DPR_FACE_DROPPED ? 0 : facing == DPR_FACE_FRONT ? 1 : -1;
+}
 
 static inline int has_other_face(uint4 edge) { return edge.w != DPR_NO_FACE; }
 static inline uint own_face(uint4 edge) { return edge.z & ~DPR_EDGE_FLAG; }
@@ -50,7 +52,8 @@ static inline uint corner_across(uint4 face, uint first, uint second) {
 /// NDC to samples: the centre of column c or row r is at c or r.
 static inline float2 to_samples(const FrameParams p, float2 ndc) {
   const float inverse = 1.0f / p.pixel_size;
-  return (float2)(ndc.x * inverse + 0.5f * (float)p.width - 0.5f, 0.5f * (float)p.height - 0.5f - ndc.y * inverse);
+  return (float2)(ndc.x * inverse + 0.5f * (float)p.width - 0.5f,
+                  0.5f * (float)p.height - 0.5f - ndc.y * inverse);
 }
 
 /// The part of a tile that lies on the raster, [first, last) columns and rows.
@@ -73,8 +76,8 @@ static inline int have_contours(global const uint* tile_starts, uint first, uint
   return tile_starts[last + 1] > tile_starts[first];
 }
 
-/// Whether a contour may cross a step of a tile's cells: it lies there, or in the tiles to the left and above, whose steps
-/// reach into it.
+/// Whether a contour may cross a step of a tile's cells: it lies there, or in the tiles to the left and
+/// above, whose steps reach into it.
 static inline int may_be_crossed(const FrameParams p, uint tile, global const uint* tile_starts) {
   const uint in_view = tile % (p.tiles_x * p.tiles_y), left = in_view % p.tiles_x > 0 ? 1 : 0;
   if (have_contours(tile_starts, tile - left, tile)) return 1;
@@ -83,7 +86,8 @@ static inline int may_be_crossed(const FrameParams p, uint tile, global const ui
 
 /// Whether a contour lies in a tile or beside it: further away nothing asks for the steps of its samples.
 static inline int is_near_contour(const FrameParams p, uint tile, global const uint* tile_starts) {
-  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x, row = in_view / p.tiles_x;
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
+             row = in_view / p.tiles_x;
   const uint left = column > 0 ? 1 : 0, right = column + 1 < p.tiles_x ? 1 : 0;
   const uint first = row > 0 ? tile - p.tiles_x : tile, last = row + 1 < p.tiles_y ? tile + p.tiles_x : tile;
   for (uint middle = first; middle <= last; middle += p.tiles_x) {

@@ -1,11 +1,11 @@
-// Crossings of contours with the lines of samples: where a mesh edge passes between two neighbouring samples, and what it
-// takes of their cells.
+// Crossings of contours with the lines of samples: where a mesh edge passes between two neighbouring samples,
+// and what it takes of their cells.
 //
-// What an edge takes is the area between it and the staircase of the rigid samples' cells. A line adds the piece of that
-// area in its row or column of cells, by the edge's place on the line. An edge's ends lie between lines: there the area is
-// closed by the straight way from the end to the corner of the four cells around it, where the staircases of all edges
-// that meet in the end meet too. So the pieces of edges that meet add up, whatever their colours, and an end's gradient
-// is that of the area: along the edge too.
+// What an edge takes is the area between it and the staircase of the rigid samples' cells. A line adds the
+// piece of that area in its row or column of cells, by the edge's place on the line. An edge's ends lie
+// between lines: there the area is closed by the straight way from the end to the corner of the four cells
+// around it, where the staircases of all edges that meet in the end meet too. So the pieces of edges that
+// meet add up, whatever their colours, and an end's gradient is that of the area: along the edge too.
 #ifndef DPR_CROSSING_H
 #define DPR_CROSSING_H
 
@@ -33,18 +33,19 @@ static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
   return e;
 }
 
-/// The squared sine of an edge's angle to the rows below which the columns alone count it, and the width of the range in
-/// which both do: slopes of 1/2 to 2.
+/// The squared sine of an edge's angle to the rows below which the columns alone count it, and the width of
+/// the range in which both do: slopes of 1/2 to 2.
 #define DPR_FLATTEST_BY_ROWS 0.2f
 #define DPR_RANGE_BY_ROWS 0.6f
 
 static inline float range_by_rows(float2 d) {
   const float length2 = dot(d, d);
-  return length2 > 0.0f ? clamp((d.y * d.y / length2 - DPR_FLATTEST_BY_ROWS) / DPR_RANGE_BY_ROWS, 0.0f, 1.0f) : 0.0f;
+  return length2 > 0.0f ? clamp((d.y * d.y / length2 - DPR_FLATTEST_BY_ROWS) / DPR_RANGE_BY_ROWS, 0.0f, 1.0f)
+                        : 0.0f;
 }
 
-/// How much an edge counts by rows; by columns it counts the rest. A step function of the slope would leave out, or count
-/// twice, up to half a cell where a smooth contour passes 45 degrees.
+/// How much an edge counts by rows; by columns it counts the rest. A step function of the slope would leave
+/// out, or count twice, up to half a cell where a smooth contour passes 45 degrees.
 static inline float weight_by_rows(float2 d) {
   const float x = range_by_rows(d);
   return x * x * (3.0f - 2.0f * x);
@@ -69,23 +70,23 @@ typedef struct {
   float along;      // from the edge's first end to its second, in [0, 1]
 } Crossing;
 
-/// Whether a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles agree: see
-/// is_owned_at().
+/// Whether a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles
+/// agree: see is_owned_at().
 static inline int is_behind(const RasterEdge e, float2 sample) {
   int side = side_of_line(e.a, e.b, sample);
   if (side == 0) side = e.b.y < e.a.y || (e.b.y == e.a.y && e.b.x < e.a.x) ? 1 : -1;
   return (side < 0) == e.ascends;
 }
 
-/// Whether a point does not lie behind a line. One on the line belongs to its upper or right side, so that a chain of edges
-/// crosses it once.
+/// Whether a point does not lie behind a line. One on the line belongs to its upper or right side, so that a
+/// chain of edges crosses it once.
 static inline int is_before_line(const FrameParams p, const RasterEdge e, float2 point, int line) {
   const float2 at = pixel_centre(p, line, line);
   return e.is_by_rows ? point.y >= at.y : point.x <= at.x;
 }
 
-/// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the triangles have
-/// them.
+/// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the
+/// triangles have them.
 static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
   Crossing c;
   const float2 at = pixel_centre(p, line, line);
@@ -99,9 +100,10 @@ static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int l
   const float size = (float)(e.is_by_rows ? p.width : p.height);
   int first = (int)floor(clamp(c.position, -2.0f, size));
   if (c.exists) {
+    const int next = first + 1;
     if (is_behind(e, e.is_by_rows ? pixel_centre(p, first, line) : pixel_centre(p, line, first))) {
       --first;
-    } else if (!is_behind(e, e.is_by_rows ? pixel_centre(p, first + 1, line) : pixel_centre(p, line, first + 1))) {
+    } else if (!is_behind(e, e.is_by_rows ? pixel_centre(p, next, line) : pixel_centre(p, line, next))) {
       ++first;
     }
   }
@@ -111,8 +113,8 @@ static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int l
   return c;
 }
 
-/// What an edge's end adds to the outermost crossing on its side: half of the way across the lines from the corner of the
-/// four cells to the end, times the way along them from the corner to the edge.
+/// What an edge's end adds to the outermost crossing on its side: half of the way across the lines from the
+/// corner of the four cells to the end, times the way along them from the corner to the edge.
 typedef struct {
   float area;
   float along;   // where the edge's line is at the corner's height, from the first end to the second
@@ -126,7 +128,8 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
   CornerArea c = {0.0f, 0.0f, 0.0f, 0.0f};
   if (is_before_line(p, e, end, x.line + towards_end) == is_before) return c;
   const float2 in_samples = to_samples(p, end);
-  const float across = e.is_by_rows ? in_samples.y : in_samples.x, position = e.is_by_rows ? in_samples.x : in_samples.y;
+  const float across = e.is_by_rows ? in_samples.y : in_samples.x,
+              position = e.is_by_rows ? in_samples.x : in_samples.y;
   const float half_step = 0.5f * (float)towards_end, lines = e.is_by_rows ? -p.pixel_size : p.pixel_size;
   c.along = x.along + half_step * lines * e.inverse;
   c.height = half_step * (across - (float)x.line - half_step);

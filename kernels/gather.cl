@@ -1,5 +1,5 @@
-// Gradients of the corners of pairs, gathered at what the corners refer to: each target adds its corners in order, each
-// corner its pairs. No atomics, so the sum is the same from run to run.
+// Gradients of the corners of pairs, gathered at what the corners refer to: each target adds its corners in
+// order, each corner its pairs. No atomics, so the sum is the same from run to run.
 #include "shared_types.h"
 
 /// One work-item per (view, target) of `targets`, or per target where the views are summed.

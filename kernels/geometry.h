@@ -1,5 +1,5 @@
-// A pixel against a triangle: edge functions, signed squared distance, barycentrics. On lanes of pixels. Loops over the
-// three corners are unrolled: an index that varies would put the vectors into memory.
+// A pixel against a triangle: edge functions, signed squared distance, barycentrics. On lanes of pixels.
+// Loops over the three corners are unrolled: an index that varies would put the vectors into memory.
 #ifndef DPR_GEOMETRY_H
 #define DPR_GEOMETRY_H
 
@@ -35,8 +35,8 @@ static inline Edge make_edge(float ax, float ay, float bx, float by, realn x, re
   return e;
 }
 
-/// A triangle seen from pixels; edge k is opposite to vertex k, and its edge function is that vertex' barycentric times
-/// the doubled area.
+/// A triangle seen from pixels; edge k is opposite to vertex k, and its edge function is that vertex'
+/// barycentric times the doubled area.
 typedef struct {
   Edge edge[3];
 } View3;
@@ -49,17 +49,19 @@ static inline View3 view_triangle(const Triangle t, realn x, realn y) {
   return v;
 }
 
-/// The least of the edge functions, positive inside. Where it is not further from zero than `side_error` its sign is not
-/// certain: owns_sample() knows.
+/// The least of the edge functions, positive inside. Where it is not further from zero than `side_error` its
+/// sign is not certain: owns_sample() knows.
 static inline realn least_side(const View3 v, float orientation) {
-  return lesser(lesser(v.edge[0].side * orientation, v.edge[1].side * orientation), v.edge[2].side * orientation);
+  return lesser(lesser(v.edge[0].side * orientation, v.edge[1].side * orientation),
+                v.edge[2].side * orientation);
 }
 
-/// A bound of the rounding error of a triangle's edge functions at the pixels of the image: five roundings of 2^-24, and
-/// some room.
+/// A bound of the rounding error of a triangle's edge functions at the pixels of the image: five roundings of
+/// 2^-24, and some room.
 static inline float side_error(const FrameParams p, const Triangle t) {
   const float reach_x = 0.5f * (float)p.width * p.pixel_size + fmax(fmax(fabs(t.x0), fabs(t.x1)), fabs(t.x2));
-  const float reach_y = 0.5f * (float)p.height * p.pixel_size + fmax(fmax(fabs(t.y0), fabs(t.y1)), fabs(t.y2));
+  const float reach_y =
+      0.5f * (float)p.height * p.pixel_size + fmax(fmax(fabs(t.y0), fabs(t.y1)), fabs(t.y2));
   const float along_x = fmax(fmax(fabs(t.x1 - t.x0), fabs(t.x2 - t.x1)), fabs(t.x0 - t.x2));
   const float along_y = fmax(fmax(fabs(t.y1 - t.y0), fabs(t.y2 - t.y1)), fabs(t.y0 - t.y2));
   return 0x1p-21f * (along_x * reach_y + along_y * reach_x) + DPR_EDGE_FLOOR;
@@ -70,8 +72,8 @@ static inline realn closest_on_edge(const Edge e) {
   return clamp((e.dx * e.ex + e.dy * e.ey) * e.inverse_length2, 0.0f, 1.0f);
 }
 
-/// From the edge's closest point to the pixel. Beside the edge it follows from the edge function, which keeps its
-/// digits where subtracting two far points would not.
+/// From the edge's closest point to the pixel. Beside the edge it follows from the edge function, which keeps
+/// its digits where subtracting two far points would not.
 static inline void offset_from_edge(const Edge e, realn along, realn* qx, realn* qy) {
   const intn beside = along > 0.0f && along < 1.0f;
   const realn s = e.side * e.inverse_length2;
@@ -93,13 +95,13 @@ static inline float doubled_area(const Triangle t) {
   return (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
 }
 
-/// Whether rounding has left nothing of the area. A sliver covers the samples that it owns, so that its neighbours' meet;
-/// it is not blurred, and its barycentrics, all weight at vertex 0, have no gradient.
+/// Whether rounding has left nothing of the area. A sliver covers the samples that it owns, so that its
+/// neighbours' meet; it is not blurred, and its barycentrics, all weight at vertex 0, have no gradient.
 static inline int is_sliver(const Triangle t) { return !(fabs(doubled_area(t)) > DPR_SLIVER_AREA); }
 
-/// What turns a triangle's edge functions into barycentrics: 1 / doubled area, signed, and 1 / depth of each vertex if
-/// perspective correct. Common factors drop out later: they keep the numbers in range, whatever the unit of length and
-/// however thin the triangle. All zero for a sliver.
+/// What turns a triangle's edge functions into barycentrics: 1 / doubled area, signed, and 1 / depth of each
+/// vertex if perspective correct. Common factors drop out later: they keep the numbers in range, whatever the
+/// unit of length and however thin the triangle. All zero for a sliver.
 typedef struct {
   float factor[3], inverse_depth[3];
 } BarycentricScale;
@@ -117,8 +119,8 @@ static inline BarycentricScale barycentric_scale(const Triangle t, uint perspect
   return s;
 }
 
-/// The unnormalised barycentrics n_i. Beyond the triangle's horizon, where its plane passes the camera, their sum is
-/// negative and all signs turn. Returns that sign.
+/// The unnormalised barycentrics n_i. Beyond the triangle's horizon, where its plane passes the camera, their
+/// sum is negative and all signs turn. Returns that sign.
 static inline realn raw_barycentrics(const View3 v, const BarycentricScale s, realn n[3]) {
 #pragma unroll
   for (int k = 0; k < 3; ++k) n[k] = v.edge[k].side * s.factor[k];

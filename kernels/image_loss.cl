@@ -1,5 +1,5 @@
-// Losses between images and targets, and their gradients: the weighted sum of those in image_losses.h. The pixels' sums are
-// reduced by reduce.cl in between.
+// Losses between images and targets, and their gradients: the weighted sum of those in image_losses.h. The
+// pixels' sums are reduced by reduce.cl in between.
 #include "image_losses.h"
 
 /// What every pixel adds to the sums of its view. One work-item per pixel.
@@ -23,9 +23,10 @@ kernel void image_loss_forward(const uint pixels, global const float4* restrict 
 /// in   sums           float[DPR_LOSS_SUMS][view]
 /// in   weights        float[view][DPR_LOSS_COUNT]
 /// out  grad_image     float4[view][pixel]
-kernel void image_loss_backward(const uint views, const uint pixels_per_view, global const float4* restrict image,
-                                global const float4* restrict target, global const float* restrict sums,
-                                global const float* restrict weights, global float4* restrict grad_image) {
+kernel void image_loss_backward(const uint views, const uint pixels_per_view,
+                                global const float4* restrict image, global const float4* restrict target,
+                                global const float* restrict sums, global const float* restrict weights,
+                                global float4* restrict grad_image) {
   const uint i = (uint)get_global_id(0);
   if (i >= views * pixels_per_view) return;
   const uint view = i / pixels_per_view;

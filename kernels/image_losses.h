@@ -1,4 +1,5 @@
-// Every loss between an image and its target, for host and kernels. A loss is a file, loss_<name>.h, and a name in the list:
+// Every loss between an image and its target, for host and kernels. A loss is a file, loss_<name>.h, and a
+// name in the list:
 //
 //   enum { <name>_sums,          how many numbers it sums over the pixels of a view
 //          <name>_reads_alpha }  1: it counts only where the target has a silhouette
@@ -6,12 +7,14 @@
 // on the device
 //
 //   <name>_add(image, target, sums)               writes what a pixel, RGBA, adds to them
-//   <name>_gradient(weight, image, target, sums)  weight times its derivative by the pixel's RGBA, from the sums of the view;
-//                                                 of RGB, times the number of pixels and colour channels of a view
+//   <name>_gradient(weight, image, target, sums)  weight times its derivative by the pixel's RGBA, from the
+//                                                 sums of the view; of RGB, times the number of pixels
+//                                                 and colour channels of a view
 //
 // and on the host
 //
-//   <name>_value(weight, sums, channels)          weight times the loss of a view of so many pixels times colour channels
+//   <name>_value(weight, sums, channels)          weight times the loss of a view of so many pixels times
+//                                                 colour channels
 #ifndef DPR_IMAGE_LOSSES_H
 #define DPR_IMAGE_LOSSES_H
 

@@ -1,14 +1,15 @@
-// The integrals of exact aggregation over the slots of a pixel, in either composition. With T_k = F(t - beta_k), or
-// T_k = 1 - p_k + p_k F(t - beta_k) where DPR_JOINT is defined, P = prod T_k, r_k = p_k f(t - beta_k) / T_k (p_k = 1 in
-// the barrier composition):
+// The integrals of exact aggregation over the slots of a pixel, in either composition. With
+// T_k = F(t - beta_k), or T_k = 1 - p_k + p_k F(t - beta_k) where DPR_JOINT is defined, P = prod T_k,
+// r_k = p_k f(t - beta_k) / T_k (p_k = 1 in the barrier composition):
 //
 //   w_j         = integral P r_j dt
 //   dL/dbeta_k  = integral P r_k (g_k R - G) dt,  R = sum r_j,  G = sum g_j r_j,  g_k = dL/dw_k
 //   dL/dp_k     = integral P f_k / T_k g_k + P (F_k - 1) / T_k (G - g_k r_k) dt
 //
-// with the same nodes t for every slot: one pass over the slots for the image, two for the gradients. Flops a slot and
-// node (an exponential counts 15, a division 1): the terms below cost those of prior_cdf_density (Gaussian 41, logistic
-// 20, Gumbel 33, Cauchy 27, uniform 3) and 6 (barrier 3); the forward pass adds 8, the backward pass 16 (barrier 10).
+// with the same nodes t for every slot: one pass over the slots for the image, two for the gradients. Flops a
+// slot and node (an exponential counts 15, a division 1): the terms below cost those of prior_cdf_density
+// (Gaussian 41, logistic 20, Gumbel 33, Cauchy 27, uniform 3) and 6 (barrier 3); the forward pass adds 8, the
+// backward pass 16 (barrier 10).
 #ifndef DPR_INTEGRATE_H
 #define DPR_INTEGRATE_H
 
@@ -31,7 +32,8 @@ typedef struct {
 
 #if defined(DPR_JOINT) || !defined(DPR_SOFTMAX)
 
-/// So many slots' terms are kept from the backward pass' first round to its second, those beyond are computed again.
+/// So many slots' terms are kept from the backward pass' first round to its second, those beyond are computed
+/// again.
 #ifndef DPR_KEPT_SLOTS
 #define DPR_KEPT_SLOTS 24
 #endif
@@ -102,8 +104,8 @@ static inline float4 integrate_colors(const Slots run, const Fragments f, float3
 }
 
 /// Adds a block's share of the integrals to a slot's gradients. `product` is P times the nodes' weights.
-static inline void add_gradients(const Slot s, const Terms terms, realn product, realn ratio_sum, realn grad_sum,
-                                 SlotGradients* out) {
+static inline void add_gradients(const Slot s, const Terms terms, realn product, realn ratio_sum,
+                                 realn grad_sum, SlotGradients* out) {
   const realn share = product * terms.density;
   const realn ratio = slot_ratio(s, terms);
   const realn by_beta = product * ratio * mad(s.grad, ratio_sum, -grad_sum);

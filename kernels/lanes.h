@@ -1,6 +1,6 @@
-// Vectors of DPR_WIDTH floats under one name. A kernel file that works on lanes defines DPR_WIDTH before it includes
-// this: 1 where the device's lanes are its work-items (GPUs), 8 or 16 where they are vector registers (CPUs),
-// 8 where they are samples.
+// Vectors of DPR_WIDTH floats under one name. A kernel file that works on lanes defines DPR_WIDTH before it
+// includes this: 1 where the device's lanes are its work-items (GPUs), 8 or 16 where they are vector
+// registers (CPUs), 8 where they are samples.
 #ifndef DPR_LANES_H
 #define DPR_LANES_H
 
@@ -75,13 +75,17 @@ static inline float4 sum_lanes_of_4x4(float4 a, float4 b, float4 c, float4 d) {
   return add_neighbours(add_neighbours(a, b), add_neighbours(c, d));
 }
 #if DPR_WIDTH == 4
-static inline float4 sum_lanes_of_4(float4 a, float4 b, float4 c, float4 d) { return sum_lanes_of_4x4(a, b, c, d); }
+static inline float4 sum_lanes_of_4(float4 a, float4 b, float4 c, float4 d) {
+  return sum_lanes_of_4x4(a, b, c, d);
+}
 #else
 static inline float4 sum_lanes_of_4x8(float8 a, float8 b, float8 c, float8 d) {
   return sum_lanes_of_4x4(a.lo + a.hi, b.lo + b.hi, c.lo + c.hi, d.lo + d.hi);
 }
 #if DPR_WIDTH == 8
-static inline float4 sum_lanes_of_4(float8 a, float8 b, float8 c, float8 d) { return sum_lanes_of_4x8(a, b, c, d); }
+static inline float4 sum_lanes_of_4(float8 a, float8 b, float8 c, float8 d) {
+  return sum_lanes_of_4x8(a, b, c, d);
+}
 #else
 static inline float4 sum_lanes_of_4(float16 a, float16 b, float16 c, float16 d) {
   return sum_lanes_of_4x8(a.lo + a.hi, b.lo + b.hi, c.lo + c.hi, d.lo + d.hi);
@@ -90,8 +94,8 @@ static inline float4 sum_lanes_of_4(float16 a, float16 b, float16 c, float16 d) 
 #endif
 #endif
 
-/// a * b + c, which compilers fuse where the device can. PoCL's own mad() is a product and a sum: its library is
-/// compiled without contraction.
+/// a * b + c, which compilers fuse where the device can. PoCL's own mad() is a product and a sum: its library
+/// is compiled without contraction.
 #define mad(a, b, c) ((a) * (b) + (c))
 
 static inline realn square(realn x) { return x * x; }
@@ -104,11 +108,12 @@ static inline realn lesser(realn a, realn b) { return choose(a < b, a, b); }
 static inline realn greater(realn a, realn b) { return choose(a > b, a, b); }
 
 #if DPR_WIDTH != 1
-/// 1.5 * 2^23: added to a number below 2^22 in magnitude it leaves the nearest integer in the low bits. PoCL's rint() and
-/// the conversion to int are a dozen instructions.
+/// 1.5 * 2^23: added to a number below 2^22 in magnitude it leaves the nearest integer in the low bits.
+/// PoCL's rint() and the conversion to int are a dozen instructions.
 #define DPR_ROUNDING 12582912.0f
 
-/// 2^round(x / ln 2) times a polynomial of the rest (least maximum error on |f| <= ln 2 / 2), for -87 <= x <= 88.
+/// 2^round(x / ln 2) times a polynomial of the rest (least maximum error on |f| <= ln 2 / 2), for
+/// -87 <= x <= 88.
 static inline realn exp_in_range(realn x) {
   const realn shifted = mad(x, M_LOG2E_F, DPR_ROUNDING);
   const realn n = shifted - DPR_ROUNDING;
@@ -125,8 +130,8 @@ static inline realn exp_in_range(realn x) {
 }
 #endif
 
-/// Natural exponential. Relative error below 2e-7 for -87 < x < 88, 0 below. On a vector CPU OpenCL's own exp() is a
-/// library call a lane; a polynomial stays in the registers.
+/// Natural exponential. Relative error below 2e-7 for -87 < x < 88, 0 below. On a vector CPU OpenCL's own
+/// exp() is a library call a lane; a polynomial stays in the registers.
 static inline realn exp_n(realn x) {
 #if DPR_WIDTH == 1
   return exp(x);
@@ -144,8 +149,9 @@ static inline realn exp_of_negative(realn x) {
 #endif
 }
 
-/// Natural logarithm of a positive normal number. Absolute error below 1e-7 + 6e-8 |ln x|; a polynomial for the same
-/// reason: ln(1 + f) = f - f^2 / 2 + f^3 P(f), the least maximum relative error on [sqrt(1/2) - 1, sqrt(2) - 1].
+/// Natural logarithm of a positive normal number. Absolute error below 1e-7 + 6e-8 |ln x|; a polynomial for
+/// the same reason: ln(1 + f) = f - f^2 / 2 + f^3 P(f), the least maximum relative error on [sqrt(1/2) - 1,
+/// sqrt(2) - 1].
 static inline realn log_n(realn x) {
 #if DPR_WIDTH == 1
   return log(x);
@@ -165,8 +171,8 @@ static inline realn log_n(realn x) {
 #endif
 }
 
-/// ln(1 + x) for x from -1 to 1 with the relative precision of small x: what rounding 1 + x takes away is added to the
-/// logarithm. Exact there up to a factor of 1 + x, which counts only where x is no longer small.
+/// ln(1 + x) for x from -1 to 1 with the relative precision of small x: what rounding 1 + x takes away is
+/// added to the logarithm. Exact there up to a factor of 1 + x, which counts only where x is no longer small.
 static inline realn log1p_n(realn x) {
 #if DPR_WIDTH == 1
   return log1p(x);

@@ -1,4 +1,5 @@
-// The light that reaches a surface point: Phong, "Illumination for computer generated pictures" (1975). On lanes.
+// The light that reaches a surface point: Phong, "Illumination for computer generated pictures" (1975). On
+// lanes.
 #ifndef DPR_LIGHTING_H
 #define DPR_LIGHTING_H
 
@@ -78,7 +79,8 @@ static inline void light_point(const LightingParams lp, global const Light* rest
   }
 }
 
-/// Gradients of one light's terms: adds to those of the point, the unit normal, the eye and the light's position.
+/// Gradients of one light's terms: adds to those of the point, the unit normal, the eye and the light's
+/// position.
 static inline void light_term_backward(const LightTerm t, const Light light, float shininess, Vec3n normal,
                                        Vec3n grad_factor, Vec3n grad_specular, Vec3n* grad_position,
                                        Vec3n* grad_normal, Vec3n* grad_eye, Vec3n* grad_light) {

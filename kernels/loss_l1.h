@@ -1,4 +1,5 @@
-// Mean absolute error over pixels and colour channels, eq. (76). image_losses.h says what each function is for.
+// Mean absolute error over pixels and colour channels, eq. (76). image_losses.h says what each function is
+// for.
 #ifndef DPR_LOSS_L1_H
 #define DPR_LOSS_L1_H
 
@@ -14,7 +15,8 @@ static inline void l1_add(float4 image, float4 target, float* sums) {
 static inline float4 l1_gradient(float weight, float4 image, float4 target, const float* sums) {
   (void)sums;
   const float3 difference = image.xyz - target.xyz;
-  return (float4)(weight * sign(difference.x), weight * sign(difference.y), weight * sign(difference.z), 0.0f);
+  return (float4)(weight * sign(difference.x), weight * sign(difference.y), weight * sign(difference.z),
+                  0.0f);
 }
 
 #else

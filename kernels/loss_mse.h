@@ -1,4 +1,5 @@
-// Mean squared error over pixels and colour channels, eq. (19). image_losses.h says what each function is for.
+// Mean squared error over pixels and colour channels, eq. (19). image_losses.h says what each function is
+// for.
 #ifndef DPR_LOSS_MSE_H
 #define DPR_LOSS_MSE_H
 

@@ -1,5 +1,6 @@
-// 1 - IoU of the alpha channels, eq. (75): intersection a b and union a + b - a b, each summed over the pixels. Where both
-// images are empty they agree: no loss, no gradient. image_losses.h says what each function is for.
+// 1 - IoU of the alpha channels, eq. (75): intersection a b and union a + b - a b, each summed over the
+// pixels. Where both images are empty they agree: no loss, no gradient. image_losses.h says what each
+// function is for.
 #ifndef DPR_LOSS_SILHOUETTE_H
 #define DPR_LOSS_SILHOUETTE_H
 

@@ -1,5 +1,5 @@
-// Losses of a mesh's shape alone: Laplacian (77), edge length, normal consistency, flatness; and their gradients, which
-// are gathered at the vertices in a fixed order.
+// Losses of a mesh's shape alone: Laplacian (77), edge length, normal consistency, flatness; and their
+// gradients, which are gathered at the vertices in a fixed order.
 #include "shared_types.h"
 
 /// Normals shorter than this have no direction, squared object units.
@@ -33,8 +33,9 @@ kernel void mesh_loss_vertices(const MeshLossParams p, global const uint* restri
   channels[p.vertices + v] = edges;
 }
 
-/// What every hinge adds: two faces with corners `a` and `b` across from their common edge from e0 to e1. Their normals
-/// are formed along the edge, so the faces' own orientation has no part in it. One work-item per hinge.
+/// What every hinge adds: two faces with corners `a` and `b` across from their common edge from e0 to e1.
+/// Their normals are formed along the edge, so the faces' own orientation has no part in it. One work-item
+/// per hinge.
 /// in   hinges     uint4[hinge]      a, b, e0, e1
 /// in   positions  as mesh_loss_vertices
 /// out  channels   float[DPR_MESH_LOSS_CHANNELS][hinge]
@@ -74,7 +75,8 @@ kernel void mesh_loss_hinges(const MeshLossParams p, global const uint4* restric
 /// out  grad  float4[...]  the mesh's from p.first_vertex on
 kernel void mesh_loss_gather(const MeshLossParams p, global const uint* restrict ring_starts,
                              global const uint* restrict ring, global const float4* restrict positions,
-                             global const float4* restrict laplacians, global const uint* restrict hinge_starts,
+                             global const float4* restrict laplacians,
+                             global const uint* restrict hinge_starts,
                              global const uint* restrict hinge_places, global const float4* restrict partial,
                              global float4* restrict grad) {
   const uint v = (uint)get_global_id(0);

@@ -1,6 +1,6 @@
-// The noise of the Monte Carlo estimators, and their control variates. Samples are taken in blocks of eight, one a
-// lane. Noise is a pure function of (seed, view, pixel, face, sample, stage): the backward pass draws that of the
-// forward pass again, so nothing is stored, and memory does not depend on the number of samples.
+// The noise of the Monte Carlo estimators, and their control variates. Samples are taken in blocks of eight,
+// one a lane. Noise is a pure function of (seed, view, pixel, face, sample, stage): the backward pass draws
+// that of the forward pass again, so nothing is stored, and memory does not depend on the number of samples.
 //
 // With M samples y_m of a function of the noise, gradients are score estimates (12), (14) with a baseline b:
 //
@@ -8,15 +8,16 @@
 //
 //   none           b = 0
 //   rigid          b = y without noise
-//   leave_one_out  b_m = (S - G_m) / (M - g): the mean of the samples outside the group of m, S = sum y, G_m the sum
-//                  of the group; a group is one sample, or an antithetic pair, whose halves know of each other
+//   leave_one_out  b_m = (S - G_m) / (M - g): the mean of the samples outside the group of m, S = sum y, G_m
+//                  the sum of the group; a group is one sample, or an antithetic pair, whose halves know of
+//                  each other
 //
-// The last needs S before its first term; but it is linear: 1/M (sum_m (y_m + G_m / (M - g)) nu'(Z_m) - S B / (M - g))
-// with B = sum_m nu'(Z_m). So one pass over the samples collects both sums. Its y count from the rigid solution, which
-// changes nothing but the rounding.
+// The last needs S before its first term; but it is linear: 1/M (sum_m (y_m + G_m / (M - g)) nu'(Z_m) - S
+// B / (M - g)) with B = sum_m nu'(Z_m). So one pass over the samples collects both sums. Its y count from the
+// rigid solution, which changes nothing but the rounding.
 //
-// A variable that y cannot depend on, given all the others, adds noise of mean zero to the gradients: such terms are
-// left out. What is left has the same expectation and less variance.
+// A variable that y cannot depend on, given all the others, adds noise of mean zero to the gradients: such
+// terms are left out. What is left has the same expectation and less variance.
 #ifndef DPR_NOISE_H
 #define DPR_NOISE_H
 
@@ -24,7 +25,8 @@
 #include "philox.h"
 #include "priors.h"
 
-/// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole launch.
+/// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole
+/// launch.
 #define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
 /// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
@@ -40,7 +42,8 @@
 #define DPR_STAGE_OCCUPANCY 0u
 #define DPR_STAGE_AGGREGATE 1u
 
-/// The block of the counter whose words choose the permutation of the stratified draws; samples end far below it.
+/// The block of the counter whose words choose the permutation of the stratified draws; samples end far below
+/// it.
 #define DPR_PERMUTATION_BLOCK 0x80000000u
 
 /// Whose noise: that of a face, or of the background, in a pixel of a view, for a stage.
@@ -60,12 +63,14 @@ static inline NoiseName name_noise(uint view, uint pixel, uint face, uint stage)
 static inline uintn sample_index(uint block) { return DPR_WIDTH * block + convert_uintn(DPR_LANE_INDEX); }
 
 /// Which lanes hold a sample: the last block may be a part of one.
-static inline intn sample_counts(const Sampling s, uint block) { return sample_index(block) < (uintn)(s.samples); }
+static inline intn sample_counts(const Sampling s, uint block) {
+  return sample_index(block) < (uintn)(s.samples);
+}
 
-/// Kensler, "Correlated multi-jittered sampling" (Pixar 13-01, 2013): a permutation of [0, count) that a hash of `seed`
-/// chooses, for any count, by walking the cycles of one of the next power of two. `i` is below `count`. Standard errors
-/// are those of true random permutations; a mere rotation, which leaves the samples of all variables on diagonals,
-/// doubles them at M = 32.
+/// Kensler, "Correlated multi-jittered sampling" (Pixar 13-01, 2013): a permutation of [0, count) that a hash
+/// of `seed` chooses, for any count, by walking the cycles of one of the next power of two. `i` is below
+/// `count`. Standard errors are those of true random permutations; a mere rotation, which leaves the samples
+/// of all variables on diagonals, doubles them at M = 32.
 static inline uintn permute(uintn i, uint count, uint seed) {
   uint mask = count - 1;
   mask |= mask >> 1;
@@ -102,9 +107,10 @@ static inline realn stratify(const Sampling s, const NoiseName name, uint block,
 
 /// Uniform numbers for a block of samples, each in (0, 1) and never 0 or 1.
 ///   independent  sample m: word m mod 4 of the counter (pixel, face, m / 4, stream)
-///   antithetic   samples 2 j and 2 j + 1: u and 1 - u, word j mod 4 of the counter (pixel, face, j / 4, stream)
-///   stratified   (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi is rotated
-///                by a word of its own, so that pi(m) is uniform whatever the hash is worth.
+///   antithetic   samples 2 j and 2 j + 1: u and 1 - u, word j mod 4 of the counter (pixel, face, j / 4,
+///                stream)
+///   stratified   (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi
+///                is rotated by a word of its own, so that pi(m) is uniform whatever the hash is worth.
 DPR_ALWAYS_INLINE realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
   const uint first = s.draws == DPR_ANTITHETIC ? block : 2 * block;
   uint8 words =
@@ -122,14 +128,15 @@ static inline realn add_group(const Sampling s, realn y) {
   return mad(s.leave_out, s.draws == DPR_ANTITHETIC ? y + y.s10325476 : y, y);
 }
 
-/// What a scale, sigma or gamma, collects over variables and samples: sums of (y + G / (M - g)) (nu'(Z) Z - 1) and of
-/// nu'(Z) Z - 1.
+/// What a scale, sigma or gamma, collects over variables and samples: sums of (y + G / (M - g)) (nu'(Z)
+/// Z - 1) and of nu'(Z) Z - 1.
 typedef struct {
   realn by_score, scores;
 } ScaleSums;
 
-/// Adds a block's scores of one variable, where `counts`: those of the scale to `scale`; returns the variable's own,
-/// sum (y + G / (M - g)) nu'(Z) and sum nu'(Z). `scores` is nu' of the noise, `grouped` add_group of y.
+/// Adds a block's scores of one variable, where `counts`: those of the scale to `scale`; returns the
+/// variable's own, sum (y + G / (M - g)) nu'(Z) and sum nu'(Z). `scores` is nu' of the noise, `grouped`
+/// add_group of y.
 static inline float2 add_scores(realn noise, realn scores, intn counts, realn grouped, ScaleSums* scale) {
   const realn score = choose(counts, scores, (realn)(0.0f));
   const realn scale_score = choose(counts, mad(score, noise, -1.0f), (realn)(0.0f));

@@ -21,13 +21,13 @@ static inline intn is_inside(realn distance) { return as_intn(distance) >= 0; }
 
 #if DPR_OCCUPANCY_WIDTH == DPR_VARIABLE_WIDTH
 
-/// How far occupancies stay from 0 and 1, where the chain through ln p and the colour behind an opaque triangle would be
-/// lost.
+/// How far occupancies stay from 0 and 1, where the chain through ln p and the colour behind an opaque
+/// triangle would be lost.
 #define DPR_RIGID_MARGIN 1e-6f
 
-/// The rigid image's occupancy, with the slope of uniform noise whose width is the distance from the pixel to the edge,
-/// |s|: over that distance p changes by 1 (Kato, Ushiku & Harada, "Neural 3D Mesh Renderer", CVPR 2018, section 3.2).
-/// Sigma keeps the slope finite at the edge; the image does not depend on it.
+/// The rigid image's occupancy, with the slope of uniform noise whose width is the distance from the pixel to
+/// the edge, |s|: over that distance p changes by 1 (Kato, Ushiku & Harada, "Neural 3D Mesh Renderer", CVPR
+/// 2018, section 3.2). Sigma keeps the slope finite at the edge; the image does not depend on it.
 static inline Perturbed perturb(realn distance, float sigma) {
   const intn inside = is_inside(distance);
   Perturbed v;
@@ -75,8 +75,9 @@ static inline Perturbed perturb(realn distance, float sigma) {
 /// out  log_occupancy    float[fragment]  ln p, DPR_LOG_ZERO for p = 0
 /// out  occupancy        float[fragment]  p, in [0, 1]
 kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
-                              global const uint* restrict fragment_starts, global const float* restrict distance,
-                              global float* restrict log_occupancy, global float* restrict occupancy) {
+                              global const uint* restrict fragment_starts,
+                              global const float* restrict distance, global float* restrict log_occupancy,
+                              global float* restrict occupancy) {
   const uint i = (uint)get_global_id(0) * DPR_WIDTH;
   if (i >= fragment_starts[last_pair]) return;
   const Perturbed v = perturb(load_n(i, distance), p.sigma);
@@ -90,10 +91,11 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
-kernel void occupancy_backward(const OccupancyParams p, const uint2 pairs, global const uint* restrict fragment_starts,
+kernel void occupancy_backward(const OccupancyParams p, const uint2 pairs,
+                               global const uint* restrict fragment_starts,
                                global const float* restrict distance,
-                               global const float* restrict grad_log_occupancy, global float* restrict grad_distance,
-                               global float* restrict grad_sigma) {
+                               global const float* restrict grad_log_occupancy,
+                               global float* restrict grad_distance, global float* restrict grad_sigma) {
   const uint2 group = pair_group(pairs);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];

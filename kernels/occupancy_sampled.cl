@@ -1,5 +1,5 @@
-// The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise. The
-// backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
+// The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise.
+// The backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
 #include "noise.h"
 #include "tile_lanes.h"
 
@@ -16,19 +16,22 @@ static inline int always_covers(float x) { return x + lowest_noise(DPR_PRIOR) > 
 
 /// Names a fragment's noise. `packed` is the fragment's pixel, x | y << 16.
 static inline NoiseName fragment_noise(const OccupancyParams p, uint view, uint face, uint packed) {
-  return name_noise(p.first_view + view, (packed >> 16) * p.width + (packed & 0xffffu), face, DPR_STAGE_OCCUPANCY);
+  return name_noise(p.first_view + view, (packed >> 16) * p.width + (packed & 0xffffu), face,
+                    DPR_STAGE_OCCUPANCY);
 }
 
-/// ln p of a run of fragments from their p. Apart from the samples: asked for its logarithm right away, whether p is 0
-/// would keep the processor waiting for all of them.
+/// ln p of a run of fragments from their p. Apart from the samples: asked for its logarithm right away,
+/// whether p is 0 would keep the processor waiting for all of them.
 static inline void write_logarithms(uint first, uint last, global const float* occupancy,
                                     global float* log_occupancy) {
 #if DPR_LANES < DPR_WIDTH
-  for (uint i = first; i < last; ++i) log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
+  for (uint i = first; i < last; ++i)
+    log_occupancy[i] = occupancy[i] > 0.0f ? log(occupancy[i]) : DPR_LOG_ZERO;
 #else
   for (uint i = first; i < last; i += DPR_WIDTH) {
     const realn p = load_own_run(last, i, occupancy);
-    store_run(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, last, log_occupancy);
+    store_run(choose(p > 0.0f, log_n(max(p, DPR_LEAST_SHARE)), (realn)(DPR_LOG_ZERO)), i, last,
+              log_occupancy);
   }
 #endif
 }
@@ -40,9 +43,12 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 /// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
 /// out  log_occupancy    float[fragment]  ln of the mean, DPR_LOG_ZERO where no sample covers
 /// out  occupancy        float[fragment]  the mean
-kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs, global const uint* restrict pair_face,
-                                      global const uint* restrict fragment_starts, global const uint* restrict pixels,
-                                      global const float* restrict distance, global float* restrict log_occupancy,
+kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
+                                      global const uint* restrict pair_face,
+                                      global const uint* restrict fragment_starts,
+                                      global const uint* restrict pixels,
+                                      global const float* restrict distance,
+                                      global float* restrict log_occupancy,
                                       global float* restrict occupancy) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
@@ -75,20 +81,21 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
     y_sum += sum_lanes(y);
     distance += add_scores(noise, noise_score(DPR_PRIOR, noise), counts, add_group(p.sampling, y), &sigma);
   }
-  return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum), scale_estimate(p.sampling, sigma, y_sum));
+  return (float2)(score_estimate(p.sampling, distance.x, distance.y, y_sum),
+                  scale_estimate(p.sampling, sigma, y_sum));
 }
 
-/// One work-item per pair of `pairs`. Deterministic. Inputs, and the occupancy, as in occupancy_sampled_forward.
+/// One work-item per pair of `pairs`. Deterministic. Inputs, and the occupancy, as in
+/// occupancy_sampled_forward.
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
-kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs,
-                                       global const uint* restrict pair_face,
-                                       global const uint* restrict fragment_starts,
-                                       global const uint* restrict pixels, global const float* restrict distance,
-                                       global const float* restrict occupancy,
-                                       global const float* restrict grad_log_occupancy,
-                                       global float* restrict grad_distance, global float* restrict grad_sigma) {
+kernel void occupancy_sampled_backward(
+    const OccupancyParams p, const uint pairs, global const uint* restrict pair_face,
+    global const uint* restrict fragment_starts, global const uint* restrict pixels,
+    global const float* restrict distance, global const float* restrict occupancy,
+    global const float* restrict grad_log_occupancy, global float* restrict grad_distance,
+    global float* restrict grad_sigma) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
@@ -98,7 +105,8 @@ kernel void occupancy_sampled_backward(const OccupancyParams p, const uint pairs
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
     // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
-    const int agrees = always_covers(x) || (!signbit(x) && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
+    const int agrees =
+        always_covers(x) || (!signbit(x) && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
     if (occupancy[i] <= 0.0f || agrees) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p

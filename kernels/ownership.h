@@ -1,23 +1,24 @@
-// Which side of an edge a point lies on, without a rounding error, and which triangle owns a sample. Triangles that
-// share an edge own every sample there exactly once: the sign is that of the exact edge function of the rounded
-// coordinates, and a sample on the edge itself belongs to the triangle whose left or upper edge it is. That is the
-// sample moved to the right by less than any number, and down by much less, so the rule holds at shared vertices too.
+// Which side of an edge a point lies on, without a rounding error, and which triangle owns a sample.
+// Triangles that share an edge own every sample there exactly once: the sign is that of the exact edge
+// function of the rounded coordinates, and a sample on the edge itself belongs to the triangle whose left or
+// upper edge it is. That is the sample moved to the right by less than any number, and down by much less, so
+// the rule holds at shared vertices too.
 #ifndef DPR_OWNERSHIP_H
 #define DPR_OWNERSHIP_H
 
 #include "shared_types.h"
 
-/// An edge function ex * dy - ey * dx whose factors are rounded differences is wrong by at most this times the sum of
-/// its products' sizes (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates",
-/// 1997: 3 + 16 u times u = 2^-24), and where these underflow by less than the floor.
+/// An edge function ex * dy - ey * dx whose factors are rounded differences is wrong by at most this times
+/// the sum of its products' sizes (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust
+/// geometric predicates", 1997: 3 + 16 u times u = 2^-24), and where these underflow by less than the floor.
 #define DPR_EDGE_ERROR 1.8e-7f
 #define DPR_EDGE_FLOOR 1e-30f
 
 /// What rounding moves a projected coordinate by at most, in pixels of images up to 16384 wide or high.
 #define DPR_BOUNDS_SLACK 1e-2f
 
-/// The largest coordinate is scaled to about 2^60: the products' sum stays below 2^128, and the products of coordinates
-/// down to 2^-99 of the largest have all their bits.
+/// The largest coordinate is scaled to about 2^60: the products' sum stays below 2^128, and the products of
+/// coordinates down to 2^-99 of the largest have all their bits.
 #define DPR_EXACT_EXPONENT 60
 
 /// a + b without error: the rounded sum, and what rounding took away (Knuth's two-sum).
@@ -27,12 +28,13 @@ static inline float two_sum(float a, float b, float* error) {
   return sum;
 }
 
-/// The sign of cross(b - a, p - a), exactly: six products without error, added to a sum of parts that do not overlap
-/// (Shewchuk's grow-expansion), whose largest has the sign.
+/// The sign of cross(b - a, p - a), exactly: six products without error, added to a sum of parts that do not
+/// overlap (Shewchuk's grow-expansion), whose largest has the sign.
 static int exact_side(float2 a, float2 b, float2 p) {
 #pragma OPENCL FP_CONTRACT OFF
   const float2 largest2 = fmax(fmax(fabs(a), fabs(b)), fabs(p));
-  const int2 exponent = (int2)(DPR_EXACT_EXPONENT - ilogb(fmax(fmax(largest2.x, largest2.y), DPR_EDGE_FLOOR)));
+  const int2 exponent =
+      (int2)(DPR_EXACT_EXPONENT - ilogb(fmax(fmax(largest2.x, largest2.y), DPR_EDGE_FLOOR)));
   a = ldexp(a, exponent);
   b = ldexp(b, exponent);
   p = ldexp(p, exponent);
@@ -67,8 +69,8 @@ static inline int is_owned_at(float2 a, float2 b, float2 p, float orientation) {
   return (float)side * orientation > 0.0f;
 }
 
-/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up. Not contracted into what uses it, so
-/// that a pixel has one centre for all triangles.
+/// NDC of a pixel's centre. Columns count to the right, rows down; NDC y is up. Not contracted into what uses
+/// it, so that a pixel has one centre for all triangles.
 static inline float2 pixel_centre(const FrameParams p, int column, int row) {
 #pragma OPENCL FP_CONTRACT OFF
   return (float2)((float)column + 0.5f - 0.5f * (float)p.width, 0.5f * (float)p.height - 0.5f - (float)row) *

@@ -1,6 +1,6 @@
-// Philox4x32-10, the counter-based generator of Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as
-// 1, 2, 3" (SC 2011). Noise is a pure function of its counter and key: nothing is stored, and the backward pass draws
-// the same numbers again.
+// Philox4x32-10, the counter-based generator of Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as
+// easy as 1, 2, 3" (SC 2011). Noise is a pure function of its counter and key: nothing is stored, and the
+// backward pass draws the same numbers again.
 #ifndef DPR_PHILOX_H
 #define DPR_PHILOX_H
 
@@ -11,8 +11,9 @@
 #define DPR_PHILOX_W1 0xBB67AE85u /* sqrt(3) - 1 */
 #define DPR_LOW_WORD 0xffffffffUL
 
-/// The four words of `counter`, then those of the next: counter.z + 1. All four multiplications of a round are one of
-/// vectors: words sit in the low halves of 64-bit lanes, what is left in the high halves does not count.
+/// The four words of `counter`, then those of the next: counter.z + 1. All four multiplications of a round
+/// are one of vectors: words sit in the low halves of 64-bit lanes, what is left in the high halves does not
+/// count.
 static inline uint8 philox4x32_10(uint4 counter, uint2 key) {
   const ulong4 factor = (ulong4)(DPR_PHILOX_M0, DPR_PHILOX_M1, DPR_PHILOX_M0, DPR_PHILOX_M1);
   ulong4 even = (ulong4)(counter.x, counter.z, counter.x, counter.z + 1); /* words 0, 2 of both counters */

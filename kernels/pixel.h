@@ -1,5 +1,5 @@
-// A pixel's run of the fragment lists, what aggregation reads of a fragment, and the slots that the exact estimator makes
-// of them.
+// A pixel's run of the fragment lists, what aggregation reads of a fragment, and the slots that the exact
+// estimator makes of them.
 #ifndef DPR_PIXEL_H
 #define DPR_PIXEL_H
 
@@ -85,7 +85,8 @@ static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixe
   return q;
 }
 
-/// b / gamma, eq. (7): relative to the pixel's nearest fragment, since zeta / gamma itself would waste its bits.
+/// b / gamma, eq. (7): relative to the pixel's nearest fragment, since zeta / gamma itself would waste its
+/// bits.
 static inline float barrier_beta(const BarrierPixel q, float depth, float log_occupancy) {
   return (q.nearest - depth) * q.depth_scale + log_occupancy * q.inverse_alpha;
 }

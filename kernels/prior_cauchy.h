@@ -8,7 +8,8 @@
 #define DPR_LOWEST_cauchy (-5.35e6f)
 #define DPR_HIGHEST_cauchy 5.35e6f
 
-/// -cot(pi u), by way of the Taylor polynomials of sine and cosine on [0, pi / 4]: relative error 5e-8 before rounding.
+/// -cot(pi u), by way of the Taylor polynomials of sine and cosine on [0, pi / 4]: relative error 5e-8 before
+/// rounding.
 static inline realn cauchy_quantile(realn u) {
   const realn folded = min(u, 1.0f - u); /* cot(pi u) = -cot(pi (1 - u)) */
   const intn is_outer = folded <= 0.25f;

@@ -8,8 +8,8 @@
 #define DPR_LOWEST_gaussian (-5.3f)
 #define DPR_HIGHEST_gaussian 5.3f
 
-/// Giles, "Approximating the erfinv function" (GPU Computing Gems Jade Edition, 2011): sqrt(2) erfinv(2 u - 1), a
-/// polynomial in w = -ln(4 u (1 - u)), and one in sqrt(w) for the 0.34% in the tails.
+/// Giles, "Approximating the erfinv function" (GPU Computing Gems Jade Edition, 2011): sqrt(2) erfinv(2
+/// u - 1), a polynomial in w = -ln(4 u (1 - u)), and one in sqrt(w) for the 0.34% in the tails.
 static inline realn gaussian_quantile(realn u) {
   const realn w = -log_n(4.0f * u * (1.0f - u));
   const realn c = w - 2.5f;
@@ -45,16 +45,18 @@ static inline realn gaussian_score(realn z) { return z; }
 #if DPR_CONCAT(DPR_GAUSSIAN_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_SMOOTH
-/// Barrier composition: where a slot's mass ends above it, 1 - F = 1e-7, and how much further a slot more moves that.
+/// Barrier composition: where a slot's mass ends above it, 1 - F = 1e-7, and how much further a slot more
+/// moves that.
 #define DPR_BARRIER_HIGH 5.2f
 #define DPR_BARRIER_HIGH_PER_LOG 0.18f
 /// The integrand is left out where the product of the F is below exp(-16).
 #define DPR_BARRIER_LOG_FLOOR 16.0f
 #define DPR_BARRIER_NODES 16
-/// How far below the largest a slot still counts. Further down its weight is Phi(-9.5 / sqrt 2) = 1e-11 at most.
+/// How far below the largest a slot still counts. Further down its weight is Phi(-9.5 / sqrt 2) = 1e-11 at
+/// most.
 #define DPR_BARRIER_REACH 9.5f
-/// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each), and the
-/// largest step between nodes where few slots cover, and where many do.
+/// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each),
+/// and the largest step between nodes where few slots cover, and where many do.
 #define DPR_JOINT_BELOW 4.8f
 #define DPR_JOINT_ABOVE 4.8f
 #define DPR_JOINT_STEP 0.67f
@@ -66,8 +68,9 @@ static inline realn gaussian_score(realn z) { return z; }
 /// Standard normal density.
 static inline realn normal_density(realn x) { return DPR_INVERSE_SQRT_2PI * exp_of_negative(-0.5f * x * x); }
 
-/// Mills' ratio (1 - Phi(x)) / phi(x) for x >= 0: a polynomial in 1 / (1 + x / 4), fitted for the least relative error
-/// on [0, 40]; 4e-7 in single precision. The ratio has no tail to lose digits in, unlike 1 - Phi.
+/// Mills' ratio (1 - Phi(x)) / phi(x) for x >= 0: a polynomial in 1 / (1 + x / 4), fitted for the least
+/// relative error on [0, 40]; 4e-7 in single precision. The ratio has no tail to lose digits in, unlike
+/// 1 - Phi.
 static inline realn mills_ratio(realn x) {
   const realn t = 1.0f / mad(x, 0.25f, 1.0f);
   realn p = 0.0513891429f;

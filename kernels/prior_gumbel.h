@@ -1,4 +1,5 @@
-// The Gumbel distribution of maxima: F = exp(-exp(-x)), nu' = 1 - exp(-z). Its perturbed arg-max is the softmax (40).
+// The Gumbel distribution of maxima: F = exp(-exp(-x)), nu' = 1 - exp(-z). Its perturbed arg-max is the
+// softmax (40).
 #ifndef DPR_PRIOR_GUMBEL_H
 #define DPR_PRIOR_GUMBEL_H
 

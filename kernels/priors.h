@@ -11,11 +11,13 @@
 //   occupancy_log(x, &log_p, &hazard)     ln p and d ln p / dx of p = 1 - F(-x): the perturbed Heaviside (8)
 //   DPR_RULE, DPR_JOINT_..., DPR_...      where aggregation's integrals are evaluated: see quadrature.h
 //
-// after a test that compares words, which #if cannot: DPR_GAUSSIAN_IS_gaussian is 1, DPR_GAUSSIAN_IS_cauchy is not
-// defined and so 0. Sampling takes a prior's name as an argument, because the joint composition samples two of them.
+// after a test that compares words, which #if cannot: DPR_GAUSSIAN_IS_gaussian is 1, DPR_GAUSSIAN_IS_cauchy
+// is not defined and so 0. Sampling takes a prior's name as an argument, because the joint composition
+// samples two of them.
 //
-// Everything is written for vectors of lanes (lanes.h), without branches, and holds far into the tails: an occupancy
-// of 1e-20 has a logarithm, and a gradient, as good as one of 0.5. Errors: tests/stages/priors_test.cpp.
+// Everything is written for vectors of lanes (lanes.h), without branches, and holds far into the tails: an
+// occupancy of 1e-20 has a logarithm, and a gradient, as good as one of 0.5. Errors:
+// tests/stages/priors_test.cpp.
 #ifndef DPR_PRIORS_H
 #define DPR_PRIORS_H
 
@@ -41,8 +43,8 @@
 #define DPR_LOWEST_UNIFORM 0x1p-24f
 #define DPR_HIGHEST_UNIFORM (1.0f - 0x1p-24f)
 
-/// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1: the mantissa of a number
-/// in [1, 2), from which 1 less half a step is taken. Exact.
+/// 23 random bits, from a word of the generator, as a number in (0, 1) that is never 0 or 1: the mantissa of
+/// a number in [1, 2), from which 1 less half a step is taken. Exact.
 static inline realn uniform_from_bits(uintn bits) {
   return as_realn(bits >> 9 | 0x3f800000u) - (1.0f - DPR_LOWEST_UNIFORM);
 }

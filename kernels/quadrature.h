@@ -1,16 +1,16 @@
-// Where the aggregation integrals are evaluated: stretches of the line of integration, each with its nodes. A prior
-// names the rule (priors.h):
+// Where the aggregation integrals are evaluated: stretches of the line of integration, each with its nodes. A
+// prior names the rule (priors.h):
 //
-//   smooth     Smooth integrands that decay at both ends: an equally spaced rule converges exponentially (Trefethen &
-//              Weideman 2014). One stretch.
+//   smooth     Smooth integrands that decay at both ends: an equally spaced rule converges exponentially
+//              (Trefethen & Weideman 2014). One stretch.
 //   tails      Heavy tails make every cluster of slots matter: each has stretches of its own, half way to its
-//              neighbours, on which t = head + sinh(u) thins the nodes out. They end at the head, where the integrand
-//              bends: Gauss-Legendre nodes crowd at the ends.
-//   piecewise  Polynomials between kinks: a stretch from kink to kink. With up to DPR_PIECE_SLOTS slots the rule is
-//              exact, with 300 coincident ones 32 nodes are right to 1e-5 of the integral.
+//              neighbours, on which t = head + sinh(u) thins the nodes out. They end at the head, where the
+//              integrand bends: Gauss-Legendre nodes crowd at the ends.
+//   piecewise  Polynomials between kinks: a stretch from kink to kink. With up to DPR_PIECE_SLOTS slots the
+//              rule is exact, with 300 coincident ones 32 nodes are right to 1e-5 of the integral.
 //
-// Nodes come in blocks of DPR_WIDTH, a vector each. Ranges, counts and steps are chosen by measurement (README, "How
-// exact is exact?").
+// Nodes come in blocks of DPR_WIDTH, a vector each. Ranges, counts and steps are chosen by measurement
+// (README, "How exact is exact?").
 #ifndef DPR_QUADRATURE_H
 #define DPR_QUADRATURE_H
 
@@ -46,8 +46,8 @@ static inline void stretch_nodes(const Stretch s, uint block, realn* t, realn* w
 
 #ifdef DPR_JOINT
 
-/// The whole span of a cluster, with as many blocks as the largest step allows. Where many slots cover, the integrand
-/// narrows, and every one leaves out a little of its mass.
+/// The whole span of a cluster, with as many blocks as the largest step allows. Where many slots cover, the
+/// integrand narrows, and every one leaves out a little of its mass.
 static inline Stretch first_stretch(const Slots run) {
   const int crowded = run.covering > DPR_JOINT_CROWD;
   Stretch s;
@@ -63,8 +63,9 @@ static inline Stretch first_stretch(const Slots run) {
 
 #elif !defined(DPR_SOFTMAX)
 
-/// Where the product of the F of all slots falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower. Newton's method
-/// on the sum of a bound of each, which is convex and falls: from the first step on it comes from below.
+/// Where the product of the F of all slots falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower.
+/// Newton's method on the sum of a bound of each, which is convex and falls: from the first step on it comes
+/// from below.
 static inline float lower_end(const Slots run) {
   float low = -DPR_BARRIER_HIGH;
   for (int step = 0; step < 3; ++step) {
@@ -79,8 +80,8 @@ static inline float lower_end(const Slots run) {
   return low;
 }
 
-/// The stretch that holds all but 1e-7 of the largest slot's and its neighbours' mass. With many slots it is short and
-/// lies higher, as the integrand does, so that the same number of nodes serves.
+/// The stretch that holds all but 1e-7 of the largest slot's and its neighbours' mass. With many slots it is
+/// short and lies higher, as the integrand does, so that the same number of nodes serves.
 static inline Stretch first_stretch(const Slots run) {
   Stretch s;
   s.centre = 0.0f;
@@ -102,19 +103,20 @@ static inline int next_stretch(const Slots run, Stretch* s) {
 #else
 
 /// Gauss-Legendre on [-1, 1].
-constant float k_gauss_nodes_16[16] = {
-    -0.989400935f, -0.944575023f, -0.865631202f, -0.755404408f, -0.617876244f, -0.458016778f, -0.281603551f,
-    -0.0950125098f, 0.0950125098f, 0.281603551f, 0.458016778f, 0.617876244f, 0.755404408f, 0.865631202f, 0.944575023f,
-    0.989400935f};
-constant float k_gauss_weights_16[16] = {
-    0.0271524594f, 0.0622535239f, 0.0951585117f, 0.124628971f, 0.149595989f, 0.169156519f, 0.182603415f, 0.18945061f,
-    0.18945061f, 0.182603415f, 0.169156519f, 0.149595989f, 0.124628971f, 0.0951585117f, 0.0622535239f, 0.0271524594f};
+constant float k_gauss_nodes_16[16] = {-0.989400935f, -0.944575023f, -0.865631202f, -0.755404408f,
+                                       -0.617876244f, -0.458016778f, -0.281603551f, -0.0950125098f,
+                                       0.0950125098f, 0.281603551f,  0.458016778f,  0.617876244f,
+                                       0.755404408f,  0.865631202f,  0.944575023f,  0.989400935f};
+constant float k_gauss_weights_16[16] = {0.0271524594f, 0.0622535239f, 0.0951585117f, 0.124628971f,
+                                         0.149595989f,  0.169156519f,  0.182603415f,  0.18945061f,
+                                         0.18945061f,   0.182603415f,  0.169156519f,  0.149595989f,
+                                         0.124628971f,  0.0951585117f, 0.0622535239f, 0.0271524594f};
 constant float k_gauss_nodes_32[32] = {
-    -0.997263862f, -0.985611512f, -0.964762256f, -0.934906076f, -0.896321156f, -0.849367614f, -0.794483796f,
-    -0.732182119f, -0.663044267f, -0.587715757f, -0.506899909f, -0.421351276f, -0.331868602f, -0.239287362f,
-    -0.144471962f, -0.0483076657f, 0.0483076657f, 0.144471962f, 0.239287362f, 0.331868602f, 0.421351276f,
-    0.506899909f, 0.587715757f, 0.663044267f, 0.732182119f, 0.794483796f, 0.849367614f, 0.896321156f, 0.934906076f,
-    0.964762256f, 0.985611512f, 0.997263862f};
+    -0.997263862f, -0.985611512f,  -0.964762256f, -0.934906076f, -0.896321156f, -0.849367614f, -0.794483796f,
+    -0.732182119f, -0.663044267f,  -0.587715757f, -0.506899909f, -0.421351276f, -0.331868602f, -0.239287362f,
+    -0.144471962f, -0.0483076657f, 0.0483076657f, 0.144471962f,  0.239287362f,  0.331868602f,  0.421351276f,
+    0.506899909f,  0.587715757f,   0.663044267f,  0.732182119f,  0.794483796f,  0.849367614f,  0.896321156f,
+    0.934906076f,  0.964762256f,   0.985611512f,  0.997263862f};
 constant float k_gauss_weights_32[32] = {
     0.00701861001f, 0.0162743947f, 0.0253920653f, 0.0342738629f, 0.042835898f, 0.0509980593f, 0.0586840935f,
     0.0658222228f, 0.0723457941f, 0.0781938958f, 0.0833119242f, 0.087652093f, 0.0911738787f, 0.0938443991f,
@@ -163,8 +165,8 @@ static inline Stretch first_stretch(const Slots run) {
   return s;
 }
 
-/// The lower half of a cluster's stretch, then the upper half of the next; false after the last. Each cluster's head lies
-/// below the last one's, so there are no more than two stretches a slot.
+/// The lower half of a cluster's stretch, then the upper half of the next; false after the last. Each
+/// cluster's head lies below the last one's, so there are no more than two stretches a slot.
 static inline int next_stretch(const Slots run, Stretch* s) {
   const float half_way = fmin(0.5f * (s->head - s->next), DPR_TAIL_REACH);
   if (s->is_upper) {
@@ -191,7 +193,8 @@ static inline void stretch_nodes(const Stretch s, uint block, realn* t, realn* w
   *weight *= radius;
 }
 
-/// Where the integrand begins. In the barrier composition the product vanishes below the largest slot's density.
+/// Where the integrand begins. In the barrier composition the product vanishes below the largest slot's
+/// density.
 static inline float lowest_kink(const Slots run) {
 #ifdef DPR_JOINT
   return run.slot[run.count - 1].beta - DPR_HALF_WIDTH;
@@ -201,8 +204,8 @@ static inline float lowest_kink(const Slots run) {
 #endif
 }
 
-/// The piece below the last one; false where the integrand begins. Every piece ends at a lower kink, so there are no more
-/// than two a slot.
+/// The piece below the last one; false where the integrand begins. Every piece ends at a lower kink, so there
+/// are no more than two a slot.
 static inline int next_stretch(const Slots run, Stretch* s) {
   s->high = s->low;
   s->low = lowest_kink(run);

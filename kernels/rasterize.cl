@@ -1,12 +1,14 @@
-// Triangles to fragments. A pair's coverage of its tile is a 64-bit mask; fragments are listed by pair (so that a
-// triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel has the list of
-// its own.
+// Triangles to fragments. A pair's coverage of its tile is a 64-bit mask; fragments are listed by pair (so
+// that a triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel
+// has the list of its own.
 #include "geometry.h"
 
 #define DPR_ROW_MASK 0xffu
 
 /// A row of a mask: bit k is column k of the tile.
-static inline uint mask_row(uint2 mask, uint row) { return ((row < 4 ? mask.x : mask.y) >> (8 * (row & 3))) & DPR_ROW_MASK; }
+static inline uint mask_row(uint2 mask, uint row) {
+  return ((row < 4 ? mask.x : mask.y) >> (8 * (row & 3))) & DPR_ROW_MASK;
+}
 
 static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
@@ -31,8 +33,8 @@ static uint owned_of(uint bits, const FrameParams p, const Triangle t, uint firs
   return owned;
 }
 
-/// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur distance.
-/// One work-item for every pair within the capacity; where there is no pair, nothing is covered.
+/// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur
+/// distance. One work-item for every pair within the capacity; where there is no pair, nothing is covered.
 /// in   pairs   uint[1]      how many there are
 /// in   triangles  Triangle[view][face]
 /// in   pair_face  uint[pair]  view * faces + face
@@ -102,24 +104,24 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   for (uint lane = 0; lane < DPR_WIDTH && column + lane < p.width; ++lane) counts[pixel + lane] = lanes[lane];
 }
 
-/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views, and one
-/// more.
+/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views,
+/// and one more.
 /// in   tile_starts      uint[view * tile + 1]  runs of pairs
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// out  rows  uint4[view * tiles_y + 1]   the first pair and fragment; z = the number of pairs
 kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
-                           global const uint* restrict pair_starts, global const uint* restrict fragment_starts,
-                           global uint4* restrict rows) {
+                           global const uint* restrict pair_starts,
+                           global const uint* restrict fragment_starts, global uint4* restrict rows) {
   const uint row = (uint)get_global_id(0);
   if (row > p.views * p.tiles_y) return;
   const uint pair = tile_starts[row * p.tiles_x];
   rows[row] = (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], 0);
 }
 
-/// Empties a frame of so many `pairs` and `pixels` whose fragments exceed the capacity of the buffers, so that no later
-/// kernel writes behind a buffer's end. A work-item takes every N-th element, where N is the size of the
-/// launch.
+/// Empties a frame of so many `pairs` and `pixels` whose fragments exceed the capacity of the buffers, so
+/// that no later kernel writes behind a buffer's end. A work-item takes every N-th element, where N is the
+/// size of the launch.
 /// in   rows  uint4[last_row + 1]  whose last has the totals
 /// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
 kernel void rasterize_fit(const uint pairs, const uint pixels, const uint capacity, const uint last_row,
@@ -132,8 +134,8 @@ kernel void rasterize_fit(const uint pairs, const uint pixels, const uint capaci
   for (uint i = first; i <= pixels; i += step) pixel_starts[i] = 0;
 }
 
-/// Counts runs from a band's first element. The runs are `columns` from `first` on and as many from every `stride` after,
-/// `rows` times. One work-item per run, and one more in every row.
+/// Counts runs from a band's first element. The runs are `columns` from `first` on and as many from every
+/// `stride` after, `rows` times. One work-item per run, and one more in every row.
 /// in   starts       uint[...]  of the frame
 /// out  band_starts  uint[...]  those of the band, where they were
 kernel void rasterize_rebase(const uint first, const uint columns, const uint rows, const uint stride,
@@ -146,14 +148,15 @@ kernel void rasterize_rebase(const uint first, const uint columns, const uint ro
   band_starts[run] = before + starts[run] - starts[begin];
 }
 
-/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of pixels of a
-/// tile's row, up to `last_vector`.
+/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of
+/// pixels of a tile's row, up to `last_vector`.
 /// in   tile_starts, masks  as rasterize_count
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixel_starts     uint[pixel + 1]  runs of the lists
 /// out  lists            uint[...]        fragments, by pixel
-kernel void rasterize_list(const FrameParams p, const uint last_vector, global const uint* restrict tile_starts,
-                           global const uint2* restrict masks, global const uint* restrict fragment_starts,
+kernel void rasterize_list(const FrameParams p, const uint last_vector,
+                           global const uint* restrict tile_starts, global const uint2* restrict masks,
+                           global const uint* restrict fragment_starts,
                            global const uint* restrict pixel_starts, global uint* restrict lists) {
   const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
   const uint tiles = p.tiles_x * p.tiles_y;
@@ -166,9 +169,11 @@ kernel void rasterize_list(const FrameParams p, const uint last_vector, global c
 
   const uint pixel = (tile / tiles * p.height + row) * p.width + column;
   uint next[DPR_WIDTH];
-  for (uint lane = 0; lane < DPR_WIDTH; ++lane) next[lane] = column + lane < p.width ? pixel_starts[pixel + lane] : 0;
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane)
+    next[lane] = column + lane < p.width ? pixel_starts[pixel + lane] : 0;
   // The pixels of the tile before this vector: their bits say how many of a pair's fragments come first.
-  const uint2 before = (uint2)(part < 32 ? (1u << part) - 1u : 0xffffffffu, part < 32 ? 0u : (1u << (part - 32)) - 1u);
+  const uint2 before =
+      (uint2)(part < 32 ? (1u << part) - 1u : 0xffffffffu, part < 32 ? 0u : (1u << (part - 32)) - 1u);
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint2 mask = masks[pair];
     uint bits = mask_row(mask, part / DPR_TILE) >> (part % DPR_TILE) & ((1u << DPR_WIDTH) - 1u);
@@ -178,8 +183,8 @@ kernel void rasterize_list(const FrameParams p, const uint last_vector, global c
   }
 }
 
-/// Takes a vector of pixels, x | y << 16, out of a mask, row by row. Behind the mask's last pixel that one is repeated.
-/// `corner` is the tile's first pixel.
+/// Takes a vector of pixels, x | y << 16, out of a mask, row by row. Behind the mask's last pixel that one is
+/// repeated. `corner` is the tile's first pixel.
 static inline uintn take_pixels(ulong* mask, uint corner) {
   uint lanes[DPR_WIDTH];
 #pragma unroll
@@ -192,9 +197,10 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
   return load_n(0, lanes);
 }
 
-/// The signed distance of a vector of fragments, with the sign of the edge functions where that is certain, of
-/// owns_sample() where it is not.
-static inline realn signed_distance(const FrameParams p, const Triangle t, const View3 v, float error, uintn packed) {
+/// The signed distance of a vector of fragments, with the sign of the edge functions where that is certain,
+/// of owns_sample() where it is not.
+static inline realn signed_distance(const FrameParams p, const Triangle t, const View3 v, float error,
+                                    uintn packed) {
   const realn distance2 = triangle_distance2(v);
   const realn s = p.euclidean ? sqrt(distance2) : distance2;
   const realn side = least_side(v, t.orientation);
@@ -217,11 +223,12 @@ static inline realn signed_distance(const FrameParams p, const Triangle t, const
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
-/// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the triangle
-///                                 owns the sample, at distance 0 too. 0 where p.sharp is set
+/// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the
+///                                 triangle owns the sample, at distance 0 too. 0 where p.sharp is set
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
-kernel void rasterize_forward(const FrameParams p, const uint2 pairs, global const Triangle* restrict triangles,
+kernel void rasterize_forward(const FrameParams p, const uint2 pairs,
+                              global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
@@ -243,7 +250,8 @@ kernel void rasterize_forward(const FrameParams p, const uint2 pairs, global con
       const uintn packed = take_pixels(&mask, corner);
       store_run_uint((uintn)(pair), i, end, fragment_pair);
       store_run_uint(packed, i, end, pixels);
-      const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+      const realn x = pixel_x(p, convert_realn(packed & 0xffffu)),
+                  y = pixel_y(p, convert_realn(packed >> 16));
       const View3 v = view_triangle(t, x, y);
       store_run(p.sharp ? (realn)(0.0f) : signed_distance(p, t, v, error, packed), i, end, distance);
 
@@ -264,10 +272,11 @@ typedef struct {
   realn x[3], y[3], z[3];
 } CornerGradients;
 
-/// Adds the gradient of the signed distance. With q from the closest point of the triangle to the pixel, and u the
-/// barycentrics of that point, d|q|^2 / d vertex_k = -2 u_k q: the point's own motion along the edge does not count
-/// (the distance is stationary there).
-static inline void add_distance_gradient(const View3 v, intn inside, uint euclidean, realn grad, CornerGradients* g) {
+/// Adds the gradient of the signed distance. With q from the closest point of the triangle to the pixel, and
+/// u the barycentrics of that point, d|q|^2 / d vertex_k = -2 u_k q: the point's own motion along the edge
+/// does not count (the distance is stationary there).
+static inline void add_distance_gradient(const View3 v, intn inside, uint euclidean, realn grad,
+                                         CornerGradients* g) {
   realn best = INFINITY, best_x = 0.0f, best_y = 0.0f;
   realn u[3] = {(realn)(0.0f), (realn)(0.0f), (realn)(0.0f)};
 #pragma unroll
@@ -284,8 +293,8 @@ static inline void add_distance_gradient(const View3 v, intn inside, uint euclid
     u[(k + 1) % 3] = choose(closer, 1.0f - along, u[(k + 1) % 3]);
     u[(k + 2) % 3] = choose(closer, along, u[(k + 2) % 3]);
   }
-  // d|q| = d|q|^2 / (2 |q|); at |q| = 0 the Euclidean distance has no derivative, and zero is one of its subgradients'
-  // averages.
+  // d|q| = d|q|^2 / (2 |q|); at |q| = 0 the Euclidean distance has no derivative, and zero is one of its
+  // subgradients' averages.
   const realn chain = euclidean ? choose(best > 0.0f, 0.5f * rsqrt(best), (realn)(0.0f)) : (realn)(1.0f);
   const realn factor = choose(inside, (realn)(-2.0f), (realn)(2.0f)) * chain * grad;
 #pragma unroll
@@ -295,10 +304,12 @@ static inline void add_distance_gradient(const View3 v, intn inside, uint euclid
   }
 }
 
-/// Adds the gradients that come by the clipped barycentrics c_i = max(n_i, 0) / sum_j max(n_j, 0): those of depth and
-/// of the shaded colour. `grad_bary` are relative to vertex 0's, which changes nothing since the c_i sum to 1.
+/// Adds the gradients that come by the clipped barycentrics c_i = max(n_i, 0) / sum_j max(n_j, 0): those of
+/// depth and of the shaded colour. `grad_bary` are relative to vertex 0's, which changes nothing since the
+/// c_i sum to 1.
 static inline void add_barycentric_gradient(const View3 v, const Triangle t, const BarycentricScale scale,
-                                            realn grad_depth, realn grad_bary1, realn grad_bary2, CornerGradients* g) {
+                                            realn grad_depth, realn grad_bary1, realn grad_bary2,
+                                            CornerGradients* g) {
   realn n[3], c[3];
   const realn turn = raw_barycentrics(v, scale, n);
   const realn inverse_sum = inverse_of_clipped(n);
@@ -331,17 +342,21 @@ static inline uintn load_pixels(intn in_run, uint first, global const uint* pixe
   return select((uintn)(0), load_n(first, pixels), in_run);
 }
 
-/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to `last_pair`.
+/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to
+/// `last_pair`.
 /// in   triangles, pair_face, fragment_starts, pixels  as rasterize_forward
 /// in   distance       float[fragment]  whose sign says on which side the sample lies
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
-kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const Triangle* restrict triangles,
-                               global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+kernel void rasterize_backward(const FrameParams p, const uint last_pair,
+                               global const Triangle* restrict triangles,
+                               global const uint* restrict pair_face,
+                               global const uint* restrict fragment_starts,
                                global const uint* restrict pixels, global const float* restrict distance,
-                               global const float* restrict grad_distance, global const float* restrict grad_depth,
-                               global const float* restrict grad_bary1, global const float* restrict grad_bary2,
-                               global float* restrict grad_corners) {
+                               global const float* restrict grad_distance,
+                               global const float* restrict grad_depth,
+                               global const float* restrict grad_bary1,
+                               global const float* restrict grad_bary2, global float* restrict grad_corners) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];

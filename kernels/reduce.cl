@@ -1,5 +1,6 @@
-// Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a plain sum
-// would lose what is left. The order of additions is fixed, so the result is the same from run to run.
+// Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a
+// plain sum would lose what is left. The order of additions is fixed, so the result is the same from run to
+// run.
 #include "tile_lanes.h"
 
 /// Adds x to a sum and its running error (Neumaier 1974). Adding zero changes no bit of either.
@@ -13,22 +14,24 @@ static inline void compensated_add(realn* sum, realn* error, realn x) {
 static inline realn load_until(uint first, uint last, global const float* values) {
   if (last - first >= DPR_WIDTH) return load_n(first, values);
   float lanes[DPR_WIDTH];
-  for (uint lane = 0; lane < DPR_WIDTH; ++lane) lanes[lane] = first + lane < last ? values[first + lane] : 0.0f;
+  for (uint lane = 0; lane < DPR_WIDTH; ++lane)
+    lanes[lane] = first + lane < last ? values[first + lane] : 0.0f;
   return load_n(0, lanes);
 }
 
-/// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel, segment, vector of
-/// slots); `slots` is a multiple of the widest vector.
+/// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel,
+/// segment, vector of slots); `slots` is a multiple of the widest vector.
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
 /// in   values   float[channel][count], of so many `channels` and `segments`
 /// out  partial  float[channel][segment][2][slot]  sums, and their compensations
 kernel void reduce_partial(const uint count, const uint channels, const uint segments, const uint stride,
-                           const uint slots, global const uint* restrict starts, global const float* restrict values,
-                           global float* restrict partial) {
+                           const uint slots, global const uint* restrict starts,
+                           global const float* restrict values, global float* restrict partial) {
   const uint i = (uint)get_global_id(0);
   const uint vectors = slots / DPR_WIDTH;
   if (i >= channels * segments * vectors) return;
-  const uint slot = i % vectors * DPR_WIDTH, segment = i / vectors % segments, channel = i / vectors / segments;
+  const uint slot = i % vectors * DPR_WIDTH, segment = i / vectors % segments,
+             channel = i / vectors / segments;
   const uint last = starts[(segment + 1) * stride];
   global const float* of_channel = values + (size_t)channel * count;
   realn sum = 0.0f, error = 0.0f;
@@ -43,8 +46,8 @@ kernel void reduce_partial(const uint count, const uint channels, const uint seg
 /// Sums the slots in order. One work-item per (channel, segment), `count` in all.
 /// in   partial  as reduce_partial left them, with its `slots`
 /// out  sums     float[channel][segment], from `first` on
-kernel void reduce_final(const uint count, const uint slots, const uint first, global const float* restrict partial,
-                         global float* restrict sums) {
+kernel void reduce_final(const uint count, const uint slots, const uint first,
+                         global const float* restrict partial, global float* restrict sums) {
   const uint i = (uint)get_global_id(0);
   if (i >= count) return;
   global const float* slot_sums = partial + (size_t)2 * slots * i;

@@ -1,4 +1,5 @@
-// What the sampled compositions share: a pixel's run of fragments, the noise of each, and what a block of samples sees.
+// What the sampled compositions share: a pixel's run of fragments, the noise of each, and what a block of
+// samples sees.
 #ifndef DPR_SAMPLED_PIXEL_H
 #define DPR_SAMPLED_PIXEL_H
 
@@ -13,7 +14,8 @@ typedef struct {
   global const uint *fragment_pair, *pair_face;
 } FaceOf;
 
-/// A pixel's run of the fragment lists. A place counts from its first; where a winner is meant, -1 is the background.
+/// A pixel's run of the fragment lists. A place counts from its first; where a winner is meant, -1 is the
+/// background.
 typedef struct {
   uint first, last;
   uint view, in_view;  // the pixel's view, and its number in it: they name its noise
@@ -37,7 +39,8 @@ static inline uint fragment_at(const SampledRun run, const Fragments f, int plac
 }
 
 /// The face of a fragment, counted in its own view.
-static inline uint face_of_fragment(const AggregateParams p, const SampledRun run, const FaceOf face, uint fragment) {
+static inline uint face_of_fragment(const AggregateParams p, const SampledRun run, const FaceOf face,
+                                    uint fragment) {
   return face.pair_face[face.fragment_pair[fragment]] - run.view * p.faces;
 }
 
@@ -46,7 +49,8 @@ static inline NoiseName name_of_noise(const AggregateParams p, const SampledRun 
 }
 
 /// RGBA of a winner.
-static inline float4 winner_color(const AggregateParams p, const SampledRun run, const Fragments f, int winner) {
+static inline float4 winner_color(const AggregateParams p, const SampledRun run, const Fragments f,
+                                  int winner) {
   if (winner < 0) return (float4)(p.background.xyz, 0.0f);
   return (float4)(fragment_color(f, fragment_at(run, f, winner)), 1.0f);
 }
@@ -68,13 +72,15 @@ static inline float4 add_winners(const AggregateParams p, const SampledRun run, 
 }
 
 /// y = <grad, RGBA> of the rigid solution, from which the samples' count; 0 without a baseline.
-static inline float rigid_value(const AggregateParams p, const SampledRun run, const Fragments f, float4 grad) {
+static inline float rigid_value(const AggregateParams p, const SampledRun run, const Fragments f,
+                                float4 grad) {
   return p.sampling.baseline * dot(grad, winner_color(p, run, f, run.rigid));
 }
 
-/// y of every sample of a block, relative to `rigid`, 0 in lanes without a sample; adds 1 to the wins of each winner.
-static inline realn sample_values(const AggregateParams p, const SampledRun run, const Fragments f, float4 grad,
-                                  float rigid, uint block, intn winner, global float* wins) {
+/// y of every sample of a block, relative to `rigid`, 0 in lanes without a sample; adds 1 to the wins of each
+/// winner.
+static inline realn sample_values(const AggregateParams p, const SampledRun run, const Fragments f,
+                                  float4 grad, float rigid, uint block, intn winner, global float* wins) {
   int winners[DPR_WIDTH];
   float y[DPR_WIDTH];
   store_n(winner, 0, winners);

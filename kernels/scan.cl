@@ -1,5 +1,5 @@
-// Exclusive prefix sums of counts, in chunks, level by level. Sums saturate, so that a total that does not fit is seen
-// as the largest number instead of wrapping around.
+// Exclusive prefix sums of counts, in chunks, level by level. Sums saturate, so that a total that does not
+// fit is seen as the largest number instead of wrapping around.
 #include "shared_types.h"
 
 /// Sums of chunks. One work-item per chunk of DPR_SCAN_CHUNK elements.
@@ -15,7 +15,8 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
   sums[chunk] = sum;
 }
 
-/// The scan itself, given the scan of the chunks' sums. One work-item per chunk; one where there is nothing to scan.
+/// The scan itself, given the scan of the chunks' sums. One work-item per chunk; one where there is nothing
+/// to scan.
 /// in   size     elements of a chunk: DPR_SCAN_CHUNK, or of the only one all
 /// in   values   uint[count]
 /// in   bases    uint[chunk]      exclusive scan of the chunks' sums

@@ -4,13 +4,14 @@
 /// Corners further away than this, NDC, have squared distances that single precision does not hold.
 #define DPR_MAX_NDC 1e18f
 
-/// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 for what is dropped: what reaches nearer
-/// than znear, lies wholly beyond zfar, has exactly no area, or reaches beyond DPR_MAX_NDC.
+/// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 for what is dropped: what
+/// reaches nearer than znear, lies wholly beyond zfar, has exactly no area, or reaches beyond DPR_MAX_NDC.
 static inline int orientation_of(float3 a, float3 b, float3 c, float znear, float zfar) {
   const float2 lowest = fmin(fmin(a.xy, b.xy), c.xy), highest = fmax(fmax(a.xy, b.xy), c.xy);
   const float2 reach = fmax(fabs(lowest), fabs(highest));
   // Written so that a NaN fails.
-  const int in_range = fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC;
+  const int in_range =
+      fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC;
   const int in_view = a.z >= znear && b.z >= znear && c.z >= znear && fmin(fmin(a.z, b.z), c.z) < zfar &&
                       fmax(fmax(a.z, b.z), c.z) < INFINITY;
   return in_range && in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
@@ -26,7 +27,8 @@ static inline float4 bounds_of(const FrameParams p, float3 a, float3 b, float3 c
   return (float4)((float2)(low.x, high.y) * scale + centre, (float2)(high.x, low.y) * scale + centre);
 }
 
-/// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does not.
+/// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does
+/// not.
 static inline int meets_image(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
 
 static inline Triangle make_triangle(const FrameParams p, float3 a, float3 b, float3 c, int orientation,
@@ -47,9 +49,9 @@ static inline uint count_tiles(const FrameParams p, const Triangle t) {
   return count;
 }
 
-/// Assembles the triangles, and counts the tiles of each. Dropped is what orientation_of() drops, cannot be seen, or whose
-/// blurred bounds miss the image; what is kept has no tile where its bounds hold no sample, or it is small and owns none.
-/// One work-item per (view, face).
+/// Assembles the triangles, and counts the tiles of each. Dropped is what orientation_of() drops, cannot be
+/// seen, or whose blurred bounds miss the image; what is kept has no tile where its bounds hold no sample, or
+/// it is small and owns none. One work-item per (view, face).
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]

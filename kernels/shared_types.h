@@ -1,5 +1,6 @@
-// Every struct, enum and limit that host and kernels share. 32-bit scalars and their vectors of two and four only, so
-// that the layout is the same on every compiler; tests/device/layout_test.cpp compares sizes and offsets.
+// Every struct, enum and limit that host and kernels share. 32-bit scalars and their vectors of two and four
+// only, so that the layout is the same on every compiler; tests/device/layout_test.cpp compares sizes and
+// offsets.
 #ifndef DPR_SHARED_TYPES_H
 #define DPR_SHARED_TYPES_H
 
@@ -34,8 +35,8 @@ using float4 = cl_float4;
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 
-/// Triangles whose doubled projected area is at most this, NDC^2, are slivers (is_sliver() in geometry.h): a few millionths
-/// of a pixel at 4096x4096.
+/// Triangles whose doubled projected area is at most this, NDC^2, are slivers (is_sliver() in geometry.h): a
+/// few millionths of a pixel at 4096x4096.
 #define DPR_SLIVER_AREA 1e-12f
 
 /// The fragment of a slot that is the background.
@@ -77,12 +78,13 @@ using float4 = cl_float4;
 #define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
 
-/// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own face where
-/// colours or normals may jump there, in the other where it goes through the edge in the same direction.
+/// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own
+/// face where colours or normals may jump there, in the other where it goes through the edge in the same
+/// direction.
 #define DPR_EDGE_FLAG 0x80000000u
 
-/// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of its ends have
-/// corners that count (CornerArea in crossing.h).
+/// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of
+/// its ends have corners that count (CornerArea in crossing.h).
 #define DPR_CONTOUR_CREASE 1u
 #define DPR_CONTOUR_FIRST_END 2u
 #define DPR_CONTOUR_SECOND_END 4u
@@ -91,15 +93,15 @@ using float4 = cl_float4;
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu
 
-/// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge lengths; and its
-/// hinges: 1 - cos, and that squared.
+/// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge
+/// lengths; and its hinges: 1 - cos, and that squared.
 #define DPR_MESH_LOSS_CHANNELS 2
 
 /// Sizes and settings of a frame that the geometry stages need.
 typedef struct FrameParams {
   DPR_SHARED_NAME(FrameParams)
   uint views, meshes, vertices, faces;
-  uint position_stride;  /* from one view's positions to the next: vertices where every view has a shape of its own, else 0 */
+  uint position_stride;  /* from one view's positions to the next: vertices where views have shapes, else 0 */
   uint color_stride;     /* the same for colours */
   uint first_view;       /* of a larger batch, which names the noise; 0 otherwise */
   uint width, height;    /* pixels */
@@ -180,10 +182,11 @@ typedef struct AggregateParams {
   uint unused;
 } AggregateParams;
 
-/// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward pass.
+/// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward
+/// pass.
 typedef struct Slot {
   DPR_SHARED_NAME(Slot)
-  float beta;      /* relative to the largest of its pixel (barrier) or to the nearest of its cluster (joint) */
+  float beta;      /* relative to the largest of its pixel (barrier) or its cluster's nearest (joint) */
   float occupancy; /* joint composition */
   float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
   uint fragment;   /* or DPR_BACKGROUND_SLOT */
@@ -205,7 +208,8 @@ typedef struct AntialiasParams {
   uint unused0, unused1;
 } AntialiasParams;
 
-/// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its sizes.
+/// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its
+/// sizes.
 typedef struct MeshLossParams {
   DPR_SHARED_NAME(MeshLossParams)
   float laplacian, edge_length, normal_consistency, flatness;
@@ -214,8 +218,8 @@ typedef struct MeshLossParams {
   uint vertices, hinges;
 } MeshLossParams;
 
-/// A pass of the blur: out[a] = sum over b of weights[a * out_step - b * in_step + offset] * in[b], for taps that there
-/// are. With the steps exchanged and symmetric weights it is its own transpose.
+/// A pass of the blur: out[a] = sum over b of weights[a * out_step - b * in_step + offset] * in[b], for taps
+/// that there are. With the steps exchanged and symmetric weights it is its own transpose.
 typedef struct BlurPass {
   DPR_SHARED_NAME(BlurPass)
   uint lines; /* along rows: rows of all images; along columns: images */

@@ -1,6 +1,7 @@
-// A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a tile, still by
-// face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on the device; the
-// host launches for the capacity of the buffers. Few elements are sorted by one work-item instead, to the same order.
+// A stable radix sort of (key, value) by eight bits a pass: pairs leave it ordered by tile and, within a
+// tile, still by face. Nothing depends on the order in which work-items run. The number of elements, `count`,
+// is on the device; the host launches for the capacity of the buffers. Few elements are sorted by one
+// work-item instead, to the same order.
 #include "shared_types.h"
 
 #define DPR_SORT_DIGITS 256
@@ -58,9 +59,10 @@ kernel void sort_scatter(const uint capacity, const uint shift, global const uin
 /// in   values    uint[count]   move with their keys
 /// out  sorted_keys, sorted_values  uint[count]
 /// out  starts    uint[last_key + 1]  where each key's run begins in the sorted list
-kernel void sort_serial(const uint last_key, global const uint* restrict count, global const uint* restrict keys,
-                        global const uint* restrict values, global uint* restrict sorted_keys,
-                        global uint* restrict sorted_values, global uint* restrict starts) {
+kernel void sort_serial(const uint last_key, global const uint* restrict count,
+                        global const uint* restrict keys, global const uint* restrict values,
+                        global uint* restrict sorted_keys, global uint* restrict sorted_values,
+                        global uint* restrict starts) {
   if (get_global_id(0) != 0) return;
   const uint elements = count[0];
   for (uint key = 0; key <= last_key; ++key) starts[key] = 0;
@@ -77,13 +79,14 @@ kernel void sort_serial(const uint last_key, global const uint* restrict count, 
   starts[0] = 0;
 }
 
-/// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one more.
+/// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one
+/// more.
 /// in   keys         how many there are, from 0 on
 /// in   count        uint[1]         the number of elements
 /// in   sorted_keys  uint[count]
 /// out  starts       uint[keys + 1]
-kernel void sort_ranges(const uint keys, global const uint* restrict count, global const uint* restrict sorted_keys,
-                        global uint* restrict starts) {
+kernel void sort_ranges(const uint keys, global const uint* restrict count,
+                        global const uint* restrict sorted_keys, global uint* restrict starts) {
   const uint key = (uint)get_global_id(0);
   if (key > keys) return;
   uint low = 0, high = count[0];

@@ -1,6 +1,7 @@
-// Lanes no wider than a row of a tile, for runs of fragments. A pair's run begins anywhere and has any length, so its last
-// vector reaches into the next run. What writes fragments by pair handles pairs in groups, in order: each run is written
-// over what the one before has left there, and only where the group ends are lanes stored apart.
+// Lanes no wider than a row of a tile, for runs of fragments. A pair's run begins anywhere and has any
+// length, so its last vector reaches into the next run. What writes fragments by pair handles pairs in
+// groups, in order: each run is written over what the one before has left there, and only where the group
+// ends are lanes stored apart.
 #ifndef DPR_TILE_LANES_H
 #define DPR_TILE_LANES_H
 
@@ -20,14 +21,17 @@ static inline uint2 pair_group(uint2 pairs) {
 }
 
 /// Which lanes of the vector at `first` lie before `last`.
-static inline intn lanes_before(uint last, uint first) { return DPR_LANE_INDEX < (intn)((int)(last - first)); }
+static inline intn lanes_before(uint last, uint first) {
+  return DPR_LANE_INDEX < (intn)((int)(last - first));
+}
 
 /// Elements of a run in those lanes, 0 in the others.
 static inline realn load_run(intn in_run, uint first, global const float* values) {
   return choose(in_run, load_n(first, values), (realn)(0.0f));
 }
 
-/// The same of a buffer that the kernel writes: the next run, which another work-item may be writing, is not read.
+/// The same of a buffer that the kernel writes: the next run, which another work-item may be writing, is not
+/// read.
 static inline realn load_own_run(uint last, uint first, global const float* values) {
 #if DPR_WIDTH == 1
   (void)last;

@@ -5,17 +5,17 @@
 #include "ownership.h"
 #include "shared_types.h"
 
-/// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it can besides,
-/// of the largest coordinate.
+/// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it
+/// can besides, of the largest coordinate.
 #define DPR_BIN_SLACK 1e-5f
 #define DPR_BIN_RELATIVE_SLACK 2e-6f
 
-/// Where the bounds of a triangle without blur hold no more samples of a tile, whether it owns one of them is found out at
-/// once: that takes less than a pair that covers nothing.
+/// Where the bounds of a triangle without blur hold no more samples of a tile, whether it owns one of them is
+/// found out at once: that takes less than a pair that covers nothing.
 #define DPR_FEW_SAMPLES 2
 
-/// The samples [x, y] along one axis within [low, high], in samples; x > y, and so for their tiles, if there is none. By
-/// conversions: PoCL's ceil() and floor() branch.
+/// The samples [x, y] along one axis within [low, high], in samples; x > y, and so for their tiles, if there
+/// is none. By conversions: PoCL's ceil() and floor() branch.
 static inline uint2 samples_within(float low, float high, uint size) {
   const uint2 none = (uint2)(DPR_TILE, 0u);
   const float from = fmin(fmax(low - DPR_BOUNDS_SLACK, 0.0f), (float)size);
@@ -27,7 +27,9 @@ static inline uint2 samples_within(float low, float high, uint size) {
 }
 
 /// The columns or rows [x, y] of a triangle's bounds.
-static inline uint2 columns_of(const Triangle t) { return (uint2)(t.first_sample & 0xffffu, t.last_sample & 0xffffu); }
+static inline uint2 columns_of(const Triangle t) {
+  return (uint2)(t.first_sample & 0xffffu, t.last_sample & 0xffffu);
+}
 static inline uint2 rows_of(const Triangle t) { return (uint2)(t.first_sample >> 16, t.last_sample >> 16); }
 
 /// Those of a tile's samples [x, y] along one axis that are within others.
@@ -35,10 +37,10 @@ static inline uint2 samples_of_tile(uint2 samples, uint tile) {
   return (uint2)(max(samples.x, tile * DPR_TILE), min(samples.y, tile * DPR_TILE + DPR_TILE - 1));
 }
 
-/// False only if no pixel centre of the tile is within the blur distance of the triangle. Either one of the edges, pushed
-/// out by the blur, has the whole tile outside; or a vertex v is the triangle's nearest point: with n from v to the
-/// nearest point of the tile, further than the blur, and dot(n, y - v) <= 0 for the other vertices y, every point x of
-/// the tile has dot(n, x - y) >= |n|^2, hence |x - y| >= |n|.
+/// False only if no pixel centre of the tile is within the blur distance of the triangle. Either one of the
+/// edges, pushed out by the blur, has the whole tile outside; or a vertex v is the triangle's nearest point:
+/// with n from v to the nearest point of the tile, further than the blur, and dot(n, y - v) <= 0 for the
+/// other vertices y, every point x of the tile has dot(n, x - y) >= |n|^2, hence |x - y| >= |n|.
 static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
   const float half_extent = 0.5f * (DPR_TILE - 1) * p.pixel_size;
   const float cx = ((float)(tile_x * DPR_TILE) + 0.5f * DPR_TILE - 0.5f * (float)p.width) * p.pixel_size;
@@ -48,7 +50,8 @@ static inline int tile_overlaps(const FrameParams p, const Triangle t, uint tile
   const float4 inside = (ex * (cy - ay) - ey * (cx - ax)) * t.orientation;
   const float4 reach = half_extent * (fabs(ex) + fabs(ey));
   const float4 far = fmax(fmax(fabs(ax), fabs(ay)), fmax(fabs(cx), fabs(cy)));
-  const float blur = p.blur_distance + DPR_BIN_SLACK + DPR_BIN_RELATIVE_SLACK * fmax(fmax(far.x, far.y), far.z);
+  const float blur =
+      p.blur_distance + DPR_BIN_SLACK + DPR_BIN_RELATIVE_SLACK * fmax(fmax(far.x, far.y), far.z);
   if (any((inside + reach < -blur * sqrt(ex * ex + ey * ey)).xyz)) return 0;
   const float4 nx = clamp(ax, cx - half_extent, cx + half_extent) - ax;
   const float4 ny = clamp(ay, cy - half_extent, cy + half_extent) - ay;

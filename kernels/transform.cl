@@ -27,7 +27,8 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
   global const ViewParams* camera = views + view;
 
-  const float3 w = apply_affine(model[0], model[1], model[2], positions[view * p.position_stride + vertex].xyz);
+  const float3 w =
+      apply_affine(model[0], model[1], model[2], positions[view * p.position_stride + vertex].xyz);
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float depth = -c.z;
   world[i] = (float4)(w, 1.0f);
@@ -35,8 +36,8 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   ndc[i] = (float4)(xy.x, xy.y, depth, 0.0f);
 }
 
-/// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that no kept
-/// triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
+/// Gradients at the world positions, and what every vertex adds to the gradients of its poses. A vertex that
+/// no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
 /// in      views, models, vertex_mesh, world  as transform_forward
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
 /// in      lit         0: nothing was lit, grad_world is only written
@@ -79,9 +80,9 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   for (int k = 0; k < DPR_POSE_CHANNELS; ++k) channels[(uint)k * count + i] = values[k];
 }
 
-/// Gradients of the object-space positions: the views' contributions in order, or, where every view has a shape of its
-/// own, its contribution alone. One work-item per vertex, or per (view, vertex). Models and the vertices' meshes as
-/// transform_forward.
+/// Gradients of the object-space positions: the views' contributions in order, or, where every view has a
+/// shape of its own, its contribution alone. One work-item per vertex, or per (view, vertex). Models and the
+/// vertices' meshes as transform_forward.
 /// in   grad_world      float4[view][vertex]
 /// out  grad_positions  float4[vertex] or, with a stride, float4[view][vertex]
 kernel void transform_backward_positions(const FrameParams p, global const float4* restrict models,
