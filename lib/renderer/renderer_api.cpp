@@ -86,6 +86,16 @@ void require_pixel_count(std::size_t found, std::size_t expected) {
                         std::to_string(expected) + ", views x height x width");
 }
 
+/// The pixels of a frame from `first` on. Blocks.
+void read_image(const Renderer::Impl& m, std::size_t first, std::span<glm::vec4> pixels) {
+  static_assert(sizeof(glm::vec4) == sizeof(cl_float4));
+  Device::Impl& device = m.device.impl();
+  ++device.host_waits;
+  check_cl(device.queue.enqueueReadBuffer(m.image().cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
+                                          pixels.size_bytes(), pixels.data()),
+           "clEnqueueReadBuffer");
+}
+
 }  // namespace
 
 Image Renderer::image(std::size_t view) const {
@@ -95,11 +105,7 @@ Image Renderer::image(std::size_t view) const {
     throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views.size()));
   }
   Image image(m.scene.width, m.scene.height);
-  std::vector<cl_float4> values(image.pixels.size());
-  m.image().download(values, view * values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    image.pixels[i] = glm::vec4(values[i].s[0], values[i].s[1], values[i].s[2], values[i].s[3]);
-  }
+  read_image(m, view * image.pixels.size(), image.pixels);
   return image;
 }
 
@@ -107,9 +113,7 @@ void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
   Impl& m = *impl_;
   m.require_forward("Renderer::read_pixels");
   require_pixel_count(pixels.size(), m.image().size());
-  check_cl(m.device.impl().queue.enqueueReadBuffer(m.image().cl_buffer(), CL_TRUE, 0, pixels.size_bytes(),
-                                                   pixels.data()),
-           "clEnqueueReadBuffer");
+  read_image(m, 0, pixels);
 }
 
 SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) {
