@@ -7,7 +7,8 @@ typedef struct {
   float4 base, along1, along2;
 } CornerColors;
 
-static inline CornerColors load_colors(const FrameParams p, uint view_face, global const uint4* restrict face_colors,
+static inline CornerColors load_colors(const FrameParams p, uint view_face,
+                                       global const uint4* restrict face_colors,
                                        global const float4* restrict colors) {
   const uint view = view_face / p.faces;
   const uint4 corners = face_colors[view_face - view * p.faces] + view * p.color_stride;
@@ -26,10 +27,11 @@ static inline CornerColors load_colors(const FrameParams p, uint view_face, glob
 /// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
 kernel void shade_forward(const FrameParams p, const uint2 pairs, global const uint* restrict pair_face,
-                          global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
-                          global const float4* restrict colors, global const float* restrict bary1,
-                          global const float* restrict bary2, global float* restrict red,
-                          global float* restrict green, global float* restrict blue) {
+                          global const uint* restrict fragment_starts,
+                          global const uint4* restrict face_colors, global const float4* restrict colors,
+                          global const float* restrict bary1, global const float* restrict bary2,
+                          global float* restrict red, global float* restrict green,
+                          global float* restrict blue) {
   const uint2 group = pair_group(pairs);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
@@ -49,14 +51,15 @@ kernel void shade_forward(const FrameParams p, const uint2 pairs, global const u
 /// One work-item per group of `pairs`. Deterministic. Inputs as shade_forward, and
 /// in   grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
-/// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's fragments
+/// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's
+///      fragments
 kernel void shade_backward(const FrameParams p, const uint2 pairs, global const uint* restrict pair_face,
-                           global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
-                           global const float4* restrict colors, global const float* restrict bary1,
-                           global const float* restrict bary2, global const float* restrict grad_red,
-                           global const float* restrict grad_green, global const float* restrict grad_blue,
-                           global float* restrict grad_bary1, global float* restrict grad_bary2,
-                           global float* restrict grad_colors) {
+                           global const uint* restrict fragment_starts,
+                           global const uint4* restrict face_colors, global const float4* restrict colors,
+                           global const float* restrict bary1, global const float* restrict bary2,
+                           global const float* restrict grad_red, global const float* restrict grad_green,
+                           global const float* restrict grad_blue, global float* restrict grad_bary1,
+                           global float* restrict grad_bary2, global float* restrict grad_colors) {
   const uint2 group = pair_group(pairs);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];

@@ -58,6 +58,20 @@ using float4 = cl_float4;
 #define DPR_PHONG 2
 #define DPR_GOURAUD 3
 
+/// Where the light finds the base colour of a fragment: in its triangle's corners, or in planes of fragments.
+#define DPR_BASE_OF_CORNERS 0
+#define DPR_BASE_OF_FRAGMENTS 1
+
+/// What lies beyond a texture, in the order of dpr::Wrap; what lies between its texels, in that of
+/// dpr::Filter; and the texture of a face that has none.
+#define DPR_REPEAT 0
+#define DPR_MIRROR 1
+#define DPR_CLAMP 2
+#define DPR_NEAREST 0
+#define DPR_BILINEAR 1
+#define DPR_TRILINEAR 2
+#define DPR_NO_TEXTURE 0xffffffffu
+
 /// Channels that the transform's backward pass leaves per vertex, to be summed over a view's meshes.
 #define DPR_CHANNEL_MODEL 0       /* rotation vector, translation of the model matrix: 6 */
 #define DPR_CHANNEL_VIEW 6        /* rotation vector, translation of the view matrix: 6 */
@@ -80,8 +94,9 @@ using float4 = cl_float4;
 
 /// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own
 /// face where colours or normals may jump there, in the other where it goes through the edge in the same
-/// direction.
+/// direction. DPR_EDGE_SEAM is set in the own face where the texture jumps.
 #define DPR_EDGE_FLAG 0x80000000u
+#define DPR_EDGE_SEAM 0x40000000u
 
 /// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of
 /// its ends have corners that count (CornerArea in crossing.h).
@@ -148,6 +163,16 @@ typedef struct Light {
   float4 position; /* world */
   float4 diffuse, specular;
 } Light;
+
+/// A texture, and where its texels lie among those of all.
+typedef struct Texture {
+  DPR_SHARED_NAME(Texture)
+  uint first;         /* texel of its largest level; the smaller ones follow */
+  uint width, height; /* of that level */
+  uint levels;        /* 1 unless the filter is trilinear */
+  uint wrap, filter;
+  uint unused0, unused1;
+} Texture;
 
 /// How the Monte Carlo estimators sample; part of the structs below.
 typedef struct Sampling {

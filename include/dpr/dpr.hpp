@@ -23,4 +23,5 @@
 #include "dpr/shape.hpp"
 #include "dpr/smoothing.hpp"
 #include "dpr/smoothing_options.hpp"
+#include "dpr/texture.hpp"
 #include "dpr/voxels.hpp"

@@ -2,16 +2,23 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
+#include "dpr/texture.hpp"
+
 namespace dpr {
+
+/// The texture of a face that has none.
+inline constexpr std::uint32_t k_no_texture = std::numeric_limits<std::uint32_t>::max();
 
 /// An indexed triangle mesh in object space. Any soup will do: shared or unshared vertices, non-manifold
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the
-/// mesh is white.
+/// mesh is white. A texture is multiplied by the colours.
 struct Mesh {
   std::vector<glm::vec3> positions;        ///< [vertex] object space
   std::vector<glm::uvec3> faces;           ///< [face] indices into positions
@@ -19,27 +26,31 @@ struct Mesh {
   std::vector<glm::vec3> face_colors;      ///< [face] linear RGB, or empty
   std::vector<glm::vec2> texcoords;        ///< texture coordinates that corners refer to, or empty
   std::vector<glm::uvec3> face_texcoords;  ///< [face] indices into texcoords, or empty
+  std::vector<Texture> textures;           ///< of the base colour, or empty; they need face_texcoords
+  /// [face] index into textures, or k_no_texture; empty: all faces have the first.
+  std::vector<std::uint32_t> face_textures;
 };
 
 /// Throws InvalidArgument unless the mesh can be rendered: at least one face, indices in range, finite
-/// positions, colours and texture coordinates, arrays of matching length. `name` says in the message which
-/// mesh it is. O(vertices + faces).
+/// positions, colours, texture coordinates and texels, arrays of matching length. `name` says in the message
+/// which mesh it is. O(vertices + faces + texels).
 void validate(const Mesh& mesh, const std::string& name = "mesh");
 
 /// Reads OBJ, PLY, OFF or STL, once from front to back; the vertices are in the order of the file. Polygons
 /// become triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices,
-/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, if the
-/// libraries are regular files beside it; dpr/notes.hpp tells what is left out. STL has no shared vertices:
-/// equal positions become one, and facets with two equal corners are left out. The texture coordinates of an
-/// OBJ (u, v; v up) are kept if every corner has some. Throws IoError where the file is missing, malformed,
-/// truncated, goes on after its end or, being a pipe or a device, does not end; and InvalidArgument where its
-/// content cannot be rendered.
+/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, and
+/// their textures (map_Kd) are the mesh's, if libraries and textures are regular files; dpr/notes.hpp tells
+/// what is left out. STL has no shared vertices: equal positions become one, and facets with two equal
+/// corners are left out. The texture coordinates of an OBJ (u, v; v up) are kept if every corner has some, or
+/// where there are textures; then faces without coordinates get (0, 0) and no texture. Throws IoError where
+/// the file is missing, malformed, truncated, goes on after its end or, being a pipe or a device, does not
+/// end; and InvalidArgument where its content cannot be rendered.
 Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face
 /// colours: asking for that is an error, not a silent loss. PLY colours are bytes, as other programs expect
-/// them: clamped to [0, 1] and rounded. Texture coordinates go to OBJ only. Throws IoError, and
-/// InvalidArgument where the mesh is not valid.
+/// them: clamped to [0, 1] and rounded. Texture coordinates go to OBJ only; textures are not written, see
+/// write_texture(). Throws IoError, and InvalidArgument where the mesh is not valid.
 void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

@@ -11,7 +11,7 @@
 
 namespace dpr {
 
-/// A sentence each: a texture of a material that is not read, a material library that is not there, a
+/// A sentence each: a texture or a material library that is not there, a
 /// material that is in no library. None of them is an error.
 using Notes = std::vector<std::string>;
 

@@ -42,6 +42,8 @@ struct MeshGradient {
   std::vector<glm::vec3> positions;  ///< [vertex] object space; empty if not requested
   std::vector<glm::vec3>
       colors;  ///< [vertex] or [face], as the mesh has them; empty if not requested or white
+  std::vector<glm::vec2> texcoords;              ///< [texcoord]; empty if not requested or without textures
+  std::vector<std::vector<glm::vec3>> textures;  ///< [texture][height * width]; empty if not requested
 };
 
 struct PointLightGradient {
@@ -98,6 +100,10 @@ class Renderer {
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
   /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+  /// New texels, linear RGB, for a texture of a mesh of the scene: [height * width].
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
+  /// New texture coordinates for a mesh of the scene that has textures: [texcoord], as many as it has.
+  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
 
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after

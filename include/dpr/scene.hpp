@@ -30,6 +30,8 @@ struct GradientRequest {
   bool lights = false;     ///< positions and colours of the lights
   bool smoothing = true;   ///< sigma, gamma, alpha
   bool background = true;  ///< background colour
+  bool texture = false;    ///< texels of every texture
+  bool texcoords = false;  ///< texture coordinates of textured meshes
 };
 
 struct Scene {

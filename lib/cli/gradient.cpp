@@ -22,8 +22,15 @@ struct GradientOptions {
 
 Json array_to_json(const GradientArray& array) {
   if (double* const* value = std::get_if<double*>(&array)) return **value;
-  if (glm::dvec3* const* vector = std::get_if<glm::dvec3*>(&array)) return to_json(**vector);
-  return to_json(*std::get<std::vector<glm::vec3>*>(array));
+  return std::visit(
+      [](const auto* list) -> Json {
+        if constexpr (std::is_same_v<decltype(list), const double*>) {
+          return *list;
+        } else {
+          return to_json(*list);
+        }
+      },
+      array);
 }
 
 /// The member of a path like "camera.rotation".

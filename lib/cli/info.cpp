@@ -1,5 +1,6 @@
 // dpr info: what is in a mesh file or a scene file, and what dpr does with it.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -25,6 +26,20 @@ Json to_json(const std::vector<MeshMaterial>& materials) {
   return list;
 }
 
+constexpr std::array k_wraps{"repeat", "mirror", "clamp"};
+constexpr std::array k_filters{"nearest", "bilinear", "trilinear"};
+
+Json to_json(const std::vector<Texture>& textures) {
+  Json list = Json::array();
+  for (const Texture& t : textures) {
+    list.push_back({{"width", t.width},
+                    {"height", t.height},
+                    {"wrap", k_wraps.at(static_cast<std::size_t>(t.wrap))},
+                    {"filter", k_filters.at(static_cast<std::size_t>(t.filter))}});
+  }
+  return list;
+}
+
 Json vector_to_json(const glm::vec3& v) { return Json::array({number(v.x), number(v.y), number(v.z)}); }
 
 const char* colors_of(const Mesh& mesh) {
@@ -42,8 +57,9 @@ Json mesh_notes(const Mesh& mesh, const MeshFacts& facts) {
     notes.push_back(counted(facts.faces_without_area, "triangle") + " without area: dropped when rendered");
   if (facts.unused_vertices > 0)
     notes.push_back("vertices without a face: " + std::to_string(facts.unused_vertices) + ", not seen");
-  if (colors_of(mesh) == std::string("none")) notes.push_back("no colours: white");
-  if (!mesh.face_texcoords.empty()) notes.push_back("texture coordinates: rendered by --aov uv");
+  if (colors_of(mesh) == std::string("none") && mesh.textures.empty()) notes.push_back("no colours: white");
+  if (!mesh.face_texcoords.empty() && mesh.textures.empty())
+    notes.push_back("texture coordinates without a texture: rendered by --aov uv");
   if (!facts.is_closed()) notes.push_back("not closed: both sides of its triangles are seen");
   if (facts.is_closed() && !facts.is_oriented())
     notes.push_back("triangles wound in opposite senses: no matter to rendering, volumes need one sense");
@@ -68,6 +84,7 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
           {"bounds", {{"low", vector_to_json(box.low)}, {"high", vector_to_json(box.high)}}},
           {"colors", colors_of(mesh)},
           {"texture_coordinates", mesh.texcoords.size()},
+          {"textures", to_json(mesh.textures)},
           {"materials", to_json(materials)},
           {"notes", mesh_notes(mesh, facts)}};
 }
@@ -187,6 +204,15 @@ std::string materials_text(const Json& materials) {
   return list_text(texts);
 }
 
+std::string textures_text(const Json& textures) {
+  Json texts = Json::array();
+  for (const Json& t : textures) {
+    texts.push_back(t["width"].dump() + "x" + t["height"].dump() + " " + t["wrap"].get<std::string>() + " " +
+                    t["filter"].get<std::string>());
+  }
+  return list_text(texts);
+}
+
 void print_notes(const Json& notes) {
   for (const Json& note : notes) print_line("note", note.get<std::string>());
 }
@@ -210,6 +236,7 @@ void print_mesh(const Json& mesh) {
   print_line("bounds", list_text(mesh["bounds"]["low"]) + " to " + list_text(mesh["bounds"]["high"]));
   print_line("colours", mesh["colors"].get<std::string>());
   print_line("texture coordinates", mesh["texture_coordinates"].dump());
+  print_line("textures", textures_text(mesh["textures"]));
   print_line("materials", materials_text(mesh["materials"]));
   print_notes(mesh["notes"]);
 }
@@ -268,8 +295,9 @@ void add_info_command(CLI::App& application, CommonOptions& common) {
       "closed,\n"
       "manifold, non_manifold_edges, non_manifold_vertices, oriented, faces_without_area, bounds {low, "
       "high}, colors\n"
-      "(vertex, face, none), texture_coordinates, materials [{name, texture}], notes (sentences). Of a "
-      "scene: file,\n"
+      "(vertex, face, none), texture_coordinates, textures [{width, height, wrap, filter}], materials "
+      "[{name, texture}],\n"
+      "notes (sentences). Of a scene: file,\n"
       "kind, width, height, camera, background, lights, smoothing, gradients, meshes, notes.\n"
       "Example: dpr info bunny.obj");
   command->callback([file, as_json] { run(*file, *as_json); });

@@ -50,6 +50,18 @@ Json to_json(const std::vector<glm::vec3>& vectors) {
   return list;
 }
 
+Json to_json(const std::vector<glm::vec2>& vectors) {
+  Json list = Json::array();
+  for (const glm::vec2& v : vectors) list.push_back(Json::array({number(v.x), number(v.y)}));
+  return list;
+}
+
+Json to_json(const std::vector<std::vector<glm::vec3>>& lists) {
+  Json all = Json::array();
+  for (const std::vector<glm::vec3>& list : lists) all.push_back(to_json(list));
+  return all;
+}
+
 Json rows_to_json(const glm::dmat3& matrix) {
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {

@@ -14,6 +14,7 @@
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
+#include "image/image_file.hpp"
 
 namespace dpr {
 namespace {
@@ -145,6 +146,8 @@ void append_pixels(const std::vector<float>& values, std::size_t channels, const
 }
 
 }  // namespace
+
+bool holds_floats(const std::filesystem::path& file) { return open(file)->spec().format.is_floating_point(); }
 
 Image read_image(const std::filesystem::path& file, bool* has_alpha) {
   const auto input = open(file);

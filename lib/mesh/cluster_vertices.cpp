@@ -51,6 +51,8 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
     ++sum.count;
   }
   Mesh result;
+  result.texcoords = mesh.texcoords;
+  result.textures = mesh.textures;
   for (const Sum& sum : sums) {
     result.positions.emplace_back(sum.position / sum.count);
     if (!mesh.vertex_colors.empty()) result.vertex_colors.emplace_back(sum.color / sum.count);
@@ -62,6 +64,8 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
     if (!known.insert(canonical(face)).second) continue;
     result.faces.push_back(face);
     if (!mesh.face_colors.empty()) result.face_colors.push_back(mesh.face_colors[i]);
+    if (!mesh.face_texcoords.empty()) result.face_texcoords.push_back(mesh.face_texcoords[i]);
+    if (!mesh.face_textures.empty()) result.face_textures.push_back(mesh.face_textures[i]);
   }
   return result.faces.empty() ? mesh : result;
 }

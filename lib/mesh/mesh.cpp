@@ -42,6 +42,26 @@ void validate_texcoords(const Mesh& mesh, const std::string& name) {
   }
 }
 
+void validate_textures(const Mesh& mesh, const std::string& name) {
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i)
+    validate(mesh.textures[i], checks::in(checks::element("textures", i), name));
+  if (!mesh.textures.empty() && mesh.face_texcoords.empty()) {
+    throw InvalidArgument(checks::in("face_texcoords", name), "none beside textures",
+                          "one for each of the " + std::to_string(mesh.faces.size()) + " faces");
+  }
+  if (!mesh.face_textures.empty() && mesh.face_textures.size() != mesh.faces.size()) {
+    throw InvalidArgument(checks::in("face_textures", name), std::to_string(mesh.face_textures.size()),
+                          std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
+  }
+  for (std::size_t i = 0; i < mesh.face_textures.size(); ++i) {
+    const std::uint32_t index = mesh.face_textures[i];
+    if (index < mesh.textures.size() || index == k_no_texture) continue;
+    throw InvalidArgument(
+        checks::in(checks::element("face_textures", i), name), "texture " + std::to_string(index),
+        "k_no_texture, or an index below the number of textures, " + std::to_string(mesh.textures.size()));
+  }
+}
+
 void validate_faces(const Mesh& mesh, const std::string& name) {
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     for (int corner = 0; corner < 3; ++corner) {
@@ -72,6 +92,7 @@ void validate(const Mesh& mesh, const std::string& name) {
   validate_colors(mesh.vertex_colors, mesh.positions.size(), "vertex_colors", "vertices", name);
   validate_colors(mesh.face_colors, mesh.faces.size(), "face_colors", "faces", name);
   validate_texcoords(mesh, name);
+  validate_textures(mesh, name);
 }
 
 }  // namespace dpr

@@ -33,11 +33,23 @@ Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& 
 /// A material of OBJ, as far as it is of use.
 struct Material {
   std::optional<glm::vec3> diffuse;  ///< Kd
-  std::string texture;               ///< map_Kd; empty if there is none
+
+  // map_Kd
+  std::string texture;                 ///< as the library names it; empty if there is none
+  std::filesystem::path texture_file;  ///< where that is
+  glm::vec2 scale{1}, offset{0};       ///< of the texture coordinates: -s, -o
+  Wrap wrap = Wrap::repeat;            ///< -clamp on
+  std::string ignored_options;         ///< those that are not read, separated by commas
+
+  bool has_same_texture(const Material& other) const {
+    return texture_file == other.texture_file && scale == other.scale && offset == other.offset &&
+           wrap == other.wrap;
+  }
 };
 using Materials = std::map<std::string, Material, std::less<>>;
 
-/// Adds the materials of an OBJ's library. Throws IoError where a colour cannot be read.
+/// Adds the materials of an OBJ's library, beside which its textures are. Throws IoError where a colour or an
+/// option of a texture cannot be read.
 void read_mtl(const std::filesystem::path& file, std::string_view text, Materials& materials);
 
 /// Appends a polygon as a fan of triangles about its first corner.

@@ -1,4 +1,9 @@
-// The reader of OBJ's material libraries: the diffuse colour of each material and the name of its texture.
+// The reader of OBJ's material libraries: the diffuse colour of each material, its texture and the options of
+// that.
+#include <algorithm>
+#include <array>
+#include <span>
+
 #include "dpr/error.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/scan_text.hpp"
@@ -20,6 +25,85 @@ glm::vec3 diffuse_color(const std::filesystem::path& file, std::size_t line,
   return color;
 }
 
+/// An option of a texture, and how many words may follow it.
+struct TextureOption {
+  std::string_view name;
+  std::size_t least, most;
+  bool is_number;
+};
+
+constexpr std::array<TextureOption, 13> k_texture_options{{{"-blendu", 1, 1, false},
+                                                           {"-blendv", 1, 1, false},
+                                                           {"-bm", 1, 1, true},
+                                                           {"-boost", 1, 1, true},
+                                                           {"-cc", 1, 1, false},
+                                                           {"-clamp", 1, 1, false},
+                                                           {"-imfchan", 1, 1, false},
+                                                           {"-mm", 2, 2, true},
+                                                           {"-o", 1, 3, true},
+                                                           {"-s", 1, 3, true},
+                                                           {"-t", 1, 3, true},
+                                                           {"-texres", 1, 1, true},
+                                                           {"-type", 1, 1, false}}};
+
+using Words = std::span<const std::string_view>;
+
+/// The words of an option at the beginning of `words`.
+Words option_words(const std::filesystem::path& file, std::size_t line, const TextureOption& option,
+                   Words words) {
+  std::size_t count = 1;
+  const auto fits = [&] {
+    return count < words.size() && (!option.is_number || scan::parse_coordinate(words[count]));
+  };
+  while (count <= option.most && fits()) ++count;
+  if (count > option.least) return words.first(count);
+  throw IoError(file,
+                "expected " + std::string(option.name) + " with " + std::to_string(option.least) +
+                    (option.is_number ? " finite numbers or more" : " word"),
+                line);
+}
+
+void apply_option(const std::filesystem::path& file, std::size_t line, Words words, Material& material) {
+  const auto take = [&](glm::vec2& value) {
+    for (std::size_t i = 0; i < 2 && i + 1 < words.size(); ++i)
+      value[static_cast<int>(i)] = *scan::parse_coordinate(words[i + 1]);
+  };
+  if (words[0] == "-s") {
+    take(material.scale);
+  } else if (words[0] == "-o") {
+    take(material.offset);
+  } else if (words[0] == "-clamp") {
+    if (words[1] != "on" && words[1] != "off")
+      throw IoError(file, "got -clamp " + std::string(words[1]) + ", expected on or off", line);
+    material.wrap = words[1] == "on" ? Wrap::clamp : Wrap::repeat;
+  } else {
+    if (!material.ignored_options.empty()) material.ignored_options += ", ";
+    material.ignored_options += words[0];
+  }
+}
+
+/// map_Kd [options] name, which may have spaces inside.
+void read_texture_map(const std::filesystem::path& file, const scan::Lines& lines, Words words,
+                      Material& material) {
+  Material plain;
+  plain.diffuse = material.diffuse;
+  material = plain;
+  std::string_view before = words[0];
+  words = words.subspan(1);
+  while (!words.empty()) {
+    const auto* const option = std::ranges::find(k_texture_options, words[0], &TextureOption::name);
+    if (option == k_texture_options.end()) break;
+    const Words taken = option_words(file, lines.number(), *option, words);
+    apply_option(file, lines.number(), taken, material);
+    before = taken.back();
+    words = words.subspan(taken.size());
+  }
+  material.texture = scan::behind(lines.line(), before);
+  std::string path = material.texture;
+  std::ranges::replace(path, '\\', '/');  // as Windows writes it
+  material.texture_file = file.parent_path() / path;
+}
+
 }  // namespace
 
 void read_mtl(const std::filesystem::path& file, std::string_view text, Materials& materials) {
@@ -32,7 +116,7 @@ void read_mtl(const std::filesystem::path& file, std::string_view text, Material
     const std::string_view rest = scan::behind(lines.line(), words[0]);
     if (words[0] == "newmtl") material = &(materials[std::string(rest)] = {});
     if (!material) continue;
-    if (words[0] == "map_Kd") material->texture = rest;
+    if (words[0] == "map_Kd") read_texture_map(file, lines, words, *material);
     if (words[0] != "Kd") continue;
     scan::split(lines.line().substr(0, lines.line().find('#')), words);
     material->diffuse = diffuse_color(file, lines.number(), words);

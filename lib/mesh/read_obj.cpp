@@ -1,5 +1,5 @@
-// The reader of OBJ: vertices with their colours, texture coordinates, polygons and the diffuse colours of
-// materials.
+// The reader of OBJ: vertices with their colours, texture coordinates, polygons, and the diffuse colours and
+// textures of materials.
 //
 // The format: Wavefront's "Object Files", version 3.0. Statements that say nothing of polygons are passed
 // over, with a note where they describe a shape.
@@ -18,6 +18,9 @@ namespace dpr {
 namespace {
 
 using Indices = std::vector<std::uint32_t>;
+
+/// The texture coordinate of a corner that has none.
+constexpr std::uint32_t k_no_texcoord = std::numeric_limits<std::uint32_t>::max();
 
 /// Statements of shapes that are not read: lines, points, curves, surfaces, and what other files hold.
 constexpr std::array<std::string_view, 11> k_other_shapes{"bsp",   "bzp", "call", "cdc", "cdp", "curv",
@@ -98,7 +101,14 @@ class ObjReader {
     }
     const std::size_t first = mesh.faces.size();
     append_fan(corners_, mesh.faces);
-    if (texcoords_.size() == corners_.size()) append_fan(texcoords_, mesh.face_texcoords);
+    const bool has_texcoords = texcoords_.size() == corners_.size();
+    if (!has_texcoords) {
+      texcoords_.assign(corners_.size(), k_no_texcoord);
+      faces_without_texcoords_ += mesh.faces.size() - first;
+    }
+    append_fan(texcoords_, mesh.face_texcoords);
+    if (texture_ != k_no_texture && !has_texcoords) ++textured_without_texcoords_;
+    mesh.face_textures.resize(mesh.faces.size(), has_texcoords ? texture_ : k_no_texture);
     if (color_) append_color(*color_, first, mesh.faces.size(), mesh.face_colors);
   }
 
@@ -156,11 +166,52 @@ class ObjReader {
     if (!mesh.face_colors.empty()) mesh.face_colors.resize(mesh.faces.size(), glm::vec3(1));
   }
 
-  /// Without the texture coordinates of every corner there are none.
+  /// Without textures there are coordinates of every corner or none. With some, faces that have none show no
+  /// texture, wherever they look.
   void finish_texcoords() {
     require_known(farthest_texcoord_, mesh.texcoords.size(), "texture coordinate");
-    if (mesh.face_texcoords.size() < mesh.faces.size()) mesh.face_texcoords.clear();
-    if (mesh.face_texcoords.empty()) mesh.texcoords.clear();
+    if (textured_without_texcoords_ > 0) {
+      notes_.push_back(file_.string() + ": polygons with a texture but without coordinates in it, " +
+                       std::to_string(textured_without_texcoords_) + ": they have the colour Kd alone");
+    }
+    const bool is_textured =
+        std::ranges::any_of(mesh.face_textures, [](std::uint32_t t) { return t != k_no_texture; });
+    if (!is_textured) {
+      mesh.textures.clear();
+      mesh.face_textures.clear();
+      if (faces_without_texcoords_ > 0) mesh.face_texcoords.clear();
+      if (mesh.face_texcoords.empty()) mesh.texcoords.clear();
+      return;
+    }
+    if (faces_without_texcoords_ > 0) add_missing_texcoords();
+    for (std::uint32_t t = 0; t < maps_.size(); ++t) transform_texcoords(t);
+    if (std::ranges::all_of(mesh.face_textures, [](std::uint32_t t) { return t == 0; }))
+      mesh.face_textures.clear();
+  }
+
+  void add_missing_texcoords() {
+    const auto last = static_cast<std::uint32_t>(mesh.texcoords.size());
+    mesh.texcoords.emplace_back(0, 0);
+    for (glm::uvec3& face : mesh.face_texcoords) {
+      if (face.x == k_no_texcoord) face = glm::uvec3(last);
+    }
+  }
+
+  /// Coordinates that a texture scales or shifts are of its own.
+  void transform_texcoords(std::uint32_t texture) {
+    const Material& map = maps_[texture];
+    if (map.scale == glm::vec2(1) && map.offset == glm::vec2(0)) return;
+    std::map<std::uint32_t, std::uint32_t> transformed;
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      if (mesh.face_textures[f] != texture) continue;
+      for (int corner = 0; corner < 3; ++corner) {
+        std::uint32_t& index = mesh.face_texcoords[f][corner];
+        const auto [place, is_new] =
+            transformed.emplace(index, static_cast<std::uint32_t>(mesh.texcoords.size()));
+        if (is_new) mesh.texcoords.push_back(mesh.texcoords[index] * map.scale + map.offset);
+        index = place->second;
+      }
+    }
   }
 
   /// Names may have spaces inside, and a line may have several names.
@@ -187,15 +238,39 @@ class ObjReader {
     const std::string_view name = scan::behind(lines_.line(), words_[0]);
     const auto found = materials_.find(name);
     color_ = found == materials_.end() ? std::nullopt : found->second.diffuse;
+    texture_ = found == materials_.end() ? k_no_texture : texture_of(name, found->second);
     if (!used_.insert(std::string(name)).second) return;
     if (found == materials_.end() && !lacks_library_) {
       notes_.push_back(file_.string() + ": the material " + scan::quoted(name) +
                        " is in no material library: its faces have no colour of it");
     }
-    if (found == materials_.end() || found->second.texture.empty()) return;
-    notes_.push_back(file_.string() + ": the texture " + scan::quoted(found->second.texture) +
-                     " of the material " + scan::quoted(name) +
-                     " (map_Kd) is not read: its faces have the colour Kd alone");
+    if (found != materials_.end()) note_options(name, found->second);
+  }
+
+  void note_options(std::string_view name, const Material& material) {
+    if (material.ignored_options.empty()) return;
+    notes_.push_back(file_.string() + ": of the texture of the material " + scan::quoted(name) +
+                     " (map_Kd) these options are not read: " + material.ignored_options);
+  }
+
+  /// The number of a material's texture, which is read where it is met first.
+  std::uint32_t texture_of(std::string_view name, const Material& material) {
+    if (material.texture.empty()) return k_no_texture;
+    const auto same = [&](const Material& other) { return other.has_same_texture(material); };
+    const auto known = std::ranges::find_if(maps_, same);
+    if (known != maps_.end()) return static_cast<std::uint32_t>(known - maps_.begin());
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(material.texture_file, error)) {
+      if (!missing_textures_.insert(material.texture_file).second) return k_no_texture;
+      notes_.push_back(file_.string() + ": the texture " + scan::quoted(material.texture) +
+                       " of the material " + scan::quoted(name) +
+                       " (map_Kd) is no regular file: its faces have the colour Kd alone");
+      return k_no_texture;
+    }
+    maps_.push_back(material);
+    mesh.textures.push_back(read_texture(material.texture_file));
+    mesh.textures.back().wrap = material.wrap;
+    return static_cast<std::uint32_t>(maps_.size() - 1);
   }
 
   const std::filesystem::path& file_;
@@ -205,8 +280,13 @@ class ObjReader {
   Reference farthest_vertex_, farthest_texcoord_;
   std::set<std::filesystem::path> libraries_;
   Materials materials_;
-  std::set<std::string> used_;                            // names of materials
-  std::optional<glm::vec3> color_;                        // of the material in use
+  std::set<std::string> used_;            // names of materials
+  std::optional<glm::vec3> color_;        // of the material in use
+  std::uint32_t texture_ = k_no_texture;  // the same
+  std::vector<Material> maps_;            // [texture] that uses it
+  std::set<std::filesystem::path> missing_textures_;
+  std::size_t faces_without_texcoords_ = 0;               // triangles
+  std::size_t textured_without_texcoords_ = 0;            // polygons
   std::map<std::string_view, std::size_t> other_shapes_;  // lines by keyword
   bool lacks_library_ = false;
   Notes& notes_;

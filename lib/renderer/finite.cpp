@@ -42,9 +42,11 @@ void require_finite(SceneGradient& gradient) {
     std::size_t count = 0;
     transform_numbers(array, [&](double value) {
       if (!std::isfinite(value)) {
-        const bool is_list = std::holds_alternative<std::vector<glm::vec3>*>(array);
         const std::string name = name_of(row, index);
-        fail(is_list ? checks::element(name, count / 3) : name, value);
+        const std::size_t components = std::holds_alternative<std::vector<glm::vec3>*>(array)   ? 3
+                                       : std::holds_alternative<std::vector<glm::vec2>*>(array) ? 2
+                                                                                                : 0;
+        fail(components > 0 ? checks::element(name, count / components) : name, value);
       }
       ++count;
       return value;

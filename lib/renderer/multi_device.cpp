@@ -83,7 +83,13 @@ class GradientSum {
 /// How often each part of the scene has been set.
 struct Versions {
   std::uint64_t scene = 0, smoothing = 0;
-  std::vector<std::uint64_t> positions, colors;  // [mesh]
+  std::vector<std::uint64_t> positions, colors, texcoords;  // [mesh]
+  std::vector<std::vector<std::uint64_t>> texels;           // [mesh][texture]
+
+  explicit Versions(const Scene& of = {}, std::uint64_t number = 0)
+      : scene(number), positions(of.meshes.size()), colors(of.meshes.size()), texcoords(of.meshes.size()) {
+    for (const Instance& instance : of.meshes) texels.emplace_back(instance.mesh.textures.size());
+  }
 };
 
 }  // namespace
@@ -130,6 +136,15 @@ struct MultiDeviceRenderer::Impl {
       if (worker.has.colors[m] != now.colors[m]) {
         renderer.set_colors(m, colors_of(scene.meshes[m].mesh));
         worker.has.colors[m] = now.colors[m];
+      }
+      if (worker.has.texcoords[m] != now.texcoords[m]) {
+        renderer.set_texcoords(m, scene.meshes[m].mesh.texcoords);
+        worker.has.texcoords[m] = now.texcoords[m];
+      }
+      for (std::size_t t = 0; t < now.texels[m].size(); ++t) {
+        if (worker.has.texels[m][t] == now.texels[m][t]) continue;
+        renderer.set_texels(m, t, scene.meshes[m].mesh.textures[t].texels);
+        worker.has.texels[m][t] = now.texels[m][t];
       }
     }
   }
@@ -211,8 +226,7 @@ void MultiDeviceRenderer::set_scene(const Scene& scene) {
   Scene new_scene = scene;
   std::vector<View> only{own_view(scene)};
   std::vector<Chunk> chunks = make_chunks(1, 1);
-  Versions versions{m.now.scene + 1, 0, std::vector<std::uint64_t>(scene.meshes.size()),
-                    std::vector<std::uint64_t>(scene.meshes.size())};
+  Versions versions(scene, m.now.scene + 1);
   std::swap(m.scene, new_scene);
   std::swap(m.views, only);
   std::swap(m.chunks, chunks);
@@ -250,6 +264,21 @@ void MultiDeviceRenderer::set_colors(std::size_t mesh, std::span<const glm::vec3
   check_colors(impl_->scene, mesh, colors);
   std::ranges::copy(colors, colors_of(impl_->scene.meshes[mesh].mesh).begin());
   ++impl_->now.colors[mesh];
+}
+
+void MultiDeviceRenderer::set_texels(std::size_t mesh, std::size_t texture,
+                                     std::span<const glm::vec3> texels) {
+  impl_->require_views("MultiDeviceRenderer::set_texels");
+  check_texels(impl_->scene, mesh, texture, texels);
+  std::ranges::copy(texels, impl_->scene.meshes[mesh].mesh.textures[texture].texels.begin());
+  ++impl_->now.texels[mesh][texture];
+}
+
+void MultiDeviceRenderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
+  impl_->require_views("MultiDeviceRenderer::set_texcoords");
+  check_texcoords(impl_->scene, mesh, texcoords);
+  std::ranges::copy(texcoords, impl_->scene.meshes[mesh].mesh.texcoords.begin());
+  ++impl_->now.texcoords[mesh];
 }
 
 std::vector<Image> MultiDeviceRenderer::render() {

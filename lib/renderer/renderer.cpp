@@ -17,8 +17,11 @@ bool is_geometric(const GradientRequest& wanted) {
 }
 
 /// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
-constexpr std::size_t k_fragment_bytes = Rasterize::k_fragment_bytes + Shade::k_fragment_bytes +
-                                         Occupancy::k_fragment_bytes + Aggregate::k_fragment_bytes;
+std::size_t fragment_bytes(const Geometry& geometry) {
+  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Shade::k_fragment_bytes +
+                                   Occupancy::k_fragment_bytes + Aggregate::k_fragment_bytes;
+  return k_always + (geometry.textures.empty() ? 0 : Shade::k_textured_fragment_bytes);
+}
 
 /// Frames of all renderers, so that a loss knows which one it was evaluated on.
 std::atomic<std::uint64_t> frames_rendered = 0;
@@ -50,6 +53,7 @@ void Renderer::Impl::require_forward(const char* caller) {
 void Renderer::Impl::forward() {
   require_scene("Renderer::forward");
   rendered = false;
+  build_pyramids();
   transform.forward(frame, device_views, *geometry);
   find_edges();
   hide_back_faces();
@@ -63,6 +67,12 @@ void Renderer::Impl::forward() {
   }
   rendered = true;
   frame_number = ++frames_rendered;
+}
+
+void Renderer::Impl::build_pyramids() {
+  if (geometry->textures.has_levels || geometry->textures.empty()) return;
+  texels->build(geometry->textures);
+  geometry->textures.has_levels = true;
 }
 
 void Renderer::Impl::find_edges() {
@@ -99,7 +109,8 @@ std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts || (pixel_noise && !pixel_noise->last_contours)) return std::nullopt;
   const FrameCounts expected = rasterize.capacity_for(*last_counts, bin);
-  if (with_headroom(expected.fragments) * k_fragment_bytes >= device.memory_budget()) return std::nullopt;
+  if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= device.memory_budget())
+    return std::nullopt;
   return expected;
 }
 
@@ -144,7 +155,7 @@ void Renderer::Impl::forward_measured() {
   find_contours(std::nullopt);
   bin.forward(frame, setup);
   rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, bin, device.memory_budget(), k_fragment_bytes);
+  bands = rasterize.cut(frame, bin, device.memory_budget(), fragment_bytes(*geometry));
   for (const Band& band : bands) render(band);
   finish_image();
   if (bands.size() == 1) last_counts = rasterize.counted();
@@ -192,6 +203,8 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
   if (pixel_noise) {
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
   }
+  const bool textured = !geometry->textures.empty();
+  if (wanted.texture && textured) texels->start(geometry->textures);
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     differentiate(pixel_noise ? pixel_noise->grad_raster : grad_images);
@@ -204,6 +217,7 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
     transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
   }
+  if (wanted.texture && textured) texels->finish(geometry->textures);
   SceneGradient gradient;
   gradient.meshes.resize(scene.meshes.size());
   gradient.views.resize(views.size());
@@ -223,13 +237,24 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
   if ((geometric || wanted.smoothing) && !sampled_jointly && !pixel_noise) {
     occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
   }
-  if (geometric || wanted.colors) shade.backward(shade_inputs(), aggregate.grad_color);
+  const bool textured = !geometry->textures.empty();
+  if (geometric || wanted.colors || (textured && (wanted.texture || wanted.texcoords))) {
+    shade.backward(shade_inputs(), aggregate.grad_color);
+  }
+  if (textured && wanted.texture) {
+    shade.surface->list(shade_inputs().surface(), shade.grad_base(aggregate.grad_color));
+    texels->add(geometry->textures, *shade.surface);
+  }
   if (geometric) {
     rasterize.backward(frame, setup.triangles, bin,
                        pixel_noise       ? aggregate.grad_depth
                        : sampled_jointly ? aggregate.grad_distance
                                          : occupancy.grad_distance,
                        aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
+    if (textured) {
+      shade.surface->backward_detail(shade_inputs().surface(), shade.grad_base(aggregate.grad_color),
+                                     rasterize.grad_corners);
+    }
   }
   if (wanted.lights && shade.lit()) {
     for (std::size_t light = 0; light < shade.light_sets(); ++light) {
@@ -240,12 +265,12 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
 
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
-         rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() + reduce.bytes() +
-         (aov ? aov->bytes() : 0) + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
-         hidden_.capacity_bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
-         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
-         host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() + grad_world.capacity_bytes() +
-         grad_colors.capacity_bytes();
+         rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
+         (texels ? texels->bytes() : 0) + reduce.bytes() + (aov ? aov->bytes() : 0) +
+         (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
+         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
+         grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -52,6 +52,18 @@ void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
   impl_->set_colors(mesh, colors);
 }
 
+void Renderer::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels) {
+  impl_->require_scene("Renderer::set_texels");
+  check_texels(impl_->scene, mesh, texture, texels);
+  impl_->set_texels(mesh, texture, texels);
+}
+
+void Renderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
+  impl_->require_scene("Renderer::set_texcoords");
+  check_texcoords(impl_->scene, mesh, texcoords);
+  impl_->set_texcoords(mesh, texcoords);
+}
+
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   Impl& m = *impl_;
   m.require_scene("Renderer::set_shapes");

@@ -43,6 +43,11 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, const AddToGra
     gradient.shapes.positions = read_range(transform.grad_positions, 0, transform.grad_positions.size());
   }
   if (colors && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
+  const bool texcoords = scene.gradients.texcoords && !geometry->textures.empty();
+  if (texcoords) {
+    gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
+                      shade.surface->grad_corner_texcoords, grad_texcoords);
+  }
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const MeshRange& range = geometry->meshes[m];
     const Mesh& mesh = scene.meshes[m].mesh;
@@ -51,6 +56,16 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, const AddToGra
     }
     if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
       gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
+    }
+    if (texcoords) {
+      for (const glm::vec3& uv : read_range(grad_texcoords, range.first_texcoord, range.texcoords))
+        gradient.meshes[m].texcoords.emplace_back(uv);
+    }
+    if (!scene.gradients.texture) continue;
+    for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
+      const shared::Texture& t = geometry->textures.list[range.first_texture + i];
+      gradient.meshes[m].textures.push_back(
+          read_range(texels->grad, t.first, std::size_t{t.width} * t.height));
     }
   }
 }

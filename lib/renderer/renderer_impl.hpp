@@ -19,6 +19,7 @@
 #include "stages/reduce.hpp"
 #include "stages/setup.hpp"
 #include "stages/shade.hpp"
+#include "stages/texels.hpp"
 #include "stages/transform.hpp"
 
 namespace dpr {
@@ -63,6 +64,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
+  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
   /// For images of the scene's size, and so many views.
   SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {
@@ -102,6 +105,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Shade shade;
   Occupancy occupancy;
   Aggregate aggregate;
+  std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
   Reduce reduce;
   Raster raster;                                // around the frame
@@ -112,6 +116,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
+  Buffer<cl_float4> grad_texcoords;                     // [texcoord]
 
  private:
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
@@ -119,11 +124,14 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set(ViewSet& prepared) noexcept;
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
 
-  ShadeInputs shade_inputs() const { return {frame, device_views, *geometry, transform, bin, rasterize}; }
+  ShadeInputs shade_inputs() const {
+    return {frame, device_views, *geometry, transform, setup.triangles, bin, rasterize};
+  }
   ContourInputs contour_inputs() const;
   Blur::Size image_size() const;
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
 
+  void build_pyramids();
   void find_edges();
   void hide_back_faces();
   std::vector<glm::vec3> shape_of_first_view() const;

@@ -119,7 +119,11 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   check_frame_size(wanted, 1, 0);
   Scene new_scene = wanted;
   Geometry new_geometry(device.impl(), wanted);
-  Shade::Lighting lighting = shade.prepare(wanted.lights);
+  if (is_textured(wanted)) {
+    shade.make_surface();
+    if (!texels) texels.emplace(device.impl());
+  }
+  Shade::Lighting lighting = shade.prepare(wanted.lights, is_textured(wanted));
   SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1);
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
 
@@ -231,6 +235,23 @@ void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> 
 void Renderer::Impl::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
   replace(geometry->color_values, geometry->meshes[mesh].first_color, colors);
   std::ranges::copy(colors, colors_of(scene.meshes[mesh].mesh).begin());
+  rendered = false;
+}
+
+void Renderer::Impl::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> values) {
+  const shared::Texture& on_device = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
+  replace(geometry->textures.texel_values, on_device.first, values);
+  geometry->textures.has_levels = false;
+  std::ranges::copy(values, scene.meshes[mesh].mesh.textures[texture].texels.begin());
+  rendered = false;
+}
+
+void Renderer::Impl::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
+  std::vector<glm::vec3> values;
+  for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
+  replace(geometry->textures.texcoord_values, geometry->meshes[mesh].first_texcoord, values);
+  std::ranges::copy(texcoords, scene.meshes[mesh].mesh.texcoords.begin());
+  if (pixel_noise) pixel_noise->edges.reset();  // which know the seams
   rendered = false;
 }
 

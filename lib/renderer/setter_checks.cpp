@@ -58,6 +58,26 @@ void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec
   check_values("colors", colors, colors_of(scene.meshes[mesh].mesh).size());
 }
 
+void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
+                  std::span<const glm::vec3> texels) {
+  check_mesh(scene, mesh);
+  const std::vector<Texture>& textures = scene.meshes[mesh].mesh.textures;
+  if (texture >= textures.size()) {
+    throw InvalidArgument("texture", std::to_string(texture), "below " + std::to_string(textures.size()));
+  }
+  check_values("texels", texels, textures[texture].texels.size());
+}
+
+void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords) {
+  check_mesh(scene, mesh);
+  if (scene.meshes[mesh].mesh.textures.empty()) {
+    throw InvalidArgument("mesh (set_texcoords)", "a mesh without textures", "one that has some");
+  }
+  std::vector<glm::vec3> values;
+  for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
+  check_values("texcoords", values, scene.meshes[mesh].mesh.texcoords.size());
+}
+
 std::size_t most_views(const Scene& scene) {
   std::size_t vertices = 0, faces = 0;
   for (const Instance& instance : scene.meshes) {

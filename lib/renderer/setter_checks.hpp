@@ -15,6 +15,9 @@ View own_view(const Scene& scene);
 void check_views(const Scene& scene, std::span<const View> views);
 void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions);
 void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> colors);
+void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
+                  std::span<const glm::vec3> texels);
+void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords);
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
 

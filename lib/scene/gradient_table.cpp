@@ -13,10 +13,11 @@ using G = SceneGradient;
 using I = GradientIndex;
 
 constexpr std::array k_names{
-    GradientName{"positions", &Request::positions},  GradientName{"colors", &Request::colors},
-    GradientName{"transform", &Request::transform},  GradientName{"camera", &Request::camera},
-    GradientName{"lights", &Request::lights},        GradientName{"smoothing", &Request::smoothing},
-    GradientName{"background", &Request::background}};
+    GradientName{"positions", &Request::positions},   GradientName{"colors", &Request::colors},
+    GradientName{"transform", &Request::transform},   GradientName{"camera", &Request::camera},
+    GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
+    GradientName{"background", &Request::background}, GradientName{"texture", &Request::texture},
+    GradientName{"texcoords", &Request::texcoords}};
 
 bool has_field_of_view(const Scene& scene) { return !scene.camera.intrinsics; }
 bool has_intrinsics(const Scene& scene) { return scene.camera.intrinsics.has_value(); }
@@ -33,6 +34,10 @@ constexpr std::array k_rows{
                 [](G& g, I i) -> GradientArray { return &g.meshes[i.item].positions; }},
     GradientRow{&Request::colors, Of::mesh, "meshes[].colors",
                 [](G& g, I i) -> GradientArray { return &g.meshes[i.item].colors; }},
+    GradientRow{&Request::texcoords, Of::mesh, "meshes[].texcoords",
+                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].texcoords; }},
+    GradientRow{&Request::texture, Of::mesh, "meshes[].textures",
+                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].textures; }},
     GradientRow{&Request::positions, Of::all_views, "shapes.positions",
                 [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
     GradientRow{&Request::colors, Of::all_views, "shapes.colors",

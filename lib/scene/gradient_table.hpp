@@ -38,8 +38,10 @@ struct GradientIndex {
   std::size_t view = 0, item = 0;
 };
 
-/// A number, a vector, or one vector for each vertex or colour.
-using GradientArray = std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*>;
+/// A number, a vector, one vector for each vertex, colour or texture coordinate, or a list of texels for each
+/// texture.
+using GradientArray = std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*, std::vector<glm::vec2>*,
+                                   std::vector<std::vector<glm::vec3>>*>;
 
 struct GradientRow {
   bool GradientRequest::*wanted;
@@ -76,12 +78,16 @@ void transform_numbers(const GradientArray& array, F&& f) {
   const auto replace = [&](auto& number) {
     number = static_cast<std::remove_reference_t<decltype(number)>>(f(static_cast<double>(number)));
   };
-  const auto replace_all = [&](auto& vector) {
-    for (int axis = 0; axis < 3; ++axis) replace(vector[axis]);
+  const auto replace_all = [&](const auto& itself, auto& list) -> void {
+    if constexpr (requires { list.begin(); }) {
+      for (auto& element : list) itself(itself, element);
+    } else if constexpr (requires { list.length(); }) {
+      for (int axis = 0; axis < list.length(); ++axis) replace(list[axis]);
+    } else {
+      replace(list);
+    }
   };
-  if (double* const* number = std::get_if<double*>(&array)) return replace(**number);
-  if (glm::dvec3* const* vector = std::get_if<glm::dvec3*>(&array)) return replace_all(**vector);
-  for (glm::vec3& vector : *std::get<std::vector<glm::vec3>*>(array)) replace_all(vector);
+  std::visit([&](auto* list) { replace_all(replace_all, *list); }, array);
 }
 
 /// Replaces every number of a gradient.

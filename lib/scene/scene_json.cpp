@@ -40,6 +40,15 @@ std::vector<glm::vec3> vec3_list(const JsonNode& node) {
   return list;
 }
 
+std::vector<glm::vec2> vec2_list(const JsonNode& node) {
+  std::vector<glm::vec2> list;
+  for (const JsonNode& element : node.elements()) {
+    const std::vector<JsonNode> numbers = element.elements(2);
+    list.emplace_back(numbers[0].number(), numbers[1].number());
+  }
+  return list;
+}
+
 std::vector<glm::uvec3> parse_faces(const JsonNode& node) {
   constexpr std::uint64_t k_most = std::numeric_limits<std::uint32_t>::max();
   std::vector<glm::uvec3> faces;
@@ -70,8 +79,43 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
   }
 }
 
+Wrap parse_wrap(const JsonNode& node) {
+  const std::string word = node.string();
+  if (word == "repeat") return Wrap::repeat;
+  if (word == "mirror") return Wrap::mirror;
+  if (word == "clamp") return Wrap::clamp;
+  node.fail("\"" + word + "\"", "repeat, mirror or clamp");
+}
+
+Filter parse_filter(const JsonNode& node) {
+  const std::string word = node.string();
+  if (word == "nearest") return Filter::nearest;
+  if (word == "bilinear") return Filter::bilinear;
+  if (word == "trilinear") return Filter::trilinear;
+  node.fail("\"" + word + "\"", "nearest, bilinear or trilinear");
+}
+
+// A texture beside a file takes the place of all of the file's.
+void take_texture(const JsonNode& node, const std::filesystem::path& folder, Mesh& mesh) {
+  if (node.find("texcoords").has_value() != node.find("face_texcoords").has_value())
+    node.fail("one of texcoords and face_texcoords", "both or none");
+  take(node, "texcoords", mesh.texcoords, vec2_list);
+  take(node, "face_texcoords", mesh.face_texcoords, parse_faces);
+  const auto texture = node.find("texture");
+  if (!texture) return;
+  texture->require_keys({"file", "wrap", "filter"});
+  if (mesh.face_texcoords.empty())
+    texture->fail("a texture on a mesh without texture coordinates",
+                  "texcoords and face_texcoords, or a file with some");
+  mesh.textures = {read_texture(folder / texture->at("file").string())};
+  mesh.face_textures.clear();
+  take(*texture, "wrap", mesh.textures[0].wrap, parse_wrap);
+  take(*texture, "filter", mesh.textures[0].filter, parse_filter);
+}
+
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
-  node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors"});
+  node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors", "texcoords",
+                     "face_texcoords", "texture"});
   Instance instance;
   const auto file = node.find("file");
   if (file && (node.find("positions") || node.find("faces"))) {
@@ -86,6 +130,7 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
     node.fail("no mesh", "a file, or positions and faces");
   }
   take_colors(node, instance.mesh);
+  take_texture(node, folder, instance.mesh);
   take(node, "transform", instance.transform, [](const JsonNode& n) { return n.mat4(); });
   return instance;
 }

@@ -331,6 +331,8 @@ Mesh make_start(const ShapeViews& views) {
     mesh.face_colors.clear();
     mesh.texcoords.clear();
     mesh.face_texcoords.clear();
+    mesh.textures.clear();
+    mesh.face_textures.clear();
     return mesh;
   }
   Mesh sphere = make_icosphere(k_subdivisions, static_cast<float>(common.radius));

@@ -78,16 +78,17 @@ void Aggregate::forward(const AggregateInputs& in, const shared::AggregateParams
   const Rasterize& r = in.rasterize;
   if (now_.kernels->exact) {
     now_.kernels->exact->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                 in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
-                                 in.shade.green, in.shade.blue, slots_, slot_counts_, image);
+                                 in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
+                                 in.shade.color.green, in.shade.color.blue, slots_, slot_counts_, image);
   } else if (now_.kernels->joint_sampled) {
     now_.kernels->joint_sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance,
-                                         r.depth, in.shade.red, in.shade.green, in.shade.blue,
-                                         r.fragment_pair, in.bin.pair_face, image);
+                                         r.depth, in.shade.color.red, in.shade.color.green,
+                                         in.shade.color.blue, r.fragment_pair, in.bin.pair_face, image);
   } else {
     now_.kernels->sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                   in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
-                                   in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face, image);
+                                   in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
+                                   in.shade.color.green, in.shade.color.blue, r.fragment_pair,
+                                   in.bin.pair_face, image);
   }
 }
 
@@ -113,21 +114,22 @@ void Aggregate::backward(const AggregateInputs& in, const shared::AggregateParam
                          const Buffer<cl_float4>& grad_image) {
   const Rasterize& r = in.rasterize;
   if (now_.kernels->exact) {
-    now_.kernels->exact->backward(
-        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth, in.occupancy.log_occupancy,
-        in.occupancy.occupancy, in.shade.red, in.shade.green, in.shade.blue, slots_, slot_counts_, grad_image,
-        grad_depth, grad_log_occupancy, grad_color.red, grad_color.green, grad_color.blue, channels);
+    now_.kernels->exact->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
+                                  in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
+                                  in.shade.color.green, in.shade.color.blue, slots_, slot_counts_, grad_image,
+                                  grad_depth, grad_log_occupancy, grad_color.red, grad_color.green,
+                                  grad_color.blue, channels);
   } else if (now_.kernels->joint_sampled) {
     now_.kernels->joint_sampled->backward(
-        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth, in.shade.red,
-        in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face, grad_image, grad_distance,
-        grad_depth, grad_color.red, grad_color.green, grad_color.blue, grad_sigma, channels);
+        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth, in.shade.color.red,
+        in.shade.color.green, in.shade.color.blue, r.fragment_pair, in.bin.pair_face, grad_image,
+        grad_distance, grad_depth, grad_color.red, grad_color.green, grad_color.blue, grad_sigma, channels);
   } else {
     now_.kernels->sampled->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.red,
-                                    in.shade.green, in.shade.blue, r.fragment_pair, in.bin.pair_face,
-                                    grad_image, grad_depth, grad_log_occupancy, grad_color.red,
-                                    grad_color.green, grad_color.blue, channels);
+                                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
+                                    in.shade.color.green, in.shade.color.blue, r.fragment_pair,
+                                    in.bin.pair_face, grad_image, grad_depth, grad_log_occupancy,
+                                    grad_color.red, grad_color.green, grad_color.blue, channels);
   }
 }
 

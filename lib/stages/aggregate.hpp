@@ -86,7 +86,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
   Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
-  ColorGradients grad_color;                     ///< [fragment]
+  ColorPlanes grad_color;                        ///< [fragment]
   Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
 
   /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not

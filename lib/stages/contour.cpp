@@ -1,5 +1,7 @@
 #include "stages/contour.hpp"
 
+#include <algorithm>
+#include <array>
 #include <limits>
 
 namespace dpr {
@@ -13,12 +15,41 @@ bool may_jump(const Mesh& mesh, const WeldedEdge& edge) {
   return !edge.shares_vertices || (mesh.vertex_colors.empty() && !mesh.face_colors.empty());
 }
 
-cl_uint4 joined(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_vertex, std::size_t first_face) {
+std::uint32_t texture_of(const Mesh& mesh, std::uint32_t face) {
+  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+}
+
+/// Whether two coordinates are one place of a texture.
+bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
+  if (wrap == Wrap::clamp) return a == b;
+  const glm::vec2 periods = (a - b) / (wrap == Wrap::mirror ? 2.0F : 1.0F);
+  return periods == glm::round(periods);
+}
+
+/// Whether the texture jumps at the edge between two faces.
+bool is_seam(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge) {
+  if (mesh.textures.empty()) return false;
+  const std::uint32_t own = edge.face, other = *edge.other, texture = texture_of(mesh, own);
+  if (texture != texture_of(mesh, other)) return true;
+  if (texture == k_no_texture) return false;
+  const auto coordinate = [&](std::uint32_t face, std::uint32_t vertex) {
+    int corner = 0;
+    while (corner < 2 && positions[mesh.faces[face][corner]] != positions[vertex]) ++corner;
+    return mesh.texcoords[mesh.face_texcoords[face][corner]];
+  };
+  return std::ranges::any_of(std::array{edge.first, edge.second}, [&](std::uint32_t end) {
+    return !is_same_place(coordinate(own, end), coordinate(other, end), mesh.textures[texture].wrap);
+  });
+}
+
+cl_uint4 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge,
+                std::size_t first_vertex, std::size_t first_face) {
   cl_uint4 row{{index(first_vertex) + edge.first, index(first_vertex) + edge.second,
                 index(first_face) + edge.face, DPR_NO_FACE}};
   if (!edge.other) return row;
   row.s[3] = (index(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
   if (may_jump(mesh, edge)) row.s[2] |= DPR_EDGE_FLAG;
+  if (is_seam(mesh, positions, edge)) row.s[2] |= DPR_EDGE_SEAM;
   return row;
 }
 
@@ -29,14 +60,18 @@ Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3
   std::size_t first_vertex = 0, first_face = 0;
   for (const Instance& instance : scene.meshes) {
     const Mesh& mesh = instance.mesh;
-    const std::vector<WeldedEdge> welded =
-        make_welded_edges(positions.subspan(first_vertex, mesh.positions.size()), mesh.faces);
-    for (const WeldedEdge& edge : welded) rows.push_back(joined(mesh, edge, first_vertex, first_face));
+    const std::span<const glm::vec3> own = positions.subspan(first_vertex, mesh.positions.size());
+    const std::vector<WeldedEdge> welded = make_welded_edges(own, mesh.faces);
+    for (const WeldedEdge& edge : welded) rows.push_back(joined(mesh, own, edge, first_vertex, first_face));
     solids.emplace_back(welded, mesh.faces.size());
     first_vertex += mesh.positions.size();
     first_face += mesh.faces.size();
   }
   count = rows.size();
+  if (first_face >= DPR_EDGE_SEAM) {
+    throw InvalidArgument("faces (scene)", std::to_string(first_face),
+                          "fewer than 2^30 with noise of the pixel");
+  }
 
   std::vector<cl_uint> starts(first_vertex + 1, 0), by_vertex(2 * count);
   for (const cl_uint4& row : rows) {

@@ -1,5 +1,7 @@
 #include "stages/geometry.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <limits>
 
 namespace dpr {
@@ -42,7 +44,41 @@ cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_col
   return {{color, color, color, 0}};
 }
 
+cl_uint4 corner_texcoords(const Mesh& mesh, std::size_t face, cl_uint first_texcoord, cl_uint first_texture) {
+  if (mesh.textures.empty()) return {{0, 0, 0, DPR_NO_TEXTURE}};
+  const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+  const glm::uvec3& f = mesh.face_texcoords[face];
+  return {{first_texcoord + f.x, first_texcoord + f.y, first_texcoord + f.z,
+           texture == k_no_texture ? DPR_NO_TEXTURE : first_texture + texture}};
+}
+
+shared::Texture device_texture(const Texture& texture, std::size_t first_texel) {
+  shared::Texture t{};
+  t.first = index(first_texel);
+  t.width = index(static_cast<std::size_t>(texture.width));
+  t.height = index(static_cast<std::size_t>(texture.height));
+  if (texture.filter == Filter::trilinear) {
+    t.levels = index(static_cast<std::size_t>(std::bit_width(std::max(t.width, t.height))));
+  } else {
+    t.levels = 1;
+  }
+  t.wrap = static_cast<cl_uint>(texture.wrap);
+  t.filter = static_cast<cl_uint>(texture.filter);
+  return t;
+}
+
+std::size_t texels_of_smaller_levels(const shared::Texture& t) {
+  std::size_t count = 0;
+  for (cl_uint level = 1; level < t.levels; ++level)
+    count += std::size_t{std::max(t.width >> level, 1U)} * std::max(t.height >> level, 1U);
+  return count;
+}
+
 }  // namespace
+
+bool is_textured(const Scene& scene) {
+  return std::ranges::any_of(scene.meshes, [](const Instance& i) { return !i.mesh.textures.empty(); });
+}
 
 cl_float4 to_cl(const glm::vec3& v) { return {{v.x, v.y, v.z, 0.0F}}; }
 
@@ -88,13 +124,53 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   color_values.upload(device, all_colors);
   vertex_corners = make_incidence(device, all_faces, vertices);
   color_corners = make_incidence(device, all_face_colors, colors);
+  if (is_textured(scene)) add_textures(device, scene);
+}
+
+/// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.
+void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_float4> all_texcoords, all_texels;
+  std::vector<cl_uint4> all_faces;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = scene.meshes[m].mesh;
+    const cl_uint first_texture = index(textures.list.size()), first_texcoord = index(all_texcoords.size());
+    for (std::size_t face = 0; face < mesh.faces.size(); ++face)
+      all_faces.push_back(corner_texcoords(mesh, face, first_texcoord, first_texture));
+    if (mesh.textures.empty()) continue;
+    meshes[m].first_texture = first_texture;
+    meshes[m].first_texcoord = first_texcoord;
+    meshes[m].texcoords = mesh.texcoords.size();
+    for (const glm::vec2& uv : mesh.texcoords) all_texcoords.push_back(to_cl(glm::vec3(uv, 0)));
+    for (const Texture& texture : mesh.textures) {
+      textures.list.push_back(device_texture(texture, all_texels.size()));
+      for (const glm::vec3& texel : texture.texels) all_texels.push_back(to_cl(texel));
+      all_texels.resize(all_texels.size() + texels_of_smaller_levels(textures.list.back()));
+    }
+  }
+  constexpr std::size_t k_most = 1U << 30U;  // of which four sums each can be counted
+  if (all_texels.size() >= k_most) {
+    throw InvalidArgument("texels (scene)", std::to_string(all_texels.size()), "fewer than 2^30");
+  }
+  textures.texcoords = all_texcoords.size();
+  textures.texels = all_texels.size();
+  textures.face_texcoords.upload(device, all_faces);
+  textures.texcoord_values.upload(device, all_texcoords);
+  textures.textures.upload(device, textures.list);
+  textures.texel_values.upload(device, all_texels);
+  textures.texcoord_corners = make_incidence(device, all_faces, textures.texcoords);
+}
+
+std::size_t Textures::bytes() const {
+  return face_texcoords.capacity_bytes() + texcoord_values.capacity_bytes() + textures.capacity_bytes() +
+         texel_values.capacity_bytes() + texcoord_corners.starts.capacity_bytes() +
+         texcoord_corners.corners.capacity_bytes();
 }
 
 std::size_t Geometry::bytes() const {
   std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() +
                       face_vertices.capacity_bytes() + face_colors.capacity_bytes() +
                       color_values.capacity_bytes() + view_positions.capacity_bytes() +
-                      view_colors.capacity_bytes();
+                      view_colors.capacity_bytes() + textures.bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

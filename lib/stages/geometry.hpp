@@ -2,6 +2,7 @@
 // atomics.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,28 @@ struct Incidence {
 /// Where a mesh lies in the joined buffers.
 struct MeshRange {
   std::size_t first_vertex, vertices, first_color, colors;
+  std::size_t first_texcoord = 0, texcoords = 0;  // of textured meshes
+  std::size_t first_texture = 0;
+};
+
+/// The textures of all meshes, and where faces look into them. Empty where no mesh has any.
+struct Textures {
+  std::size_t texcoords = 0, texels = 0;
+  std::vector<shared::Texture> list;  ///< [texture]
+
+  Buffer<cl_uint4> face_texcoords;    ///< [face] coordinates of each corner; w = texture or DPR_NO_TEXTURE
+  Buffer<cl_float4> texcoord_values;  ///< [texcoord] u, v
+  Buffer<shared::Texture> textures;   ///< `list`
+  Buffer<cl_float4> texel_values;     ///< [texel] of every level
+  bool has_levels = false;            ///< the smaller levels are those of the largest
+  Incidence texcoord_corners;
+
+  bool empty() const { return list.empty(); }
+  /// Whether some have smaller levels.
+  bool has_pyramids() const {
+    return std::ranges::any_of(list, [](const shared::Texture& t) { return t.levels > 1; });
+  }
+  std::size_t bytes() const;
 };
 
 struct Geometry {
@@ -35,6 +58,7 @@ struct Geometry {
   Buffer<cl_float4> color_values;                 ///< [color]
   Buffer<cl_float4> view_positions, view_colors;  ///< [view][vertex], [view][color]: of views' own shapes
   Incidence vertex_corners, color_corners;
+  Textures textures;
 
   /// What the kernels read with the frame's strides.
   const Buffer<cl_float4>& positions_of(const shared::FrameParams& p) const {
@@ -45,7 +69,13 @@ struct Geometry {
   }
 
   std::size_t bytes() const;
+
+ private:
+  void add_textures(Device::Impl& device, const Scene& scene);
 };
+
+/// Whether a mesh of the scene has textures.
+bool is_textured(const Scene& scene);
 
 /// A vector of three in the first components; w = 0.
 cl_float4 to_cl(const glm::vec3& v);

@@ -3,31 +3,40 @@
 namespace dpr {
 namespace {
 
-std::string shading_option(Shading shading) {
-  return " -DDPR_SHADING=" + std::to_string(static_cast<int>(shading) + DPR_FLAT);
+std::string shading_options(Shading shading, bool is_textured) {
+  return " -DDPR_SHADING=" + std::to_string(static_cast<int>(shading) + DPR_FLAT) +
+         " -DDPR_BASE=" + std::to_string(is_textured ? DPR_BASE_OF_FRAGMENTS : DPR_BASE_OF_CORNERS);
 }
 
 }  // namespace
 
-LitShading::LitShading(Device::Impl& device, Shading model)
+LitShading::LitShading(Device::Impl& device, Shading model, bool textured)
     : shading(model),
+      is_textured(textured),
       normals_forward(device, "normals.cl", "normals_forward"),
       normals_backward_normalize(device, "normals.cl", "normals_backward_normalize"),
       normals_backward(device, "normals.cl", "normals_backward"),
-      forward(device, "shade_lit.cl", "shade_lit_forward", shading_option(model)),
-      backward(device, "shade_lit.cl", "shade_lit_backward", shading_option(model)),
-      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_option(model)) {}
+      forward(device, "shade_lit.cl", "shade_lit_forward", shading_options(model, textured)),
+      backward(device, "shade_lit.cl", "shade_lit_backward", shading_options(model, textured)),
+      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_options(model, textured)) {
+}
 
 Shade::Shade(Device::Impl& device)
     : device_(device),
       forward_(device, "shade.cl", "shade_forward"),
       backward_(device, "shade.cl", "shade_backward") {}
 
-Shade::Lighting Shade::prepare(const std::optional<Lights>& lights) const {
+void Shade::make_surface() {
+  if (!surface) surface.emplace(device_);
+}
+
+Shade::Lighting Shade::prepare(const std::optional<Lights>& lights, bool is_textured) const {
   Lighting prepared;
   if (!lights) return prepared;
-  const bool known = now_.kernels && now_.kernels->shading == lights->shading;
-  prepared.kernels = known ? now_.kernels : std::make_shared<LitShading>(device_, lights->shading);
+  const bool known =
+      now_.kernels && now_.kernels->shading == lights->shading && now_.kernels->is_textured == is_textured;
+  prepared.kernels =
+      known ? now_.kernels : std::make_shared<LitShading>(device_, lights->shading, is_textured);
   prepared.params.ambient = to_cl(lights->ambient);
   prepared.params.lights = static_cast<cl_uint>(lights->point.size());
   prepared.params.shininess = lights->shininess;
@@ -41,19 +50,26 @@ Shade::Lighting Shade::prepare(const std::optional<Lights>& lights) const {
 }
 
 void Shade::settle(std::size_t fragments) {
-  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->settle(fragments);
+  color.settle(fragments);
+  base_.settle(fragments);
 }
 
 void Shade::forward(const ShadeInputs& in) {
-  const Range pairs = in.rasterize.pairs(in.bin);
-  const PairGroups groups = in.rasterize.pair_groups(in.bin);
-  for (Buffer<float>* buffer : {&red, &green, &blue}) buffer->resize(device_, in.rasterize.fragment_length());
-  if (!now_.kernels) {
+  const bool is_textured = !in.geometry.textures.empty();
+  color.resize(device_, in.rasterize.fragment_length());
+  if (is_textured) surface->forward(in.surface(), lit() ? base_ : color);
+  if (lit()) {
+    light(in);
+  } else if (!is_textured) {
+    const PairGroups groups = in.rasterize.pair_groups(in.bin);
     forward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
              in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
-             red, green, blue);
-    return;
+             color.red, color.green, color.blue);
   }
+}
+
+void Shade::light(const ShadeInputs& in) {
+  const Range pairs = in.rasterize.pairs(in.bin);
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   normals_.resize(device_, vertices);
   if (now_.kernels->shading != Shading::flat) {
@@ -64,28 +80,37 @@ void Shade::forward(const ShadeInputs& in) {
   now_.kernels->forward(pairs, in.p, now_.params, pairs.last(), in.views.cameras, now_.lights,
                         in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
                         in.transform.world, normals_, in.bin.pair_face, in.rasterize.fragment_starts,
-                        in.rasterize.bary1, in.rasterize.bary2, red, green, blue);
+                        in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green, base_.blue, color.red,
+                        color.green, color.blue);
 }
 
-void Shade::backward(const ShadeInputs& in, const ColorGradients& grad) {
-  const Range pairs = in.rasterize.pairs(in.bin);
+void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
+  const bool is_textured = !in.geometry.textures.empty();
   for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
   grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
-  if (!now_.kernels) {
+  if (lit()) light_backward(in, grad);
+  if (is_textured) {
+    surface->backward(in.surface(), grad_base(grad), lit(), grad_bary1, grad_bary2, grad_corner_colors);
+  } else if (!lit()) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     backward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
               in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
-    return;
   }
+}
+
+void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
+  const Range pairs = in.rasterize.pairs(in.bin);
+  if (now_.kernels->is_textured) grad_base_.resize(device_, in.rasterize.fragments);
   grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
   now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
                          in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
                          in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
-                         in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, grad.red,
-                         grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors,
+                         in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red,
+                         base_.green, base_.blue, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
+                         grad_base_.red, grad_base_.green, grad_base_.blue, grad_corner_colors,
                          grad_corner_positions_, grad_corner_normals_, grad_eye);
 }
 
@@ -102,23 +127,23 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
                                  grad_world);
 }
 
-void Shade::backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light) {
+void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {
   const Range pairs = in.rasterize.pairs(in.bin);
   light_channels.resize(device_, light_sets() * k_light_channels * in.bin.pairs);
-  now_.kernels->backward_lights(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
-                                static_cast<cl_uint>(light), in.views.cameras, now_.lights,
-                                in.geometry.face_vertices, in.geometry.face_colors,
-                                in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
-                                in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2,
-                                grad.red, grad.green, grad.blue, light_channels);
+  now_.kernels->backward_lights(
+      pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
+      in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
+      in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
+      in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green,
+      base_.blue, grad.red, grad.green, grad.blue, light_channels);
 }
 
 std::size_t Shade::bytes() const {
-  std::size_t bytes =
-      now_.lights.capacity_bytes() + normals_.capacity_bytes() + grad_normals_.capacity_bytes();
-  for (const Buffer<float>* buffer :
-       {&red, &green, &blue, &grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye, &light_channels,
-        &grad_corner_positions_, &grad_corner_normals_}) {
+  std::size_t bytes = now_.lights.capacity_bytes() + normals_.capacity_bytes() +
+                      grad_normals_.capacity_bytes() + (surface ? surface->bytes() : 0) + color.bytes() +
+                      base_.bytes() + grad_base_.bytes();
+  for (const Buffer<float>* buffer : {&grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye,
+                                      &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

@@ -10,24 +10,21 @@
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
 #include "stages/rasterize.hpp"
+#include "stages/surface.hpp"
 #include "stages/transform.hpp"
 
 namespace dpr {
 
-/// Gradients of fragments' colours, planes of [fragment].
-struct ColorGradients {
-  Buffer<float> red, green, blue;
-};
-
 /// Channels of shade_lit_backward_lights: a light's position, diffuse, specular, and the ambient light.
 inline constexpr std::size_t k_light_channels = 12;
 
-/// The kernels of a shading model.
+/// The kernels of a shading model, for base colours of the corners or of the surface stage.
 class LitShading {
  public:
-  LitShading(Device::Impl& device, Shading shading);
+  LitShading(Device::Impl& device, Shading shading, bool is_textured);
 
   Shading shading;
+  bool is_textured;
   Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
       normals_forward;
   Kernel<shared::FrameParams, In<cl_float4>, Out<cl_float4>> normals_backward_normalize;
@@ -36,16 +33,18 @@ class LitShading {
       normals_backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
          In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>,
-         In<float>, In<float>, Out<float>, Out<float>, Out<float>>
+         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       forward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
          In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, In<float>,
+         In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>,
+         Out<float>, Out<float>, Out<float>>
       backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, cl_uint, In<shared::ViewParams>,
          In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>>
+         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, In<float>,
+         In<float>, In<float>, Out<float>>
       backward_lights;
 };
 
@@ -55,8 +54,11 @@ struct ShadeInputs {
   const DeviceViews& views;
   const Geometry& geometry;
   const Transform& transform;
+  const Buffer<shared::Triangle>& triangles;
   const Bin& bin;
   const Rasterize& rasterize;
+
+  SurfaceInputs surface() const { return {p, geometry, triangles, bin, rasterize}; }
 };
 
 class Shade {
@@ -70,8 +72,10 @@ class Shade {
     Buffer<shared::Light> lights;
   };
 
+  /// Before the first textured scene.
+  void make_surface();
   /// Everything about setting the lights that can fail.
-  Lighting prepare(const std::optional<Lights>& lights) const;
+  Lighting prepare(const std::optional<Lights>& lights, bool is_textured) const;
   void set(Lighting&& prepared) noexcept { std::swap(now_, prepared); }
   bool lit() const { return now_.kernels != nullptr; }
   std::size_t lights() const { return now_.params.lights; }
@@ -81,18 +85,23 @@ class Shade {
   void forward(const ShadeInputs& in);
   /// Says how many fragments there are, where forward() could not know.
   void settle(std::size_t fragments);
-  /// Fills the gradients of barycentrics and corner colours, and, if lit, of corner positions, normals and
-  /// the eye.
-  void backward(const ShadeInputs& in, const ColorGradients& grad);
+  /// Fills the gradients of barycentrics and corner colours, if textured of texture coordinates, and, if lit,
+  /// of corner positions, normals and the eye.
+  void backward(const ShadeInputs& in, const ColorPlanes& grad);
+  /// The base colours' gradients after backward(), of a textured scene.
+  const ColorPlanes& grad_base(const ColorPlanes& grad) const { return lit() ? grad_base_ : grad; }
   /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
   /// The gradients of one light and of the ambient light, per pair: a set of `light_channels`.
-  void backward_light(const ShadeInputs& in, const ColorGradients& grad, std::size_t light);
+  void backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light);
 
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
+  /// Of a textured scene's base colours, their gradients, and what the surface holds.
+  static constexpr std::size_t k_textured_fragment_bytes = 6 * sizeof(float) + Surface::k_fragment_bytes;
 
-  Buffer<float> red, green, blue;        ///< [fragment]
+  std::optional<Surface> surface;        ///< of textured scenes: made for the first of them
+  ColorPlanes color;                     ///< [fragment]
   Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
   Buffer<float> grad_corner_colors;      ///< [pair][9]
   Buffer<float> grad_eye;                ///< [3][pair]
@@ -108,7 +117,12 @@ class Shade {
   Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
          In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       backward_;
+  void light(const ShadeInputs& in);
+  void light_backward(const ShadeInputs& in, const ColorPlanes& grad);
+
   Lighting now_;
+  // [fragment] of lit textured scenes; in others the kernels get null pointers, which they do not read.
+  ColorPlanes base_, grad_base_;
   Buffer<cl_float4> normals_, grad_normals_;                   // [view][vertex]
   Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
 };

@@ -65,6 +65,7 @@ TEST_SUITE("pipeline") {
     CHECK(scrap["faces_without_area"] == 1);
     CHECK(scrap["boundary_edges"] == 3);
     CHECK(scrap["texture_coordinates"] == 3);
+    CHECK(scrap["textures"].empty());
     CHECK(scrap["materials"] == json::parse(R"([{"name": "red", "texture": "paint.png"}])"));
     for (const char* part :
          {"1 triangle without area", "vertices without a face: 1", "gone.mtl", "paint.png", "not closed"})

@@ -166,6 +166,64 @@ TEST_SUITE("unit") {
     DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "a.obj"), "a.mtl:2: expected Kd with one or three");
   }
 
+  TEST_CASE("OBJ: materials' textures, their options, and faces without any") {
+    const TempDir folder;
+    std::filesystem::create_directory(folder / "maps");
+    write_texture(folder / "maps/oak bark.exr", {2, 1, {glm::vec3(0.5F), glm::vec3(1)}});
+    write_texture(folder / "ash.exr", {1, 1, {glm::vec3(0.25F)}});
+    folder.write("m.mtl",
+                 "newmtl oak\nmap_Kd -clamp on -s 2 3 -o 0.5 maps\\oak bark.exr\nnewmtl ash\nKd 1 0 0\n"
+                 "map_Kd -mm 0 1 -blendu off ash.exr\nnewmtl none\nKd 0 0 1\n");
+    const std::string corners = "vt 0 0\nvt 1 0.25\nvt 0.5 2\n";
+    Notes notes;
+    const Mesh mesh = read_mesh(
+        folder.write("a.obj",
+                     "mtllib m.mtl\n" + k_obj_square + corners +
+                         "usemtl oak\nf 1/1 2/2 3/3\nusemtl ash\nf 1/1 2/2 3/3\nusemtl none\nf 1 2 3\n"
+                         "usemtl oak\nf 2/2 3/3 1/1\nf 1 2 3 4\n"),
+        notes);
+    REQUIRE(mesh.textures.size() == 2);
+    CHECK(mesh.textures[0].wrap == Wrap::clamp);
+    CHECK(mesh.textures[0].texels[0] == glm::vec3(0.5F));
+    CHECK(mesh.textures[1].wrap == Wrap::repeat);
+    CHECK(mesh.face_textures ==
+          std::vector<std::uint32_t>{0, 1, k_no_texture, 0, k_no_texture, k_no_texture});
+    CHECK(mesh.face_colors[0] == glm::vec3(1));
+    CHECK(mesh.face_colors[1] == glm::vec3(1, 0, 0));
+    const auto corner = [&](std::size_t face, int k) { return mesh.texcoords[mesh.face_texcoords[face][k]]; };
+    CHECK(corner(0, 1) == glm::vec2(2.5F, 0.75F));
+    CHECK(corner(1, 1) == glm::vec2(1, 0.25F));
+    CHECK(corner(3, 0) == corner(0, 1));
+    REQUIRE(notes.size() == 2);
+    CHECK(notes[0].find("\"ash\" (map_Kd) these options are not read: -mm, -blendu") != std::string::npos);
+    CHECK(notes[1].find("polygons with a texture but without coordinates in it, 1") != std::string::npos);
+    // One texture on all faces needs no list.
+    const Mesh plain = read_mesh(
+        folder.write("b.obj", "mtllib m.mtl\n" + k_obj_square + corners + "usemtl ash\nf 1/1 2/2 3/3\n"));
+    CHECK(plain.textures.size() == 1);
+    CHECK(plain.face_textures.empty());
+  }
+
+  TEST_CASE("OBJ: textures that are missing are noted, those that cannot be read are errors") {
+    const TempDir folder;
+    const std::string face = "vt 0 0\nvt 1 0\nvt 0 1\nusemtl oak\nf 1/1 2/2 3/3\n";
+    folder.write("m.mtl", "newmtl oak\nmap_Kd oak.png\n");
+    const std::filesystem::path obj = folder.write("a.obj", "mtllib m.mtl\n" + k_obj_square + face);
+    Notes notes;
+    const Mesh mesh = read_mesh(obj, notes);
+    CHECK(mesh.textures.empty());
+    CHECK(mesh.face_textures.empty());
+    CHECK(mesh.texcoords.size() == 3);
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("the texture \"oak.png\"") != std::string::npos);
+    folder.write("oak.png", "not a picture");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(obj), "oak.png");
+    folder.write("m.mtl", "newmtl oak\nmap_Kd -s oak.png\n");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(obj), "m.mtl:2: expected -s with 1 finite numbers or more");
+    folder.write("m.mtl", "newmtl oak\nmap_Kd -clamp maybe oak.png\n");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(obj), "m.mtl:2: got -clamp maybe, expected on or off");
+  }
+
   TEST_CASE("OBJ: what is left out is noted") {
     const TempDir folder;
     folder.write("m.mtl",
@@ -175,9 +233,8 @@ TEST_SUITE("unit") {
         k_obj_square + "usemtl oak\nf 1 2 3\nusemtl elm\nf 1 2 3\nusemtl oak\nf 1 2 3\n";
     CHECK(read_mesh(folder.write("a.obj", "mtllib m.mtl\n" + faces), notes).face_colors.size() == 3);
     REQUIRE(notes.size() == 2);  // of what the faces use, once
-    CHECK(
-        notes[0].find("the texture \"-s 2 2 2 oak bark.png\" of the material \"oak\" (map_Kd) is not read") !=
-        std::string::npos);
+    CHECK(notes[0].find("the texture \"oak bark.png\" of the material \"oak\" (map_Kd) is no regular file") !=
+          std::string::npos);
     CHECK(notes[1].find("the material \"elm\" is in no material library") != std::string::npos);
     notes.clear();
     CHECK(read_mesh(folder.write("b.obj", "mtllib no.mtl\n" + faces), notes).faces.size() == 3);

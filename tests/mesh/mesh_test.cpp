@@ -105,7 +105,22 @@ TEST_SUITE("robustness") {
                           "face_texcoords[0] (mesh): got texture coordinate 2");
     mesh.face_texcoords = {{0, 1, 1}, {0, 1, 1}};
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "face_texcoords (mesh): got 2, expected 1");
+    mesh.face_texcoords = {{0, 1, 1}};
+    mesh.textures = {{1, 1, {glm::vec3(1)}}};
+    CHECK_NOTHROW(validate(mesh));
+    mesh.face_textures = {k_no_texture};
+    CHECK_NOTHROW(validate(mesh));
+    mesh.face_textures = {1};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "face_textures[0] (mesh): got texture 1");
+    mesh.face_textures = {0, 0};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "face_textures (mesh): got 2, expected 1");
+    mesh.face_textures.clear();
+    mesh.textures[0].height = 2;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "texels (textures[0] (mesh)): got 1, expected 2");
+    mesh.textures[0].height = 1;
     mesh.face_texcoords.clear();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "face_texcoords (mesh): got none beside textures");
+    mesh.textures.clear();
     mesh.texcoords[1].y = std::numeric_limits<float>::infinity();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(mesh), "texcoords[1] (mesh)");
   }

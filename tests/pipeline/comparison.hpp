@@ -76,6 +76,19 @@ inline reference::Lights to_reference(const Lights& lights) {
   return result;
 }
 
+inline void add_textures(const Mesh& mesh, reference::Mesh& result) {
+  for (const glm::vec2& uv : mesh.texcoords) result.texcoords.push_back({uv.x, uv.y});
+  for (const glm::uvec3& face : mesh.face_texcoords)
+    result.face_texcoords.push_back({face.x, face.y, face.z});
+  for (const Texture& t : mesh.textures) {
+    result.textures.push_back({t.width, t.height, to_reference(t.texels),
+                               static_cast<reference::Wrap>(t.wrap),
+                               static_cast<reference::Filter>(t.filter)});
+  }
+  for (const std::uint32_t texture : mesh.face_textures)
+    result.face_textures.push_back(texture == k_no_texture ? -1 : static_cast<int>(texture));
+}
+
 inline reference::Scene to_reference(const Scene& scene) {
   reference::Scene result;
   result.width = scene.width;
@@ -87,7 +100,12 @@ inline reference::Scene to_reference(const Scene& scene) {
                          {},
                          to_reference(instance.mesh.vertex_colors),
                          to_reference(instance.mesh.face_colors),
-                         to_reference(instance.transform)};
+                         to_reference(instance.transform),
+                         {},
+                         {},
+                         {},
+                         {}};
+    add_textures(instance.mesh, mesh);
     for (const glm::uvec3& face : instance.mesh.faces) mesh.faces.push_back({face.x, face.y, face.z});
     result.meshes.push_back(mesh);
   }
@@ -103,6 +121,10 @@ inline void append(std::vector<double>& list, const glm::vec3& v) {
 }
 inline void append(std::vector<double>& list, const glm::dvec3& v) {
   list.insert(list.end(), {v.x, v.y, v.z});
+}
+inline void append(std::vector<double>& list, const glm::vec2& v) { list.insert(list.end(), {v.x, v.y}); }
+inline void append(std::vector<double>& list, const reference::Vec2d& v) {
+  list.insert(list.end(), {v.x, v.y});
 }
 inline void append(std::vector<double>& list, const reference::Vec3d& v) {
   list.insert(list.end(), {v.x, v.y, v.z});
@@ -141,6 +163,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
   for (std::size_t m = 0; m < found.meshes.size(); ++m) {
     add("positions", flat(found.meshes[m].positions));
     add("colors", flat(found.meshes[m].colors));
+    if (!found.meshes[m].texcoords.empty()) add("texcoords", flat(found.meshes[m].texcoords));
+    for (const std::vector<glm::vec3>& texels : found.meshes[m].textures) add("texels", flat(texels));
     const PoseGradient& pose = found.views[0].transforms[m];
     add("rotation", flat<glm::dvec3>({pose.rotation}));
     add("translation", flat<glm::dvec3>({pose.translation}));
@@ -170,6 +194,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found, const reference:
   for (const reference::MeshGradient& mesh : expected.meshes) {
     set(flat(mesh.positions));
     set(flat(mesh.colors));
+    if (!mesh.texcoords.empty()) set(flat(mesh.texcoords));
+    for (const std::vector<reference::Vec3d>& texels : mesh.textures) set(flat(texels));
     set(flat<reference::Vec3d>({mesh.rotation}));
     set(flat<reference::Vec3d>({mesh.translation}));
   }

@@ -24,8 +24,8 @@ inline std::vector<Pixel> pixels_of(const Renderer& renderer) {
   const Renderer::Impl& m = renderer.impl();
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
   const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
-                           red = m.shade.red.download(), green = m.shade.green.download(),
-                           blue = m.shade.blue.download();
+                           red = m.shade.color.red.download(), green = m.shade.color.green.download(),
+                           blue = m.shade.color.blue.download();
   std::vector<Pixel> pixels(starts.size() - 1);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     for (cl_uint at = starts[i]; at < starts[i + 1]; ++at) {

@@ -209,6 +209,57 @@ TEST_SUITE("pipeline") {
     check_scenes(scenes);
   }
 
+  TEST_CASE("reference: textures of every wrap mode, filter and size, unlit and lit") {
+    const int size = reduced(24, 7);
+    std::vector<NamedScene> scenes;
+    for (const Wrap wrap : {Wrap::repeat, Wrap::mirror, Wrap::clamp}) {
+      for (const Filter filter : {Filter::nearest, Filter::bilinear}) {
+        const std::string name = "wrap " + std::to_string(static_cast<int>(wrap)) + ", filter " +
+                                 std::to_string(static_cast<int>(filter));
+        scenes.emplace_back(name,
+                            textured_scene(make_cube(), random_texture(5, 3, wrap, filter), size, size));
+        if (reduced(1, 0) == 0) break;
+        scenes.emplace_back(name + ", 1x1",
+                            textured_scene(make_cube(), random_texture(1, 1, wrap, filter), size, size));
+        scenes.emplace_back(name + ", 1x4", textured_scene(make_torus(1.1F, 0.45F, 9, 7),
+                                                           random_texture(1, 4, wrap, filter), size, size));
+      }
+    }
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+      Scene& lit =
+          scenes
+              .emplace_back("lit " + std::to_string(static_cast<int>(shading)),
+                            textured_scene(make_cube(), random_texture(6, 5, Wrap::mirror, Filter::bilinear),
+                                           size, size))
+              .second;
+      lit.lights = two_lights(shading);
+      lit.gradients.lights = true;
+      lit.smoothing.composition = Composition::joint;
+    }
+    check_scenes(scenes);
+  }
+
+  TEST_CASE("reference: several textures, faces without one, and a mesh without any beside") {
+    const int size = reduced(24, 7);
+    std::vector<NamedScene> scenes;
+    for (const bool is_lit : {false, true}) {
+      Scene scene =
+          textured_scene(make_cube(), random_texture(4, 4, Wrap::repeat, Filter::bilinear), size, size);
+      Mesh& cube = scene.meshes[0].mesh;
+      cube.textures.push_back(random_texture(3, 7, Wrap::clamp, Filter::bilinear, 9));
+      for (std::uint32_t face = 0; face < cube.faces.size(); ++face)
+        cube.face_textures.push_back(face % 3 == 2 ? k_no_texture : face % 3);
+      scene.meshes[0].transform = placed(50.0F, 0.8F, {-0.4F, 0.2F, 0.1F});
+      scene.meshes.push_back({make_icosphere(1), placed(-31.0F, 0.7F, {0.6F, -0.1F, 0.3F})});
+      scene.meshes.push_back({textured(make_cube(), random_texture(2, 2, Wrap::mirror, Filter::nearest, 10)),
+                              placed(11.0F, 0.4F, {0.1F, 0.9F, 0.2F})});
+      if (is_lit) scene.lights = two_lights(Shading::phong);
+      scene.gradients.lights = is_lit;
+      scenes.emplace_back(is_lit ? "several, lit" : "several", scene);
+    }
+    check_scenes(scenes);
+  }
+
   TEST_CASE("reference: every occupancy prior with every depth prior in both compositions") {
     const int size = reduced(16, 6);
     std::vector<NamedScene> scenes;

@@ -101,6 +101,31 @@ inline Scene odd_scene(int width, int height) {
   return scene;
 }
 
+inline Texture random_texture(int width, int height, Wrap wrap, Filter filter, unsigned seed = 7) {
+  Random random(seed);
+  Texture texture{width, height, {}, wrap, filter};
+  for (int i = 0; i < width * height; ++i) texture.texels.push_back(random.vector(0.0F, 1.0F));
+  return texture;
+}
+
+/// The mesh with coordinates that go beyond the texture on all sides, other ones on both sides of every edge.
+inline Mesh textured(Mesh mesh, Texture texture) {
+  Random random(8);
+  mesh.textures.push_back(std::move(texture));
+  for (unsigned i = 0; i < 3 * mesh.faces.size(); ++i) {
+    const float u = random(-1.3F, 2.2F);
+    mesh.texcoords.emplace_back(u, random(-1.3F, 2.2F));
+    if (i % 3 == 2) mesh.face_texcoords.emplace_back(i - 2, i - 1, i);
+  }
+  return mesh;
+}
+
+inline Scene textured_scene(Mesh mesh, Texture texture, int width, int height) {
+  Scene scene = scene_of(textured(std::move(mesh), std::move(texture)), width, height);
+  scene.gradients.texture = scene.gradients.texcoords = true;
+  return scene;
+}
+
 inline Lights two_lights(Shading shading) {
   Lights lights;
   lights.ambient = {0.4F, 0.3F, 0.5F};

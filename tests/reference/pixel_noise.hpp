@@ -200,7 +200,7 @@ class PixelNoiseRenderer {
       if (!fragment) continue;
       inputs.push_back({fragment->depth, 1.0, 0.0,
                         shade_forward(prepared_.shade, face, fragment->barycentric,
-                                      corner_colors(scene_, prepared_, face))});
+                                      base_of_face(scene_, prepared_, face))});
     }
     if (inputs.empty()) return {0.0, 0.0, 0.0, 0.0};
     Vec3d color;

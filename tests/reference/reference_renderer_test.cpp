@@ -79,6 +79,28 @@ std::vector<double> flat(const std::vector<Vec3d>& values) {
   return list;
 }
 
+void displace_all(std::vector<Vec2d>& values, const std::vector<double>& v) {
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] += Vec2d{v[2 * i], v[2 * i + 1]};
+}
+
+std::vector<double> flat(const std::vector<Vec2d>& values) {
+  std::vector<double> list;
+  for (const Vec2d& v : values) list.insert(list.end(), {v.x, v.y});
+  return list;
+}
+
+/// Coordinates that go beyond the texture on all sides.
+void add_texture(Mesh& mesh, Wrap wrap, Random& random) {
+  Texture texture{3, 2, {}, wrap, Filter::bilinear};
+  for (int i = 0; i < 6; ++i) texture.texels.push_back(random.vector(0.0, 1.0));
+  mesh.textures.push_back(texture);
+  for (std::size_t i = 0; i < 3 * mesh.faces.size(); ++i) {
+    const double u = random(-1.2, 2.1);
+    mesh.texcoords.push_back({u, random(-1.2, 2.1)});
+  }
+  for (std::size_t i = 0; i < mesh.texcoords.size(); i += 3) mesh.face_texcoords.push_back({i, i + 1, i + 2});
+}
+
 void append_mesh_blocks(const Gradients& g, std::size_t m, std::vector<Block>& blocks) {
   const std::string name = "mesh " + std::to_string(m);
   const MeshGradient& mesh = g.meshes[m];
@@ -89,6 +111,17 @@ void append_mesh_blocks(const Gradients& g, std::size_t m, std::vector<Block>& b
                                                                      : s.meshes[m].vertex_colors,
                                    v);
                     }});
+  if (!mesh.texcoords.empty()) {
+    blocks.push_back({name + " texcoords", flat(mesh.texcoords), [m](Scene& s, const std::vector<double>& v) {
+                        displace_all(s.meshes[m].texcoords, v);
+                      }});
+  }
+  for (std::size_t t = 0; t < mesh.textures.size(); ++t) {
+    blocks.push_back(
+        {name + " texels", flat(mesh.textures[t]), [m, t](Scene& s, const std::vector<double>& v) {
+           displace_all(s.meshes[m].textures[t].texels, v);
+         }});
+  }
   blocks.push_back({name + " transform", flat({mesh.rotation, mesh.translation}),
                     [m](Scene& s, const std::vector<double>& v) {
                       s.meshes[m].transform = moved(s.meshes[m].transform, take(v, 0), take(v, 3));
@@ -229,6 +262,17 @@ TEST_SUITE("gradient") {
       block.gradient[0] += 1e-3;
       CHECK_FALSE(check_block(scene, weights, block, Directions::all, 1e-6).passed);
       CHECK_FALSE(check_block(scene, weights, block, Directions::one, 1e-6).passed);
+    }
+  }
+
+  TEST_CASE("renderer: gradients of textures with every wrap mode") {
+    for (const Wrap wrap : {Wrap::repeat, Wrap::mirror, Wrap::clamp}) {
+      Scene scene = small_scene();
+      Random random(14);
+      for (Mesh& mesh : scene.meshes) add_texture(mesh, wrap, random);
+      scene.lights = two_lights(Shading::phong);
+      CAPTURE(static_cast<int>(wrap));
+      check_scene(scene, Directions::all, 1e-6);
     }
   }
 

@@ -246,7 +246,8 @@ TEST_SUITE("gradient") {
         const ShadeScene scene = unpack(v);
         double sum = 0.0;
         for (std::size_t i = 0; i < 3; ++i) {
-          sum += dot(weight, shade_forward(scene, i, take(v, 3 * i), {take(v, 9), take(v, 12), take(v, 15)}));
+          sum += dot(weight, shade_forward(scene, i, take(v, 3 * i),
+                                           CornerColors{take(v, 9), take(v, 12), take(v, 15)}));
         }
         return sum;
       };

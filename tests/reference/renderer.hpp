@@ -26,6 +26,8 @@ struct MeshGradient {
   std::vector<Vec3d> colors;     ///< follows vertex_colors or face_colors, whichever the mesh has
   Vec3d rotation;                ///< at zero of r in A <- exp([r]x) A, radians
   Vec3d translation;
+  std::vector<Vec2d> texcoords;
+  std::vector<std::vector<Vec3d>> textures;  ///< texels of each
 };
 
 struct CameraGradient {
@@ -137,6 +139,27 @@ inline CornerColors corner_colors(const Scene& scene, const PreparedScene& prepa
   return corners;
 }
 
+/// The texture of a face of a mesh; -1: none.
+inline int face_texture(const Mesh& mesh, std::size_t face) {
+  if (mesh.textures.empty()) return -1;
+  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+}
+
+inline BaseColor base_of_face(const Scene& scene, const PreparedScene& prepared, std::size_t face) {
+  const std::size_t m = prepared.face_mesh[face];
+  const Mesh& mesh = scene.meshes[m];
+  const std::size_t local = face - prepared.first_face[m];
+  BaseColor base(corner_colors(scene, prepared, face));
+  const int texture = face_texture(mesh, local);
+  if (texture < 0) return base;
+  base.texture = &mesh.textures[static_cast<std::size_t>(texture)];
+  for (std::size_t i = 0; i < 3; ++i) base.texcoords[i] = mesh.texcoords[mesh.face_texcoords[local][i]];
+  base.triangle = ndc_triangle(prepared, face);
+  base.pixel = 2.0 / std::min(scene.width, scene.height);
+  base.perspective_correct = scene.perspective_correct;
+  return base;
+}
+
 /// Fragments of a pixel in face order.
 inline std::vector<Fragment> pixel_fragments(const Scene& scene, const PreparedScene& prepared, int row,
                                              int column) {
@@ -157,7 +180,7 @@ inline std::vector<FragmentInput> aggregate_inputs(const Scene& scene, const Pre
     const Occupancy occupancy =
         occupancy_forward(scene.smoothing.occupancy_prior, fragment.distance, scene.smoothing.sigma);
     const Vec3d color = shade_forward(prepared.shade, fragment.face, fragment.barycentric,
-                                      corner_colors(scene, prepared, fragment.face));
+                                      base_of_face(scene, prepared, fragment.face));
     inputs.push_back({fragment.depth, occupancy.p, occupancy.log_p, color});
   }
   return inputs;
@@ -187,15 +210,21 @@ struct PixelSums {
 };
 
 inline void add_color_gradient(const Scene& scene, const PreparedScene& prepared, std::size_t face,
-                               const CornerColors& grad_corners, Gradients& grad) {
+                               const ShadeFragmentGradient& shade, Gradients& grad) {
   const std::size_t m = prepared.face_mesh[face];
   const Mesh& mesh = scene.meshes[m];
   const std::size_t local = face - prepared.first_face[m];
   if (!mesh.vertex_colors.empty()) {
-    for (std::size_t i = 0; i < 3; ++i) grad.meshes[m].colors[mesh.faces[local][i]] += grad_corners[i];
+    for (std::size_t i = 0; i < 3; ++i) grad.meshes[m].colors[mesh.faces[local][i]] += shade.corners[i];
   } else if (!mesh.face_colors.empty()) {
-    grad.meshes[m].colors[local] += grad_corners[0] + grad_corners[1] + grad_corners[2];
+    grad.meshes[m].colors[local] += shade.corners[0] + shade.corners[1] + shade.corners[2];
   }
+  const int texture = face_texture(mesh, local);
+  if (texture < 0) return;
+  std::vector<Vec3d>& texels = grad.meshes[m].textures[static_cast<std::size_t>(texture)];
+  for (std::size_t i = 0; i < texels.size(); ++i) texels[i] += shade.texels[i];
+  for (std::size_t i = 0; i < 3; ++i)
+    grad.meshes[m].texcoords[mesh.face_texcoords[local][i]] += shade.texcoords[i];
 }
 
 inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, int row, int column,
@@ -217,8 +246,8 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
     grad.sigma += occupancy.sigma;
     const ShadeFragmentGradient shade =
         shade_backward(prepared.shade, fragment.face, fragment.barycentric,
-                       corner_colors(scene, prepared, fragment.face), input.color, sums.shade);
-    add_color_gradient(scene, prepared, fragment.face, shade.corners, grad);
+                       base_of_face(scene, prepared, fragment.face), input.color, sums.shade);
+    add_color_gradient(scene, prepared, fragment.face, shade, grad);
     const NdcTriangle corners =
         rasterize_backward(ndc_triangle(prepared, fragment.face), point, prepared.rasterize,
                            {occupancy.distance, input.depth, shade.barycentric});
@@ -263,7 +292,14 @@ inline Gradients gradient(const Scene& scene, const Image& grad_image) {
   for (const Mesh& mesh : scene.meshes) {
     const std::size_t colors =
         mesh.vertex_colors.empty() ? mesh.face_colors.size() : mesh.vertex_colors.size();
-    grad.meshes.push_back({std::vector<Vec3d>(mesh.positions.size()), std::vector<Vec3d>(colors), {}, {}});
+    grad.meshes.push_back({std::vector<Vec3d>(mesh.positions.size()),
+                           std::vector<Vec3d>(colors),
+                           {},
+                           {},
+                           std::vector<Vec2d>(mesh.texcoords.size()),
+                           {}});
+    for (const Texture& texture : mesh.textures)
+      grad.meshes.back().textures.emplace_back(texture.texels.size());
   }
   PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()), make_shade_gradient(prepared.shade)};
   for (int row = 0; row < scene.height; ++row) {

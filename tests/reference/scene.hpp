@@ -18,6 +18,10 @@ struct Mesh {
   std::vector<Vec3d> vertex_colors;  ///< one per vertex, or empty
   std::vector<Vec3d> face_colors;    ///< one per face, or empty; without any colours the mesh is white
   Mat4d transform = k_identity;      ///< object to world
+  std::vector<Vec2d> texcoords;      ///< texture coordinates, or empty
+  std::vector<Face> face_texcoords;  ///< indices into texcoords, or empty
+  std::vector<Texture> textures;     ///< or empty
+  std::vector<int> face_textures;    ///< one per face, -1 for none; empty: all faces have the first
 };
 
 struct Smoothing {

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "rasterize.hpp"
+#include "texture.hpp"
 #include "vec.hpp"
 
 #include <array>
@@ -146,6 +147,25 @@ inline ShadeScene shade_prepare(std::vector<Vec3d> world, std::vector<Face> face
 /// Colours at the three corners of a triangle: three times the same for face colours.
 using CornerColors = std::array<Vec3d, 3>;
 
+/// What a triangle's base colour is made of: its corners' colours, and a texture by which they are
+/// multiplied.
+struct BaseColor {
+  BaseColor(const CornerColors& corners_) : corners(corners_) {}
+
+  CornerColors corners;
+  const Texture* texture = nullptr;
+  std::array<Vec2d, 3> texcoords;
+
+  // For trilinear filtering: what is seen of the triangle a pixel further.
+  NdcTriangle triangle;
+  double pixel = 0.0;  ///< NDC
+  bool perspective_correct = true;
+};
+
+inline Vec2d texcoord_at(const BaseColor& base, const Vec3d& c) {
+  return c.x * base.texcoords[0] + c.y * base.texcoords[1] + c.z * base.texcoords[2];
+}
+
 template <class Values>
 Vec3d interpolate(const Vec3d& barycentric, const Values& at_corner) {
   return barycentric.x * at_corner(0) + barycentric.y * at_corner(1) + barycentric.z * at_corner(2);
@@ -171,10 +191,47 @@ inline LightTerms fragment_light(const ShadeScene& scene, std::size_t face_index
   return light_terms(*scene.lights, scene.camera, fragment_position(scene, face, c), normal);
 }
 
+/// Texture coordinates at a point of the screen, also outside of the triangle.
+inline Vec2d texcoord_on_screen(const BaseColor& base, const Vec2d& point) {
+  RasterizeParameters p;
+  p.perspective_correct = base.perspective_correct;
+  const Vec3d n = barycentric_numerators(base.triangle, screen_barycentric(base.triangle, point), p).n;
+  return texcoord_at(base, (1.0 / (n.x + n.y + n.z)) * n);
+}
+
+/// Logarithm to base 2 of the texels between neighbouring pixels, of the longer of the steps along rows and
+/// columns.
+inline double level_of_detail(const BaseColor& base, const Vec3d& c) {
+  const NdcTriangle& t = base.triangle;
+  Vec2d point;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double b = base.perspective_correct ? c[i] * t[i].z : c[i];
+    point += b * screen(t[i]);
+    sum += b;
+  }
+  point = (1.0 / sum) * point;
+  constexpr double k_step = 1e-6;  // NDC
+  double longest = 0.0;
+  for (const Vec2d& d : {Vec2d{k_step, 0.0}, Vec2d{0.0, k_step}}) {
+    const Vec2d uv = texcoord_on_screen(base, point + d) - texcoord_on_screen(base, point - d);
+    const double scale = base.pixel / (2.0 * k_step);
+    longest = std::max(longest, scale * std::hypot(uv.x * base.texture->width, uv.y * base.texture->height));
+  }
+  return std::log2(longest);
+}
+
+inline Vec3d base_color(const BaseColor& base, const Vec3d& c) {
+  const Vec3d color = interpolate(c, [&](std::size_t i) { return base.corners[i]; });
+  if (base.texture && base.texture->filter == Filter::trilinear)
+    return color * sample_pyramid(*base.texture, texcoord_at(base, c), level_of_detail(base, c));
+  return base.texture ? color * sample_texture(*base.texture, texcoord_at(base, c)).color : color;
+}
+
 /// Colour of a fragment with barycentrics `c`.
 inline Vec3d shade_forward(const ShadeScene& scene, std::size_t face_index, const Vec3d& c,
-                           const CornerColors& corners) {
-  const Vec3d base = interpolate(c, [&](std::size_t i) { return corners[i]; });
+                           const BaseColor& made_of) {
+  const Vec3d base = base_color(made_of, c);
   if (!scene.lights) return base;
   const LightTerms light = fragment_light(scene, face_index, c);
   return base * light.factor + light.specular;
@@ -222,24 +279,45 @@ inline Vec3d fragment_light_backward(const ShadeScene& scene, std::size_t face_i
 struct ShadeFragmentGradient {
   Vec3d barycentric;
   CornerColors corners;
+  std::array<Vec2d, 3> texcoords;
+  std::vector<Vec3d> texels;  ///< of the texture, if there is one
 };
+
+/// Adds the gradients of what a base colour is made of. Those of trilinear filtering are not here: they are
+/// compared with finite differences.
+inline void base_color_backward(const BaseColor& base, const Vec3d& c, const Vec3d& grad_base,
+                                ShadeFragmentGradient& grad) {
+  Vec3d grad_color = grad_base;
+  if (base.texture) {
+    const TextureSample sample = sample_texture(*base.texture, texcoord_at(base, c));
+    const Vec3d grad_sample = grad_base * interpolate(c, [&](std::size_t i) { return base.corners[i]; });
+    const Vec2d grad_uv{dot(grad_sample, sample.by_u), dot(grad_sample, sample.by_v)};
+    for (const double weight : sample.weight) grad.texels.push_back(weight * grad_sample);
+    for (std::size_t i = 0; i < 3; ++i) {
+      grad.texcoords[i] = c[i] * grad_uv;
+      grad.barycentric[i] += dot(grad_uv, base.texcoords[i]);
+    }
+    grad_color = grad_base * sample.color;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    grad.barycentric[i] += dot(grad_color, base.corners[i]);
+    grad.corners[i] = c[i] * grad_color;
+  }
+}
 
 /// Gradient of one fragment's colour. The rest goes into `total`, which `shade_finish_backward` completes.
 inline ShadeFragmentGradient shade_backward(const ShadeScene& scene, std::size_t face_index, const Vec3d& c,
-                                            const CornerColors& corners, const Vec3d& grad_color,
+                                            const BaseColor& made_of, const Vec3d& grad_color,
                                             ShadeGradient& total) {
   ShadeFragmentGradient grad;
   Vec3d grad_base = grad_color;
   if (scene.lights) {
-    const Vec3d base = interpolate(c, [&](std::size_t i) { return corners[i]; });
+    const Vec3d base = base_color(made_of, c);
     const LightTerms light = fragment_light(scene, face_index, c);
     grad.barycentric = fragment_light_backward(scene, face_index, c, {grad_color * base, grad_color}, total);
     grad_base = grad_color * light.factor;
   }
-  for (std::size_t i = 0; i < 3; ++i) {
-    grad.barycentric[i] += dot(grad_base, corners[i]);
-    grad.corners[i] = c[i] * grad_base;
-  }
+  base_color_backward(made_of, c, grad_base, grad);
   return grad;
 }
 

@@ -15,7 +15,11 @@ namespace {
 /// Two views of two meshes and two lights.
 SceneGradient sample_gradient() {
   SceneGradient gradient;
-  gradient.meshes = {{std::vector<glm::vec3>(3), std::vector<glm::vec3>(2)}, {std::vector<glm::vec3>(4), {}}};
+  gradient.meshes = {{std::vector<glm::vec3>(3),
+                      std::vector<glm::vec3>(2),
+                      std::vector<glm::vec2>(5),
+                      {std::vector<glm::vec3>(6), std::vector<glm::vec3>(1)}},
+                     {std::vector<glm::vec3>(4), {}, {}, {}}};
   gradient.shapes = {std::vector<glm::vec3>(5), std::vector<glm::vec3>(1)};
   gradient.lights.resize(2);
   gradient.views.resize(2);
@@ -33,9 +37,12 @@ TEST_SUITE("unit") {
       CHECK(value == 0);  // visited before, it would hold its number
       return ++count;
     });
-    constexpr int k_meshes = 3 * (3 + 2 + 4), k_shapes = 3 * (5 + 1), k_lights = 3 + 2 * 9;
+    constexpr int k_meshes = 3 * (3 + 2 + 4) + 2 * 5 + 3 * (6 + 1), k_shapes = 3 * (5 + 1),
+                  k_lights = 3 + 2 * 9;
     constexpr int k_views = 2 * (6 + 1 + 4 + 2 * 6), k_rest = 3 + 3;
     CHECK(count == k_meshes + k_shapes + k_lights + k_views + k_rest);
+    CHECK(gradient.meshes[0].texcoords[4].y != 0);
+    CHECK(gradient.meshes[0].textures[1][0].z != 0);
     CHECK(gradient.views[1].transforms[1].translation.z != 0);
     CHECK(gradient.views[0].camera.intrinsics[3] != 0);
   }

@@ -123,6 +123,35 @@ TEST_SUITE("unit") {
     CHECK(scene.meshes[0].mesh.face_colors[0] == glm::vec3(0, 0, 1));
   }
 
+  TEST_CASE("textures") {
+    const TempDir folder;
+    write_texture(folder / "t.exr", {2, 1, {glm::vec3(0.5F), glm::vec3(1)}});
+    const std::string coordinates = R"(, "texcoords": [[0,0],[1,0.5]], "face_texcoords": [[0,1,1]])";
+    const Mesh plain = read(folder, with_mesh(k_triangle + coordinates + R"(, "texture": {"file": "t.exr"})"))
+                           .meshes[0]
+                           .mesh;
+    CHECK(plain.texcoords == std::vector<glm::vec2>{{0, 0}, {1, 0.5F}});
+    CHECK(plain.face_texcoords == std::vector<glm::uvec3>{{0, 1, 1}});
+    REQUIRE(plain.textures.size() == 1);
+    CHECK(plain.textures[0].texels[0] == glm::vec3(0.5F));
+    CHECK(plain.textures[0].wrap == Wrap::repeat);
+    CHECK(plain.textures[0].filter == Filter::bilinear);
+    const std::string words = R"(, "texture": {"file": "t.exr", "wrap": "mirror", "filter": "trilinear"})";
+    const Mesh mesh = read(folder, with_mesh(k_triangle + coordinates + words)).meshes[0].mesh;
+    CHECK(mesh.textures[0].wrap == Wrap::mirror);
+    CHECK(mesh.textures[0].filter == Filter::trilinear);
+    const auto fails = [&](const std::string& members, const std::string& message) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, with_mesh(k_triangle + members)), message);
+    };
+    fails(R"(, "texture": {"file": "t.exr"})", "a texture on a mesh without texture coordinates");
+    fails(R"(, "texcoords": [[0,0]])", "one of texcoords and face_texcoords");
+    fails(R"(, "texcoords": [[0,0]], "face_texcoords": [[0,0,1]])", "face_texcoords[0]");
+    fails(coordinates + R"(, "texture": {"file": "t.exr", "wrap": "round"})",
+          "expected repeat, mirror or clamp");
+    fails(coordinates + R"(, "texture": {"file": "t.exr", "filter": "cubic"})",
+          "expected nearest, bilinear or trilinear");
+  }
+
   TEST_CASE("presets and estimators") {
     const TempDir folder;
     Smoothing smoothing = read(folder, with(R"("smoothing": {"preset": "softras"})")).smoothing;

@@ -205,7 +205,7 @@ TEST_SUITE("robustness") {
     Mesh flat_mesh;
     flat_mesh.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 0, 0}, {5, 5, 5}};
     flat_mesh.faces = {{0, 1, 2}, {1, 3, 2}, {4, 4, 4}};
-    for (const Mesh& mesh : {flat_mesh, Mesh{{{0, 0, 0}}, {{0, 0, 0}}, {}, {}, {}, {}}}) {
+    for (const Mesh& mesh : {flat_mesh, Mesh{{{0, 0, 0}}, {{0, 0, 0}}, {}, {}, {}, {}, {}, {}}}) {
       for (const MeshLossWeights& weights : k_each) {
         const Evaluation found = evaluate(mesh, weights);
         CHECK(std::isfinite(found.loss));

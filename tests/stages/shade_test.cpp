@@ -86,7 +86,7 @@ class Shaded {
     renderer_.set_views(views);
     renderer_.forward();
     dpr::Renderer::Impl& m = impl();
-    for (Buffer<float>* buffer : {&m.shade.red, &m.shade.green, &m.shade.blue}) {
+    for (Buffer<float>* buffer : {&m.shade.color.red, &m.shade.color.green, &m.shade.color.blue}) {
       poison(*buffer, m.rasterize.fragments);
     }
     m.shade.forward(inputs());
@@ -96,7 +96,7 @@ class Shaded {
   dpr::Renderer::Impl& impl() { return renderer_.impl(); }
   dpr::ShadeInputs inputs() {
     dpr::Renderer::Impl& m = impl();
-    return {m.frame, m.device_views, *m.geometry, m.transform, m.bin, m.rasterize};
+    return {m.frame, m.device_views, *m.geometry, m.transform, m.setup.triangles, m.bin, m.rasterize};
   }
 
   ref::Vec3d barycentric(std::size_t fragment) const {
@@ -193,14 +193,14 @@ ShadeErrors all_errors(const Model& model) {
   Shaded s(model);
   dpr::Renderer::Impl& m = s.impl();
   ShadeErrors errors;
-  const std::vector<float> red = m.shade.red.download(), green = m.shade.green.download(),
-                           blue = m.shade.blue.download();
+  const std::vector<float> red = m.shade.color.red.download(), green = m.shade.color.green.download(),
+                           blue = m.shade.color.blue.download();
   const std::size_t fragments = m.rasterize.fragments, views = s.reference.size();
 
   RandomFloat random(9);
   std::array<std::vector<float>, 3> grad;
   for (auto& plane : grad) plane.assign(fragments, dpr::test::k_poison);
-  dpr::ColorGradients device_grad;
+  dpr::ColorPlanes device_grad;
   for (const cl_uint fragment : s.list) {
     for (auto& plane : grad) plane[fragment] = random(-1, 1);
   }
@@ -315,11 +315,11 @@ TEST_SUITE("unit") {
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> lit = renderer.impl().shade.red.download();
+    const std::vector<float> lit = renderer.impl().shade.color.red.download();
     scene.lights.reset();
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> unlit = renderer.impl().shade.red.download();
+    const std::vector<float> unlit = renderer.impl().shade.color.red.download();
     REQUIRE(lit.size() == unlit.size());
     Worst worst;
     for (std::size_t i = 0; i < lit.size(); ++i)

@@ -111,9 +111,9 @@ class SyntheticFrame {
     rasterize_.distance.upload(device_impl(), distance);
     occupancy_.log_occupancy.upload(device_impl(), log_p);
     occupancy_.occupancy.upload(device_impl(), p);
-    shade_.red.upload(device_impl(), red);
-    shade_.green.upload(device_impl(), green);
-    shade_.blue.upload(device_impl(), blue);
+    shade_.color.red.upload(device_impl(), red);
+    shade_.color.green.upload(device_impl(), green);
+    shade_.color.blue.upload(device_impl(), blue);
     shared::ViewParams view{};
     view.znear = k_znear;
     view.zfar = k_zfar;

@@ -1,0 +1,43 @@
+// Textures: images that are laid on a mesh by its texture coordinates.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+namespace dpr {
+
+/// What lies beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels.
+enum class Wrap { repeat, mirror, clamp };
+
+/// What a point between the centres of texels shows: the nearest texel; the four around it, by their
+/// distance; or those of the two levels of a pyramid of ever smaller images whose texels are next in size to
+/// the step between neighbouring pixels.
+enum class Filter { nearest, bilinear, trilinear };
+
+/// Texture coordinates (u, v) have v up: (0, 0) is the lower left corner of the image, (1, 1) the upper
+/// right one, whatever its size. The texel of column c and row r of W x H has its centre at u = (c + 1/2) / W
+/// and v = 1 - (r + 1/2) / H.
+struct Texture {
+  int width = 0, height = 0;
+  std::vector<glm::vec3> texels;  ///< [height * width] linear RGB, row-major, row 0 on top
+  Wrap wrap = Wrap::repeat;
+  Filter filter = Filter::bilinear;
+};
+
+/// Throws InvalidArgument unless the texture has 1 to 16384 texels a side, as many texels as its sides say,
+/// and all of them finite. `name` says in the message which texture it is.
+void validate(const Texture& texture, const std::string& name = "texture");
+
+/// Reads any format of read_image(). 8- and 16-bit files hold sRGB (IEC 61966-2-1) and are decoded to linear
+/// RGB; files of floats, EXR and the like, are taken as they are. Alpha is left out. Throws as read_image()
+/// does.
+Texture read_texture(const std::filesystem::path& file);
+
+/// Writes by the extension, as write_image(): .exr keeps the linear floats, 8-bit formats are encoded to
+/// sRGB. Throws as write_image() does.
+void write_texture(const std::filesystem::path& file, const Texture& texture);
+
+}  // namespace dpr

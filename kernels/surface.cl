@@ -1,0 +1,226 @@
+// Base colours of the fragments of textured scenes: the corners' colours, interpolated, times the texture.
+// Where no mesh has a texture, shading interpolates the colours itself.
+#include "texture.h"
+
+static inline SurfaceScene make_scene(global const uint4* face_colors, global const float4* colors,
+                                      global const uint4* face_texcoords, global const float4* texcoords,
+                                      global const Texture* textures, global const Triangle* triangles) {
+  SurfaceScene s;
+  s.face_colors = face_colors;
+  s.colors = colors;
+  s.face_texcoords = face_texcoords;
+  s.texcoords = texcoords;
+  s.textures = textures;
+  s.triangles = triangles;
+  return s;
+}
+
+/// One work-item per pair, up to `last_pair`. Deterministic.
+/// in   pair_face        uint[pair]      view * faces + face
+/// in   fragment_starts  uint[pair + 1]  runs of fragments
+/// in   face_colors      uint4[face]     indices into colors, by corner
+/// in   colors           float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
+/// in   face_texcoords   uint4[face]     indices into texcoords, by corner; w = texture or DPR_NO_TEXTURE
+/// in   texcoords        float4[texcoord]  u, v
+/// in   textures         Texture[texture]
+/// in   texels           float4[texel]   linear RGB, every level; w unused
+/// in   triangles        Triangle[view][face]
+/// in   bary1, bary2     float[fragment]  barycentrics of corners 1 and 2
+/// out  red, green, blue  float[fragment]
+kernel void surface_forward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
+                            global const uint* restrict fragment_starts,
+                            global const uint4* restrict face_colors, global const float4* restrict colors,
+                            global const uint4* restrict face_texcoords,
+                            global const float4* restrict texcoords, global const Texture* restrict textures,
+                            global const float4* restrict texels, global const Triangle* restrict triangles,
+                            global const float* restrict bary1, global const float* restrict bary2,
+                            global float* restrict red, global float* restrict green,
+                            global float* restrict blue) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  if (first == last) return;
+  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const TexturedFace face = load_face(scene, p, pair_face[pair]);
+  for (uint i = first; i < last; ++i) {
+    const float c1 = bary1[i], c2 = bary2[i];
+    const float4 base =
+        base_of_corners(face, c1, c2) * sample_face(face, find_detail(p, face, c1, c2), c1, c2, texels).color;
+    red[i] = base.x;
+    green[i] = base.y;
+    blue[i] = base.z;
+  }
+}
+
+/// Gradients of a level of detail's barycentrics, relative to corner 0's, of the q_k and of the depths, from
+/// that of the place's step, which is the sum of c_k' place_k.
+typedef struct {
+  float bary1, bary2, q[3], z[3];
+} DetailGradient;
+
+static inline DetailGradient detail_backward(const TexturedFace f, const Detail d, float c1, float c2,
+                                             float2 grad_step) {
+  const float along[3] = {0.0f, dot(grad_step, f.place1), dot(grad_step, f.place2)},
+              c[3] = {1.0f - c1 - c2, c1, c2};
+  const float mean = c1 * along[1] + c2 * along[2];
+  const float by_depth = along[1] * d.q[1] + along[2] * d.q[2] - mean * d.sum_q;
+  DetailGradient g;
+  g.bary1 = (d.z[1] - d.z[0]) * by_depth - d.depth * along[1] * d.sum_q;
+  g.bary2 = (d.z[2] - d.z[0]) * by_depth - d.depth * along[2] * d.sum_q;
+  for (int k = 0; k < 3; ++k) {
+    g.q[k] = d.depth * (along[k] - mean);
+    g.z[k] = c[k] * by_depth - g.q[k] * d.q[k] / d.z[k];
+  }
+  return g;
+}
+
+/// One work-item per pair, up to `last_pair`. Deterministic. Inputs as surface_forward, and
+/// in   adds         whether grad_bary1, grad_bary2 hold the light's part already
+/// in   grad_red, grad_green, grad_blue  float[fragment]  of the base colours
+/// in out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
+/// out  grad_colors     float[pair][9]  RGB of the corners' colours, summed over the pair's fragments
+/// out  grad_texcoords  float[pair][9]  u, v of the corners, and 0
+kernel void surface_backward(const FrameParams p, const uint last_pair, const uint adds,
+                             global const uint* restrict pair_face,
+                             global const uint* restrict fragment_starts,
+                             global const uint4* restrict face_colors, global const float4* restrict colors,
+                             global const uint4* restrict face_texcoords,
+                             global const float4* restrict texcoords, global const Texture* restrict textures,
+                             global const float4* restrict texels, global const Triangle* restrict triangles,
+                             global const float* restrict bary1, global const float* restrict bary2,
+                             global const float* restrict grad_red, global const float* restrict grad_green,
+                             global const float* restrict grad_blue, global float* restrict grad_bary1,
+                             global float* restrict grad_bary2, global float* restrict grad_colors,
+                             global float* restrict grad_texcoords) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const TexturedFace face = load_face(scene, p, pair_face[pair]);
+  float3 color[3] = {0.0f, 0.0f, 0.0f};
+  float2 place[3] = {0.0f, 0.0f, 0.0f};
+  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
+    const float c1 = bary1[i], c2 = bary2[i], c0 = 1.0f - c1 - c2;
+    const Detail detail = find_detail(p, face, c1, c2);
+    const Sample sample = sample_face(face, detail, c1, c2, texels);
+    const float3 grad = (float3)(grad_red[i], grad_green[i], grad_blue[i]);
+    const float3 grad_color = grad * sample.color.xyz, grad_sample = grad * base_of_corners(face, c1, c2).xyz;
+    const float2 grad_place = (float2)(dot(grad_sample, sample.by_x.xyz), dot(grad_sample, sample.by_y.xyz));
+    float along1 = dot(grad_color, face.color1.xyz) + dot(grad_place, face.place1);
+    float along2 = dot(grad_color, face.color2.xyz) + dot(grad_place, face.place2);
+    if (detail.varies) {
+      const float2 grad_step = dot(grad_sample, sample.by_detail.xyz) * detail.by_step;
+      const DetailGradient g = detail_backward(face, detail, c1, c2, grad_step);
+      along1 += g.bary1;
+      along2 += g.bary2;
+      place[0] -= (detail.step1 + detail.step2) * grad_step;
+      place[1] += detail.step1 * grad_step;
+      place[2] += detail.step2 * grad_step;
+    }
+    grad_bary1[i] = adds ? grad_bary1[i] + along1 : along1;
+    grad_bary2[i] = adds ? grad_bary2[i] + along2 : along2;
+    color[0] += c0 * grad_color;
+    color[1] += c1 * grad_color;
+    color[2] += c2 * grad_color;
+    place[0] += c0 * grad_place;
+    place[1] += c1 * grad_place;
+    place[2] += c2 * grad_place;
+  }
+  for (int k = 0; k < 3; ++k) {
+    vstore3(color[k], 0, grad_colors + 9 * pair + 3 * k);
+    vstore3((float3)(place[k].x, -place[k].y, 0.0f), 0, grad_texcoords + 9 * pair + 3 * k);
+  }
+}
+
+/// From the levels of detail to the corners on the screen: what a triangle that turns or goes away does to
+/// the texture's sharpness. One work-item per pair, up to `last_pair`. Deterministic. Inputs as
+/// surface_backward, and
+/// in out  grad_corners  float[pair][9]  x, y (NDC) and view depth of the corners
+kernel void surface_detail_backward(
+    const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
+    global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
+    global const float4* restrict colors, global const uint4* restrict face_texcoords,
+    global const float4* restrict texcoords, global const Texture* restrict textures,
+    global const float4* restrict texels, global const Triangle* restrict triangles,
+    global const float* restrict bary1, global const float* restrict bary2,
+    global const float* restrict grad_red, global const float* restrict grad_green,
+    global const float* restrict grad_blue, global float* restrict grad_corners) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const TexturedFace face = load_face(scene, p, pair_face[pair]);
+  if (!face.is_textured || face.texture.levels == 1) return;
+  const Triangle t = face.triangle;
+  const float inverse_area = 1.0f / doubled_area(t);
+  float steps[2][3];
+  screen_steps(t, 0, steps[0]);
+  screen_steps(t, 1, steps[1]);
+  float3 corner[3] = {0.0f, 0.0f, 0.0f};
+  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
+    const float c1 = bary1[i], c2 = bary2[i];
+    const Detail detail = find_detail(p, face, c1, c2);
+    if (!detail.varies) continue;
+    const Sample sample = sample_face(face, detail, c1, c2, texels);
+    const float3 grad_sample =
+        (float3)(grad_red[i], grad_green[i], grad_blue[i]) * base_of_corners(face, c1, c2).xyz;
+    const DetailGradient g =
+        detail_backward(face, detail, c1, c2, dot(grad_sample, sample.by_detail.xyz) * detail.by_step);
+    float of_step[3], of_area = 0.0f;
+    for (int k = 0; k < 3; ++k) {
+      of_step[k] = g.q[k] * inverse_area / detail.z[k];
+      of_area -= g.q[k] * detail.q[k] * inverse_area;
+    }
+    for (int k = 0; k < 3; ++k) {
+      const float turned = of_step[(k + 2) % 3] - of_step[(k + 1) % 3];
+      // The doubled area changes with x and y as the steps along y and x say, exchanged.
+      corner[k].x += of_area * steps[0][k] - (detail.along_y ? turned : 0.0f);
+      corner[k].y += of_area * steps[1][k] + (detail.along_y ? 0.0f : turned);
+      if (p.perspective_correct) corner[k].z += g.z[k];
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    global float* place = grad_corners + 9 * pair + 3 * k;
+    vstore3(vload3(0, place) + corner[k], 0, place);
+  }
+}
+
+/// What every fragment asks of the texels: a cell, which is a texel and its neighbours to the right and
+/// below, and the parts of these. Sorted by cell, fragments are added up without atomics. One work-item per
+/// pair, up to `last_pair`. Inputs as surface_backward, and
+/// in   no_cell     what stands for the cell of a fragment without texture; no texel has that number
+/// in   levels      how many of a pyramid a fragment sees at most, 1 or 2
+/// out  cells       uint[fragment][levels]    the first of the cell's texels
+/// out  numbers     uint[fragment][levels]    the place's own: what sorting permutes
+/// out  parts       float2[fragment][levels]  of the neighbours to the right and below
+/// out  grad_seen   float4[fragment][levels]  RGB of what is seen of the level
+kernel void surface_list(const FrameParams p, const uint last_pair, const uint no_cell, const uint levels,
+                         global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+                         global const uint4* restrict face_colors, global const float4* restrict colors,
+                         global const uint4* restrict face_texcoords, global const float4* restrict texcoords,
+                         global const Texture* restrict textures, global const Triangle* restrict triangles,
+                         global const float* restrict bary1, global const float* restrict bary2,
+                         global const float* restrict grad_red, global const float* restrict grad_green,
+                         global const float* restrict grad_blue, global uint* restrict cells,
+                         global uint* restrict numbers, global float2* restrict parts,
+                         global float4* restrict grad_seen) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const TexturedFace face = load_face(scene, p, pair_face[pair]);
+  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
+    const float c1 = bary1[i], c2 = bary2[i];
+    const Detail detail = find_detail(p, face, c1, c2);
+    const float4 grad =
+        (float4)(grad_red[i], grad_green[i], grad_blue[i], 0.0f) * base_of_corners(face, c1, c2);
+    for (uint k = 0; k < levels; ++k) {
+      const uint place = levels * i + k;
+      numbers[place] = place;
+      cells[place] = no_cell;
+      if (!face.is_textured || k >= face.texture.levels) continue;
+      const Footprint footprint =
+          find_footprint(face.texture, (uint)detail.level + k, place_at(face, c1, c2));
+      cells[place] = footprint_cell(footprint);
+      parts[place] = (float2)(footprint.x.part, footprint.y.part);
+      grad_seen[place] = (k == 0 ? 1.0f - detail.part : detail.part) * grad;
+    }
+  }
+}

@@ -1,0 +1,77 @@
+// Base colours of fragments in scenes with textures: the corners' colours times the texture.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "stages/bin.hpp"
+#include "stages/geometry.hpp"
+#include "stages/rasterize.hpp"
+
+namespace dpr {
+
+/// Planes of [fragment].
+struct ColorPlanes {
+  Buffer<float> red, green, blue;
+
+  void resize(Device::Impl& device, Length length);
+  void settle(std::size_t fragments);
+  std::size_t bytes() const;
+};
+
+/// Everything of a frame that base colours are made of.
+struct SurfaceInputs {
+  const shared::FrameParams& p;
+  const Geometry& geometry;
+  const Buffer<shared::Triangle>& triangles;
+  const Bin& bin;
+  const Rasterize& rasterize;
+};
+
+class Surface {
+ public:
+  explicit Surface(Device::Impl& device);
+
+  /// The base colours of the band's fragments.
+  void forward(const SurfaceInputs& in, ColorPlanes& base);
+  /// From the gradients of the base colours to those of the corners' colours and texture coordinates, and of
+  /// barycentrics, to which they are added where the light has left its own there.
+  void backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds, Buffer<float>& grad_bary1,
+                Buffer<float>& grad_bary2, Buffer<float>& grad_corner_colors);
+  /// Adds what goes by way of the levels of detail to the gradients of the corners on the screen, [pair][9]
+  /// as Rasterize has them.
+  void backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base, Buffer<float>& grad_corners);
+  /// What the band's fragments ask of the texels, by fragment and level: for the stage that gathers it.
+  void list(const SurfaceInputs& in, const ColorPlanes& grad_base);
+
+  /// Of those below, of two levels, and of what sorting needs beside.
+  static constexpr std::size_t k_fragment_bytes =
+      2 * (4 * sizeof(cl_uint) + sizeof(cl_float2) + sizeof(cl_float4));
+
+  Buffer<float> grad_corner_texcoords;  ///< [pair][9] u, v and 0
+  Buffer<cl_uint> cells, numbers;  ///< [fragment][level] the first texel that is seen; the place's number
+  Buffer<cl_float2> parts;         ///< [fragment][level] of its neighbours
+  Buffer<cl_float4> grad_seen;     ///< [fragment][level] RGB of what is seen of the level
+
+  std::size_t bytes() const;
+
+ private:
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
+         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>, In<float>,
+         Out<float>, Out<float>, Out<float>>
+      forward_;
+  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
+         In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+      backward_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
+         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>, In<float>,
+         In<float>, In<float>, In<float>, Out<float>>
+      backward_detail_;
+  Kernel<shared::FrameParams, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>,
+         In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<cl_uint>, Out<cl_uint>, Out<cl_float2>,
+         Out<cl_float4>>
+      list_;
+};
+
+}  // namespace dpr

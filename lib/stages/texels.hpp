@@ -1,0 +1,39 @@
+// The smaller levels of textures; and gradients of texels, gathered from what fragments see of them.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "stages/geometry.hpp"
+#include "stages/sort.hpp"
+#include "stages/surface.hpp"
+
+namespace dpr {
+
+class Texels {
+ public:
+  explicit Texels(Device::Impl& device);
+
+  /// Fills the smaller levels from the largest.
+  void build(Textures& textures);
+  /// Before the first band of a frame.
+  void start(const Textures& textures);
+  /// Adds a band's fragments, as Surface::list() left them; their order is lost there.
+  void add(const Textures& textures, Surface& surface);
+  /// From the sums over all bands to `grad`.
+  void finish(const Textures& textures);
+
+  Buffer<cl_float4> grad;  ///< [texel]; those of the largest levels are the textures' own
+
+  std::size_t bytes() const;
+
+ private:
+  Device::Impl& device_;
+  Sort sort_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>> sum_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<shared::Texture>, In<cl_float4>, Out<cl_float4>> gather_;
+  Kernel<cl_uint, cl_uint, In<shared::Texture>, Out<cl_float4>> shrink_, shrink_backward_;
+  Buffer<cl_uint> count_;   // [1]
+  Buffer<cl_uint> starts_;  // [texel + 2] runs of fragments by cell; the last cell is that of no texture
+  Buffer<cl_float4> sums_;  // [4][texel]
+};
+
+}  // namespace dpr
