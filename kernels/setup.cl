@@ -17,28 +17,24 @@ static inline int orientation_of(float3 a, float3 b, float3 c, float znear, floa
   return in_range && in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
 }
 
-/// Blurred bounds in pixels: left, top, right, bottom.
-static inline float4 bounds_of(const FrameParams p, float3 a, float3 b, float3 c) {
+/// Blurred bounds in pixels.
+typedef struct {
+  float left, top, right, bottom;
+} PixelBounds;
+
+static inline PixelBounds bounds_of(const FrameParams p, float3 a, float3 b, float3 c) {
   const float2 low = fmin(fmin(a.xy, b.xy), c.xy) - p.blur_distance;
   const float2 high = fmax(fmax(a.xy, b.xy), c.xy) + p.blur_distance;
-  const float2 scale = (float2)(1.0f, -1.0f) / p.pixel_size;
+  const float scale = 1.0f / p.pixel_size;
   // A centre lies half a pixel from its corner.
-  const float2 centre = 0.5f * (float2)((float)p.width, (float)p.height) - 0.5f;
-  return (float4)((float2)(low.x, high.y) * scale + centre, (float2)(high.x, low.y) * scale + centre);
+  const float x = 0.5f * (float)p.width - 0.5f, y = 0.5f * (float)p.height - 0.5f;
+  const PixelBounds bounds = {low.x * scale + x, y - high.y * scale, high.x * scale + x, y - low.y * scale};
+  return bounds;
 }
 
 /// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does
 /// not.
 static inline int meets_image(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
-
-static inline Triangle make_triangle(const FrameParams p, float3 a, float3 b, float3 c, int orientation,
-                                     float4 bounds) {
-  const uint2 columns = samples_within(bounds.x, bounds.z, p.width);
-  const uint2 rows = samples_within(bounds.y, bounds.w, p.height);
-  const Triangle t = {a.x, a.y, b.x, b.y, c.x, c.y, a.z, b.z, c.z, (float)orientation,
-                      columns.x | rows.x << 16, columns.y | rows.y << 16};
-  return t;
-}
 
 static inline uint count_tiles(const FrameParams p, const Triangle t) {
   const uint2 columns = columns_of(t) / DPR_TILE, rows = rows_of(t) / DPR_TILE;
@@ -70,13 +66,28 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   global const float4* vertices = ndc + view * p.vertices;
   const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
   const int orientation = orientation_of(a, b, c, views[view].znear, views[view].zfar);
-  const float4 bounds = bounds_of(p, a, b, c);
+  const PixelBounds bounds = bounds_of(p, a, b, c);
   const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
-                      meets_image(bounds.x, bounds.z, p.width) && meets_image(bounds.y, bounds.w, p.height);
+                      meets_image(bounds.left, bounds.right, p.width) &&
+                      meets_image(bounds.top, bounds.bottom, p.height);
   kept[i] = is_kept ? 1 : 0;
   counts[i] = 0;
   if (!is_kept) return;
-  const Triangle t = make_triangle(p, a, b, c, orientation, bounds);
+  const uint2 columns = samples_within(bounds.left, bounds.right, p.width);
+  const uint2 rows = samples_within(bounds.top, bounds.bottom, p.height);
+  Triangle t;
+  t.x0 = a.x;
+  t.y0 = a.y;
+  t.x1 = b.x;
+  t.y1 = b.y;
+  t.x2 = c.x;
+  t.y2 = c.y;
+  t.z0 = a.z;
+  t.z1 = b.z;
+  t.z2 = c.z;
+  t.orientation = (float)orientation;
+  t.first_sample = columns.x | rows.x << 16;
+  t.last_sample = columns.y | rows.y << 16;
   const uint count = count_tiles(p, t);
   if (count == 0) return;
   counts[i] = count;

@@ -17,13 +17,12 @@
 /// The samples [x, y] along one axis within [low, high], in samples; x > y, and so for their tiles, if there
 /// is none. By conversions: PoCL's ceil() and floor() branch.
 static inline uint2 samples_within(float low, float high, uint size) {
-  const uint2 none = (uint2)(DPR_TILE, 0u);
   const float from = fmin(fmax(low - DPR_BOUNDS_SLACK, 0.0f), (float)size);
   const float to = fmin(high + DPR_BOUNDS_SLACK, (float)size - 1.0f);
-  if (!(to >= 0.0f)) return none;
-  const uint2 truncated = (uint2)((uint)from, (uint)to);
-  const uint first = truncated.x + ((float)truncated.x < from ? 1 : 0);
-  return first <= truncated.y ? (uint2)(first, truncated.y) : none;
+  const uint truncated = (uint)from, last = (uint)fmax(to, 0.0f);
+  const uint first = truncated + ((float)truncated < from ? 1 : 0);
+  const int is_none = !(to >= 0.0f) || first > last;
+  return (uint2)(is_none ? DPR_TILE : first, is_none ? 0 : last);
 }
 
 /// The columns or rows [x, y] of a triangle's bounds.

@@ -71,7 +71,8 @@ Sorted sort(const std::vector<cl_uint>& keys, std::size_t key_count, std::size_t
   std::vector<cl_uint> places(keys.size());
   std::iota(places.begin(), places.end(), 0U);
   Buffer<cl_uint> key_buffer = on_device(keys), value_buffer = on_device(places), starts;
-  poison(starts, key_count + 1, k_poison);
+  if (!dpr::test::is_reduced())
+    poison(starts, key_count + 1, k_poison);  // oclgrind takes it for uninitialised
   const Buffer<cl_uint> count = on_device({static_cast<cl_uint>(keys.size())});
   operation(keys.size() + spare, count, key_count, key_buffer, value_buffer, starts);
   key_buffer.resize(device_impl(), keys.size());
