@@ -5,7 +5,7 @@
 dpr_packages_demo=(
   g++ cmake ninja-build
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
-  libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev nlohmann-json3-dev libcli11-dev
+  libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev libpng-dev nlohmann-json3-dev libcli11-dev
   gnuplot-nox
 )
 # The tests, and the reference manual.

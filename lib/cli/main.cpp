@@ -1,13 +1,13 @@
 // The dpr command.
-#include <string>
 
 #include "cli/application.hpp"
 #include "cli/commands.hpp"
+#include "dpr/version.hpp"
 
 int main(int argc, char** argv) {
   dpr::cli::CommonOptions common;
   CLI::App application("A differentiable perturbed renderer on OpenCL.", "dpr");
-  application.set_version_flag("--version", std::string("dpr ") + DPR_VERSION);
+  application.set_version_flag("--version", "dpr " DPR_VERSION);
   application.require_subcommand(1);
   application.footer("Every command explains itself: dpr COMMAND --help\nExample: dpr demo -o demo-output");
   dpr::cli::add_devices_command(application, common);

@@ -13,9 +13,9 @@
 namespace {
 
 /// From the ground up.
-const std::vector<std::string> k_floors{"base",   "image",  "mesh",     "smoothing", "scene",
-                                        "device", "stages", "renderer", "loss",      "solve",
-                                        "torch",  "cli",    "learn"};
+const std::vector<std::string> k_floors{"base",  "image",  "codecs", "mesh",     "smoothing",
+                                        "scene", "device", "stages", "renderer", "loss",
+                                        "solve", "c",      "torch",  "cli",      "learn"};
 
 /// The one arrow up: a renderer runs the backward pass of losses, which see its last frame through
 /// renderer/frame.hpp.

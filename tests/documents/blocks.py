@@ -5,7 +5,8 @@ blocks.py cpp DOCUMENT OUTPUT.cpp   the C++ blocks of a document, one after the 
 blocks.py run DOCUMENT --source DIR --build DIR --work DIR [--program FILE] [--python FILE]
                                     everything else, in an empty folder that looks like the repository's root
 
-Blocks of other languages (console, text) are not tried. A block after a line <!-- file: NAME --> is written to that file.
+Blocks of other languages (console, text) are not tried. A block after a line <!-- file: NAME --> is written to that file;
+one after <!-- shows: NAME --> must be that file of the repository, which is tried elsewhere.
 """
 import argparse
 import json
@@ -31,19 +32,19 @@ REDUCED = {
 
 
 def blocks(document):
-    """(language, first line, file or None, text) of every fenced block."""
-    found, language, name = [], None, None
+    """(language, first line, marker of a file or None, text) of every fenced block."""
+    found, language, marker = [], None, None
     for number, line in enumerate(document.read_text().splitlines(), 1):
         fence = re.match(r"\s*```(\S*)", line)
         if language is None and fence:
             language, first, text = fence.group(1), number + 1, []
         elif language is not None and fence:
-            found.append((language, first, name, "\n".join(text) + "\n"))
-            language, name = None, None
+            found.append((language, first, marker, "\n".join(text) + "\n"))
+            language, marker = None, None
         elif language is not None:
             text.append(line)
-        elif marker := re.match(r"<!-- file: (\S+) -->", line):
-            name = marker.group(1)
+        elif comment := re.match(r"<!-- (file|shows): (\S+) -->", line):
+            marker = comment.groups()
     if language is not None:
         sys.exit(f"{document}: a block is not closed")
     return found
@@ -51,8 +52,8 @@ def blocks(document):
 
 def write_cpp(document, output):
     includes, body = [], []
-    for language, first, _, text in blocks(document):
-        if language != "cpp":
+    for language, first, marker, text in blocks(document):
+        if language != "cpp" or marker:
             continue
         lines = text.splitlines()
         includes += [line for line in lines if line.startswith("#include")]
@@ -95,10 +96,13 @@ def run(arguments):
 
     call("dpr demo", "dpr", "demo", "-o", "demo-output", "--quiet")
     tried, python = 0, ""
-    for language, first, name, text in blocks(arguments.document):
+    for language, first, marker, text in blocks(arguments.document):
         where = f"{arguments.document}:{first}"
-        if name:
+        action, name = marker or (None, None)
+        if action == "file":
             (work / name).write_text(text)
+        elif action == "shows" and text != (arguments.source / name).read_text():
+            sys.exit(f"{where} is not {name}")
         if language == "json":
             try:
                 json.loads(text)

@@ -1,0 +1,207 @@
+/* The C interface: the same renderer for programs in C99 and for languages that call C.
+ *
+ * Every function that can fail returns a dpr_status, and dpr_last_error() says what was wrong, one sentence,
+ * of the calling thread's last call that failed. A call that fails changes nothing and gives no handle.
+ * Handles are freed by their dpr_..._destroy(), which takes NULL; what was made from a handle may outlive it.
+ * Threads may work at the same time on handles that nothing connects: each thread has a device, and what is
+ * made from it, of its own.
+ *
+ * Arrays are copied. Matrices are row-major and act on column vectors; a colour is linear RGB, a pixel is
+ * linear RGBA. Structs begin with their size: fill them by their DPR_..._INIT, so that a program which was
+ * compiled with an earlier version of this header works with a later library. */
+#ifndef DPR_DPR_H
+#define DPR_DPR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "dpr/export.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum dpr_status {
+  DPR_SUCCESS = 0,
+  DPR_INVALID_ARGUMENT = 1, /* an argument or the content of a file has a value that cannot be used */
+  DPR_IO_ERROR = 2,         /* a file cannot be read */
+  DPR_DEVICE_ERROR = 3,     /* an OpenCL call failed */
+  DPR_BUILD_ERROR = 4,      /* a kernel did not compile */
+  DPR_OUT_OF_MEMORY = 5,    /* of the host */
+  DPR_INTERNAL_ERROR = 6
+} dpr_status;
+
+/* What the thread's last call that failed said; "" before. Valid until the thread's next call that fails. */
+DPR_API const char* dpr_last_error(void);
+
+/* "0.2.0": of the library that runs. */
+DPR_API const char* dpr_version(void);
+
+/* OpenCL's own, whose header need not be included. */
+struct _cl_context;
+struct _cl_command_queue;
+struct _cl_mem;
+
+typedef struct dpr_device dpr_device;
+typedef struct dpr_scene dpr_scene;
+typedef struct dpr_renderer dpr_renderer;
+typedef struct dpr_loss dpr_loss;
+typedef struct dpr_gradient dpr_gradient;
+
+/* ---- Device ---- */
+
+/* Opens a device: "" or NULL takes the best that can be used; "cpu", "gpu", an index as `dpr devices` lists
+ * them, or a part of its name. */
+DPR_API dpr_status dpr_device_open(const char* selector, dpr_device** device);
+
+/* Uses the caller's cl_context and in-order cl_command_queue, which are retained. */
+DPR_API dpr_status dpr_device_adopt(struct _cl_context* context, struct _cl_command_queue* queue,
+                                    dpr_device** device);
+
+/* The device's name; valid as long as the handle. */
+DPR_API dpr_status dpr_device_name(const dpr_device* device, const char** name);
+
+DPR_API void dpr_device_destroy(dpr_device* device);
+
+/* ---- Scene ---- */
+
+/* An OpenGL camera: right-handed, looks down -z, y up. */
+typedef struct dpr_camera {
+  size_t size;
+  float view[16];       /* world to camera */
+  float fov_y_degrees;  /* full vertical field of view, in (0, 180); ignored if fx is not 0 */
+  float fx, fy, cx, cy; /* intrinsics, pixels; the origin is the corner of the top-left pixel */
+  float znear, zfar;    /* 0 < znear < zfar, along the view direction */
+} dpr_camera;
+
+#define DPR_CAMERA_INIT \
+  { sizeof(dpr_camera), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 60.0f, 0, 0, 0, 0, 1.0f, 100.0f }
+
+/* At most one of the two colour arrays is given; with neither the mesh is white. */
+typedef struct dpr_mesh {
+  size_t size;
+  const float* positions; /* [vertex][3], object space */
+  size_t vertices;
+  const uint32_t* faces; /* [face][3], indices of vertices */
+  size_t face_count;
+  const float* vertex_colors; /* [vertex][3], or NULL */
+  const float* face_colors;   /* [face][3], or NULL */
+  const float* transform;     /* [16], object to world; NULL: the identity */
+} dpr_mesh;
+
+#define DPR_MESH_INIT \
+  { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL }
+
+typedef enum dpr_shading { DPR_SHADING_FLAT = 0, DPR_SHADING_PHONG = 1, DPR_SHADING_GOURAUD = 2 } dpr_shading;
+
+/* World space, without attenuation. */
+typedef struct dpr_point_light {
+  float position[3], diffuse[3], specular[3];
+} dpr_point_light;
+
+typedef struct dpr_lights {
+  size_t size;
+  float ambient[3];
+  const dpr_point_light* point; /* [point_count]; NULL if that is 0 */
+  size_t point_count;
+  float shininess; /* >= 1 */
+  dpr_shading shading;
+} dpr_lights;
+
+#define DPR_LIGHTS_INIT \
+  { sizeof(dpr_lights), {0.5f, 0.5f, 0.5f}, NULL, 0, 64.0f, DPR_SHADING_PHONG }
+
+/* A scene without meshes, for images of that many pixels (1 to 16384 a side). */
+DPR_API dpr_status dpr_scene_create(int width, int height, dpr_scene** scene);
+/* Reads the scene format of lib/cli/README.md. */
+DPR_API dpr_status dpr_scene_read(const char* file, dpr_scene** scene);
+/* Meshes are counted from 0 in the order in which they are added. */
+DPR_API dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh);
+DPR_API dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera);
+DPR_API dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]);
+/* NULL: no lights, colours as they are. */
+DPR_API dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights);
+/* Sets a member of "smoothing" in the scene format that is a word: "preset", "occupancy_prior", "estimator",
+ * ... */
+DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* key, const char* word);
+/* The same for a number: "sigma", "gamma", "samples", "seed", ... Together they are checked when a renderer
+ * takes the scene. */
+DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
+/* What backward passes compute: "positions", "colors", "transform", "camera", "lights", "smoothing",
+ * "background". Without this call all but "lights". */
+DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
+DPR_API void dpr_scene_destroy(dpr_scene* scene);
+
+/* ---- Renderer ---- */
+
+DPR_API dpr_status dpr_renderer_create(const dpr_device* device, dpr_renderer** renderer);
+/* Checks and uploads the scene as it is now; its camera and transforms become the only view. */
+DPR_API dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene);
+/* Replaces the views, all rendered by the same launches. cameras: [views]. transforms: [view][mesh][16],
+ * object to world, `transform_count` floats; NULL and 0: where the scene has the meshes. */
+DPR_API dpr_status dpr_renderer_set_views(dpr_renderer* renderer, const dpr_camera* cameras, size_t views,
+                                          const float* transforms, size_t transform_count);
+/* New positions of a mesh, [vertex][3], `count` floats: as many as it has. */
+DPR_API dpr_status dpr_renderer_set_positions(dpr_renderer* renderer, size_t mesh, const float* positions,
+                                              size_t count);
+/* New colours of a mesh, [vertex][3] or [face][3] as it has them, `count` floats. */
+DPR_API dpr_status dpr_renderer_set_colors(dpr_renderer* renderer, size_t mesh, const float* colors,
+                                           size_t count);
+/* Renders every view; enqueues the work, and seldom waits for it. */
+DPR_API dpr_status dpr_renderer_forward(dpr_renderer* renderer);
+/* The floats of all images: views * height * width * 4. */
+DPR_API dpr_status dpr_renderer_image_size(const dpr_renderer* renderer, size_t* count);
+/* All images, [view][height][width][4], row 0 on top, `count` floats. Waits for the device. */
+DPR_API dpr_status dpr_renderer_read_image(const dpr_renderer* renderer, float* pixels, size_t count);
+/* The images as a cl_mem on the device, of the same layout; not retained, valid until the next forward pass
+ * that needs a larger one. What is enqueued on the device's queue after dpr_renderer_forward() sees them
+ * finished. */
+DPR_API dpr_status dpr_renderer_image_buffer(const dpr_renderer* renderer, struct _cl_mem** buffer);
+DPR_API void dpr_renderer_destroy(dpr_renderer* renderer);
+
+/* ---- Losses ---- */
+
+/* How much each loss counts: means over pixels and colour channels, and 1 - IoU of the alpha channels. */
+typedef struct dpr_loss_weights {
+  size_t size;
+  float mse, l1, silhouette;
+} dpr_loss_weights;
+
+#define DPR_LOSS_WEIGHTS_INIT \
+  { sizeof(dpr_loss_weights), 0, 0, 0 }
+
+/* Against a target for each view, [view][height][width][4], `count` floats. */
+DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights,
+                                   const float* targets, size_t count, size_t views, int width, int height,
+                                   dpr_loss** loss);
+/* The loss of the renderer's last images, mean over the views; its gradient stays on the device. */
+DPR_API dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, double* value);
+DPR_API void dpr_loss_destroy(dpr_loss* loss);
+
+/* ---- Gradients ---- */
+
+/* Of a loss that was evaluated on the last forward pass. */
+DPR_API dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_gradient** gradient);
+/* Of sum <grad, image> over views and pixels: grad is [view][height][width][4], `count` floats. */
+DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad, size_t count,
+                                       dpr_gradient** gradient);
+/* The same from a cl_mem of the device's context. */
+DPR_API dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr_gradient** gradient);
+
+/* The arrays that the scene asked for, by names such as "meshes[0].positions", "views[0].camera.rotation" or
+ * "sigma". */
+DPR_API dpr_status dpr_gradient_count(const dpr_gradient* gradient, size_t* count);
+/* Valid as long as the handle. */
+DPR_API dpr_status dpr_gradient_name(const dpr_gradient* gradient, size_t index, const char** name);
+/* How many numbers an array has. */
+DPR_API dpr_status dpr_gradient_size(const dpr_gradient* gradient, const char* name, size_t* count);
+/* Copies an array, [vertex][3] and so on, `count` numbers. */
+DPR_API dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, double* values,
+                                     size_t count);
+DPR_API void dpr_gradient_destroy(dpr_gradient* gradient);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

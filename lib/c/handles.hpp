@@ -1,0 +1,101 @@
+// What the handles of the C interface hold, and how its functions end: no exception leaves them.
+#pragma once
+
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dpr/dpr.h"
+#include "dpr/error.hpp"
+#include "dpr/image_loss.hpp"
+#include "dpr/renderer.hpp"
+#include "dpr/smoothing_options.hpp"
+
+struct dpr_device {
+  dpr::Device device;
+};
+
+struct dpr_scene {
+  dpr::Scene scene;
+  dpr::SmoothingOptions smoothing;  ///< what was set of it
+};
+
+struct dpr_renderer {
+  dpr::Renderer renderer;
+};
+
+struct dpr_loss {
+  dpr::ImageLoss loss;
+};
+
+struct dpr_gradient {
+  struct Array {
+    std::string name;
+    std::vector<double> values;
+  };
+  std::vector<Array> arrays;
+};
+
+namespace dpr::c {
+
+/// Keeps the message of the exception that is being handled for dpr_last_error(); its status.
+dpr_status status_of_exception() noexcept;
+
+/// Runs a function's body; what it throws becomes a status.
+template <class Body>
+dpr_status guarded(const Body& body) noexcept {
+  try {
+    body();
+    return DPR_SUCCESS;
+  } catch (...) {
+    return status_of_exception();
+  }
+}
+
+/// What a pointer points to. Throws for NULL.
+template <class Type>
+Type& deref(Type* pointer, const char* argument) {
+  if (!pointer) throw InvalidArgument(argument, "NULL", "a pointer");
+  return *pointer;
+}
+
+/// Hands a new handle to the caller, at the end of a body that has checked `out` at its begin.
+template <class Handle, class... Content>
+void give(Handle** out, Content&&... content) {
+  *out = new Handle{std::forward<Content>(content)...};
+}
+
+/// A versioned struct of the caller's: what an older program does not know keeps its default.
+template <class Struct>
+Struct versioned(const Struct* given, Struct defaults, const char* argument) {
+  const std::size_t size = deref(given, argument).size;
+  if (size < sizeof(std::size_t) || size > sizeof(Struct)) {
+    throw InvalidArgument(std::string(argument) + ".size", std::to_string(size),
+                          "at most " + std::to_string(sizeof(Struct)) + ", the struct's size");
+  }
+  std::memcpy(&defaults, given, size);
+  return defaults;
+}
+
+/// `count` numbers behind a pointer, of which there are [n][width]. Throws for NULL, and where n would not be
+/// whole.
+template <class Number>
+std::span<Number> numbers(Number* pointer, std::size_t count, std::size_t width, const char* argument) {
+  deref(pointer, argument);
+  if (count % width != 0) {
+    throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count),
+                          "a multiple of " + std::to_string(width));
+  }
+  return {pointer, count};
+}
+
+/// Vectors of three numbers.
+std::vector<glm::vec3> to_vectors(std::span<const float> values);
+/// Row-major.
+glm::mat4 to_matrix(const float* values);
+Camera to_camera(const dpr_camera* camera, const char* argument);
+
+}  // namespace dpr::c

@@ -1,0 +1,207 @@
+// Scenes of the C interface.
+#include <array>
+#include <cmath>
+
+#include "base/checks.hpp"
+#include "c/handles.hpp"
+#include "scene/gradient_table.hpp"
+#include "smoothing/option_fields.hpp"
+
+using dpr::InvalidArgument;
+using dpr::c::deref;
+using dpr::c::give;
+using dpr::c::guarded;
+using dpr::c::versioned;
+
+namespace dpr::c {
+
+std::vector<glm::vec3> to_vectors(std::span<const float> values) {
+  std::vector<glm::vec3> vectors;
+  vectors.reserve(values.size() / 3);
+  for (std::size_t i = 0; i + 2 < values.size(); i += 3)
+    vectors.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return vectors;
+}
+
+glm::mat4 to_matrix(const float* values) {
+  glm::mat4 matrix;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) matrix[column][row] = values[4 * row + column];
+  }
+  return matrix;
+}
+
+Camera to_camera(const dpr_camera* camera, const char* argument) {
+  const dpr_camera c = versioned<dpr_camera>(camera, DPR_CAMERA_INIT, argument);
+  Camera converted{.view = to_matrix(c.view),
+                   .fov_y_degrees = c.fov_y_degrees,
+                   .intrinsics = {},
+                   .znear = c.znear,
+                   .zfar = c.zfar};
+  if (c.fx != 0) converted.intrinsics = Intrinsics{c.fx, c.fy, c.cx, c.cy};
+  validate(converted, argument);
+  return converted;
+}
+
+namespace {
+
+glm::vec3 to_vector(const float* values) { return {values[0], values[1], values[2]}; }
+
+/// An array of [count][3]; empty for NULL.
+std::vector<glm::vec3> triples(const float* values, std::size_t count) {
+  if (!values) return {};
+  return to_vectors({values, 3 * count});
+}
+
+/// Indices of vertices are 32 bits wide.
+void require_count(std::size_t count, const char* argument) {
+  constexpr std::size_t k_most = 0xffffffffU / 3;
+  if (count > 0 && count <= k_most) return;
+  throw InvalidArgument(argument, std::to_string(count), "1 to " + std::to_string(k_most));
+}
+
+Instance to_instance(const dpr_mesh* given) {
+  const dpr_mesh mesh = versioned<dpr_mesh>(given, DPR_MESH_INIT, "mesh");
+  deref(mesh.positions, "mesh.positions");
+  deref(mesh.faces, "mesh.faces");
+  require_count(mesh.vertices, "mesh.vertices");
+  require_count(mesh.face_count, "mesh.face_count");
+  Instance instance;
+  Mesh& m = instance.mesh;
+  m.positions = triples(mesh.positions, mesh.vertices);
+  m.faces.reserve(mesh.face_count);
+  for (std::size_t i = 0; i < 3 * mesh.face_count; i += 3)
+    m.faces.emplace_back(mesh.faces[i], mesh.faces[i + 1], mesh.faces[i + 2]);
+  m.vertex_colors = triples(mesh.vertex_colors, mesh.vertices);
+  m.face_colors = triples(mesh.face_colors, mesh.face_count);
+  validate(m);
+  if (mesh.transform) {
+    instance.transform = to_matrix(mesh.transform);
+    checks::require_affine(instance.transform, "mesh.transform");
+  }
+  return instance;
+}
+
+Lights to_lights(const dpr_lights* given) {
+  const dpr_lights lights = versioned<dpr_lights>(given, DPR_LIGHTS_INIT, "lights");
+  if (lights.point_count > 0) deref(lights.point, "lights.point");
+  constexpr std::size_t k_most_lights = 1U << 16U;
+  if (lights.point_count > k_most_lights) {
+    throw InvalidArgument("lights.point_count", std::to_string(lights.point_count),
+                          "at most " + std::to_string(k_most_lights));
+  }
+  constexpr std::array k_shadings{Shading::flat, Shading::phong, Shading::gouraud};
+  const auto shading = static_cast<std::size_t>(lights.shading);
+  if (shading >= k_shadings.size())
+    throw InvalidArgument("lights.shading", std::to_string(shading), "a dpr_shading");
+  Lights converted{to_vector(lights.ambient), {}, lights.shininess, k_shadings[shading]};
+  for (const dpr_point_light& light : std::span(lights.point, lights.point_count)) {
+    converted.point.push_back(
+        {to_vector(light.position), to_vector(light.diffuse), to_vector(light.specular)});
+  }
+  validate(converted);
+  return converted;
+}
+
+void set_smoothing(dpr_scene* scene, const char* key, const OptionValue& value) {
+  SmoothingOptions& options = deref(scene, "scene").smoothing;
+  const std::string name = &deref(key, "key");
+  if (set_option(options, name, value, name)) return;
+  std::string known;
+  for (const std::string_view option : option_keys()) known.append(known.empty() ? "" : ", ").append(option);
+  throw InvalidArgument("key (smoothing)", "\"" + name + "\"", "one of " + known);
+}
+
+/// Turns on the gradient that the word names.
+void ask_for(GradientRequest& request, std::string_view word) {
+  std::string known;
+  for (const GradientName& name : gradient_names()) {
+    if (name.word == word) {
+      request.*name.wanted = true;
+      return;
+    }
+    known.append(known.empty() ? "" : ", ").append(name.word);
+  }
+  throw InvalidArgument("names", "\"" + std::string(word) + "\"", "one of " + known);
+}
+
+}  // namespace
+}  // namespace dpr::c
+
+dpr_status dpr_scene_create(int width, int height, dpr_scene** scene) {
+  return guarded([&] {
+    deref(scene, "scene");
+    constexpr int k_most = dpr::checks::k_largest_side;
+    if (width < 1 || height < 1 || width > k_most || height > k_most) {
+      throw InvalidArgument("size (scene)", dpr::checks::size(width, height),
+                            "1 to " + std::to_string(k_most) + " pixels on a side");
+    }
+    dpr_scene made;
+    made.scene.width = width;
+    made.scene.height = height;
+    give(scene, std::move(made));
+  });
+}
+
+dpr_status dpr_scene_read(const char* file, dpr_scene** scene) {
+  return guarded([&] {
+    deref(file, "file");
+    deref(scene, "scene");
+    give(scene, dpr::read_scene(file), dpr::SmoothingOptions{});
+  });
+}
+
+dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh) {
+  return guarded([&] { deref(scene, "scene").scene.meshes.push_back(dpr::c::to_instance(mesh)); });
+}
+
+dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera) {
+  return guarded([&] { deref(scene, "scene").scene.camera = dpr::c::to_camera(camera, "camera"); });
+}
+
+dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]) {
+  return guarded([&] {
+    deref(scene, "scene");
+    const glm::vec3 background = dpr::c::to_vector(&deref(color, "color"));
+    dpr::checks::require_finite(background, "color");
+    scene->scene.background = background;
+  });
+}
+
+dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights) {
+  return guarded([&] {
+    deref(scene, "scene");
+    if (lights) {
+      scene->scene.lights = dpr::c::to_lights(lights);
+    } else {
+      scene->scene.lights.reset();
+    }
+  });
+}
+
+dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* key, const char* word) {
+  return guarded([&] { dpr::c::set_smoothing(scene, key, std::string(&deref(word, "word"))); });
+}
+
+dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number) {
+  return guarded([&] {
+    if (!std::isfinite(number)) throw InvalidArgument("number", dpr::checks::text(number), "a finite number");
+    dpr::c::set_smoothing(scene, key, number);
+  });
+}
+
+dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, std::size_t count) {
+  return guarded([&] {
+    deref(scene, "scene");
+    if (count > 0) deref(names, "names");
+    if (count > dpr::gradient_names().size()) {
+      throw InvalidArgument("count (names)", std::to_string(count),
+                            "at most " + std::to_string(dpr::gradient_names().size()));
+    }
+    dpr::GradientRequest request = dpr::no_gradients();
+    for (const char* name : std::span(names, count)) dpr::c::ask_for(request, &deref(name, "names"));
+    scene->scene.gradients = request;
+  });
+}
+
+void dpr_scene_destroy(dpr_scene* scene) { delete scene; }

@@ -1,0 +1,131 @@
+// Images on disk, by way of OpenImageIO.
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <stdexcept>
+
+#include "base/checks.hpp"
+#include "image/codec.hpp"
+
+namespace dpr {
+namespace {
+
+// Alpha is the silhouette, not a factor of the colours. OpenImageIO multiplies it in while reading PNG and
+// the like, and takes it out again while writing, unless both sides are told that it is not there.
+constexpr const char* k_unassociated_alpha = "oiio:UnassociatedAlpha";
+
+// Reasons span lines at times; an error is one line.
+std::string one_line(std::string reason) {
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  while (!reason.empty() && reason.back() == ' ') reason.pop_back();
+  return reason.empty() ? "OpenImageIO gives no reason" : reason;
+}
+
+std::unique_ptr<OIIO::ImageInput> open(const std::string& file) {
+  OIIO::ImageSpec configuration;
+  configuration.attribute(k_unassociated_alpha, 1);
+  auto input = OIIO::ImageInput::open(file, &configuration);
+  if (!input) throw std::runtime_error("cannot be read: " + one_line(OIIO::geterror()));
+  return input;
+}
+
+// Which of the file's channels is red, green, blue and alpha; -1 where there is none.
+std::array<int, 4> channels_of(const OIIO::ImageSpec& spec) {
+  if (spec.nchannels == 1) return {0, 0, 0, -1};
+  if (spec.nchannels == 2) return {0, 0, 0, 1};
+  if (spec.nchannels == 4) return {0, 1, 2, 3};
+  return {0, 1, 2, spec.alpha_channel > 2 ? spec.alpha_channel : -1};
+}
+
+/// The values of the channels that the format has.
+std::vector<float> values_of(const Image& image, const PixelFormat& format) {
+  std::vector<float> values;
+  values.reserve(image.pixels.size() * static_cast<std::size_t>(format.channels));
+  for (const glm::vec4& pixel : image.pixels) {
+    const glm::vec4 value = format.bytes ? glm::clamp(pixel, 0.0F, 1.0F) : pixel;
+    for (int c = 0; c < format.channels; ++c) values.push_back(value[c]);
+  }
+  return values;
+}
+
+/// The image as a file's bytes, in memory: OpenImageIO takes some writes to a full disk for successes, and
+/// libjpeg ends the process at one.
+std::vector<unsigned char> encode(const Image& image, const PixelFormat& format) {
+  const auto output = OIIO::ImageOutput::create(format.extension);
+  if (!output) throw std::runtime_error("cannot be written: " + one_line(OIIO::geterror()));
+  OIIO::ImageSpec spec(image.width, image.height, format.channels,
+                       format.bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
+  spec.attribute(k_unassociated_alpha, 1);
+  spec.attribute("DateTime", "");  // none: equal images are equal files
+  OIIO::Filesystem::IOVecOutput bytes;
+  if (!output->set_ioproxy(&bytes) || !output->open("image." + format.extension, spec) ||
+      !output->write_image(OIIO::TypeDesc::FLOAT, values_of(image, format).data()) || !output->close()) {
+    throw std::runtime_error("cannot be written: " + one_line(output->geterror()));
+  }
+  return std::move(bytes.buffer());
+}
+
+/// The rows from `begin` to `end`, all channels.
+bool read_rows(OIIO::ImageInput& input, int begin, int end, std::vector<float>& values) {
+  const OIIO::ImageSpec& spec = input.spec();
+  values.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec.width) *
+                static_cast<std::size_t>(spec.nchannels));
+  const int top = spec.y + begin, bottom = spec.y + end;
+  if (spec.tile_height == 0) {
+    return input.read_scanlines(0, 0, top, bottom, spec.z, 0, spec.nchannels, OIIO::TypeDesc::FLOAT,
+                                values.data());
+  }
+  return input.read_tiles(0, 0, spec.x, spec.x + spec.width, top, bottom, spec.z, spec.z + 1, 0,
+                          spec.nchannels, OIIO::TypeDesc::FLOAT, values.data());
+}
+
+/// Appends the pixels of some rows; what their file does not have is one.
+void append_pixels(const std::vector<float>& values, std::size_t channels, const std::array<int, 4>& source,
+                   std::vector<glm::vec4>& pixels) {
+  for (std::size_t i = 0; i < values.size(); i += channels) {
+    glm::vec4& pixel = pixels.emplace_back(1);
+    for (int c = 0; c < 4; ++c) {
+      const int from = source[static_cast<std::size_t>(c)];
+      if (from >= 0) pixel[c] = values[i + static_cast<std::size_t>(from)];
+    }
+  }
+}
+
+Image read(const std::string& file, bool& has_alpha) {
+  const auto input = open(file);
+  const OIIO::ImageSpec& spec = input->spec();
+  if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
+      spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {
+    throw std::runtime_error("got " + checks::size(spec.width, spec.height) + " pixels in " +
+                             std::to_string(spec.nchannels) + " channels, expected 1 to " +
+                             std::to_string(checks::k_largest_side) +
+                             " pixels on a side in one channel or more");
+  }
+  const std::array<int, 4> source = channels_of(spec);
+  Image image;
+  image.width = spec.width;
+  image.height = spec.height;
+  // In bands, so that a few bytes that claim to be a large image do not take the memory of one.
+  constexpr int k_rows = 64;
+  const int rows = spec.tile_height > 0 ? spec.tile_height : k_rows;
+  std::vector<float> values;
+  for (int row = 0; row < spec.height; row += rows) {
+    if (!read_rows(*input, row, std::min(row + rows, spec.height), values))
+      throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
+    append_pixels(values, static_cast<std::size_t>(spec.nchannels), source, image.pixels);
+  }
+  has_alpha = source[3] >= 0;
+  return image;
+}
+
+bool holds_floats(const std::string& file) { return open(file)->spec().format.is_floating_point(); }
+
+constexpr ImageCodec k_codec{holds_floats, read, encode};
+
+}  // namespace
+}  // namespace dpr
+
+extern "C" DPR_API const dpr::ImageCodec* dpr_image_codec() { return &dpr::k_codec; }

@@ -1,0 +1,345 @@
+/* The C interface from C99: an image, its gradients, the caller's OpenCL objects, and every argument that is
+ * wrong. */
+#include <dpr/dpr.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CL_TARGET_OPENCL_VERSION 120
+#include <CL/cl.h>
+
+enum { SIDE = 16, FLOATS = SIDE * SIDE * 4 };
+
+static int failures = 0;
+
+static void expect(int condition, const char* what, int line) {
+  if (condition) return;
+  ++failures;
+  printf("line %d: not so: %s (last error: %s)\n", line, what, dpr_last_error());
+}
+
+#define EXPECT(condition) expect(condition, #condition, __LINE__)
+#define OK(call) expect((call) == DPR_SUCCESS, #call, __LINE__)
+
+/* The call is refused as an invalid argument, with one sentence that has these words. */
+#define REFUSED(call, words)                                                          \
+  expect((call) == DPR_INVALID_ARGUMENT && strstr(dpr_last_error(), words) != NULL && \
+             strchr(dpr_last_error(), '\n') == NULL,                                  \
+         #call " is refused with \"" words "\"", __LINE__)
+
+static const float positions[] = {-1, -1, 0, 1, -1, 0, 0, 1, 0};
+static const uint32_t faces[] = {0, 1, 2};
+static const float colors[] = {1, 0.5f, 0.25f};
+
+static dpr_mesh triangle(void) {
+  dpr_mesh mesh = DPR_MESH_INIT;
+  mesh.positions = positions;
+  mesh.vertices = 3;
+  mesh.faces = faces;
+  mesh.face_count = 1;
+  mesh.face_colors = colors;
+  return mesh;
+}
+
+static dpr_camera three_units_away(void) {
+  dpr_camera camera = DPR_CAMERA_INIT;
+  camera.view[11] = -3; /* row 2, column 3 */
+  return camera;
+}
+
+static dpr_scene* make_scene(void) {
+  const dpr_mesh mesh = triangle();
+  const dpr_camera camera = three_units_away();
+  const char* const wanted[] = {"positions", "smoothing"};
+  dpr_scene* scene = NULL;
+  OK(dpr_scene_create(SIDE, SIDE, &scene));
+  OK(dpr_scene_add_mesh(scene, &mesh));
+  OK(dpr_scene_set_camera(scene, &camera));
+  OK(dpr_scene_set_smoothing_word(scene, "preset", "joint_gaussian"));
+  OK(dpr_scene_set_smoothing_number(scene, "sigma", 0.01));
+  OK(dpr_scene_set_gradients(scene, wanted, 2));
+  return scene;
+}
+
+static dpr_loss* make_loss(const dpr_device* device, const float* targets) {
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT;
+  dpr_loss* loss = NULL;
+  weights.mse = 1;
+  OK(dpr_loss_create(device, &weights, targets, FLOATS, 1, SIDE, SIDE, &loss));
+  return loss;
+}
+
+/* A step against the gradient lowers the loss by what the gradient says of it. */
+static void test_descent(const dpr_device* device, dpr_scene* scene) {
+  const float step = 1e-3f;
+  float target[FLOATS], moved[9];
+  double before = 0, after = 0, grad[9], squared = 0, sigma = 0;
+  size_t count = 0, i;
+  const char* name = NULL;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  dpr_loss* loss;
+  for (i = 0; i < FLOATS; ++i) target[i] = 0;
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  loss = make_loss(device, target);
+  OK(dpr_loss_evaluate(loss, renderer, &before));
+  OK(dpr_backward_loss(renderer, loss, &gradient));
+  OK(dpr_gradient_count(gradient, &count));
+  EXPECT(count == 4); /* the positions; sigma, gamma and alpha */
+  OK(dpr_gradient_name(gradient, 0, &name));
+  EXPECT(strcmp(name, "meshes[0].positions") == 0);
+  OK(dpr_gradient_size(gradient, name, &count));
+  EXPECT(count == 9);
+  OK(dpr_gradient_read(gradient, name, grad, 9));
+  OK(dpr_gradient_read(gradient, "sigma", &sigma, 1));
+  EXPECT(sigma != 0);
+  for (i = 0; i < 9; ++i) {
+    squared += grad[i] * grad[i];
+    moved[i] = positions[i] - step * (float)grad[i];
+  }
+  OK(dpr_renderer_set_positions(renderer, 0, moved, 9));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_loss_evaluate(loss, renderer, &after));
+  EXPECT(squared > 0 && fabs((before - after) / (step * squared) - 1) < 0.05);
+  REFUSED(dpr_gradient_read(gradient, name, grad, 8), "got 8, expected 9");
+  REFUSED(dpr_gradient_read(gradient, "sigmas", grad, 1), "\"sigmas\"");
+  REFUSED(dpr_gradient_size(gradient, NULL, &count), "name");
+  REFUSED(dpr_gradient_name(gradient, 4, &name), "below 4");
+  dpr_gradient_destroy(gradient);
+  dpr_loss_destroy(loss);
+  dpr_renderer_destroy(renderer);
+}
+
+/* Views of one scene are images of one frame; a gradient of pixels counts them all. */
+static void test_views(const dpr_device* device, const dpr_scene* scene) {
+  dpr_camera cameras[2];
+  float pixels[2 * FLOATS];
+  double both[9];
+  size_t count = 0, i;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  cameras[0] = cameras[1] = three_units_away();
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_set_views(renderer, cameras, 2, NULL, 0));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_image_size(renderer, &count));
+  EXPECT(count == 2 * FLOATS);
+  OK(dpr_renderer_read_image(renderer, pixels, count));
+  EXPECT(memcmp(pixels, pixels + FLOATS, sizeof pixels / 2) == 0);
+  EXPECT(pixels[4 * (SIDE * SIDE / 2 + SIDE / 2)] > 0.9f);
+  for (i = 0; i < count; ++i) pixels[i] = i < FLOATS ? 0 : 1; /* of the second view alone */
+  OK(dpr_backward_pixels(renderer, pixels, count, &gradient));
+  OK(dpr_gradient_read(gradient, "meshes[0].positions", both, 9));
+  EXPECT(both[7] > 0); /* the top vertex: moved up, more is seen of the triangle */
+  REFUSED(dpr_backward_pixels(renderer, pixels, count - 4, &gradient), "pixels");
+  REFUSED(dpr_backward_pixels(renderer, pixels, 3, &gradient), "multiple of 4");
+  REFUSED(dpr_renderer_read_image(renderer, pixels, FLOATS), "count");
+  REFUSED(dpr_renderer_set_views(renderer, cameras, 0, NULL, 0), "views");
+  REFUSED(dpr_renderer_set_views(renderer, cameras, (size_t)-1, NULL, 0), "views");
+  REFUSED(dpr_renderer_set_views(renderer, NULL, 1, NULL, 0), "cameras");
+  REFUSED(dpr_renderer_set_views(renderer, cameras, 2, pixels, 16), "expected 32");
+  cameras[1].zfar = NAN;
+  REFUSED(dpr_renderer_set_views(renderer, cameras, 2, NULL, 0), "zfar");
+  dpr_gradient_destroy(gradient);
+  dpr_renderer_destroy(renderer);
+}
+
+/* In the caller's context, on the caller's queue: images and gradients as buffers. */
+static void test_own_opencl(const dpr_scene* scene) {
+  cl_platform_id platform;
+  cl_device_id id;
+  cl_context context;
+  cl_command_queue queue;
+  cl_mem image = NULL;
+  float read[FLOATS], mapped[FLOATS];
+  double of_buffer[9], of_pixels[9];
+  dpr_device* device = NULL;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient *first = NULL, *second = NULL;
+  EXPECT(clGetPlatformIDs(1, &platform, NULL) == CL_SUCCESS);
+  EXPECT(clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 1, &id, NULL) == CL_SUCCESS);
+  context = clCreateContext(NULL, 1, &id, NULL, NULL, NULL);
+  queue = clCreateCommandQueue(context, id, 0, NULL);
+  OK(dpr_device_adopt(context, queue, &device));
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  REFUSED(dpr_renderer_image_buffer(renderer, &image), "forward");
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, read, FLOATS));
+  OK(dpr_renderer_image_buffer(renderer, &image));
+  EXPECT(clEnqueueReadBuffer(queue, image, CL_TRUE, 0, sizeof mapped, mapped, 0, NULL, NULL) == CL_SUCCESS);
+  EXPECT(memcmp(read, mapped, sizeof read) == 0);
+  OK(dpr_backward_buffer(renderer, image, &first));
+  OK(dpr_backward_pixels(renderer, read, FLOATS, &second));
+  OK(dpr_gradient_read(first, "meshes[0].positions", of_buffer, 9));
+  OK(dpr_gradient_read(second, "meshes[0].positions", of_pixels, 9));
+  EXPECT(memcmp(of_buffer, of_pixels, sizeof of_buffer) == 0);
+  REFUSED(dpr_backward_buffer(renderer, NULL, &first), "grad");
+  REFUSED(dpr_device_adopt(NULL, queue, &device), "context");
+  REFUSED(dpr_device_adopt(context, NULL, &device), "queue");
+  dpr_gradient_destroy(first);
+  dpr_gradient_destroy(second);
+  dpr_renderer_destroy(renderer);
+  dpr_device_destroy(device);
+  clReleaseCommandQueue(queue);
+  clReleaseContext(context);
+}
+
+static void test_wrong_meshes(dpr_scene* scene) {
+  const float not_finite[] = {-1, -1, 0, 1, NAN, 0, 0, 1, 0};
+  const float singular[16] = {0};
+  const uint32_t beyond[] = {0, 1, 3};
+  dpr_mesh mesh = triangle();
+  REFUSED(dpr_scene_add_mesh(NULL, &mesh), "scene");
+  REFUSED(dpr_scene_add_mesh(scene, NULL), "mesh");
+  mesh.positions = NULL;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.positions");
+  mesh.positions = not_finite;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "positions[1]");
+  mesh = triangle();
+  mesh.faces = NULL;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.faces");
+  mesh.faces = beyond;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "vertex 3");
+  mesh = triangle();
+  mesh.vertices = (size_t)-1;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.vertices");
+  mesh = triangle();
+  mesh.face_count = 0;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.face_count");
+  mesh = triangle();
+  mesh.vertex_colors = positions;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "face_colors");
+  mesh = triangle();
+  mesh.transform = singular;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.transform");
+  mesh = triangle();
+  mesh.size = 0;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.size");
+  mesh.size = sizeof mesh + 8; /* of a later version, with more than this library knows */
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.size");
+}
+
+static void test_wrong_scenes(void) {
+  const float black[3] = {0, 0, INFINITY};
+  const char* const names[] = {"positions", "position"};
+  dpr_point_light light = {{0, 0, 0}, {1, 1, 1}, {0, 0, NAN}};
+  dpr_lights lights = DPR_LIGHTS_INIT;
+  dpr_camera camera = three_units_away();
+  dpr_scene *scene = NULL, *none = NULL;
+  REFUSED(dpr_scene_create(0, SIDE, &none), "0x16");
+  REFUSED(dpr_scene_create(SIDE, 1 << 30, &none), "pixels");
+  REFUSED(dpr_scene_create(SIDE, SIDE, NULL), "scene");
+  EXPECT(dpr_scene_read("no-such-file.json", &none) == DPR_IO_ERROR);
+  EXPECT(strstr(dpr_last_error(), "no-such-file.json") != NULL);
+  REFUSED(dpr_scene_read(NULL, &none), "file");
+  EXPECT(none == NULL);
+  OK(dpr_scene_create(SIDE, SIDE, &scene));
+  camera.fov_y_degrees = 180;
+  REFUSED(dpr_scene_set_camera(scene, &camera), "fov_y_degrees");
+  camera = three_units_away();
+  camera.view[0] = NAN;
+  REFUSED(dpr_scene_set_camera(scene, &camera), "view");
+  REFUSED(dpr_scene_set_camera(scene, NULL), "camera");
+  REFUSED(dpr_scene_set_background(scene, black), "color");
+  REFUSED(dpr_scene_set_background(scene, NULL), "color");
+  lights.point_count = 1;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point");
+  lights.point = &light;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "finite");
+  lights.point_count = (size_t)-1;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point_count");
+  lights.point_count = 0;
+  lights.shading = (dpr_shading)7;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "lights.shading");
+  OK(dpr_scene_set_lights(scene, NULL));
+  REFUSED(dpr_scene_set_smoothing_word(scene, "preset", "soft"), "softras");
+  REFUSED(dpr_scene_set_smoothing_word(scene, "sigma", "wide"), "a number");
+  REFUSED(dpr_scene_set_smoothing_word(scene, NULL, "wide"), "key");
+  REFUSED(dpr_scene_set_smoothing_word(scene, "preset", NULL), "word");
+  REFUSED(dpr_scene_set_smoothing_number(scene, "sgima", 1), "one of preset");
+  REFUSED(dpr_scene_set_smoothing_number(scene, "sigma", NAN), "finite");
+  REFUSED(dpr_scene_set_smoothing_number(scene, "samples", 2.5), "whole");
+  REFUSED(dpr_scene_set_gradients(scene, names, 2), "\"position\"");
+  REFUSED(dpr_scene_set_gradients(scene, names, 1000), "count");
+  REFUSED(dpr_scene_set_gradients(scene, NULL, 1), "names");
+  test_wrong_meshes(scene);
+  dpr_scene_destroy(scene);
+}
+
+static void test_wrong_renderers(const dpr_device* device, const dpr_scene* scene) {
+  const float target[FLOATS] = {NAN};
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT;
+  float pixels[FLOATS];
+  double value = 0;
+  size_t count = 0;
+  dpr_renderer *renderer = NULL, *none = NULL;
+  dpr_scene* empty = NULL;
+  dpr_loss* loss = NULL;
+  dpr_gradient* gradient = NULL;
+  REFUSED(dpr_renderer_create(NULL, &none), "device");
+  REFUSED(dpr_renderer_create(device, NULL), "renderer");
+  OK(dpr_renderer_create(device, &renderer));
+  REFUSED(dpr_renderer_forward(renderer), "scene");
+  REFUSED(dpr_renderer_forward(NULL), "renderer");
+  REFUSED(dpr_renderer_read_image(renderer, pixels, 0), "forward");
+  REFUSED(dpr_renderer_set_positions(renderer, 0, positions, 9), "scene");
+  OK(dpr_scene_create(SIDE, SIDE, &empty));
+  REFUSED(dpr_renderer_set_scene(renderer, empty), "mesh");
+  OK(dpr_renderer_set_scene(renderer, scene));
+  REFUSED(dpr_renderer_set_positions(renderer, 1, positions, 9), "below 1");
+  REFUSED(dpr_renderer_set_positions(renderer, 0, positions, 6), "expected 3");
+  REFUSED(dpr_renderer_set_positions(renderer, 0, positions, 8), "multiple of 3");
+  REFUSED(dpr_renderer_set_positions(renderer, 0, NULL, 9), "positions");
+  REFUSED(dpr_renderer_set_colors(renderer, 0, colors, 9), "expected 1");
+  weights.mse = 1;
+  REFUSED(dpr_loss_create(device, &weights, target, FLOATS, 1, SIDE, SIDE, &loss), "finite");
+  REFUSED(dpr_loss_create(device, &weights, target, FLOATS, 2, SIDE, SIDE, &loss), "count");
+  REFUSED(dpr_loss_create(device, &weights, NULL, FLOATS, 1, SIDE, SIDE, &loss), "targets");
+  REFUSED(dpr_loss_create(device, NULL, target, FLOATS, 1, SIDE, SIDE, &loss), "weights");
+  weights.mse = -1;
+  REFUSED(dpr_loss_create(device, &weights, pixels, FLOATS, 1, SIDE, SIDE, &loss), "weight");
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, pixels, FLOATS));
+  loss = make_loss(device, pixels);
+  REFUSED(dpr_backward_loss(renderer, loss, &gradient), "loss");
+  REFUSED(dpr_loss_evaluate(loss, NULL, &value), "renderer");
+  REFUSED(dpr_loss_evaluate(loss, renderer, NULL), "value");
+  REFUSED(dpr_gradient_count(NULL, &count), "gradient");
+  EXPECT(gradient == NULL && none == NULL);
+  dpr_loss_destroy(loss);
+  dpr_scene_destroy(empty);
+  dpr_renderer_destroy(renderer);
+  dpr_device_destroy(NULL);
+  dpr_scene_destroy(NULL);
+  dpr_renderer_destroy(NULL);
+  dpr_loss_destroy(NULL);
+  dpr_gradient_destroy(NULL);
+}
+
+int main(void) {
+  dpr_device* device = NULL;
+  dpr_scene* scene;
+  const char* name = NULL;
+  EXPECT(strcmp(dpr_last_error(), "") == 0);
+  EXPECT(strncmp(dpr_version(), "0.", 2) == 0);
+  REFUSED(dpr_device_open("no such device", &device), "no such device");
+  REFUSED(dpr_device_open("", NULL), "device");
+  OK(dpr_device_open(NULL, &device));
+  OK(dpr_device_name(device, &name));
+  EXPECT(name != NULL && strlen(name) > 0);
+  scene = make_scene();
+  test_descent(device, scene);
+  test_views(device, scene);
+  test_own_opencl(scene);
+  test_wrong_scenes();
+  test_wrong_renderers(device, scene);
+  dpr_scene_destroy(scene);
+  dpr_device_destroy(device);
+  printf("%d failures\n", failures);
+  return failures == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}

@@ -1,0 +1,97 @@
+"""The C interface from Python's ctypes: a triangle is moved towards its image. Argument: the shared library."""
+
+import ctypes
+import sys
+from ctypes import byref, c_char_p, c_double, c_float, c_int, c_size_t, c_uint32, c_void_p
+
+SIDE = 16
+
+
+class Mesh(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("positions", c_void_p), ("vertices", c_size_t), ("faces", c_void_p),
+                ("face_count", c_size_t), ("vertex_colors", c_void_p), ("face_colors", c_void_p),
+                ("transform", c_void_p)]
+
+
+class Camera(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("view", c_float * 16), ("fov_y_degrees", c_float)]
+
+
+class LossWeights(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("mse", c_float), ("l1", c_float), ("silhouette", c_float)]
+
+
+class Library:
+    """The functions, whose failures are exceptions."""
+
+    def __init__(self, file):
+        self.library = ctypes.CDLL(file)
+        self.library.dpr_last_error.restype = c_char_p
+        self.library.dpr_version.restype = c_char_p
+
+    def __getattr__(self, name):
+        function = getattr(self.library, "dpr_" + name)
+
+        def call(*arguments):
+            if function(*arguments) != 0:
+                raise RuntimeError(self.library.dpr_last_error().decode())
+
+        return call
+
+
+def refusal(call, *arguments):
+    try:
+        call(*arguments)
+    except RuntimeError as error:
+        return str(error)
+    return ""
+
+
+def main():
+    dpr = Library(sys.argv[1])
+    assert dpr.library.dpr_version().startswith(b"0.")
+    positions = (c_float * 9)(-1, -1, 0, 1, -1, 0, 0, 1, 0)
+    faces = (c_uint32 * 3)(0, 1, 2)
+    mesh = Mesh(ctypes.sizeof(Mesh), ctypes.addressof(positions), 3, ctypes.addressof(faces), 1)
+    # An older program's camera: what it does not have keeps its default.
+    camera = Camera(ctypes.sizeof(Camera), (c_float * 16)(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3, 0, 0, 0, 1), 60)
+
+    device, scene, renderer, loss = c_void_p(), c_void_p(), c_void_p(), c_void_p()
+    dpr.device_open(b"cpu", byref(device))
+    dpr.scene_create(c_int(SIDE), c_int(SIDE), byref(scene))
+    dpr.scene_add_mesh(scene, byref(mesh))
+    dpr.scene_set_camera(scene, byref(camera))
+    dpr.scene_set_smoothing_word(scene, b"preset", b"joint_gaussian")
+    dpr.scene_set_smoothing_number(scene, b"sigma", c_double(0.01))
+    dpr.renderer_create(device, byref(renderer))
+    dpr.renderer_set_scene(renderer, scene)
+    dpr.renderer_forward(renderer)
+    target = (c_float * (SIDE * SIDE * 4))()
+    dpr.renderer_read_image(renderer, target, c_size_t(len(target)))
+    assert max(target) > 0.9, max(target)
+    weights = LossWeights(ctypes.sizeof(LossWeights), 1, 0, 0)
+    dpr.loss_create(device, byref(weights), target, c_size_t(len(target)), c_size_t(1), c_int(SIDE), c_int(SIDE),
+                    byref(loss))
+
+    moved = (c_float * 9)(*(x + 0.1 for x in positions))
+    losses, gradient = [], c_void_p()
+    for _ in range(40):
+        dpr.renderer_set_positions(renderer, c_size_t(0), moved, c_size_t(9))
+        dpr.renderer_forward(renderer)
+        value, grad = c_double(), (c_double * 9)()
+        dpr.loss_evaluate(loss, renderer, byref(value))
+        dpr.backward_loss(renderer, loss, byref(gradient))
+        dpr.gradient_read(gradient, b"meshes[0].positions", grad, c_size_t(9))
+        dpr.library.dpr_gradient_destroy(gradient)
+        moved = (c_float * 9)(*(x - g for x, g in zip(moved, grad)))
+        losses.append(value.value)
+    print("loss", losses[0], "to", losses[-1])
+    assert losses[-1] < 0.1 * losses[0], losses
+
+    assert "NULL" in refusal(dpr.scene_add_mesh, scene, None)
+    assert "multiple of 3" in refusal(dpr.renderer_set_positions, renderer, c_size_t(0), moved, c_size_t(8))
+    for kind, handle in (("loss", loss), ("renderer", renderer), ("scene", scene), ("device", device)):
+        getattr(dpr.library, f"dpr_{kind}_destroy")(handle)
+
+
+main()
