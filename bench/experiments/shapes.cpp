@@ -119,9 +119,13 @@ std::vector<Method> make_methods(bool smoke) {
   paper.loss = {.l1 = 1, .silhouette = 1};
   paper.regularizers.laplacian = 3e-3F;
   paper.learning_rate = 0.01;
+  ShapeOptions narrow = options;  // edges and seams of triangles are as wide as their noise
+  narrow.blur = 0.5F;
+  narrow.blur_end = 0.1F;
   return {{"default", options, ""},
-          {"joint", options, "joint_gaussian"},
-          {"softras", options, "softras"},
+          {"barrier", narrow, "gaussian"},
+          {"joint", narrow, "joint_gaussian"},
+          {"softras", narrow, "softras"},
           {"adaptive smoothing", adaptive, ""},
           {"direct steps, Laplacian", paper, ""}};
 }

@@ -118,6 +118,8 @@ struct PoseResult : PoseHypothesis {
   unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose
   bool explained = false;   ///< see PoseOptions::explained
+  /// What was found along with the pose: fixed where the scene's own light explains the target.
+  PoseLight light = PoseLight::fixed;
   double seconds = 0;
   std::vector<PoseIteration> history;
 };

@@ -56,7 +56,7 @@ struct ShapeOptions {
   unsigned remesh_interval = 50;
   /// > 0: of the edges, in pixels of the level, at its beginning and at its end. Where the views have a
   /// smoothing of their own, that is the end, and it begins blur / blur_end times as wide.
-  float blur = 0.5F, blur_end = 0.1F;
+  float blur = 1.0F, blur_end = 0.2F;
   ShapeSchedule schedule = ShapeSchedule::annealed;
   ShapeSteps steps = ShapeSteps::large_steps;
   float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
@@ -69,9 +69,9 @@ struct ShapeOptions {
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
 };
 
-/// The smoothing at the finest level's end: that of the views, or else the exact Gaussian barrier with edges
-/// blurred by `blur_end`, and depths by the same length in the world. A level with half the pixels has twice
-/// the blur. Throws InvalidArgument where cameras see no common point.
+/// The smoothing at the finest level's end: that of the views, or else Gaussian noise of the pixel's position
+/// by `blur_end`, and of depths by the same length in the world. A level with half the pixels has twice the
+/// blur. Throws InvalidArgument where cameras see no common point.
 Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options);
 
 /// One iteration: what it evaluated, and how.

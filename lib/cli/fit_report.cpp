@@ -217,6 +217,9 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
 
   Page page(source);
   page.add_heading("Images, and the shape from there");
+  if (compared.size() < views_.views.size()) {
+    page.add_paragraph(format("%zu of the %zu images.", compared.size(), views_.views.size()));
+  }
   page.add_player({}, compared);
   page.add_heading("From the start to the end");
   page.add_player({target}, one_by_one(iterations));

@@ -191,8 +191,8 @@ void Page::add_player(const std::vector<Picture>& fixed, const std::vector<std::
            " hidden>\n" + figures(fixed) +
            "</div>\n<div class=\"controls\" hidden><button type=\"button\">Play</button>"
            "<input type=\"range\" aria-label=\"frame\" min=\"0\" value=\"0\" max=\"" +
-           std::to_string(last) + "\"></div>\n<details open><summary>All " + std::to_string(rows.size()) +
-           "</summary>\n<div class=\"rows\" " + count("row", row) + ">\n";
+           std::to_string(last) + "\"></div>\n<details open><summary>The " + std::to_string(rows.size()) +
+           " pictures</summary>\n<div class=\"rows\" " + count("row", row) + ">\n";
   for (const std::vector<Picture>& pictures : rows)
     html_ += "<div class=\"row\">\n" + figures(pictures) + "</div>\n";
   html_ += "</div></details>\n</section>\n";

@@ -34,9 +34,9 @@ struct PoseCommandOptions {
 };
 
 PoseLight parse_light(const std::string& word) {
-  if (word == "fixed") return PoseLight::fixed;
-  if (word == "gain") return PoseLight::gain;
-  if (word == "harmonics") return PoseLight::harmonics;
+  for (const PoseLight light : {PoseLight::fixed, PoseLight::gain, PoseLight::harmonics}) {
+    if (word == name_of(light)) return light;
+  }
   throw InvalidArgument("--light (command line)", "\"" + word + "\"", "harmonics, gain or fixed");
 }
 

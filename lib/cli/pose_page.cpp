@@ -9,6 +9,19 @@ namespace {
 
 std::string vector_text(const glm::dvec3& v) { return format("%.6g, %.6g, %.6g", v.x, v.y, v.z); }
 
+/// A solver that tries rotations all around does not go on from the start.
+std::string search_text(const PoseResult& result) {
+  if (result.history.empty() || result.history.front().hypotheses == 1) return "";
+  return " Many poses are turned at once: an iteration shows the best of them.";
+}
+
+std::string light_text(const PoseResult& result) {
+  if (result.light == PoseLight::fixed) return "";
+  return " The target's light is not the scene's: it was found along with the pose. These pictures are in "
+         "the "
+         "scene's.";
+}
+
 void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
   std::vector<TableRow> rows;
   if (truth) {
@@ -47,7 +60,8 @@ void write_pose_page(const std::filesystem::path& file, const PageSource& source
   Page page(source);
   page.add_pictures({pictures.target, pictures.start, pictures.end, pictures.difference});
   page.add_heading("From the start to the end");
-  page.add_paragraph("Start and end are rendered without smoothing, the iterations as the solver saw them.");
+  page.add_paragraph("Start and end are rendered without smoothing, the iterations as the solver saw them." +
+                     search_text(result) + light_text(result));
   std::vector<std::vector<Picture>> rows;
   for (const Picture& frame : pictures.frames) rows.push_back({frame});
   page.add_player({pictures.target}, rows);

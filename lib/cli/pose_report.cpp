@@ -137,13 +137,24 @@ Json covariance_to_json(const std::vector<double>& covariance) {
 
 }  // namespace
 
+const char* name_of(PoseLight light) {
+  switch (light) {
+    case PoseLight::gain:
+      return "gain";
+    case PoseLight::harmonics:
+      return "harmonics";
+    default:
+      return "fixed";
+  }
+}
+
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);
   return [progress, iterations](const PoseIteration& step) {
-    char text[96];
-    std::snprintf(text, sizeof text, "descent %u  %dx%d  %u poses  loss %.4e  sigma %.1e", step.descent + 1,
-                  step.width, step.height, step.hypotheses, step.loss, number(step.smoothing.sigma));
-    progress->update(step.iteration % iterations + 1, text);
+    const std::string restart = step.descent > 0 ? format("restart %u  ", step.descent) : "";
+    progress->update(step.iteration % iterations + 1,
+                     restart + format("%dx%d  poses tried: %u  loss %.4e", step.width, step.height,
+                                      step.hypotheses, step.loss));
     return true;
   };
 }
@@ -152,6 +163,7 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   const glm::dmat3 stretch = stretch_of(scene);
   Json json = to_json(result, stretch);
   json["explained"] = result.explained;
+  json["light"] = name_of(result.light);
   json["iterations"] = result.iterations;
   json["seconds"] = result.seconds;
   if (truth) {

@@ -11,6 +11,9 @@
 
 namespace dpr::cli {
 
+/// As --light and pose.json have it.
+const char* name_of(PoseLight light);
+
 /// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
 /// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);

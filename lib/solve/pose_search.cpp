@@ -275,6 +275,7 @@ void Fit::finish(bool anywhere) {
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = covariance(candidates_.front().equations, space_.size());
   if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
+  result_.light = light_;
   result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong_;
 }
 

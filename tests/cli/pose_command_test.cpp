@@ -66,6 +66,7 @@ TEST_SUITE("pipeline") {
     CHECK(pose["transform"][0][3].get<double>() == doctest::Approx(pose["translation"][0].get<double>()));
     CHECK(pose["loss"].get<double>() < 1e-3);
     CHECK(pose["explained"] == true);
+    CHECK(pose["light"] == "fixed");
     CHECK(pose["focal_scale"] == 1.0);
     CHECK(pose["covariance"].size() == 6);
     CHECK(pose["covariance"][5].size() == 6);

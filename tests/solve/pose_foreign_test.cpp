@@ -67,6 +67,7 @@ TEST_SUITE("pipeline") {
       errors.push_back(dpr::angle_degrees(result.pose.rotation, rotation_of(rows)));
       CAPTURE(picture);
       CHECK(result.explained);
+      CHECK(result.light == dpr::PoseLight::harmonics);
       CHECK(errors.back() < 2);
     }
     REQUIRE(errors.size() == 6);
