@@ -11,6 +11,8 @@
 #include "experiments/pose/figures.hpp"
 #include "experiments/pose/problems.hpp"
 #include "experiments/pose/protocol.hpp"
+#include "support/data.hpp"
+#include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
 namespace {
@@ -52,6 +54,27 @@ TEST_SUITE("gradient") {
       const glm::dvec3 found = dpr::bench::rotation_vector_gradient(r, left);
       CHECK(glm::length(found - wanted) < 1e-7);
       if (angle >= 0.5) CHECK(glm::length(left - wanted) > 1e-2);  // they are not the same thing
+    }
+  }
+}
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("clutter does not count, however much wrong hypotheses leave: the robust scale is bounded") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = dpr::read_scene(dpr::test::data_folder() / "foreign" / "spot.json");
+    scene.width = scene.height = 64;
+    PoseProblemSet set;
+    set.clutter = true;
+    set.occluded = 0.2;
+    dpr::LeastSquares method;
+    method.robust = true;
+    dpr::bench::RigidCamera camera(device, scene);
+    for (PoseProblem problem : dpr::bench::make_pose_problems(set, 2)) {
+      problem.truth.translation = glm::dvec3(scene.meshes.front().transform[3]);
+      const dpr::Image target = dpr::bench::make_target(camera, set, problem);
+      const dpr::PoseResult result = dpr::PoseSolver(device, scene, target, {.method = method}).search();
+      CHECK(dpr::angle_degrees(result.pose.rotation, problem.truth.rotation) < 3);
     }
   }
 }
