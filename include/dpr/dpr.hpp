@@ -24,4 +24,5 @@
 #include "dpr/smoothing.hpp"
 #include "dpr/smoothing_options.hpp"
 #include "dpr/texture.hpp"
+#include "dpr/version.hpp"
 #include "dpr/voxels.hpp"
