@@ -119,7 +119,9 @@ Renderer BatchRenderer::take(const Topology& topology) {
   Scene scene;
   scene.width = width_;
   scene.height = height_;
-  Mesh mesh{std::vector<glm::vec3>(topology.vertices), faces_, {}, {}, {}, {}};
+  Mesh mesh;
+  mesh.positions.resize(topology.vertices);
+  mesh.faces = faces_;
   if (topology.face_colors) {
     mesh.face_colors.resize(faces_.size());
   } else {
