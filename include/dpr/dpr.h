@@ -105,7 +105,7 @@ typedef struct dpr_lights {
   const dpr_point_light* point; /* [point_count]; NULL if that is 0 */
   size_t point_count;
   float shininess; /* >= 1 */
-  dpr_shading shading;
+  int shading; /* a dpr_shading */
 } dpr_lights;
 
 #define DPR_LIGHTS_INIT \

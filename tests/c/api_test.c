@@ -254,7 +254,7 @@ static void test_wrong_scenes(void) {
   lights.point_count = (size_t)-1;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point_count");
   lights.point_count = 0;
-  lights.shading = (dpr_shading)7;
+  lights.shading = 7;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.shading");
   OK(dpr_scene_set_lights(scene, NULL));
   REFUSED(dpr_scene_set_smoothing_word(scene, "preset", "soft"), "softras");

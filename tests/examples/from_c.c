@@ -24,10 +24,8 @@ int main(void) {
   dpr_mesh mesh = DPR_MESH_INIT;
   dpr_camera camera = DPR_CAMERA_INIT;
   dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT;
-  mesh.positions = positions;
-  mesh.vertices = 3;
-  mesh.faces = faces;
-  mesh.face_count = 1;
+  mesh.positions = positions, mesh.vertices = 3;
+  mesh.faces = faces, mesh.face_count = 1;
   camera.view[4 * 2 + 3] = -3; /* row-major: three units in front of the camera */
   weights.mse = 1;
 
@@ -55,5 +53,7 @@ int main(void) {
     if (step == 0) first = loss;
   }
   printf("loss %g, then %g\n", first, loss);
+  dpr_loss_destroy(image_loss), dpr_renderer_destroy(renderer);
+  dpr_scene_destroy(scene), dpr_device_destroy(device);
   return loss < 0.1 * first ? EXIT_SUCCESS : EXIT_FAILURE;
 }
