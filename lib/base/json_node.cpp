@@ -83,6 +83,14 @@ nlohmann::json parse_json(const std::filesystem::path& file, std::string_view te
   }
 }
 
+std::filesystem::path JsonNode::file_in(const std::filesystem::path& folder) const {
+  std::filesystem::path file = folder / string();
+  std::error_code error;
+  if (!std::filesystem::exists(file, error))
+    throw IoError(file, "the file does not exist, which " + name() + " names");
+  return file;
+}
+
 std::string JsonNode::name() const { return (path_.empty() ? "the document" : path_) + " (" + file_ + ")"; }
 
 void JsonNode::fail(const std::string& got, const std::string& expected) const {

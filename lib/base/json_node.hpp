@@ -44,6 +44,9 @@ class JsonNode {
   float number() const;  ///< finite, also as a float
   bool boolean() const;
   std::string string() const;
+  /// The file that this names, relative to the folder. Throws IoError, which names this too, where there is
+  /// none.
+  std::filesystem::path file_in(const std::filesystem::path& folder) const;
   glm::vec3 vec3() const;
   glm::mat4 mat4() const;  ///< four rows of four
   /// A whole number of at most that value; negative ones are refused.

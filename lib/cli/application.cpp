@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "base/name_list.hpp"
 #include "cli/completion.hpp"
 #include "cli/process.hpp"
 #include "dpr/error.hpp"
@@ -30,16 +32,43 @@ std::string command_name(const CLI::App& application) {
   return chosen.empty() ? name : name + " " + chosen.front()->get_name();
 }
 
+/// All names of the commands, or, of a command, of the options.
+std::vector<std::string> known_words(const CLI::App& application) {
+  const auto chosen = application.get_subcommands();
+  std::vector<std::string> words;
+  if (chosen.empty()) {
+    for (const CLI::App* command : application.get_subcommands([](const CLI::App*) { return true; }))
+      words.push_back(command->get_name());
+  } else {
+    for (const CLI::Option* option : chosen.front()->get_options()) {
+      for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+    }
+  }
+  return words;
+}
+
+/// "X, or Y" where the word is nearly Y.
+std::string did_you_mean(const CLI::App& application, const std::string& word) {
+  const std::vector<std::string> known = known_words(application);
+  const std::vector<std::string_view> names(known.begin(), known.end());
+  const auto nearest = nearest_name(word, names);
+  return nearest ? std::string(*nearest) + ", or " : "";
+}
+
 int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
   const std::string name = command_name(application);
-  const auto unknown = application.remaining();
-  const bool is_unknown = name == application.get_name() && !unknown.empty();
+  const auto unknown = application.remaining(/*recurse=*/true);
+  const bool is_command = name == application.get_name() && !unknown.empty();
+  const bool is_option = !is_command && !unknown.empty() && unknown.front().starts_with("--");
   // --help and --version arrive as errors too.
-  if (error.get_exit_code() == 0 && !is_unknown) return application.exit(error);
-  const std::string problem = is_unknown ? "no such command: " + unknown.front() : std::string(error.what());
-  return fail(
-      "arguments (" + name + "): got \"" + problem + "\", expected what \"" + name + " --help\" describes",
-      k_wrong_input);
+  if (error.get_exit_code() == 0 && !is_command) return application.exit(error);
+  std::string problem = error.what(), expected;
+  if (is_command) problem = "no such command: " + unknown.front();
+  if (is_option) problem = "no such option: " + unknown.front();
+  if (is_command || is_option) expected = did_you_mean(application, unknown.front());
+  return fail("arguments (" + name + "): got \"" + problem + "\", expected " + expected + "what \"" + name +
+                  " --help\" describes",
+              k_wrong_input);
 }
 
 /// The program by its name, and its arguments, quoted where a shell needs it.

@@ -107,7 +107,7 @@ void take_texture(const JsonNode& node, const std::filesystem::path& folder, Mes
   if (mesh.face_texcoords.empty())
     texture->fail("a texture on a mesh without texture coordinates",
                   "texcoords and face_texcoords, or a file with some");
-  mesh.textures = {read_texture(folder / texture->at("file").string())};
+  mesh.textures = {read_texture(texture->at("file").file_in(folder))};
   mesh.face_textures.clear();
   take(*texture, "wrap", mesh.textures[0].wrap, parse_wrap);
   take(*texture, "filter", mesh.textures[0].filter, parse_filter);
@@ -122,7 +122,7 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
     node.fail("file beside positions or faces", "a file, or positions and faces");
   }
   if (file) {
-    instance.mesh = read_mesh(folder / file->string(), notes);
+    instance.mesh = read_mesh(file->file_in(folder), notes);
   } else if (node.find("positions") || node.find("faces")) {
     instance.mesh.positions = vec3_list(node.at("positions"));
     instance.mesh.faces = parse_faces(node.at("faces"));

@@ -28,7 +28,7 @@ bool shows_silhouette(const Image& image) {
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views) {
   node.require_keys({"image", "camera"});
   ShapeView view;
-  const std::filesystem::path file = folder / node.at("image").string();
+  const std::filesystem::path file = node.at("image").file_in(folder);
   view.image = read_image(file, &view.has_alpha);
   view.has_alpha = view.has_alpha && shows_silhouette(view.image);
   if (view.image.width != views.width || view.image.height != views.height) {
@@ -71,7 +71,7 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
   for (const JsonNode& view : node.at("views").elements())
     views.views.push_back(parse_view(view, folder, views));
   if (views.views.empty()) node.at("views").fail("none", "at least one");
-  if (const auto initial = node.find("initial")) views.initial = read_mesh(folder / initial->string(), notes);
+  if (const auto initial = node.find("initial")) views.initial = read_mesh(initial->file_in(folder), notes);
   if (const auto smoothing = node.find("smoothing")) result.smoothing = parse_smoothing(*smoothing);
   return result;
 }

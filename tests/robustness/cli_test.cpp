@@ -91,6 +91,19 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_image(folder / "a.png").width == 20);
   }
 
+  TEST_CASE("cli: what is mistyped is named, with what is nearest to it") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    check_fails(folder, 1, "no such command: rendr\", expected render, or what \"dpr --help\"", {"rendr"});
+    check_fails(folder, 1, "no such command: draw\", expected what", {"draw"});
+    check_fails(folder, 1,
+                "no such option: --elevaton\", expected --elevation, or what \"dpr render --help\"",
+                {"render", "cube.ply", "--elevaton", "3"});
+    check_fails(folder, 1, "no such option: --colour\", expected what",
+                {"render", "cube.ply", "-o", "a.png", "--colour", "red"});
+  }
+
   TEST_CASE("cli: a memory budget makes bands, and the same image") {
     if (is_skipped()) return;
     const TempDir folder;

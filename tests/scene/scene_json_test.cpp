@@ -90,7 +90,7 @@ TEST_SUITE("unit") {
     CHECK_FALSE(scene.camera.intrinsics);
     CHECK_FALSE(scene.lights);
     CHECK(scene.meshes[0].mesh.vertex_colors.empty());
-    CHECK(scene.smoothing.sigma == Smoothing{}.sigma);
+    CHECK(scene.smoothing == Smoothing{});
     CHECK_FALSE(scene.smoothing.blur_radius);
     CHECK(scene.perspective_correct);
     CHECK(scene.gradients.positions);
@@ -204,7 +204,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, "[1, 2]"), "got a list of 2, expected an object");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, "{}"), "got no key \"meshes\"");
     DPR_CHECK_MESSAGE_HAS(IoError, read(folder, with_mesh(R"("file": "no.obj")")),
-                          "no.obj: the file does not exist");
+                          "no.obj: the file does not exist, which meshes[0].file (");
   }
 
   TEST_CASE("unknown keys are named, with their object") {
