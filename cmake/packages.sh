@@ -16,7 +16,7 @@ dpr_packages_learning=(libtorch-dev libopenblas0-pthread python3-torch)
 dpr_packages_oclgrind=(oclgrind)
 
 # Fuzzing the readers.
-dpr_packages_fuzzing=(clang-14 libclang-rt-14-dev)
+dpr_packages_fuzzing=(clang-14 libclang-rt-14-dev llvm-14)
 
 # Prints those of the packages that are not installed.
 missing_packages() {

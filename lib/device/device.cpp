@@ -170,8 +170,8 @@ Device open_device(const std::string& selector) {
   const std::string wanted = selector.empty() && environment != nullptr ? environment : selector;
   const auto [found, failure] = find_devices();
   if (wanted.empty() && !found.empty()) {
-    Device device = open_best(infos_of(found), [&](std::size_t position, bool is_tried) {
-      Device candidate = open_found(found[position]);
+    Device device = open_best(infos_of(found), [&entries = found](std::size_t position, bool is_tried) {
+      Device candidate = open_found(entries[position]);
       if (is_tried) try_out(candidate);
       return candidate;
     });

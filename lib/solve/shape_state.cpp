@@ -8,11 +8,11 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
 
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
+#include "solve/hash.hpp"
 
 namespace dpr {
 namespace {
@@ -22,76 +22,6 @@ using nlohmann::json;
 /// What a file begins with. The fingerprint and the checksum follow, and then the content.
 constexpr std::string_view k_magic = "dpr shape checkpoint 4\n";
 constexpr std::size_t k_number_size = 8, k_head_size = k_magic.size() + 2 * k_number_size;
-
-/// FNV-1a, 64 bits (Fowler, Noll & Vo 1991).
-class Hash {
- public:
-  template <typename Value>
-  void add(const Value& value) {
-    static_assert(std::has_unique_object_representations_v<Value> || std::is_floating_point_v<Value>);
-    add_bytes(std::as_bytes(std::span(&value, 1)));
-  }
-  void add(const glm::vec3& v) {
-    for (int i = 0; i < 3; ++i) add(v[i]);
-  }
-  void add_bytes(std::span<const std::byte> bytes) {
-    for (const std::byte byte : bytes)
-      value_ = (value_ ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001b3U;
-  }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325U;
-};
-
-void add(Hash& hash, const Camera& camera) {
-  for (int column = 0; column < 4; ++column) {
-    for (int row = 0; row < 4; ++row) hash.add(camera.view[column][row]);
-  }
-  const Intrinsics k = camera.intrinsics.value_or(Intrinsics{});
-  for (const float value : {camera.fov_y_degrees, camera.znear, camera.zfar, k.fx, k.fy, k.cx, k.cy})
-    hash.add(value);
-}
-
-void add(Hash& hash, const Mesh& mesh) {
-  for (const auto* list : {&mesh.positions, &mesh.vertex_colors}) {
-    for (const glm::vec3& v : *list) hash.add(v);
-  }
-  for (const glm::uvec3& f : mesh.faces) {
-    for (int i = 0; i < 3; ++i) hash.add(f[i]);
-  }
-}
-
-void add(Hash& hash, const Smoothing& s) {
-  for (const int value :
-       {static_cast<int>(s.occupancy_prior), static_cast<int>(s.depth_prior), static_cast<int>(s.composition),
-        static_cast<int>(s.occupancy_estimator), static_cast<int>(s.aggregation_estimator),
-        static_cast<int>(s.variance_reduction), static_cast<int>(s.draws), static_cast<int>(s.distance),
-        static_cast<int>(s.occupancy_width), static_cast<int>(s.samples), static_cast<int>(s.noise),
-        static_cast<int>(s.supersampling)}) {
-    hash.add(value);
-  }
-  for (const float value : {s.sigma, s.gamma, s.alpha, s.occupancy_threshold, s.blur_radius.value_or(-1.0F),
-                            s.background_depth}) {
-    hash.add(value);
-  }
-  hash.add(s.seed);
-}
-
-void add(Hash& hash, const ShapeOptions& o) {
-  for (const unsigned value : {o.levels, o.iterations, o.batch, o.remesh_interval,
-                               static_cast<unsigned>(o.steps), static_cast<unsigned>(o.schedule)})
-    hash.add(value);
-  for (const float value :
-       {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette,
-        o.regularizers.laplacian, o.regularizers.edge_length, o.regularizers.normal_consistency,
-        o.regularizers.flatness, o.regularizers.edge_target}) {
-    hash.add(value);
-  }
-  hash.add(o.learning_rate);
-  hash.add(o.learning_rate_end);
-  hash.add(o.color_learning_rate);
-}
 
 json to_json(const OptimizerState& state) {
   return {state.first_moment, state.second_moment, state.iteration};
@@ -234,24 +164,6 @@ Mesh ShapeState::mesh() const {
     mesh.vertex_colors.emplace_back(colors[i], colors[i + 1], colors[i + 2]);
   }
   return mesh;
-}
-
-std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const ShapeOptions& options) {
-  Hash hash;
-  hash.add(views.width);
-  hash.add(views.height);
-  hash.add(views.background);
-  for (const ShapeView& view : views.views) {
-    for (const glm::vec4& pixel : view.image.pixels) {
-      for (int i = 0; i < 4; ++i) hash.add(pixel[i]);
-    }
-    add(hash, view.camera);
-    hash.add(static_cast<int>(view.has_alpha));
-  }
-  if (views.smoothing) add(hash, *views.smoothing);
-  add(hash, start);
-  add(hash, options);
-  return hash.value();
 }
 
 std::string checkpoint_bytes(std::string_view content, std::uint64_t fingerprint) {

@@ -5,6 +5,7 @@
 
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
+#include "image/image_file.hpp"
 #include "learn/npz.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "scene/scene_json.hpp"
@@ -22,6 +23,11 @@ const test::TempDir& folder() {
     Folder() {
       temporary.write("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
       write_image(temporary / "grey.ppm", Image(2, 2, glm::vec4(0.5F)));
+      write_image(temporary / "clear.exr", Image(2, 2, glm::vec4(0.25F)));
+      temporary.write(
+          "textured.mtl",
+          "newmtl one\nmap_Kd grey.ppm\nnewmtl same\nmap_Kd grey.ppm\nnewmtl lost\nmap_Kd no.ppm\n"
+          "newmtl moved\nmap_Kd -s 2 2 -o 0.5 0 -bm 1 grey.ppm\n");
     }
   } made;
   return made.temporary;
@@ -52,7 +58,9 @@ void read_image_bytes(std::string_view content) {
   for (const auto& [beginning, its_name] : k_formats) {
     if (content.starts_with(beginning)) name = its_name;
   }
-  read_image(folder().write(name, content));
+  const std::filesystem::path file = folder().write(name, content);
+  read_image(file);
+  holds_floats(file);
 }
 
 void read_scene_text(std::string_view content) {
@@ -70,10 +78,19 @@ void read_shape_checkpoint(std::string_view content) {
   constexpr std::uint64_t k_fingerprint = 7;
   const bool is_whole = content.starts_with("dpr shape checkpoint");
   const std::string bytes = is_whole ? std::string(content) : checkpoint_bytes(content, k_fingerprint);
-  read_checkpoint(folder().write("checkpoint", bytes), k_fingerprint, {});
+  const ShapeState read = read_checkpoint(folder().write("checkpoint", bytes), k_fingerprint, {});
+  write_checkpoint(folder() / "again", read, k_fingerprint);
+  const ShapeState again = read_checkpoint(folder() / "again", k_fingerprint, {});
+  if (again.positions != read.positions || again.faces != read.faces) throw std::logic_error("another mesh");
 }
 
-void read_npz_bytes(std::string_view content) { learn::read_npz(folder().write("a.npz", content)); }
+/// What is read is what is written of it.
+void read_npz_bytes(std::string_view content) {
+  const learn::ByteArray read = learn::read_npz(folder().write("a.npz", content));
+  learn::write_npz(folder() / "again.npz", read.shape, read.values);
+  const learn::ByteArray again = learn::read_npz(folder() / "again.npz");
+  if (again.shape != read.shape || again.values != read.values) throw std::logic_error("other values");
+}
 
 constexpr std::array<Target, 10> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
                                             {"mesh_ply", read_mesh_bytes<k_ply>},
