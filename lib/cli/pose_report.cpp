@@ -58,6 +58,20 @@ std::string angle_text(const Pose& pose, const std::optional<glm::dmat3>& truth)
   return truth ? format(", %.2f degrees from the truth", angle_degrees(pose.rotation, *truth)) : "";
 }
 
+/// As blurred as the step was, by noise of the pixel: in the joint composition of triangles their seams would
+/// show.
+Smoothing blur_of(const PoseIteration& step) {
+  const Smoothing& own = step.smoothing;
+  if (own.composition != Composition::joint || own.occupancy_width != OccupancyWidth::fixed ||
+      own.occupancy_prior == Prior::gumbel || is_sampled(own)) {
+    return own;
+  }
+  Smoothing smoothing = own;
+  smoothing.noise = Noise::pixel;
+  smoothing.blur_radius.reset();
+  return smoothing;
+}
+
 /// The start, then iterations of the descent that found the pose, at equal distances, first and last among
 /// them.
 std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera& camera,
@@ -71,7 +85,7 @@ std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera&
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t last = history.size() - 1;
     const PoseIteration& step = history[count > 1 ? i * last / (count - 1) : last];
-    images.push_back(camera.render(step.pose, step.focal_scale, step.smoothing));
+    images.push_back(camera.render(step.pose, step.focal_scale, blur_of(step)));
     captions.push_back(format("iteration %u, %dx%d", step.iteration, step.width, step.height) +
                        angle_text(step.pose, truth));
   }

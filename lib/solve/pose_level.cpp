@@ -70,6 +70,8 @@ void simplify(Scene& scene, const PoseSpace& space) {
 Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const LeastSquares& options,
                           float blur) {
   constexpr double k_of_side = 0.25;
+  // Fainter fragments cost as much and say little. With a robust loss a few degrees depend on them.
+  constexpr float k_least_occupancy = 1e-2F;
   const double pixel_ndc = 2.0 / std::min(scene.width, scene.height);
   const double world_per_ndc = space.radius() / space.radius_ndc();
   const double side_pixels = mean_side(scene.meshes.front().mesh) / pixel_at_object(scene, space);
@@ -78,6 +80,7 @@ Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const Leas
   Smoothing smoothing = smoothing_preset("joint_gaussian");
   smoothing.distance = DistanceMetric::euclidean;
   smoothing.sigma = static_cast<float>(blur_ndc);
+  if (!options.robust) smoothing.occupancy_threshold = k_least_occupancy;
   smoothing.gamma = static_cast<float>(blur_ndc * world_per_ndc) / (scene.camera.zfar - scene.camera.znear);
   return smoothing;
 }
