@@ -73,6 +73,7 @@ Scene make_scene(const Definition& d) {
   const bool cube = d.subdivisions == 0;
   scene.meshes.push_back({cube ? make_cube() : make_icosphere(d.subdivisions)});
   scene.camera = orbit_camera(cube ? k_cube_distance : k_sphere_distance, 30.0F, 120.0F);
+  scene.smoothing = smoothing_preset("gaussian");
   scene.smoothing.sigma = d.sigma;
   scene.smoothing.gamma = d.gamma;
   scene.smoothing.blur_radius = k_blur_radius_in_sigma * d.sigma;

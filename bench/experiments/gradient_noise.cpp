@@ -63,7 +63,8 @@ std::string panels(const Json& result, const std::vector<unsigned>& samples) {
 Json run_operator(const Settings& settings, const Operator& op, const std::vector<unsigned>& samples,
                   std::size_t repeats) {
   const std::vector<double> arguments(repeats, op.argument);
-  const Response exact = op.evaluate(settings.device, Smoothing{}, std::span(arguments).first(1));
+  const Response exact =
+      op.evaluate(settings.device, smoothing_preset("gaussian"), std::span(arguments).first(1));
   Json result{{"operator", op.name}, {"argument", op.argument}, {"exact", exact.derivative[0]}};
   Json& estimates = result["estimates"] = Json::object();
   for (const Estimate& estimate : k_estimates) {

@@ -29,7 +29,7 @@ bool is_valid(const Smoothing& smoothing) {
 std::vector<Curve> heaviside_curves(const Device& device, std::span<const double> x) {
   std::vector<Curve> curves;
   for (const Prior prior : choices<Prior>()) {
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     smoothing.occupancy_prior = prior;
     if (is_valid(smoothing))
       curves.push_back({std::string(to_string(prior)), heaviside(device, smoothing, x)});
@@ -40,7 +40,7 @@ std::vector<Curve> heaviside_curves(const Device& device, std::span<const double
 std::vector<Curve> arg_max_curves(const Device& device, std::span<const double> x) {
   std::vector<Curve> curves;
   for (const Prior prior : choices<Prior>()) {
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     smoothing.depth_prior = prior;
     if (is_valid(smoothing)) curves.push_back({std::string(to_string(prior)), arg_max(device, smoothing, x)});
   }

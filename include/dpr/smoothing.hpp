@@ -47,13 +47,14 @@ enum class DistanceMetric { squared, euclidean };
 /// (kernels/shared_types.h).
 enum class OccupancyWidth { fixed, variable, zero };
 
+/// The default is the preset "pixel".
 struct Smoothing {
   Prior occupancy_prior = Prior::gaussian;
   Prior depth_prior = Prior::gaussian;
   float sigma = 1e-3F;  ///< > 0, scale of the distance noise, in the unit of the metric
-  float gamma = 1e-2F;  ///< > 0, scale of the depth noise; depth is normalised to 1 at znear, 0 at zfar
+  float gamma = 1e-4F;  ///< > 0, scale of the depth noise; depth is normalised to 1 at znear, 0 at zfar
   float alpha = 1.0F;   ///< > 0, weight of the barrier
-  Composition composition = Composition::barrier;
+  Composition composition = Composition::joint;
   Estimator occupancy_estimator = Estimator::exact;
   Estimator aggregation_estimator = Estimator::exact;
   std::uint32_t samples = 8;  ///< 1 to 2^20, of Monte Carlo
@@ -66,7 +67,7 @@ struct Smoothing {
   float background_depth = 1e-10F;  ///< normalised depth of the background slot (barrier only)
   DistanceMetric distance = DistanceMetric::squared;
   OccupancyWidth occupancy_width = OccupancyWidth::fixed;
-  Noise noise = Noise::triangle;
+  Noise noise = Noise::pixel;
   std::uint32_t supersampling = 1;  ///< 1, 2 or 4: samples of a pixel along each axis, of its noise
 
   bool operator==(const Smoothing&) const = default;
@@ -108,8 +109,8 @@ bool is_sampled(const Smoothing& smoothing);
 Smoothing rigid_smoothing();
 
 /// A named member of the family; throws InvalidArgument for another name and for a size below 1x1. What is
-/// not said is the default above. Equations in brackets are the paper's; tests/pipeline/presets_test.cpp
-/// evaluates each formula by itself.
+/// not said of a member of the triangles' noise is that of "gaussian". Equations in brackets are the paper's;
+/// tests/pipeline/presets_test.cpp evaluates each formula by itself.
 /// - "softras" (Liu et al. 2019): logistic occupancy, Gumbel depth, exact, which by (21) and (40) is
 ///   D_j = sigmoid(s_j / sigma), w_j = D_j exp(zeta_j / gamma) / (sum_k D_k exp(zeta_k / gamma) +
 ///   exp(background_depth / gamma)); blur radius 9.21 sigma, where D is 1e-4
@@ -125,10 +126,10 @@ Smoothing rigid_smoothing();
 /// - "paper_gaussian" (36), "paper_cauchy" (35): both stages of one prior, sampled 8 times as in (11) and
 /// (14),
 ///   blur radius 9.21 sigma: the published program
-/// - "gaussian": the default above, Gaussian noise in the barrier, exact: (36), (10)
+/// - "gaussian": Gaussian noise of the triangles in the barrier, exact: (36), (10); sigma 1e-3, gamma 1e-2
 /// - "joint_gaussian": the joint composition, exact: the expectation of (3) under (8)
-/// - "pixel": Gaussian noise of the pixel's position, joint composition, exact; gamma is 1e-4, so that what
-///   lies a thousandth of the depth range behind is not seen
+/// - "pixel": the default above, Gaussian noise of the pixel's position, joint composition, exact; gamma is
+///   1e-4, so that what lies a thousandth of the depth range behind is not seen
 /// - "rigid": rigid_smoothing()
 Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
 

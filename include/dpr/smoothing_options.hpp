@@ -26,11 +26,15 @@ struct SmoothingOptions {
   std::optional<OccupancyWidth> occupancy_width = {};
   std::optional<Noise> noise = {};
   std::optional<std::uint32_t> supersampling = {};
+
+  bool operator==(const SmoothingOptions&) const = default;
 };
 
 /// The smoothing that the options describe, for images of `width` x `height`. Throws InvalidArgument where
 /// they describe none. Command line, scene and views files, and the torch operator all end here:
-/// 1. The preset says everything but the seed; what it does not say, or all without one, is `otherwise`.
+/// 1. The preset says everything but the seed. Without one it is `otherwise` that does. Without either it is
+///    the default, "pixel", where says_nothing() or the noise is that of the pixel, and "gaussian" where
+///    anything else is given: a sigma alone is one of the triangles' noise.
 /// 2. What is given replaces that.
 /// 3. The blur radius that is given decides alone. Else, where an occupancy_threshold is given, the radius
 ///    follows from it (blur_radius()). Else that of step 1 stays the same number of sigmas, as set_sigma()
@@ -38,7 +42,11 @@ struct SmoothingOptions {
 ///    width keeps the radius of step 1 in NDC: 0.5 in "nmr"; noise of the pixel has none. The other presets
 ///    have no radius of their own, so that theirs follows from sigma, prior and threshold.
 Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
-                            const Smoothing& otherwise = {});
+                            const std::optional<Smoothing>& otherwise = {});
+
+/// Whether no member of the family is described: nothing is given but, perhaps, the seed and the
+/// supersampling.
+bool says_nothing(const SmoothingOptions& given);
 
 /// What `over`, such as a command line, leaves of `under`, such as a file, and adds to it: each option given
 /// replaces its like. A preset replaces all but the seed, an estimator those of both stages.

@@ -20,7 +20,8 @@ struct dpr_device {
 
 struct dpr_scene {
   dpr::Scene scene;
-  dpr::SmoothingOptions smoothing;  ///< what was set of it
+  dpr::SmoothingOptions smoothing;             ///< what was set of it
+  std::optional<dpr::Smoothing> of_file = {};  ///< what that changes, of a scene that was read
 };
 
 struct dpr_renderer {

@@ -83,7 +83,7 @@ dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene
     deref(renderer, "renderer");
     dpr::Scene resolved = deref(scene, "scene").scene;
     resolved.smoothing =
-        dpr::resolve_smoothing(scene->smoothing, resolved.width, resolved.height, resolved.smoothing);
+        dpr::resolve_smoothing(scene->smoothing, resolved.width, resolved.height, scene->of_file);
     renderer->renderer.set_scene(resolved);
   });
 }

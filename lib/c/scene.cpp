@@ -147,7 +147,9 @@ dpr_status dpr_scene_read(const char* file, dpr_scene** scene) {
   return guarded([&] {
     deref(file, "file");
     deref(scene, "scene");
-    give(scene, dpr::read_scene(file), dpr::SmoothingOptions{});
+    dpr::Scene read = dpr::read_scene(file);
+    const dpr::Smoothing smoothing = read.smoothing;
+    give(scene, std::move(read), dpr::SmoothingOptions{}, smoothing);
   });
 }
 

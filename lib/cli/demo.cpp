@@ -83,8 +83,7 @@ Json scene_to_json(const Scene& scene, const Pose& pose) {
           {"lights",
            {{"point", Json::array({{{"position", vector(light.position)},
                                     {"diffuse", vector(light.diffuse)},
-                                    {"specular", vector(light.specular)}}})}}},
-          {"smoothing", {{"preset", "joint_gaussian"}}}};
+                                    {"specular", vector(light.specular)}}})}}}};
 }
 
 /// Two rings of cameras about the cube, one above it and one below.

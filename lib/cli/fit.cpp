@@ -60,8 +60,9 @@ ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
   if (file.smoothing) {
     views.smoothing = resolve_smoothing(overlay(*file.smoothing, flags), views.width, views.height);
   } else if (common.seed || gives_any(command, k_smoothing_group)) {
-    views.smoothing =
-        resolve_smoothing(flags, views.width, views.height, finest_smoothing(views, options.solver));
+    Smoothing otherwise = finest_smoothing(views, options.solver);
+    if (!says_nothing(flags)) otherwise.noise = Noise::triangle;
+    views.smoothing = resolve_smoothing(flags, views.width, views.height, otherwise);
   }
   return std::move(views);
 }

@@ -51,14 +51,17 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   return camera;
 }
 
-/// For a picture: edges blurred by a quarter of a pixel, and little depth noise. In the joint composition the
-/// seams of triangles as small as pixels would show.
-Smoothing picture_smoothing(int width, int height) {
-  constexpr float k_blur_pixels = 0.25F, k_gamma = 1e-3F;
-  const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(width, height));  // NDC
+/// For a picture: edges blurred by a quarter of a pixel. Flags that describe another member of the family
+/// start from the triangles' noise, with as little noise in depth as seams allow.
+Smoothing picture_smoothing(const SmoothingOptions& flags, glm::ivec2 size) {
+  constexpr float k_blur_pixels = 0.25F, k_gamma_of_triangles = 1e-3F;
+  const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(size.x, size.y));  // NDC
   Smoothing smoothing;
+  if (!says_nothing(flags) && flags.noise != Noise::pixel) {
+    smoothing = smoothing_preset("gaussian");
+    smoothing.gamma = k_gamma_of_triangles;
+  }
   smoothing.sigma = blur * blur;
-  smoothing.gamma = k_gamma;
   return smoothing;
 }
 
@@ -84,7 +87,7 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   scene.meshes.push_back({read_mesh(options.mesh, notes), glm::mat4(1.0F)});
   print_notes(notes, common);
   const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
-  scene.smoothing = picture_smoothing(size.x, size.y);
+  scene.smoothing = picture_smoothing(common.smoothing, size);
   apply(common, scene);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
   scene.camera = fit_camera(sphere, options, scene.width, scene.height);

@@ -16,8 +16,16 @@ float published_blur_radius(float sigma) {
   return static_cast<float>(reach(Prior::logistic, 1e-4) * static_cast<double>(sigma));  // 9.21 sigma
 }
 
-Smoothing softras() {
+Smoothing gaussian() {
   Smoothing smoothing;
+  smoothing.noise = Noise::triangle;
+  smoothing.composition = Composition::barrier;
+  smoothing.gamma = 1e-2F;
+  return smoothing;
+}
+
+Smoothing softras() {
+  Smoothing smoothing = gaussian();
   smoothing.occupancy_prior = Prior::logistic;
   smoothing.depth_prior = Prior::gumbel;
   smoothing.blur_radius = published_blur_radius(smoothing.sigma);
@@ -25,7 +33,7 @@ Smoothing softras() {
 }
 
 Smoothing published(Prior prior) {
-  Smoothing smoothing;
+  Smoothing smoothing = gaussian();
   smoothing.occupancy_prior = smoothing.depth_prior = prior;
   smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
   smoothing.samples = 8;
@@ -35,16 +43,8 @@ Smoothing published(Prior prior) {
 }
 
 Smoothing joint_gaussian() {
-  Smoothing smoothing;
+  Smoothing smoothing = gaussian();
   smoothing.composition = Composition::joint;
-  return smoothing;
-}
-
-Smoothing pixel() {
-  constexpr float k_gamma = 1e-4F;  // at the default's, closed surfaces show their back
-  Smoothing smoothing = joint_gaussian();
-  smoothing.noise = Noise::pixel;
-  smoothing.gamma = k_gamma;
   return smoothing;
 }
 
@@ -82,9 +82,9 @@ constexpr std::array<Preset, 9> k_presets{
      {"nmr", [](int, int) { return nmr(); }},
      {"paper_gaussian", [](int, int) { return published(Prior::gaussian); }},
      {"paper_cauchy", [](int, int) { return published(Prior::cauchy); }},
-     {"gaussian", [](int, int) { return Smoothing{}; }},
+     {"gaussian", [](int, int) { return gaussian(); }},
      {"joint_gaussian", [](int, int) { return joint_gaussian(); }},
-     {"pixel", [](int, int) { return pixel(); }},
+     {"pixel", [](int, int) { return Smoothing{}; }},
      {"rigid", [](int, int) { return rigid_smoothing(); }}}};
 
 const Preset& find_preset(std::string_view name, std::string_view where) {
@@ -97,7 +97,7 @@ const Preset& find_preset(std::string_view name, std::string_view where) {
 }  // namespace
 
 Smoothing rigid_smoothing() {
-  Smoothing smoothing;
+  Smoothing smoothing = gaussian();
   smoothing.composition = Composition::joint;
   smoothing.occupancy_width = OccupancyWidth::zero;
   smoothing.sigma = 1e-12F;  // has no part in it

@@ -30,15 +30,24 @@ void take_estimators(const SmoothingOptions& given, Smoothing& smoothing) {
   take(given.aggregation_estimator, smoothing.aggregation_estimator);
 }
 
+/// What the options change.
+Smoothing basis(const SmoothingOptions& given, int width, int height,
+                const std::optional<Smoothing>& otherwise) {
+  if (given.preset) {
+    Smoothing smoothing = smoothing_preset(*given.preset, width, height);
+    if (otherwise) smoothing.seed = otherwise->seed;
+    return smoothing;
+  }
+  if (otherwise) return *otherwise;
+  const bool of_pixel = says_nothing(given) || given.noise == Noise::pixel;
+  return smoothing_preset(of_pixel ? "pixel" : "gaussian");
+}
+
 }  // namespace
 
 Smoothing resolve_smoothing(const SmoothingOptions& given, int width, int height,
-                            const Smoothing& otherwise) {
-  Smoothing smoothing = otherwise;
-  if (given.preset) {
-    smoothing = smoothing_preset(*given.preset, width, height);
-    smoothing.seed = otherwise.seed;
-  }
+                            const std::optional<Smoothing>& otherwise) {
+  Smoothing smoothing = basis(given, width, height, otherwise);
   take(given.occupancy_prior, smoothing.occupancy_prior);
   take(given.depth_prior, smoothing.depth_prior);
   take_reach(given, smoothing);
@@ -55,6 +64,10 @@ Smoothing resolve_smoothing(const SmoothingOptions& given, int width, int height
   take(given.supersampling, smoothing.supersampling);
   validate(smoothing);
   return smoothing;
+}
+
+bool says_nothing(const SmoothingOptions& given) {
+  return given == SmoothingOptions{.seed = given.seed, .supersampling = given.supersampling};
 }
 
 SmoothingOptions overlay(const SmoothingOptions& under, const SmoothingOptions& over) {

@@ -84,7 +84,8 @@ BatchRenderer::BatchRenderer(const at::Tensor& faces, std::int64_t width, std::i
 
 void BatchRenderer::set_smoothing(const Smoothing& smoothing) {
   validate(smoothing);
-  smoothing_ = otherwise_ = smoothing;
+  smoothing_ = smoothing;
+  otherwise_ = smoothing;
   options_ = {};
 }
 

@@ -49,9 +49,9 @@ class BatchRenderer : public torch::CustomClassHolder {
 
   std::vector<glm::uvec3> faces_;
   int width_, height_;
-  SmoothingOptions options_;  // what was set
-  Smoothing otherwise_;       // what they leave open
-  Smoothing smoothing_;       // what they come to
+  SmoothingOptions options_;            // what was set
+  std::optional<Smoothing> otherwise_;  // what they leave open
+  Smoothing smoothing_;                 // what they come to
   float znear_ = 1.0F, zfar_ = 100.0F;
   Device device_;
   Topology topology_;           // of the free renderers

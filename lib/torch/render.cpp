@@ -243,8 +243,9 @@ TORCH_LIBRARY(dpr, m) {
                        const std::string&>(),
            "Faces, image size, smoothing and device of a batch",
            {torch::arg("faces"), torch::arg("width"), torch::arg("height"),
-            torch::arg("preset") = std::string("joint_gaussian"), torch::arg("device") = std::string()})
-      .def("set", &BatchRenderer::set, "Sets a value of the smoothing or the camera, by its key in a scene file",
+            torch::arg("preset") = std::string("pixel"), torch::arg("device") = std::string()})
+      .def("set", &BatchRenderer::set,
+           "Sets a value of the smoothing or the camera, by its key in a scene file",
            {torch::arg("name"), torch::arg("value")})
       .def("seconds", &BatchRenderer::seconds);
   m.def(

@@ -99,6 +99,7 @@ TEST_SUITE("bench-smoke") {
 
   TEST_CASE("work is counted: one triangle over every pixel, near and far") {
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     scene.width = scene.height = 16;
     Mesh mesh;
     mesh.positions = {{-99, -99, -2}, {99, -99, -2}, {0, 99, -2}};
@@ -112,7 +113,7 @@ TEST_SUITE("bench-smoke") {
       renderer.forward();
       return bench::count_work(renderer);
     };
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     const bench::FrameWork one_slot = count(smoothing);
     CHECK(one_slot.pairs == 4);
     CHECK(one_slot.fragments == 256);
@@ -141,8 +142,8 @@ TEST_SUITE("bench-smoke") {
                                 .forward_evaluations = 1000,
                                 .backward_evaluations = 900};
     bench::FrameWork twice = work;
-    for (double* value : {&twice.pairs, &twice.fragments, &twice.pixels,
-                          &twice.forward_evaluations, &twice.backward_evaluations}) {
+    for (double* value : {&twice.pairs, &twice.fragments, &twice.pixels, &twice.forward_evaluations,
+                          &twice.backward_evaluations}) {
       *value *= 2;
     }
     for (const char* const stage : {"rasterize", "shade", "occupancy", "aggregate"}) {
@@ -153,7 +154,7 @@ TEST_SUITE("bench-smoke") {
     }
     CHECK_FALSE(bench::stage_cost("scan", work, {}));
     CHECK_FALSE(bench::stage_cost("aggregate", bench::FrameWork{}, {}));
-    Smoothing cauchy;
+    Smoothing cauchy = smoothing_preset("gaussian");
     cauchy.occupancy_prior = Prior::cauchy;
     CHECK_FALSE(bench::stage_cost("occupancy", work, cauchy));
   }

@@ -171,6 +171,24 @@ TEST_SUITE("unit") {
     CHECK(resolve_smoothing({.preset = "rigid"}, 128, 128, own).seed == 5);
   }
 
+  TEST_CASE("nothing said is noise of the pixel, anything else said is noise of the triangles") {
+    const TempDir folder;
+    CHECK(Smoothing{} == smoothing_preset("pixel"));
+    CHECK(by_file(folder, json::object()) == Smoothing{});
+    CHECK(by_command_line(folder, json::object(), json::object()) == Smoothing{});
+    Smoothing seeded;
+    seeded.seed = 7;
+    seeded.supersampling = 2;
+    CHECK(by_file(folder, {{"seed", 7}, {"supersampling", 2}}) == seeded);
+    Smoothing narrow = smoothing_preset("gaussian");
+    narrow.sigma = 1e-4F;
+    CHECK(by_file(folder, {{"sigma", 1e-4}}) == narrow);
+    CHECK(by_command_line(folder, json::object(), {{"sigma", 1e-4}}) == narrow);
+    narrow = {};
+    narrow.sigma = 1e-4F;
+    CHECK(by_file(folder, {{"noise", "pixel"}, {"sigma", 1e-4}}) == narrow);
+  }
+
   TEST_CASE("the command line over a file") {
     const TempDir folder;
     const auto resolve = [&](const json& file, const json& flags) {
@@ -182,7 +200,7 @@ TEST_SUITE("unit") {
     CHECK(resolve({{"sigma", 0.1}, {"composition", "barrier"}, {"seed", 3}}, {{"preset", "rigid"}}) == rigid);
     // An estimator is that of both stages.
     const Smoothing exact = resolve({{"occupancy_estimator", "monte_carlo"}}, {{"estimator", "exact"}});
-    CHECK(exact == Smoothing{});
+    CHECK(exact == smoothing_preset("gaussian"));
     CHECK(resolve({{"estimator", "monte_carlo"}}, {{"occupancy_estimator", "exact"}}).aggregation_estimator ==
           Estimator::monte_carlo);
     // A file may say only together with the flags what can be rendered.

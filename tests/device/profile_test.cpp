@@ -10,6 +10,7 @@ using namespace dpr;
 TEST_SUITE("unit") {
   TEST_CASE("a profile times every launch while it lives, by file and kernel") {
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     scene.width = scene.height = 8;
     scene.meshes.push_back({make_cube()});
     scene.camera = orbit_camera(6.7F, 30.0F, 120.0F);

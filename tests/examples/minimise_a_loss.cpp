@@ -8,14 +8,12 @@ int main() {
   scene.width = scene.height = 64;
   scene.camera = dpr::orbit_camera(/*distance*/ 5, /*elevation*/ 20, /*azimuth*/ 30);
   scene.meshes.push_back({.mesh = dpr::make_icosphere(2)});
-  scene.smoothing = dpr::smoothing_preset("joint_gaussian");
-  dpr::set_sigma(scene.smoothing, 1e-2F);
 
   dpr::Renderer renderer(device);
   renderer.set_scene(scene);
   renderer.forward();
   const dpr::Image target = renderer.image();
-  dpr::ImageLoss loss(device, {.mse = 1, .silhouette = 1}, {&target, 1});
+  dpr::ImageLoss loss(device, {.mse = 1}, {&target, 1});
 
   glm::dvec3 place(0.5, -0.3, 0.2);  // the target has the sphere at the origin
   dpr::View view{scene.camera, {glm::mat4(1)}};

@@ -291,7 +291,7 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(same_bits(colored, moved));
 
     for (Smoothing smoothing : {smoothing_preset("softras"), smoothing_preset("joint_gaussian"),
-                                smoothing_preset("paper_cauchy"), Smoothing{}}) {
+                                smoothing_preset("paper_cauchy"), smoothing_preset("gaussian")}) {
       smoothing.sigma *= 2;
       smoothing.distance = DistanceMetric::squared;
       scene.smoothing = smoothing;

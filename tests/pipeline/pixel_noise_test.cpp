@@ -422,7 +422,7 @@ TEST_SUITE("pipeline") {
       }
     }
     Scene triangles = scene;
-    triangles.smoothing = Smoothing{};
+    triangles.smoothing = smoothing_preset("gaussian");
     renderer.set_smoothing(triangles.smoothing);
     CHECK(same_bits(render(renderer), render(device, triangles)));
     renderer.set_smoothing(scene.smoothing);

@@ -33,7 +33,7 @@ Scene two_triangles(int width, int height) {
   scene.camera.view[3] = {0.03F, -0.02F, -2.6F, 1.0F};
   scene.camera.znear = 1;
   scene.camera.zfar = 10;
-  scene.smoothing = Smoothing{};
+  scene.smoothing = smoothing_preset("gaussian");
   scene.meshes[0].transform = glm::mat4(1.0F);
   return scene;
 }

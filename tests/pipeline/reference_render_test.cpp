@@ -171,7 +171,7 @@ TEST_SUITE("pipeline") {
     check_scenes(scenes);
   }
 
-  TEST_CASE("reference: lights, metrics, interpolation, coloured faces, the default smoothing") {
+  TEST_CASE("reference: lights, metrics, interpolation, coloured faces, the preset gaussian") {
     const int size = reduced(30, 7);
     std::vector<NamedScene> scenes;
     for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
@@ -193,8 +193,9 @@ TEST_SUITE("pipeline") {
         scenes.emplace_back("not perspective correct", scene_of(make_torus(1.1F, 0.45F, 9, 7), size, size))
             .second;
     affine.perspective_correct = false;
-    Scene& black = scenes.emplace_back("default smoothing, black background", cube_scene(size, size)).second;
-    black.smoothing = Smoothing{};
+    Scene& black =
+        scenes.emplace_back("the preset gaussian, black background", cube_scene(size, size)).second;
+    black.smoothing = smoothing_preset("gaussian");
     black.background = glm::vec3(0);
     Scene& alpha = scenes.emplace_back("alpha 0.4", cube_scene(size, size)).second;
     alpha.smoothing.alpha = 0.4F;
@@ -349,6 +350,7 @@ TEST_SUITE("pipeline") {
     // A triangle whose upper edge runs through the centres of row 2 of 8x8 pixels, its left edge a blur
     // radius to the right of column 1.
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     scene.width = scene.height = 8;
     const float distance = 2.0F, per_ndc = distance * std::tan(glm::radians(30.0F));
     const auto place = [&](float x, float y) { return glm::vec3(per_ndc * x, per_ndc * y, -distance); };

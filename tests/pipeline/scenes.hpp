@@ -39,6 +39,7 @@ inline glm::mat4 placed(float degrees, float scale = 1.0F, glm::vec3 shift = glm
 /// gamma mixes what lies behind one another, and the background shows through.
 inline Scene scene_of(Mesh mesh, int width, int height) {
   Scene scene;
+  scene.smoothing = smoothing_preset("gaussian");
   scene.width = width;
   scene.height = height;
   scene.camera = orbit_camera(5.3F, 24.0F, 37.0F, {0.03F, -0.02F, 0.01F});

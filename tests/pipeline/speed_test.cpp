@@ -15,6 +15,7 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("speed: forward and backward of the cube at 128x128 take less than a second after a warm-up") {
     if (dpr::test::reduced(1, 0) == 0) return;
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     scene.camera = orbit_camera(6.7F, 30.0F, 120.0F);
     scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
     scene.smoothing.blur_radius = 9.21e-3F;

@@ -490,7 +490,7 @@ TEST_SUITE("robustness") {
     };
     for (const Prior prior : dpr::test::k_sampled_priors) {
       if (reduced(1, 0) == 0 && prior != Prior::gaussian) continue;
-      Smoothing smoothing;
+      Smoothing smoothing = smoothing_preset("gaussian");
       smoothing.occupancy_prior = smoothing.depth_prior = prior;
       check(smoothing);
       smoothing.composition = Composition::joint;
@@ -499,7 +499,7 @@ TEST_SUITE("robustness") {
       smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
       check(smoothing);
     }
-    Smoothing uniform;
+    Smoothing uniform = smoothing_preset("gaussian");
     uniform.occupancy_prior = Prior::uniform;
     uniform.distance = DistanceMetric::euclidean;
     check(uniform);

@@ -11,7 +11,7 @@
 namespace {
 
 dpr::Smoothing sampled_smoothing() {
-  dpr::Smoothing smoothing;
+  dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.occupancy_estimator = smoothing.aggregation_estimator = dpr::Estimator::monte_carlo;
   return smoothing;
 }
@@ -24,7 +24,7 @@ dpr::AdaptiveSchedule eager() { return {.start = 0, .interval = 1}; }
 TEST_SUITE("unit") {
   TEST_CASE("the average remembers nine tenths") {
     dpr::AdaptiveSmoothing adaptive;
-    dpr::Smoothing smoothing;
+    dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
     double learning_rate = 1;
     adaptive.update(0, 2.0, smoothing, learning_rate);
     CHECK(adaptive.average() == doctest::Approx(0.2).epsilon(1e-6));
@@ -51,7 +51,7 @@ TEST_SUITE("unit") {
     double learning_rate = 1;
     CHECK_FALSE(adaptive.update(0, -1.0, smoothing, learning_rate));
     CHECK_FALSE(adaptive.update(1, 0.5, smoothing, learning_rate));  // the average is still negative
-    CHECK(smoothing.sigma == dpr::Smoothing{}.sigma);
+    CHECK(smoothing.sigma == dpr::smoothing_preset("gaussian").sigma);
     CHECK(learning_rate == 1);
     CHECK(adaptive.update(2, 2.0, smoothing, learning_rate));
   }
@@ -110,14 +110,14 @@ TEST_SUITE("unit") {
 
   TEST_CASE("a given blur radius shrinks with sigma; the exact estimator keeps its samples") {
     dpr::AdaptiveSmoothing adaptive(eager());
-    dpr::Smoothing smoothing;
+    dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
     smoothing.blur_radius = 9e-3F;
     double learning_rate = 1;
     CHECK(adaptive.update(0, 1.0, smoothing, learning_rate));
     CHECK(*smoothing.blur_radius == doctest::Approx(9e-3 / 1.1));
-    CHECK(smoothing.samples == dpr::Smoothing{}.samples);
+    CHECK(smoothing.samples == dpr::smoothing_preset("gaussian").samples);
 
-    dpr::Smoothing without;
+    dpr::Smoothing without = dpr::smoothing_preset("gaussian");
     CHECK(adaptive.update(1, 1.0, without, learning_rate));
     CHECK_FALSE(without.blur_radius.has_value());
   }
@@ -137,7 +137,7 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("a gradient that is not finite is an error") {
     dpr::AdaptiveSmoothing adaptive;
-    dpr::Smoothing smoothing;
+    dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
     double learning_rate = 1;
     CHECK_THROWS_AS(adaptive.update(0, std::numeric_limits<double>::infinity(), smoothing, learning_rate),
                     dpr::InvalidArgument);

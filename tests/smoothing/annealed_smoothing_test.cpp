@@ -9,7 +9,7 @@
 namespace {
 
 dpr::Smoothing start() {
-  dpr::Smoothing smoothing;
+  dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.sigma = 1e-2F;
   smoothing.gamma = 1e-2F;
   return smoothing;

@@ -33,7 +33,7 @@ double occupancy_outside(Prior prior, double x) {
 }
 
 double reach(Prior prior, float threshold) {
-  Smoothing smoothing;
+  Smoothing smoothing = smoothing_preset("gaussian");
   smoothing.occupancy_prior = prior;
   smoothing.occupancy_threshold = threshold;
   smoothing.sigma = 1;
@@ -67,7 +67,7 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("the blur radius follows sigma, unless it is given") {
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     const float at_default = blur_radius(smoothing);
     smoothing.sigma *= 2;
     CHECK(blur_radius(smoothing) == doctest::Approx(2 * at_default));
@@ -150,7 +150,7 @@ TEST_SUITE("unit") {
 TEST_SUITE("robustness") {
   TEST_CASE("values out of range") {
     const auto check = [](auto change, const std::string& part) {
-      Smoothing smoothing;
+      Smoothing smoothing = smoothing_preset("gaussian");
       change(smoothing);
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), part);
     };
@@ -173,7 +173,7 @@ TEST_SUITE("robustness") {
   }
 
   TEST_CASE("what has no estimator") {
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     smoothing.occupancy_prior = Prior::uniform;
     CHECK_NOTHROW(validate(smoothing));
     smoothing.aggregation_estimator = Estimator::monte_carlo;  // of the Gaussian depth prior
@@ -182,7 +182,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(
         InvalidArgument, validate(smoothing),
         "occupancy_estimator (smoothing): got monte_carlo with the uniform prior, expected exact");
-    smoothing = Smoothing();
+    smoothing = smoothing_preset("gaussian");
     smoothing.depth_prior = Prior::uniform;
     smoothing.aggregation_estimator = Estimator::monte_carlo;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), "aggregation_estimator (smoothing)");
@@ -260,7 +260,7 @@ TEST_SUITE("robustness") {
     check([](Smoothing& s) { s.distance = DistanceMetric::squared; }, "squared distances");
     check([](Smoothing& s) { s.composition = Composition::barrier; }, "the barrier");
     check([](Smoothing& s) { s.blur_radius.reset(); }, "no blur_radius");
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     smoothing = smoothing_preset("rigid");
     smoothing.occupancy_estimator = smoothing.aggregation_estimator = Estimator::monte_carlo;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing),
@@ -286,7 +286,7 @@ TEST_SUITE("robustness") {
     check([](Smoothing& s) { s.supersampling = 3; }, "supersampling (smoothing): got 3, expected 1, 2 or 4");
     check([](Smoothing& s) { s.noise = static_cast<Noise>(5); },
           "noise (smoothing): got 5, expected triangle or pixel");
-    Smoothing smoothing;
+    Smoothing smoothing = smoothing_preset("gaussian");
     smoothing.supersampling = 2;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing),
                           "supersampling (smoothing): got 2, expected 1, or noise of the pixel");

@@ -50,7 +50,7 @@ const SyntheticPixel k_pixel =
 
 Smoothing sampled_joint(Prior occupancy, Prior depth, SamplingMode mode, std::uint32_t samples,
                         std::uint64_t seed = 1) {
-  Smoothing smoothing;
+  Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.composition = dpr::Composition::joint;
   smoothing.occupancy_prior = occupancy;
   smoothing.depth_prior = depth;

@@ -41,7 +41,7 @@ constexpr std::array<PriorCase, 5> k_cases{{{Prior::gaussian, "gaussian", 2.4e-6
 constexpr double k_alpha = 2e-7;  // of the image; measured 9.5e-8
 
 Smoothing joint(Prior prior, float gamma) {
-  Smoothing smoothing;
+  Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.depth_prior = prior;
   smoothing.gamma = gamma;
   smoothing.composition = dpr::Composition::joint;

@@ -38,7 +38,7 @@ constexpr glm::vec3 k_background{0.7F, 0.2F, 0.1F};
 constexpr cl_float4 k_grad{{0.8F, -0.5F, 0.6F, 0.4F}};
 
 Smoothing sampled_aggregation(Prior prior, SamplingMode mode, std::uint32_t samples, std::uint64_t seed = 1) {
-  Smoothing smoothing;
+  Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.depth_prior = prior;
   smoothing.aggregation_estimator = dpr::Estimator::monte_carlo;
   smoothing.gamma = 0.01F;  // 1 in depth: the fragments' noise overlaps

@@ -44,7 +44,7 @@ struct Setting {
 constexpr std::array<Setting, 4> k_settings{{{1e-7F, 0.5F}, {1e-4F, 3.0F}, {1e-2F, 1.0F}, {1.0F, 0.5F}}};
 
 Smoothing barrier(Prior prior, float gamma, float alpha) {
-  Smoothing smoothing;
+  Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.depth_prior = prior;
   smoothing.gamma = gamma;
   smoothing.alpha = alpha;

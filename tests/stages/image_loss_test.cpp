@@ -21,6 +21,7 @@ constexpr std::size_t k_views = 3;
 
 dpr::Renderer render_cube() {
   dpr::Scene scene;
+  scene.smoothing = dpr::smoothing_preset("gaussian");
   scene.width = dpr::test::reduced(14, 6);
   scene.height = dpr::test::reduced(10, 5);
   scene.background = glm::vec3(0.1F, 0.3F, 0.2F);

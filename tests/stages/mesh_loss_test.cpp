@@ -132,6 +132,7 @@ TEST_SUITE("gradient") {
 
   TEST_CASE("backward of images and a mesh loss is the sum of both, the same bits each time") {
     dpr::Scene scene;
+    scene.smoothing = dpr::smoothing_preset("gaussian");
     scene.width = scene.height = dpr::test::reduced(24, 8);
     scene.camera = dpr::orbit_camera(3, 10, 20);
     scene.meshes.push_back({dpr::make_cube()});

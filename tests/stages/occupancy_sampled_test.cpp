@@ -110,7 +110,7 @@ class OccupancySamples {
 };
 
 Smoothing sampled_occupancy(Prior prior, SamplingMode mode, std::uint32_t samples, std::uint64_t seed = 1) {
-  Smoothing smoothing;
+  Smoothing smoothing = dpr::smoothing_preset("gaussian");
   smoothing.occupancy_prior = prior;
   smoothing.occupancy_estimator = dpr::Estimator::monte_carlo;
   smoothing.sigma = OccupancySamples::k_sigma;

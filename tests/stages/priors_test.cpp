@@ -128,7 +128,7 @@ class Distances {
   }
 
   void forward(Prior prior, float sigma) {
-    dpr::Smoothing smoothing;
+    dpr::Smoothing smoothing = dpr::smoothing_preset("gaussian");
     smoothing.occupancy_prior = prior;
     smoothing.sigma = sigma;
     occupancy_.set_smoothing(smoothing);

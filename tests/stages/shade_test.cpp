@@ -53,6 +53,7 @@ dpr::Lights make_lights(Shading shading) {
 /// A smooth mesh with vertex colours and one with face colours, in two views.
 dpr::Scene make_scene(const Model& model) {
   dpr::Scene scene;
+  scene.smoothing = dpr::smoothing_preset("gaussian");
   scene.width = dpr::test::reduced(26, 5);
   scene.height = dpr::test::reduced(19, 5);
   scene.camera = dpr::orbit_camera(5, 20, 30);

@@ -208,6 +208,7 @@ TEST_SUITE("gradient") {
   TEST_CASE(
       "transform: a vertex in the camera's plane that no triangle uses has a gradient of zero, not NaN") {
     dpr::Scene scene;
+    scene.smoothing = dpr::smoothing_preset("gaussian");
     scene.width = scene.height = 8;
     dpr::Mesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

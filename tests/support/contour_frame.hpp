@@ -60,6 +60,7 @@ class ContourFrame {
  private:
   static Scene scene_of(const Mesh& mesh) {
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     scene.meshes.push_back({mesh});
     return scene;
   }

@@ -106,6 +106,7 @@ class NdcStages {
  private:
   static Scene scene_of(const NdcFrame& frame, const std::vector<NdcTriangle>& all) {
     Scene scene;
+    scene.smoothing = smoothing_preset("gaussian");
     Mesh mesh;
     const auto faces = static_cast<unsigned>(all.size() / frame.views);
     for (unsigned f = 0; f < faces; ++f) {

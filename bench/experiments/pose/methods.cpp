@@ -42,7 +42,7 @@ PoseResult solve_by_annealing(const PoseMethod&, const Device& device, const Sce
 
 /// The members of the family that the published protocol is run with.
 Smoothing member(std::string_view name) {
-  Smoothing smoothing;  // exact, Gaussian, barrier
+  Smoothing smoothing = smoothing_preset("gaussian");
   if (name == "exact" || name == "perturbed_pose") return smoothing;
   if (name == "paper_gaussian_minus_one") return smoothing_preset("paper_gaussian");
   if (!name.starts_with("joint")) return smoothing_preset(name);
