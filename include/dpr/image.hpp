@@ -29,17 +29,21 @@ struct Image {
   }
 };
 
+/// What the colours in files of 8 or 16 bits mean: sRGB (IEC 61966-2-1), which is decoded and encoded, or
+/// linear, which is taken as it is. Files of floats are linear, and alpha always is.
+enum class Encoding { srgb, linear };
+
 /// Reads any format OpenImageIO knows, up to 16384 pixels a side. One and two channels are grey (and alpha),
-/// three get alpha 1. 8- and 16-bit formats are scaled to [0, 1] without a colour transform; EXR is taken as
-/// stored. `has_alpha`, if given, tells what the file had. Throws IoError, also for a pixel that is not
-/// finite.
-Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr);
+/// three get alpha 1. `has_alpha`, if given, tells what the file had. Throws IoError, also for a pixel that
+/// is not finite.
+Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr,
+                 Encoding encoding = Encoding::srgb);
 
 /// Writes by extension: .exr keeps the floats (32 bit, RGBA); .png, .tif, .tiff and .tga clamp to [0, 1] and
 /// round to 8 bits; .bmp, .jpg, .jpeg and .ppm do so without alpha. Written to a temporary file that is
 /// renamed at the end, so that no half-written file stays behind. Throws IoError, and InvalidArgument for an
 /// image without pixels.
-void write_image(const std::filesystem::path& file, const Image& image);
+void write_image(const std::filesystem::path& file, const Image& image, Encoding encoding = Encoding::srgb);
 
 /// The same with alpha 1: for viewers, which would blend colours by the silhouette that were blended already.
 Image opaque(Image image);

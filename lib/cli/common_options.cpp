@@ -90,6 +90,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
   add_output_options(command, options);
   add_device_options(command, options);
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
+  command.add_flag("--linear", options.linear, "Files of 8 and 16 bits hold linear colours instead of sRGB");
   add_seed_option(
       command, [&](std::uint64_t seed) { options.seed = seed; }, "Seed of everything random");
   add_smoothing_options(command, options.smoothing);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dpr/device.hpp"
+#include "dpr/image.hpp"
 #include "dpr/notes.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/smoothing_options.hpp"
@@ -21,6 +22,10 @@ struct CommonOptions {
   std::optional<std::size_t> memory_budget;  // MiB
   SmoothingOptions smoothing;
   bool verbose = false, quiet = false;
+  bool linear = false;  ///< files of 8 and 16 bits hold linear colours
+
+  Encoding encoding() const { return linear ? Encoding::linear : Encoding::srgb; }
+
   std::string command_line;  ///< as it was typed, for pages
 };
 

@@ -52,7 +52,7 @@ void resize(ShapeViews& views, glm::ivec2 size) {
 ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
                       const CommonOptions& common) {
   Notes notes;
-  ViewsFile file = parse_views_file(options.views, read_file(options.views), notes);
+  ViewsFile file = parse_views_file(options.views, read_file(options.views), notes, common.encoding());
   print_notes(notes, common);
   ShapeViews& views = file.views;
   if (common.size) resize(views, parse_size(*common.size));

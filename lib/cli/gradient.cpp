@@ -73,7 +73,7 @@ Json gradient_to_json(const Scene& scene, double loss, SceneGradient gradient) {
 void run(const GradientOptions& options, const CommonOptions& common) {
   const Scene scene = read_scene(options.scene, common);
   const LossWeights weights = LossWeights::only(parse_loss(options.loss, "--loss"));
-  const Image target = read_target(options.target, weights);
+  const Image target = read_target(options.target, weights, common.encoding());
   const Device device = open_device(common);
   Renderer renderer(device);
   ImageLoss image_loss(device, weights, {&target, 1});

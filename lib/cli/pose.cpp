@@ -62,7 +62,8 @@ bool wants_descent(const CLI::App& command, const std::optional<std::string>& me
 
 void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   if (!wants_descent(command, options.method)) {
-    if (!options.mask.empty()) options.least_squares.mask = read_image(options.mask);
+    if (!options.mask.empty())
+      options.least_squares.mask = read_image(options.mask, nullptr, Encoding::linear);
     options.least_squares.robust = command.count("--robust") > 0;
     options.least_squares.light = parse_light(options.light);
     options.solver.method = options.least_squares;
@@ -115,7 +116,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   }
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
-  const Image target = read_target(options.target, options.descent.loss);
+  const Image target = read_target(options.target, options.descent.loss, common.encoding());
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);

@@ -71,10 +71,10 @@ Lights fit_lights(const Camera& camera, const Sphere& sphere) {
   const glm::vec3 shoulder(-2 * sphere.radius, 3 * sphere.radius, 0);
   PointLight light;
   light.position = glm::vec3(to_world * glm::vec4(shoulder, 1));
-  light.diffuse = glm::vec3(0.55F);
-  light.specular = glm::vec3(0.1F);
+  light.diffuse = glm::vec3(0.65F);
+  light.specular = glm::vec3(0.05F);
   Lights lights;
-  lights.ambient = glm::vec3(0.45F);
+  lights.ambient = glm::vec3(0.15F);
   lights.point = {light};
   return lights;
 }
@@ -105,7 +105,7 @@ void run(const RenderOptions& options, CommonOptions& common) {
   const Image image = renderer.image();
   const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
-  write_image(options.output, keeps_silhouette ? image : opaque(image));
+  write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
   aovs.write(renderer);
   if (statistics.fragments == 0) {
     print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "

@@ -6,8 +6,8 @@
 
 namespace dpr::cli {
 
-Image read_target(const std::string& file, const LossWeights& weights) {
-  Image target = read_image(file);
+Image read_target(const std::string& file, const LossWeights& weights, Encoding encoding) {
+  Image target = read_image(file, nullptr, encoding);
   const bool shows_silhouette = std::ranges::any_of(target.pixels, [](const auto& p) { return p.a < 1; });
   if (weights.silhouette > 0 && !shows_silhouette) {
     throw InvalidArgument("--target " + file + " (command line)", "no alpha, or 1 everywhere",

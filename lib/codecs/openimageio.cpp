@@ -59,6 +59,7 @@ std::vector<unsigned char> encode(const Image& image, const PixelFormat& format)
   OIIO::ImageSpec spec(image.width, image.height, format.channels,
                        format.bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
   spec.attribute(k_unassociated_alpha, 1);
+  if (format.bytes) spec.attribute("oiio:ColorSpace", format.srgb ? "sRGB" : "Linear");
   spec.attribute("DateTime", "");  // none: equal images are equal files
   OIIO::Filesystem::IOVecOutput bytes;
   if (!output->set_ioproxy(&bytes) || !output->open("image." + format.extension, spec) ||
@@ -94,7 +95,7 @@ void append_pixels(const std::vector<float>& values, std::size_t channels, const
   }
 }
 
-Image read(const std::string& file, bool& has_alpha) {
+Image read(const std::string& file, PixelFacts& facts) {
   const auto input = open(file);
   const OIIO::ImageSpec& spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
@@ -117,13 +118,11 @@ Image read(const std::string& file, bool& has_alpha) {
       throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
     append_pixels(values, static_cast<std::size_t>(spec.nchannels), source, image.pixels);
   }
-  has_alpha = source[3] >= 0;
+  facts = {source[3] >= 0, spec.format.is_floating_point()};
   return image;
 }
 
-bool holds_floats(const std::string& file) { return open(file)->spec().format.is_floating_point(); }
-
-constexpr ImageCodec k_codec{holds_floats, read, encode};
+constexpr ImageCodec k_codec{read, encode};
 
 }  // namespace
 }  // namespace dpr

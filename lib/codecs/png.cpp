@@ -21,12 +21,13 @@ std::vector<png_byte> to_bytes(const Image& image) {
   return bytes;
 }
 
-std::vector<unsigned char> encode(const Image& image, const PixelFormat&) {
+std::vector<unsigned char> encode(const Image& image, const PixelFormat& format) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = static_cast<png_uint_32>(image.width);
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGBA;
+  if (!format.srgb) png.flags = PNG_IMAGE_FLAG_COLORSPACE_NOT_sRGB;
   std::vector<unsigned char> file(PNG_IMAGE_PNG_SIZE_MAX(png));
   png_alloc_size_t size = file.size();
   if (png_image_write_to_memory(&png, file.data(), &size, 0, to_bytes(image).data(), 0, nullptr) == 0)
@@ -35,7 +36,7 @@ std::vector<unsigned char> encode(const Image& image, const PixelFormat&) {
   return file;
 }
 
-constexpr ImageCodec k_codec{nullptr, nullptr, encode};
+constexpr ImageCodec k_codec{nullptr, encode};
 
 }  // namespace
 }  // namespace dpr

@@ -15,15 +15,20 @@ struct PixelFormat {
   std::string extension;  ///< of the file, without the dot
   int channels = 4;       ///< 3 or 4
   bool bytes = true;      ///< 8 bits a channel, or else floats
+  bool srgb = true;       ///< what a file of bytes says that they are
 };
 
-/// What a module does. Its functions throw std::runtime_error with the reason. Where it only writes, those
-/// that read are null.
+/// What a file says of its pixels.
+struct PixelFacts {
+  bool has_alpha = false;
+  bool floats = false;  ///< or else whole numbers, as parts of the largest one
+};
+
+/// What a module does. Its functions throw std::runtime_error with the reason. Where it only writes, `read`
+/// is null.
 struct ImageCodec {
-  /// As the function of image/image_file.hpp.
-  bool (*holds_floats)(const std::string& file);
-  /// As read_image(), but for the finiteness of the pixels.
-  Image (*read)(const std::string& file, bool& has_alpha);
+  /// The pixels as they are stored, finite or not; whole numbers from 0 to 1.
+  Image (*read)(const std::string& file, PixelFacts& facts);
   /// The content of a file of a valid image, in memory.
   std::vector<unsigned char> (*encode)(const Image& image, const PixelFormat& format);
 };

@@ -13,7 +13,7 @@
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "image/codec.hpp"
-#include "image/image_file.hpp"
+#include "image/srgb.hpp"
 
 namespace dpr {
 namespace {
@@ -61,6 +61,12 @@ void require_finite(const std::filesystem::path& file, const Image& image) {
   }
 }
 
+/// Colours below 0 are what formats of bytes hold least of.
+Image encoded(Image image) {
+  for (glm::vec4& pixel : image.pixels) pixel = transferred(glm::max(pixel, 0.0F), encode_srgb);
+  return image;
+}
+
 const ImageCodec& load_codec(const char* module) {
   const auto codec = reinterpret_cast<ImageCodecFunction*>(module_function(module, k_image_codec_symbol));
   return *codec();
@@ -79,30 +85,24 @@ const ImageCodec& png() {
 
 }  // namespace
 
-bool holds_floats(const std::filesystem::path& file) {
+Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding encoding) {
   require_file(file);
-  try {
-    return openimageio().holds_floats(file.string());
-  } catch (const std::runtime_error& error) {
-    throw IoError(file, error.what());
-  }
-}
-
-Image read_image(const std::filesystem::path& file, bool* has_alpha) {
-  require_file(file);
-  bool alpha = false;
+  PixelFacts facts;
   Image image;
   try {
-    image = openimageio().read(file.string(), alpha);
+    image = openimageio().read(file.string(), facts);
   } catch (const std::runtime_error& error) {
     throw IoError(file, error.what());
   }
   require_finite(file, image);
-  if (has_alpha) *has_alpha = alpha;
+  if (encoding == Encoding::srgb && !facts.floats) {
+    for (glm::vec4& pixel : image.pixels) pixel = transferred(pixel, decode_srgb);
+  }
+  if (has_alpha) *has_alpha = facts.has_alpha;
   return image;
 }
 
-void write_image(const std::filesystem::path& file, const Image& image) {
+void write_image(const std::filesystem::path& file, const Image& image, Encoding encoding) {
   const Format& format = format_of(file);
   const auto width = static_cast<std::size_t>(std::max(image.width, 0));
   if (image.width < 1 || image.height < 1 ||
@@ -113,10 +113,12 @@ void write_image(const std::filesystem::path& file, const Image& image) {
         "at least 1x1, and width times height pixels");
   }
   require_finite(file, image);
+  const bool is_srgb = format.bytes && encoding == Encoding::srgb;
   std::vector<unsigned char> bytes;
   try {
     const ImageCodec& codec = format.extension == ".png" ? png() : openimageio();
-    bytes = codec.encode(image, {std::string(format.extension.substr(1)), format.channels, format.bytes});
+    const PixelFormat pixels{std::string(format.extension.substr(1)), format.channels, format.bytes, is_srgb};
+    bytes = codec.encode(is_srgb ? encoded(image) : image, pixels);
   } catch (const std::runtime_error& error) {
     throw IoError(file, error.what());
   }

@@ -1,32 +1,11 @@
 // Textures: what makes one that can be rendered, and its files.
 #include "dpr/texture.hpp"
 
-#include <cmath>
-
 #include "base/checks.hpp"
-#include "base/input_file.hpp"
 #include "dpr/image.hpp"
-#include "image/image_file.hpp"
 
 namespace dpr {
 namespace {
-
-// IEC 61966-2-1: a line near black, a power above it.
-constexpr float k_end_of_line = 0.0031308F, k_slope = 12.92F, k_offset = 0.055F, k_power = 2.4F;
-
-float decode_srgb(float encoded) {
-  if (encoded <= k_end_of_line * k_slope) return encoded / k_slope;
-  return std::pow((encoded + k_offset) / (1 + k_offset), k_power);
-}
-
-float encode_srgb(float linear) {
-  if (linear <= k_end_of_line) return linear * k_slope;
-  return (1 + k_offset) * std::pow(linear, 1 / k_power) - k_offset;
-}
-
-glm::vec3 by_channel(const glm::vec3& color, float (*transfer)(float)) {
-  return {transfer(color.r), transfer(color.g), transfer(color.b)};
-}
 
 void validate_size(const Texture& texture, const std::string& name) {
   for (const int side : {texture.width, texture.height}) {
@@ -63,25 +42,18 @@ void validate(const Texture& texture, const std::string& name) {
 }
 
 Texture read_texture(const std::filesystem::path& file) {
-  const bool is_linear = holds_floats(file);
   const Image image = read_image(file);
   Texture texture;
   texture.width = image.width;
   texture.height = image.height;
-  texture.texels.reserve(image.pixels.size());
-  for (const glm::vec4& pixel : image.pixels)
-    texture.texels.push_back(is_linear ? glm::vec3(pixel) : by_channel(glm::vec3(pixel), decode_srgb));
+  texture.texels.assign(image.pixels.begin(), image.pixels.end());
   return texture;
 }
 
 void write_texture(const std::filesystem::path& file, const Texture& texture) {
   validate(texture, "texture for " + file.string());
-  const bool is_linear = lower_case_extension(file) == ".exr";
   Image image(texture.width, texture.height);
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const glm::vec3& texel = texture.texels[i];
-    image.pixels[i] = glm::vec4(is_linear ? texel : by_channel(texel, encode_srgb), 1);
-  }
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = glm::vec4(texture.texels[i], 1);
   write_image(file, image);
 }
 

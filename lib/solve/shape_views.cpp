@@ -25,11 +25,12 @@ bool shows_silhouette(const Image& image) {
 }
 
 /// The next of the views, in what is known of all.
-ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views) {
+ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
+                     Encoding encoding) {
   node.require_keys({"image", "camera"});
   ShapeView view;
   const std::filesystem::path file = node.at("image").file_in(folder);
-  view.image = read_image(file, &view.has_alpha);
+  view.image = read_image(file, &view.has_alpha, encoding);
   view.has_alpha = view.has_alpha && shows_silhouette(view.image);
   if (view.image.width != views.width || view.image.height != views.height) {
     throw InvalidArgument("size (" + file.string() + ")", checks::size(view.image.width, view.image.height),
@@ -58,7 +59,8 @@ ShapeViews parse_views(const std::filesystem::path& file, std::string_view text,
   return std::move(views);
 }
 
-ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes) {
+ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes,
+                           Encoding encoding) {
   const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
   node.require_keys({"width", "height", "background", "views", "initial", "smoothing"});
@@ -69,7 +71,7 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
   if (const auto background = node.find("background")) views.background = background->vec3();
   const std::filesystem::path folder = file.parent_path();
   for (const JsonNode& view : node.at("views").elements())
-    views.views.push_back(parse_view(view, folder, views));
+    views.views.push_back(parse_view(view, folder, views, encoding));
   if (views.views.empty()) node.at("views").fail("none", "at least one");
   if (const auto initial = node.find("initial")) views.initial = read_mesh(initial->file_in(folder), notes);
   if (const auto smoothing = node.find("smoothing")) result.smoothing = parse_smoothing(*smoothing);

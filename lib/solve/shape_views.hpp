@@ -19,7 +19,8 @@ struct ViewsFile {
 
 /// What a file of views holds; `file` is what messages call it, and beside it the images are looked for.
 /// Throws as read_views() does.
-ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes);
+ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes,
+                           Encoding encoding = Encoding::srgb);
 /// The same, resolved.
 ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes);
 

@@ -5,7 +5,6 @@
 
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
-#include "image/image_file.hpp"
 #include "learn/npz.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "scene/scene_json.hpp"
@@ -58,9 +57,7 @@ void read_image_bytes(std::string_view content) {
   for (const auto& [beginning, its_name] : k_formats) {
     if (content.starts_with(beginning)) name = its_name;
   }
-  const std::filesystem::path file = folder().write(name, content);
-  read_image(file);
-  holds_floats(file);
+  read_image(folder().write(name, content));
 }
 
 void read_scene_text(std::string_view content) {

@@ -38,6 +38,17 @@ float largest_difference(const Image& a, const Image& b) {
   return largest;
 }
 
+/// An image comes back as it is written, to half a step of 8 bits: a step of sRGB is at most 2.3 linear ones.
+/// `image` is what the file keeps of the sample.
+void check_kept(const std::filesystem::path& file, const Image& image, bool alpha) {
+  for (const auto& [encoding, steps] : {std::pair{Encoding::linear, 0.5F}, {Encoding::srgb, 1.15F}}) {
+    bool has_alpha = !alpha;
+    write_image(file, sample(), encoding);
+    CHECK(largest_difference(read_image(file, &has_alpha, encoding), image) <= steps / 255 + 1e-6F);
+    CHECK(has_alpha == alpha);
+  }
+}
+
 }  // namespace
 
 TEST_SUITE("unit") {
@@ -62,25 +73,36 @@ TEST_SUITE("unit") {
   TEST_CASE("formats of eight bits with alpha keep colour and alpha apart") {
     const TempDir folder;
     for (const char* name : {"a.png", "a.tif", "a.tga"}) {
-      bool has_alpha = false;
-      write_image(folder / name, sample());
-      CHECK_MESSAGE(largest_difference(read_image(folder / name, &has_alpha), sample()) <= 0.5F / 255 + 1e-6F,
-                    name);
-      CHECK_MESSAGE(has_alpha, name);
+      CAPTURE(name);
+      check_kept(folder / name, sample(), true);
     }
   }
 
   TEST_CASE("formats without alpha") {
     const TempDir folder;
     for (const char* name : {"a.bmp", "a.ppm"}) {
-      bool has_alpha = true;
-      write_image(folder / name, sample());
-      const Image back = read_image(folder / name, &has_alpha);
-      CHECK_FALSE(has_alpha);
-      CHECK_MESSAGE(largest_difference(back, dpr::opaque(sample())) <= 0.5F / 255 + 1e-6F, name);
+      CAPTURE(name);
+      check_kept(folder / name, dpr::opaque(sample()), false);
     }
     write_image(folder / "a.jpg", Image(16, 16, {0.5F, 0.25F, 0.75F, 0}));
     CHECK(largest_difference(read_image(folder / "a.jpg"), Image(16, 16, {0.5F, 0.25F, 0.75F, 1})) < 0.03F);
+  }
+
+  TEST_CASE("eight bits hold sRGB and say so, unless they are linear; alpha is linear") {
+    const TempDir folder;
+    const Image image(1, 1, {0.25F, 0.001F, 1, 0.4F});
+    for (const char* name : {"a.png", "a.tif", "a.tga"}) {
+      CAPTURE(name);
+      write_image(folder / name, image);
+      const glm::vec4 stored = read_image(folder / name, nullptr, Encoding::linear).pixels[0];
+      CHECK(glm::length(stored - glm::vec4(137, 3, 255, 102) / 255.0F) < 1e-6F);
+    }
+    CHECK(folder.read("a.png").find("sRGB") != std::string::npos);
+    write_image(folder / "a.png", image, Encoding::linear);
+    CHECK(folder.read("a.png").find("sRGB") == std::string::npos);
+    write_image(folder / "a.exr", image);
+    for (const Encoding encoding : {Encoding::srgb, Encoding::linear})
+      CHECK(read_image(folder / "a.exr", nullptr, encoding).pixels == image.pixels);
   }
 
   TEST_CASE("eight bits are clamped, not wrapped") {
@@ -93,7 +115,7 @@ TEST_SUITE("unit") {
     const TempDir folder;
     bool has_alpha = true;
     const auto file = folder.write("grey.pgm", std::string("P5\n2 1\n255\n") + '\x33' + '\xff');
-    const Image image = read_image(file, &has_alpha);
+    const Image image = read_image(file, &has_alpha, Encoding::linear);
     CHECK_FALSE(has_alpha);
     CHECK(image.width == 2);
     CHECK(glm::length(image.pixels[0] - glm::vec4(0.2F, 0.2F, 0.2F, 1)) < 1e-6F);

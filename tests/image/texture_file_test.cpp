@@ -28,7 +28,7 @@ TEST_SUITE("unit") {
     constexpr std::array<float, 4> k_values{0, 8, 128, 255};
     for (int i = 0; i < 4; ++i)
       bytes.at(i, 0) = glm::vec4(glm::vec3(k_values[static_cast<std::size_t>(i)] / 255.0F), 0.5F);
-    write_image(folder / "bytes.png", bytes);
+    write_image(folder / "bytes.png", bytes, Encoding::linear);
     const Texture texture = read_texture(folder / "bytes.png");
     CHECK(texture.width == 4);
     CHECK(texture.height == 1);
@@ -38,7 +38,7 @@ TEST_SUITE("unit") {
     CHECK(texture.texels[2].r == doctest::Approx(std::pow((128 / 255.0 + 0.055) / 1.055, 2.4)));
     CHECK(texture.texels[3].b == doctest::Approx(1));
     write_texture(folder / "again.png", texture);
-    const Image again = read_image(folder / "again.png");
+    const Image again = read_image(folder / "again.png", nullptr, Encoding::linear);
     for (int i = 0; i < 4; ++i) CHECK(again.at(i, 0).r == bytes.at(i, 0).r);
   }
 
