@@ -92,7 +92,12 @@ typedef struct dpr_mesh {
 #define DPR_MESH_INIT \
   { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL }
 
-typedef enum dpr_shading { DPR_SHADING_FLAT = 0, DPR_SHADING_PHONG = 1, DPR_SHADING_GOURAUD = 2 } dpr_shading;
+typedef enum dpr_shading {
+  DPR_SHADING_FLAT = 0,
+  DPR_SHADING_PHONG = 1,
+  DPR_SHADING_GOURAUD = 2,
+  DPR_SHADING_BLINN = 3
+} dpr_shading;
 
 /* World space, without attenuation. */
 typedef struct dpr_point_light {
@@ -105,7 +110,7 @@ typedef struct dpr_lights {
   const dpr_point_light* point; /* [point_count]; NULL if that is 0 */
   size_t point_count;
   float shininess; /* >= 1 */
-  int shading; /* a dpr_shading */
+  int shading;     /* a dpr_shading */
 } dpr_lights;
 
 #define DPR_LIGHTS_INIT \

@@ -90,11 +90,14 @@ Lights to_lights(const dpr_lights* given) {
     throw InvalidArgument("lights.point_count", std::to_string(lights.point_count),
                           "at most " + std::to_string(k_most_lights));
   }
-  constexpr std::array k_shadings{Shading::flat, Shading::phong, Shading::gouraud};
+  constexpr std::array k_shadings{Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn};
   const auto shading = static_cast<std::size_t>(lights.shading);
   if (shading >= k_shadings.size())
     throw InvalidArgument("lights.shading", std::to_string(shading), "a dpr_shading");
-  Lights converted{to_vector(lights.ambient), {}, lights.shininess, k_shadings[shading]};
+  Lights converted;
+  converted.ambient = to_vector(lights.ambient);
+  converted.shininess = lights.shininess;
+  converted.shading = k_shadings[shading];
   for (const dpr_point_light& light : std::span(lights.point, lights.point_count)) {
     converted.point.push_back(
         {to_vector(light.position), to_vector(light.diffuse), to_vector(light.specular)});

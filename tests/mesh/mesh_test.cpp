@@ -139,6 +139,6 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "shininess (lights): got 0.5");
     lights.shininess = 2;
     lights.shading = static_cast<Shading>(7);
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong or gouraud");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud or blinn");
   }
 }
