@@ -55,9 +55,9 @@ struct Lights {
   std::vector<PointLight> point;
   float shininess = 64.0F;  ///< >= 1
   Shading shading = Shading::phong;
-  std::vector<DirectionalLight> directional;
-  std::vector<SpotLight> spot;
-  std::vector<glm::vec3> harmonics;  ///< [k_harmonics] RGB of L_lm by l, then m from -l to l; or empty
+  std::vector<DirectionalLight> directional{};
+  std::vector<SpotLight> spot{};
+  std::vector<glm::vec3> harmonics{};  ///< [k_harmonics] RGB of L_lm by l, then m from -l to l; or empty
 };
 
 struct PointLightGradient {

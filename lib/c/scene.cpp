@@ -1,10 +1,10 @@
 // Scenes of the C interface.
-#include <array>
 #include <cmath>
 
 #include "base/checks.hpp"
 #include "c/handles.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 
 using dpr::InvalidArgument;
@@ -90,14 +90,13 @@ Lights to_lights(const dpr_lights* given) {
     throw InvalidArgument("lights.point_count", std::to_string(lights.point_count),
                           "at most " + std::to_string(k_most_lights));
   }
-  constexpr std::array k_shadings{Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn};
   const auto shading = static_cast<std::size_t>(lights.shading);
   if (shading >= k_shadings.size())
     throw InvalidArgument("lights.shading", std::to_string(shading), "a dpr_shading");
   Lights converted;
   converted.ambient = to_vector(lights.ambient);
   converted.shininess = lights.shininess;
-  converted.shading = k_shadings[shading];
+  converted.shading = static_cast<Shading>(shading);
   for (const dpr_point_light& light : std::span(lights.point, lights.point_count)) {
     converted.point.push_back(
         {to_vector(light.position), to_vector(light.diffuse), to_vector(light.specular)});

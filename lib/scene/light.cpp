@@ -2,6 +2,7 @@
 #include "dpr/light.hpp"
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "scene/light_table.hpp"
 
 namespace dpr {
@@ -58,15 +59,9 @@ void validate(const Lights& lights) {
   if (!(lights.shininess >= 1 && std::isfinite(lights.shininess))) {
     throw InvalidArgument("shininess (lights)", checks::text(lights.shininess), "a finite number >= 1");
   }
-  switch (lights.shading) {
-    case Shading::flat:
-    case Shading::phong:
-    case Shading::gouraud:
-    case Shading::blinn:
-      return;
-  }
-  throw InvalidArgument("shading (lights)", std::to_string(static_cast<int>(lights.shading)),
-                        "flat, phong, gouraud or blinn");
+  const auto shading = static_cast<std::size_t>(lights.shading);
+  if (shading >= k_shadings.size())
+    throw InvalidArgument("shading (lights)", std::to_string(shading), one_of(k_shadings));
 }
 
 }  // namespace dpr

@@ -1,8 +1,11 @@
 #include "scene/light_table.hpp"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "base/name_list.hpp"
+#include "dpr/error.hpp"
 
 namespace dpr {
 namespace {
@@ -61,6 +64,12 @@ shared::Light LightKind<SpotLight>::to_device(const Light& light) {
 /// By degrees.
 double LightKind<SpotLight>::cosine_slope(float degrees) {
   return -std::sin(glm::radians(static_cast<double>(degrees))) * glm::radians(1.0);
+}
+
+Shading parse_shading(const std::string& word, const std::string& argument) {
+  const auto found = std::ranges::find(k_shadings, word);
+  if (found == k_shadings.end()) throw InvalidArgument(argument, "\"" + word + "\"", one_of(k_shadings));
+  return static_cast<Shading>(found - k_shadings.begin());
 }
 
 cl_uint needs_of(const Lights& lights) {

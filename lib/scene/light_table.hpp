@@ -2,14 +2,19 @@
 // Files, checks, uploads, gradients, the operator and tests walk this table.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "dpr/renderer.hpp"
 #include "shared_types.h"
 
 namespace dpr {
+
+/// Names in files, in the order of the enumeration.
+inline constexpr std::array<std::string_view, 4> k_shadings{"flat", "phong", "gouraud", "blinn"};
 
 /// A kind has
 /// - key, lights, gradients: its list in files, in Lights and in SceneGradient
@@ -95,11 +100,52 @@ void for_each_light_kind(Visit&& visit) {
   visit(LightKind<SpotLight>());
 }
 
+/// visit(key, number) for a number, or for those of a vector.
+template <typename Value, typename Visit>
+void visit_numbers(std::string_view key, Value& value, const Visit& visit) {
+  if constexpr (requires { value.x; }) {
+    for (int axis = 0; axis < 3; ++axis) visit(key, value[axis]);
+  } else {
+    visit(key, value);
+  }
+}
+
+/// visit(key, number) for every number of the lights that has a gradient, ambient light, harmonics,
+/// then light by light.
+template <typename Visit>
+void for_each_light_number(Lights& lights, const Visit& visit) {
+  visit_numbers("ambient", lights.ambient, visit);
+  for (glm::vec3& c : lights.harmonics) visit_numbers("harmonics", c, visit);
+  for_each_light_kind([&](auto kind) {
+    for (auto& light : lights.*kind.lights) {
+      kind.for_each_member(
+          [&](std::string_view key, auto member, auto...) { visit_numbers(key, light.*member, visit); });
+    }
+  });
+}
+
+/// The same for their gradients.
+template <typename Visit>
+void for_each_light_number(SceneGradient& gradient, const Visit& visit) {
+  visit_numbers("ambient", gradient.ambient, visit);
+  for (glm::vec3& c : gradient.harmonics) visit_numbers("harmonics", c, visit);
+  for_each_light_kind([&](auto kind) {
+    for (auto& light : gradient.*kind.gradients) {
+      kind.for_each_member([&](std::string_view key, auto, auto member, auto...) {
+        visit_numbers(key, light.*member, visit);
+      });
+    }
+  });
+}
+
 /// "lights.point"
 template <typename Kind>
 std::string list_of(Kind) {
   return "lights." + std::string(Kind::key);
 }
+
+/// By its name in files. Throws InvalidArgument for another word, which it calls `argument`.
+Shading parse_shading(const std::string& word, const std::string& argument);
 
 /// The bits of DPR_LIGHTS.
 cl_uint needs_of(const Lights& lights);

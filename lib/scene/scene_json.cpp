@@ -136,15 +136,6 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
   return instance;
 }
 
-Shading parse_shading(const JsonNode& node) {
-  const std::string word = node.string();
-  if (word == "flat") return Shading::flat;
-  if (word == "phong") return Shading::phong;
-  if (word == "gouraud") return Shading::gouraud;
-  if (word == "blinn") return Shading::blinn;
-  node.fail("\"" + word + "\"", "flat, phong, gouraud or blinn");
-}
-
 void read_member(const JsonNode& node, float& value) { value = node.number(); }
 
 void read_member(const JsonNode& node, glm::vec3& value) { value = node.vec3(); }
@@ -168,7 +159,8 @@ Lights parse_lights(const JsonNode& node) {
   Lights lights;
   take_vec3(node, "ambient", lights.ambient);
   take_number(node, "shininess", lights.shininess);
-  take(node, "shading", lights.shading, parse_shading);
+  take(node, "shading", lights.shading,
+       [](const JsonNode& n) { return parse_shading(n.string(), n.name()); });
   if (const auto list = node.find("harmonics")) {
     for (const JsonNode& element : list->elements(k_harmonics)) lights.harmonics.push_back(element.vec3());
   }
