@@ -23,7 +23,7 @@ struct ShadeGradient {
   std::vector<Vec3d> vertex_normals;     ///< unit normals, phong and gouraud
   std::vector<LightTerms> vertex_light;  ///< gouraud
   Vec3d camera;
-  Lights lights;  ///< every number but shininess
+  Lights lights = zero_like({});  ///< every number but shininess
 };
 
 /// World-space geometry and what the lighting prepares once for all pixels. Without lights only colours are

@@ -277,7 +277,7 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"occupancy_width": "wide"})"),
           "got \"wide\", expected fixed, variable or zero");
     check(with(R"("smoothing": {"occupancy_width": "variable"})"), "occupancy_width (smoothing)");
-    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong or gouraud");
+    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong, gouraud or blinn");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
     const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";
     check(with_mesh(k_triangle + R"(, "transform": )" + rows), "meshes[0].transform[2] (");
