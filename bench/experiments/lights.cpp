@@ -1,4 +1,4 @@
-// Lights from images: the lights of a known shape, every kind, found from wrong ones by the gradients of two
+// Lights from images: the lights of a known shape, every kind, found from wrong ones by the gradients of six
 // noisy 8-bit views, and how far what was found is from the truth.
 #include <algorithm>
 #include <cmath>
@@ -17,8 +17,9 @@ namespace {
 
 constexpr std::uint64_t k_seed = 1;
 constexpr float k_noise = 0.01F;  // standard deviation of the target's, beside that of 8 bits
-constexpr double k_first_rate = 5e-2, k_last_rate = 5e-4;
-constexpr double k_degrees_of_a_step = 20;  // that an angle moves where a length or a colour moves by 1
+constexpr double k_first_rate = 0.1, k_last_rate = 1e-3;
+// That an angle and a position move where a colour or a direction moves by 1.
+constexpr double k_degrees_of_a_step = 20, k_length_of_a_step = 4;
 
 /// Uniform numbers that are the same with every standard library.
 class Random {
@@ -44,10 +45,10 @@ class Random {
   std::mt19937 engine_{k_seed};
 };
 
-/// A grey surface with bumps, seen from two sides.
+/// A grey surface with bumps, seen from all sides.
 Scene make_scene(bool smoke) {
   Scene scene;
-  scene.width = scene.height = smoke ? 24 : 96;
+  scene.width = scene.height = smoke ? 24 : 64;
   scene.camera = orbit_camera(4, 20, -25);
   scene.camera.fov_y_degrees = 40;
   Mesh mesh = make_icosphere(smoke ? 2 : 4);
@@ -61,8 +62,11 @@ Scene make_scene(bool smoke) {
 }
 
 std::vector<View> make_views(const Scene& scene) {
-  std::vector<View> views(2, View{scene.camera, {scene.meshes[0].transform}});
-  views[1].camera.view = orbit_camera(4, 35, 35).view;
+  std::vector<View> views(6, View{scene.camera, {scene.meshes[0].transform}});
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const float elevation = v % 2 == 0 ? 35 : -35;
+    views[v].camera.view = orbit_camera(4, elevation, 60 * static_cast<float>(v)).view;
+  }
   return views;
 }
 
@@ -122,18 +126,19 @@ Problem make_directional(Random& random) {
 /// The cone's edge lies on the shape, in the truth and at the start.
 Problem make_spot(Random& random) {
   Problem problem{dim(Shading::phong), dim(Shading::phong)};
-  const auto aimed = [&](float angle, float inner) {
+  const glm::vec3 side = random.towards_light();
+  const auto aimed = [&](const glm::vec3& from, float angle, float inner) {
     SpotLight light;
-    light.position = random(3, 5) * random.towards_light();
+    light.position = random(3, 5) * glm::normalize(from);
     light.direction = random.vector(-0.2F, 0.2F) - light.position;
     const float to_edge = glm::degrees(std::atan(0.8F / glm::length(light.position)));
     light.angle_degrees = angle * to_edge;
     light.inner_angle_degrees = inner * to_edge;
     return light;
   };
-  problem.truth.spot = {aimed(1, 0.6F)};
+  problem.truth.spot = {aimed(side, 1, 0.6F)};
   problem.truth.spot[0].diffuse = random.vector(0.4F, 0.7F);
-  problem.start.spot = {aimed(1.2F, 0.4F)};
+  problem.start.spot = {aimed(side + random.vector(-0.4F, 0.4F), 1.2F, 0.4F)};
   return problem;
 }
 
@@ -191,15 +196,20 @@ void spoil(Image& image, Random& random) {
   }
 }
 
-/// Keeps a cone one that can be rendered with.
-void clamp_angles(Lights& lights) {
+/// Light takes nothing away, and a cone stays one that can be rendered with.
+void clamp(Lights& lights) {
+  for_each_light_number(lights, [](std::string_view key, float& number) {
+    if (key == "ambient" || key == "diffuse" || key == "specular") number = std::max(number, 0.0F);
+  });
   for (SpotLight& light : lights.spot) {
     light.angle_degrees = std::clamp(light.angle_degrees, 1.0F, 180.0F);
     light.inner_angle_degrees = std::clamp(light.inner_angle_degrees, 0.0F, light.angle_degrees - 0.5F);
   }
 }
 
-double unit_of(std::string_view key) { return key.ends_with("degrees") ? k_degrees_of_a_step : 1; }
+double unit_of(std::string_view key) {
+  return key.ends_with("degrees") ? k_degrees_of_a_step : key == "position" ? k_length_of_a_step : 1;
+}
 
 /// Adam on every number of the lights, at a rate that falls by a constant factor. Of the environment's scenes
 /// the ambient light is known.
@@ -220,7 +230,7 @@ Lights find(Renderer& renderer, ImageLoss& loss, Lights lights, unsigned iterati
     for_each_light_number(lights, [&](std::string_view key, float& number) {
       number += static_cast<float>(*step++ * unit_of(key));
     });
-    clamp_angles(lights);
+    clamp(lights);
   }
   return lights;
 }
@@ -244,8 +254,9 @@ Json run_kind(const Settings& settings, const Kind& kind, const Scene& plain, st
     renderer.set_scene(scene);
     renderer.set_views(make_views(scene));
     renderer.forward();
-    std::vector<Image> targets{renderer.image(0), renderer.image(1)};
-    for (Image& target : targets) spoil(target, random);
+    std::vector<Image> targets;
+    for (std::size_t v = 0; v < renderer.views().size(); ++v)
+      spoil(targets.emplace_back(renderer.image(v)), random);
     ImageLoss loss(settings.device, LossWeights::only(LossKind::mse), targets);
     const Lights found = find(renderer, loss, problem.start, iterations);
     before.push_back(kind.errors(problem.start, problem.truth));
@@ -274,8 +285,8 @@ Json run_kind(const Settings& settings, const Kind& kind, const Scene& plain, st
 }  // namespace
 
 void run_lights(const Settings& settings) {
-  const std::size_t problems = settings.smoke ? 1 : 9;
-  const unsigned iterations = settings.smoke ? 3 : 600;
+  const std::size_t problems = settings.smoke ? 1 : 5;
+  const unsigned iterations = settings.smoke ? 3 : 1000;
   const Scene scene = make_scene(settings.smoke);
   Json rows = Json::array();
   std::vector<Image> pictures;
