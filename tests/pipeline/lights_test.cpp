@@ -57,7 +57,7 @@ Lights without_lights(Shading shading = Shading::phong) {
 Lights find(Renderer& renderer, ImageLoss& loss, Lights lights, int iterations) {
   Optimizer optimizer({.learning_rate = 1});
   for (int i = 0; i < iterations; ++i) {
-    optimizer.set_learning_rate(0.1 * std::pow(1e-2, double(i) / iterations));
+    optimizer.set_learning_rate(0.3 * std::pow(3e-3, double(i) / iterations));
     renderer.set_lights(lights);
     renderer.forward();
     loss.evaluate(renderer);
@@ -165,7 +165,7 @@ TEST_SUITE("pipeline") {
     truth.point = {{{1.5F, 2.5F, 3.0F}, {0.6F, 0.5F, 0.4F}, {0.3F, 0.4F, 0.2F}}};
     start.point = truth.point;
     start.point[0].position = {-2.0F, 1.0F, 3.0F};
-    const glm::vec3 found = find(truth, start, 300).point[0].position, wanted = truth.point[0].position;
+    const glm::vec3 found = find(truth, start, 400).point[0].position, wanted = truth.point[0].position;
     CHECK(glm::distance(start.point[0].position, wanted) > 0.5F * glm::length(wanted));
     CHECK(glm::distance(found, wanted) < 0.01F * glm::length(wanted));
 
@@ -175,7 +175,7 @@ TEST_SUITE("pipeline") {
     for (std::size_t k = 0; k < k_harmonics; ++k) truth.harmonics.push_back(random.vector(-0.4F, 0.4F));
     truth.harmonics[0] += glm::vec3(1.5F);
     start.harmonics.resize(k_harmonics);
-    const Lights environment = find(truth, start, 300);
+    const Lights environment = find(truth, start, 400);
     double difference = 0, size = 0;
     for (std::size_t k = 0; k < k_harmonics; ++k) {
       const glm::dvec3 wrong = environment.harmonics[k] - truth.harmonics[k], right = truth.harmonics[k];
