@@ -26,12 +26,12 @@ typedef struct {
   realn edge, cone;       // where in the cone's edge, 0 outside to 1 inside, and what comes through
 } LightTerm;
 
-DPR_ALWAYS_INLINE LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, const Light light,
+DPR_ALWAYS_INLINE LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, global const Light* light,
                                        float shininess) {
   LightTerm t;
   t.to_light = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
-                   ? mad3n(position, (realn)(-light.position.w), splat3(light.position))
-                   : sub3n(splat3(light.position), position);
+                   ? mad3n(position, (realn)(-light->position.w), splat3(light->position))
+                   : sub3n(splat3(light->position), position);
   t.inverse_light = normalize3n(&t.to_light);
   t.to_eye = sub3n(splat3(eye), position);
   t.inverse_eye = normalize3n(&t.to_eye);
@@ -49,8 +49,8 @@ DPR_ALWAYS_INLINE LightTerm light_term(Vec3n position, Vec3n normal, float4 eye,
   t.base = choose(cosine > 0.0f, max(towards, 0.0f), (realn)(0.0f));
   t.highlight = choose(t.base > 0.0f, exp(shininess * log(max(t.base, 1e-30f))), (realn)(0.0f));
   if (DPR_LIGHTS & DPR_LIGHTS_CONES) {
-    const realn along = -dot3n(splat3(light.axis), t.to_light);
-    t.edge = clamp((along - light.cos_outer) * light.inverse_edge, 0.0f, 1.0f);
+    const realn along = -dot3n(splat3(light->axis), t.to_light);
+    t.edge = clamp((along - light->cos_outer) * light->inverse_edge, 0.0f, 1.0f);
     t.cone = square(t.edge) * mad(t.edge, -2.0f, 3.0f);  // smoothstep
   }
   return t;
@@ -94,7 +94,7 @@ DPR_ALWAYS_INLINE void light_point(const LightingParams lp, global const Light* 
     for (int k = 0; k < DPR_HARMONICS; ++k) *factor = mad3n(splat3(lp.harmonics[k]), basis[k], *factor);
   }
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights[l], lp.shininess);
+    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
     *factor = mad3n(splat3(lights[l].diffuse), through_cone(t, t.lambert), *factor);
     *specular = mad3n(splat3(lights[l].specular), through_cone(t, t.highlight), *specular);
   }
@@ -112,23 +112,23 @@ typedef struct {
 } LightGradient;
 
 /// Adds those through a light's cone, and returns what reaches the direction to the light.
-DPR_ALWAYS_INLINE Vec3n cone_backward(const LightTerm t, const Light light, realn grad_cone,
+DPR_ALWAYS_INLINE Vec3n cone_backward(const LightTerm t, global const Light* light, realn grad_cone,
                                       LightGradient* g) {
   const realn grad_edge = grad_cone * 6.0f * t.edge * (1.0f - t.edge);  // smoothstep's slope
-  const realn grad_along = grad_edge * light.inverse_edge;
+  const realn grad_along = grad_edge * light->inverse_edge;
   g->cos_inner -= grad_along * t.edge;
   g->cos_outer -= grad_along * (1.0f - t.edge);
   g->axis = mad3n(t.to_light, -grad_along, g->axis);
-  return scale3n(splat3(light.axis), -grad_along);
+  return scale3n(splat3(light->axis), -grad_along);
 }
 
 /// Gradients of one light's terms: adds to those of the point and of the light.
-DPR_ALWAYS_INLINE void light_term_backward(const LightTerm t, const Light light, float shininess,
+DPR_ALWAYS_INLINE void light_term_backward(const LightTerm t, global const Light* light, float shininess,
                                            Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
                                            PointGradient* point, LightGradient* g) {
   const realn cosine = t.lambert;
-  const realn by_diffuse = dot3n(grad_factor, splat3(light.diffuse)),
-              by_specular = dot3n(grad_specular, splat3(light.specular));
+  const realn by_diffuse = dot3n(grad_factor, splat3(light->diffuse)),
+              by_specular = dot3n(grad_specular, splat3(light->specular));
   const realn grad_highlight = through_cone(t, by_specular);
   const realn grad_base =
       choose(t.base > 0.0f, grad_highlight * shininess * t.highlight / max(t.base, 1e-30f), (realn)(0.0f));
@@ -156,7 +156,7 @@ DPR_ALWAYS_INLINE void light_term_backward(const LightTerm t, const Light light,
   g->specular = mad3n(grad_specular, through_cone(t, t.highlight), g->specular);
   point->eye = mad3n(eye_moves, (realn)(1.0f), point->eye);
   point->position = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
-                        ? sub3n(mad3n(light_moves, (realn)(-light.position.w), point->position), eye_moves)
+                        ? sub3n(mad3n(light_moves, (realn)(-light->position.w), point->position), eye_moves)
                         : sub3n(sub3n(point->position, light_moves), eye_moves);
 }
 
@@ -179,13 +179,13 @@ DPR_ALWAYS_INLINE void light_point_backward(const LightingParams lp, global cons
   }
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights[l], lp.shininess);
-    light_term_backward(t, lights[l], lp.shininess, normal, grad_factor, grad_specular, point, &unused);
+    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
+    light_term_backward(t, lights + l, lp.shininess, normal, grad_factor, grad_specular, point, &unused);
   }
 }
 
 /// Adds the gradients of a light at a point.
-DPR_ALWAYS_INLINE void add_light_gradient(const LightingParams lp, const Light light, float4 eye,
+DPR_ALWAYS_INLINE void add_light_gradient(const LightingParams lp, global const Light* light, float4 eye,
                                           Vec3n position, Vec3n normal, Vec3n grad_factor,
                                           Vec3n grad_specular, LightGradient* g) {
   const LightTerm t = light_term(position, normal, eye, light, lp.shininess);

@@ -302,7 +302,7 @@ DPR_ALWAYS_INLINE void add_light_sums(const LightingParams lp, uint l, global co
   if ((DPR_LIGHTS & DPR_LIGHTS_HARMONICS) && l == 0)
     add_harmonics_gradient(normal, grad_factor, sums->harmonics);
   if (l < lp.lights)
-    add_light_gradient(lp, lights[l], eye, position, normal, grad_factor, grad_specular, &sums->light);
+    add_light_gradient(lp, lights + l, eye, position, normal, grad_factor, grad_specular, &sums->light);
 }
 
 DPR_ALWAYS_INLINE void store_channels(Vec3n v, uint channel, uint pairs, uint pair, global float* channels) {
@@ -313,14 +313,14 @@ DPR_ALWAYS_INLINE void store_channels(Vec3n v, uint channel, uint pairs, uint pa
 }
 
 /// The environment's channels go before those of the lights.
-DPR_ALWAYS_INLINE void store_light_sums(const LightSums sums, const Light light, uint pairs, uint pair,
+DPR_ALWAYS_INLINE void store_light_sums(const LightSums sums, global const Light* light, uint pairs, uint pair,
                                         global float* channels) {
   const LightGradient g = sums.light;
   store_channels(g.position, DPR_CHANNEL_POSITION, pairs, pair, channels);
   store_channels(g.diffuse, DPR_CHANNEL_DIFFUSE, pairs, pair, channels);
   store_channels(g.specular, DPR_CHANNEL_SPECULAR, pairs, pair, channels);
   if (!(DPR_LIGHTS & DPR_LIGHTS_CONES)) return;
-  const Vec3n axis = normalize3n_backward(splat3(light.axis), (realn)(light.axis.w), g.axis);
+  const Vec3n axis = normalize3n_backward(splat3(light->axis), (realn)(light->axis.w), g.axis);
   store_channels(axis, DPR_CHANNEL_AXIS, pairs, pair, channels);
   channels[(size_t)DPR_CHANNEL_COS_INNER * pairs + pair] = sum_lanes(g.cos_inner);
   channels[(size_t)DPR_CHANNEL_COS_OUTER * pairs + pair] = sum_lanes(g.cos_outer);
@@ -375,5 +375,5 @@ kernel void shade_lit_backward_lights(
   }
   if (light >= lp.lights) return;
   channels += (size_t)(DPR_ENVIRONMENT_CHANNELS(DPR_LIGHTS) + light * DPR_LIGHT_CHANNELS(DPR_LIGHTS)) * pairs;
-  store_light_sums(sums, lights[light], pairs, pair, channels);
+  store_light_sums(sums, lights + light, pairs, pair, channels);
 }
