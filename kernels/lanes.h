@@ -4,9 +4,6 @@
 #ifndef DPR_LANES_H
 #define DPR_LANES_H
 
-/// For what must not be called: the arguments would go through memory.
-#define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
-
 #ifndef DPR_LANES
 #define DPR_LANES 8 /* the device's width; the host chooses it */
 #endif

@@ -1,8 +1,7 @@
 // The light that reaches a surface point: Phong, "Illumination for computer generated pictures" (1975);
 // Blinn, "Models of light reflection for computer synthesized pictures" (1977); Ramamoorthi and Hanrahan, "An
 // efficient representation for irradiance environment maps" (2001). On lanes. DPR_SHADING says which
-// highlight, and DPR_LIGHTS what kinds of lights there are beyond points. All is inlined: what these pass to
-// each other is large.
+// highlight, and DPR_LIGHTS what kinds of lights there are beyond points.
 #ifndef DPR_LIGHTING_H
 #define DPR_LIGHTING_H
 
@@ -26,8 +25,8 @@ typedef struct {
   realn edge, cone;       // where in the cone's edge, 0 outside to 1 inside, and what comes through
 } LightTerm;
 
-DPR_ALWAYS_INLINE LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, global const Light* light,
-                                       float shininess) {
+static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, global const Light* light,
+                                   float shininess) {
   LightTerm t;
   t.to_light = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
                    ? mad3n(position, (realn)(-light->position.w), splat3(light->position))
@@ -57,13 +56,13 @@ DPR_ALWAYS_INLINE LightTerm light_term(Vec3n position, Vec3n normal, float4 eye,
 }
 
 /// What comes through the light's cone.
-DPR_ALWAYS_INLINE realn through_cone(const LightTerm t, realn v) {
+static inline realn through_cone(const LightTerm t, realn v) {
   return (DPR_LIGHTS & DPR_LIGHTS_CONES) ? v * t.cone : v;
 }
 
 /// The basis, but for its constants, at a normal: of degree 0, 1 and 2, so that without a normal the mean is
 /// left. In the order (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), ..., (2, 2).
-DPR_ALWAYS_INLINE void harmonic_basis(Vec3n n, realn basis[DPR_HARMONICS]) {
+static inline void harmonic_basis(Vec3n n, realn basis[DPR_HARMONICS]) {
   basis[0] = 1.0f;
   basis[1] = n.y;
   basis[2] = n.z;
@@ -76,15 +75,15 @@ DPR_ALWAYS_INLINE void harmonic_basis(Vec3n n, realn basis[DPR_HARMONICS]) {
 }
 
 /// Its gradient to the normal, from those of the basis.
-DPR_ALWAYS_INLINE Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS]) {
+static inline Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS]) {
   return make_vec3n(g[3] + n.y * g[4] + n.z * g[7] + 2.0f * n.x * (g[8] - g[6]),
                     g[1] + n.x * g[4] + n.z * g[5] - 2.0f * n.y * (g[8] + g[6]),
                     g[2] + n.y * g[5] + n.x * g[7] + 2.0f * n.z * (g[6] + g[6]));
 }
 
 /// factor = ambient + environment + sum diffuse * lambert, specular = sum specular * highlight, RGB each.
-DPR_ALWAYS_INLINE void light_point(const LightingParams lp, global const Light* restrict lights,
-                                   Vec3n position, Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
+static inline void light_point(const LightingParams lp, global const Light* restrict lights, Vec3n position,
+                               Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
   *factor = splat3(lp.ambient);
   *specular = zero3n();
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
@@ -112,8 +111,8 @@ typedef struct {
 } LightGradient;
 
 /// Adds those through a light's cone, and returns what reaches the direction to the light.
-DPR_ALWAYS_INLINE Vec3n cone_backward(const LightTerm t, global const Light* light, realn grad_cone,
-                                      LightGradient* g) {
+static inline Vec3n cone_backward(const LightTerm t, global const Light* light, realn grad_cone,
+                                  LightGradient* g) {
   const realn grad_edge = grad_cone * 6.0f * t.edge * (1.0f - t.edge);  // smoothstep's slope
   const realn grad_along = grad_edge * light->inverse_edge;
   g->cos_inner -= grad_along * t.edge;
@@ -123,9 +122,9 @@ DPR_ALWAYS_INLINE Vec3n cone_backward(const LightTerm t, global const Light* lig
 }
 
 /// Gradients of one light's terms: adds to those of the point and of the light.
-DPR_ALWAYS_INLINE void light_term_backward(const LightTerm t, global const Light* light, float shininess,
-                                           Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
-                                           PointGradient* point, LightGradient* g) {
+static inline void light_term_backward(const LightTerm t, global const Light* light, float shininess,
+                                       Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+                                       PointGradient* point, LightGradient* g) {
   const realn cosine = t.lambert;
   const realn by_diffuse = dot3n(grad_factor, splat3(light->diffuse)),
               by_specular = dot3n(grad_specular, splat3(light->specular));
@@ -160,7 +159,7 @@ DPR_ALWAYS_INLINE void light_term_backward(const LightTerm t, global const Light
                         : sub3n(sub3n(point->position, light_moves), eye_moves);
 }
 
-DPR_ALWAYS_INLINE LightGradient zero_light_gradient(void) {
+static inline LightGradient zero_light_gradient(void) {
   LightGradient g;
   g.position = g.diffuse = g.specular = g.axis = zero3n();
   g.cos_inner = g.cos_outer = 0.0f;
@@ -168,9 +167,9 @@ DPR_ALWAYS_INLINE LightGradient zero_light_gradient(void) {
 }
 
 /// Adds the gradients through the light at a point.
-DPR_ALWAYS_INLINE void light_point_backward(const LightingParams lp, global const Light* restrict lights,
-                                            float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                            Vec3n grad_specular, PointGradient* point) {
+static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
+                                        float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
+                                        Vec3n grad_specular, PointGradient* point) {
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
     realn grad_basis[DPR_HARMONICS];
 #pragma unroll
@@ -185,9 +184,9 @@ DPR_ALWAYS_INLINE void light_point_backward(const LightingParams lp, global cons
 }
 
 /// Adds the gradients of a light at a point.
-DPR_ALWAYS_INLINE void add_light_gradient(const LightingParams lp, global const Light* light, float4 eye,
-                                          Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                          Vec3n grad_specular, LightGradient* g) {
+static inline void add_light_gradient(const LightingParams lp, global const Light* light, float4 eye,
+                                      Vec3n position, Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+                                      LightGradient* g) {
   const LightTerm t = light_term(position, normal, eye, light, lp.shininess);
   PointGradient unused;
   unused.position = unused.normal = unused.eye = zero3n();
@@ -195,7 +194,7 @@ DPR_ALWAYS_INLINE void add_light_gradient(const LightingParams lp, global const 
 }
 
 /// Adds the gradients of the harmonics at a normal.
-DPR_ALWAYS_INLINE void add_harmonics_gradient(Vec3n normal, Vec3n grad_factor, Vec3n grad[DPR_HARMONICS]) {
+static inline void add_harmonics_gradient(Vec3n normal, Vec3n grad_factor, Vec3n grad[DPR_HARMONICS]) {
   realn basis[DPR_HARMONICS];
   harmonic_basis(normal, basis);
 #pragma unroll

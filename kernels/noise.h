@@ -25,8 +25,9 @@
 #include "philox.h"
 #include "priors.h"
 
-// What draws noise is DPR_ALWAYS_INLINE: the key's part in the generator's rounds is computed once for a
-// whole launch then.
+/// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole
+/// launch.
+#define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
 /// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
 #ifndef DPR_NOISE_CACHE

@@ -17,17 +17,18 @@ typedef struct {
 } Surface;
 
 /// The face's own normal, of length one.
-DPR_ALWAYS_INLINE float4 flat_normal(float4 a, float4 b, float4 c) {
+static inline float4 flat_normal(float4 a, float4 b, float4 c) {
   const float3 n = cross(b.xyz - a.xyz, c.xyz - a.xyz);
   const float size = length(n);
   return (float4)(size > DPR_MIN_LENGTH ? n / size : (float3)(0.0f), size);
 }
 
-DPR_ALWAYS_INLINE Surface load_surface(
-    const FrameParams p, const LightingParams lp, uint view_face, global const ViewParams* restrict views,
-    global const Light* restrict lights, global const uint4* restrict faces,
-    global const uint4* restrict face_colors, global const float4* restrict colors,
-    global const float4* restrict world, global const float4* restrict normals) {
+static inline Surface load_surface(const FrameParams p, const LightingParams lp, uint view_face,
+                                   global const ViewParams* restrict views,
+                                   global const Light* restrict lights, global const uint4* restrict faces,
+                                   global const uint4* restrict face_colors,
+                                   global const float4* restrict colors, global const float4* restrict world,
+                                   global const float4* restrict normals) {
   const uint view = view_face / p.faces;
   const uint4 f = faces[view_face % p.faces], c = face_colors[view_face % p.faces];
   const uint vertex[3] = {f.x, f.y, f.z}, color[3] = {c.x, c.y, c.z};
@@ -50,7 +51,7 @@ DPR_ALWAYS_INLINE Surface load_surface(
   return s;
 }
 
-DPR_ALWAYS_INLINE Vec3n interpolate3(const Vec3n corner[3], realn c1, realn c2) {
+static inline Vec3n interpolate3(const Vec3n corner[3], realn c1, realn c2) {
   return mad3n(sub3n(corner[2], corner[0]), c2, mad3n(sub3n(corner[1], corner[0]), c1, corner[0]));
 }
 
@@ -61,8 +62,8 @@ typedef struct {
 } Shaded;
 
 /// `base` is read where base colours come from fragments.
-DPR_ALWAYS_INLINE Shaded shade_fragment(const Surface s, const LightingParams lp,
-                                        global const Light* restrict lights, realn c1, realn c2, Vec3n base) {
+static inline Shaded shade_fragment(const Surface s, const LightingParams lp,
+                                    global const Light* restrict lights, realn c1, realn c2, Vec3n base) {
   Shaded f;
   f.base = DPR_BASE == DPR_BASE_OF_CORNERS ? interpolate3(s.color, c1, c2) : base;
   f.position = interpolate3(s.position, c1, c2);
@@ -78,15 +79,15 @@ DPR_ALWAYS_INLINE Shaded shade_fragment(const Surface s, const LightingParams lp
 }
 
 /// RGB of the fragments from `first` on that are in the run; 0 in the other lanes.
-DPR_ALWAYS_INLINE Vec3n load_rgb(intn in_run, uint first, global const float* red, global const float* green,
-                                 global const float* blue) {
+static inline Vec3n load_rgb(intn in_run, uint first, global const float* red, global const float* green,
+                             global const float* blue) {
   return make_vec3n(load_run(in_run, first, red), load_run(in_run, first, green),
                     load_run(in_run, first, blue));
 }
 
 /// Their base colours; 0 where those are interpolated here.
-DPR_ALWAYS_INLINE Vec3n load_base(intn in_run, uint first, global const float* red, global const float* green,
-                                  global const float* blue) {
+static inline Vec3n load_base(intn in_run, uint first, global const float* red, global const float* green,
+                              global const float* blue) {
   return DPR_BASE == DPR_BASE_OF_CORNERS ? zero3n() : load_rgb(in_run, first, red, green, blue);
 }
 
@@ -128,22 +129,22 @@ typedef struct {
   Vec3n color[3], position[3], normal[3], factor[3], specular[3], eye;
 } SurfaceGradients;
 
-DPR_ALWAYS_INLINE void add_corners(Vec3n grad[3], Vec3n g, const realn c[3]) {
+static inline void add_corners(Vec3n grad[3], Vec3n g, const realn c[3]) {
 #pragma unroll
   for (int k = 0; k < 3; ++k) grad[k] = mad3n(g, c[k], grad[k]);
 }
 
 /// What moving weight from corner 0 to corner k does to an interpolated quantity with gradient g.
-DPR_ALWAYS_INLINE realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
+static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
   return dot3n(sub3n(corner[k], corner[0]), g);
 }
 
 /// One fragment's share of everything: the gradients of its base colour, and of the barycentrics, relative to
 /// corner 0's.
-DPR_ALWAYS_INLINE void shade_fragment_backward(const Surface s, const LightingParams lp,
-                                               global const Light* restrict lights, realn c1, realn c2,
-                                               Vec3n base, Vec3n grad, SurfaceGradients* g, Vec3n* grad_base,
-                                               realn* grad_bary1, realn* grad_bary2) {
+static inline void shade_fragment_backward(const Surface s, const LightingParams lp,
+                                           global const Light* restrict lights, realn c1, realn c2,
+                                           Vec3n base, Vec3n grad, SurfaceGradients* g, Vec3n* grad_base,
+                                           realn* grad_bary1, realn* grad_bary2) {
   const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
   const realn c[3] = {1.0f - c1 - c2, c1, c2};
   const Vec3n grad_factor = mul3n(grad, f.base);
@@ -173,13 +174,12 @@ DPR_ALWAYS_INLINE void shade_fragment_backward(const Surface s, const LightingPa
   *grad_bary2 += along_corner(s.position, 2, point.position) + along_corner(s.normal, 2, grad_normal);
 }
 
-DPR_ALWAYS_INLINE float4 sum_vec3n(Vec3n v) {
+static inline float4 sum_vec3n(Vec3n v) {
   return (float4)(sum_lanes(v.x), sum_lanes(v.y), sum_lanes(v.z), 0.0f);
 }
 
 /// The three corners share one normal, cross(b - a, c - a) normalised: its gradient moves to the positions.
-DPR_ALWAYS_INLINE void flat_normal_backward(const float4 world[3], float4 grad_unit,
-                                            float4 grad_position[3]) {
+static inline void flat_normal_backward(const float4 world[3], float4 grad_unit, float4 grad_position[3]) {
   const float4 n = flat_normal(world[0], world[1], world[2]);
   const float inverse = n.w > DPR_MIN_LENGTH ? 1.0f / n.w : 0.0f;
   const float3 g = (grad_unit.xyz - n.xyz * dot(n.xyz, grad_unit.xyz)) * inverse;
@@ -190,8 +190,8 @@ DPR_ALWAYS_INLINE void flat_normal_backward(const float4 world[3], float4 grad_u
 }
 
 /// The light was evaluated at the corners: all lanes hold the same, and lane sums have been taken before.
-DPR_ALWAYS_INLINE void corners_backward(const Surface s, const LightingParams lp,
-                                        global const Light* restrict lights, SurfaceGradients* g) {
+static inline void corners_backward(const Surface s, const LightingParams lp,
+                                    global const Light* restrict lights, SurfaceGradients* g) {
   const realn share = 1.0f / DPR_WIDTH;  // each lane carries its part of the sum
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
@@ -286,7 +286,7 @@ typedef struct {
   LightGradient light;
 } LightSums;
 
-DPR_ALWAYS_INLINE LightSums zero_light_sums(void) {
+static inline LightSums zero_light_sums(void) {
   LightSums sums;
   sums.ambient = zero3n();
 #pragma unroll
@@ -296,16 +296,16 @@ DPR_ALWAYS_INLINE LightSums zero_light_sums(void) {
 }
 
 /// Adds those at a point in the light; `l` is the light.
-DPR_ALWAYS_INLINE void add_light_sums(const LightingParams lp, uint l, global const Light* restrict lights,
-                                      float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                      Vec3n grad_specular, LightSums* sums) {
+static inline void add_light_sums(const LightingParams lp, uint l, global const Light* restrict lights,
+                                  float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
+                                  Vec3n grad_specular, LightSums* sums) {
   if ((DPR_LIGHTS & DPR_LIGHTS_HARMONICS) && l == 0)
     add_harmonics_gradient(normal, grad_factor, sums->harmonics);
   if (l < lp.lights)
     add_light_gradient(lp, lights + l, eye, position, normal, grad_factor, grad_specular, &sums->light);
 }
 
-DPR_ALWAYS_INLINE void store_channels(Vec3n v, uint channel, uint pairs, uint pair, global float* channels) {
+static inline void store_channels(Vec3n v, uint channel, uint pairs, uint pair, global float* channels) {
   const float4 sum = sum_vec3n(v);
   channels[(size_t)channel * pairs + pair] = sum.x;
   channels[(size_t)(channel + 1) * pairs + pair] = sum.y;
@@ -313,8 +313,8 @@ DPR_ALWAYS_INLINE void store_channels(Vec3n v, uint channel, uint pairs, uint pa
 }
 
 /// The environment's channels go before those of the lights.
-DPR_ALWAYS_INLINE void store_light_sums(const LightSums sums, global const Light* light, uint pairs, uint pair,
-                                        global float* channels) {
+static inline void store_light_sums(const LightSums sums, global const Light* light, uint pairs, uint pair,
+                                    global float* channels) {
   const LightGradient g = sums.light;
   store_channels(g.position, DPR_CHANNEL_POSITION, pairs, pair, channels);
   store_channels(g.diffuse, DPR_CHANNEL_DIFFUSE, pairs, pair, channels);

@@ -165,7 +165,7 @@ TEST_SUITE("pipeline") {
     truth.point = {{{1.5F, 2.5F, 3.0F}, {0.6F, 0.5F, 0.4F}, {0.3F, 0.4F, 0.2F}}};
     start.point = truth.point;
     start.point[0].position = {-2.0F, 1.0F, 3.0F};
-    const glm::vec3 found = find(truth, start, 400).point[0].position, wanted = truth.point[0].position;
+    const glm::vec3 found = find(truth, start, 1000).point[0].position, wanted = truth.point[0].position;
     CHECK(glm::distance(start.point[0].position, wanted) > 0.5F * glm::length(wanted));
     CHECK(glm::distance(found, wanted) < 0.01F * glm::length(wanted));
 
