@@ -57,8 +57,9 @@ dpr::Lights make_lights(const Model& model) {
   if (!model.has_every_light) return lights;
   lights.directional = {{glm::vec3(-0.4F, -0.7F, -0.9F), glm::vec3(0.3F, 0.2F, 0.4F), glm::vec3(0.2F)},
                         {glm::vec3(2, -0.5F, 0.3F), glm::vec3(0.2F, 0.5F, 0.1F), glm::vec3(0.4F)}};
-  lights.spot = {{glm::vec3(2, 2, 3), glm::vec3(-1.7F, -2.1F, -3), 25, 5, glm::vec3(0.4F), glm::vec3(0.3F)},
-                 {glm::vec3(-3.1F, 2.2F, -1.3F), glm::vec3(3, -2, 1.5F), 120, 0, glm::vec3(0.3F), glm::vec3(0.2F)}};
+  lights.spot = {
+      {glm::vec3(2, 2, 3), glm::vec3(-1.7F, -2.1F, -3), 25, 5, glm::vec3(0.4F), glm::vec3(0.3F)},
+      {glm::vec3(-3.1F, 2.2F, -1.3F), glm::vec3(3, -2, 1.5F), 120, 0, glm::vec3(0.3F), glm::vec3(0.2F)}};
   RandomFloat random(4);
   for (std::size_t k = 0; k < dpr::k_harmonics; ++k) lights.harmonics.push_back(random.color() - 0.5F);
   return lights;
