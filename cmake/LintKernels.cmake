@@ -9,7 +9,7 @@ endif()
 set(flags -x cl -cl-std=CL1.2 -Xclang -finclude-default-header -fsyntax-only
           -Wall -Wextra -Wdouble-promotion -Werror -I ${KERNELS})
 set(option_sets "" -DDPR_LANES=1 -DDPR_LANES=8 -DDPR_LANES=16 -DDPR_VARIABLE_WIDTH
-    -DDPR_BASE=DPR_BASE_OF_FRAGMENTS)
+    -DDPR_BASE=DPR_BASE_OF_FRAGMENTS -DDPR_LIGHTS=7)
 set(exact_options "")  # of priors that are not sampled: they have no score
 file(GLOB prior_files ${KERNELS}/prior_*.h)
 foreach(prior_file IN LISTS prior_files)

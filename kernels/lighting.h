@@ -1,104 +1,204 @@
-// The light that reaches a surface point: Phong, "Illumination for computer generated pictures" (1975). On
-// lanes.
+// The light that reaches a surface point: Phong, "Illumination for computer generated pictures" (1975);
+// Blinn, "Models of light reflection for computer synthesized pictures" (1977); Ramamoorthi and Hanrahan, "An
+// efficient representation for irradiance environment maps" (2001). On lanes. DPR_SHADING says which
+// highlight, and DPR_LIGHTS what kinds of lights there are beyond points.
 #ifndef DPR_LIGHTING_H
 #define DPR_LIGHTING_H
 
-#include "lanes.h"
 #include "shared_types.h"
+#include "vec3n.h"
 
-/// Vectors whose length is below this have no direction and give no gradient, world units.
-#define DPR_MIN_LENGTH 1e-20f
-
-/// A vector of three in each lane.
-typedef struct {
-  realn x, y, z;
-} Vec3n;
-
-static inline Vec3n make_vec3n(realn x, realn y, realn z) {
-  Vec3n v;
-  v.x = x;
-  v.y = y;
-  v.z = z;
-  return v;
-}
-static inline Vec3n splat3(float4 v) { return make_vec3n((realn)(v.x), (realn)(v.y), (realn)(v.z)); }
-static inline Vec3n zero3n(void) { return make_vec3n(0.0f, 0.0f, 0.0f); }
-static inline realn dot3n(Vec3n a, Vec3n b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static inline Vec3n sub3n(Vec3n a, Vec3n b) { return make_vec3n(a.x - b.x, a.y - b.y, a.z - b.z); }
-static inline Vec3n mul3n(Vec3n a, Vec3n b) { return make_vec3n(a.x * b.x, a.y * b.y, a.z * b.z); }
-static inline Vec3n scale3n(Vec3n a, realn s) { return make_vec3n(a.x * s, a.y * s, a.z * s); }
-/// a + b * s
-static inline Vec3n mad3n(Vec3n b, realn s, Vec3n a) {
-  return make_vec3n(mad(b.x, s, a.x), mad(b.y, s, a.y), mad(b.z, s, a.z));
-}
-
-/// Normalises, and returns 1 / length: 0 where there is no direction.
-static inline realn normalize3n(Vec3n* v) {
-  const realn length2 = dot3n(*v, *v);
-  const realn inverse = choose(length2 > square((realn)(DPR_MIN_LENGTH)), rsqrt(length2), (realn)(0.0f));
-  *v = scale3n(*v, inverse);
-  return inverse;
-}
-
-/// The gradient of v from that of v / |v|.
-static inline Vec3n normalize3n_backward(Vec3n unit, realn inverse_length, Vec3n grad) {
-  return scale3n(mad3n(unit, -dot3n(unit, grad), grad), inverse_length);
-}
+#ifndef DPR_SHADING
+#define DPR_SHADING DPR_PHONG
+#endif
+#ifndef DPR_LIGHTS
+#define DPR_LIGHTS 0
+#endif
 
 /// One light at a point: everything that value and gradient share.
 typedef struct {
-  Vec3n to_light, to_eye, reflected;
-  realn inverse_light, inverse_eye;  // 1 / distance
-  realn lambert;                     // max(n.l, 0)
-  realn base, highlight;             // max(v.r, 0), and its power; 0 on the side away from the light
+  Vec3n to_light, to_eye;
+  Vec3n mirror;                                       // reflected light; Blinn: halfway between light and eye
+  realn inverse_light, inverse_eye, inverse_halfway;  // 1 / length
+  realn lambert;                                      // max(n.l, 0)
+  realn base, highlight;  // max(v.r, 0) or max(n.h, 0), and its power; 0 on the side away from the light
+  realn edge, cone;       // where in the cone's edge, 0 outside to 1 inside, and what comes through
 } LightTerm;
 
-static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, float4 light, float shininess) {
+static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, global const Light* light,
+                                   float shininess) {
   LightTerm t;
-  t.to_light = sub3n(splat3(light), position);
+  t.to_light = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
+                   ? mad3n(position, (realn)(-light->position.w), splat3(light->position))
+                   : sub3n(splat3(light->position), position);
   t.inverse_light = normalize3n(&t.to_light);
   t.to_eye = sub3n(splat3(eye), position);
   t.inverse_eye = normalize3n(&t.to_eye);
   const realn cosine = dot3n(normal, t.to_light);
-  t.reflected = sub3n(scale3n(normal, 2.0f * cosine), t.to_light);
+  realn towards;
+  if (DPR_SHADING == DPR_BLINN) {
+    t.mirror = mad3n(t.to_light, (realn)(1.0f), t.to_eye);
+    t.inverse_halfway = normalize3n(&t.mirror);
+    towards = dot3n(normal, t.mirror);
+  } else {
+    t.mirror = sub3n(scale3n(normal, 2.0f * cosine), t.to_light);
+    towards = dot3n(t.to_eye, t.mirror);
+  }
   t.lambert = max(cosine, 0.0f);
-  t.base = choose(cosine > 0.0f, max(dot3n(t.to_eye, t.reflected), 0.0f), (realn)(0.0f));
+  t.base = choose(cosine > 0.0f, max(towards, 0.0f), (realn)(0.0f));
   t.highlight = choose(t.base > 0.0f, exp(shininess * log(max(t.base, 1e-30f))), (realn)(0.0f));
+  if (DPR_LIGHTS & DPR_LIGHTS_CONES) {
+    const realn along = -dot3n(splat3(light->axis), t.to_light);
+    t.edge = clamp((along - light->cos_outer) * light->inverse_edge, 0.0f, 1.0f);
+    t.cone = square(t.edge) * mad(t.edge, -2.0f, 3.0f);  // smoothstep
+  }
   return t;
 }
 
-/// factor = ambient + sum diffuse * lambert, specular = sum specular * highlight, RGB each.
+/// What comes through the light's cone.
+static inline realn through_cone(const LightTerm t, realn v) {
+  return (DPR_LIGHTS & DPR_LIGHTS_CONES) ? v * t.cone : v;
+}
+
+/// The basis, but for its constants, at a normal: of degree 0, 1 and 2, so that without a normal the mean is
+/// left. In the order (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), ..., (2, 2).
+static inline void harmonic_basis(Vec3n n, realn basis[DPR_HARMONICS]) {
+  basis[0] = 1.0f;
+  basis[1] = n.y;
+  basis[2] = n.z;
+  basis[3] = n.x;
+  basis[4] = n.x * n.y;
+  basis[5] = n.y * n.z;
+  basis[6] = 2.0f * n.z * n.z - n.x * n.x - n.y * n.y;
+  basis[7] = n.x * n.z;
+  basis[8] = n.x * n.x - n.y * n.y;
+}
+
+/// Its gradient to the normal, from those of the basis.
+static inline Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS]) {
+  return make_vec3n(g[3] + n.y * g[4] + n.z * g[7] + 2.0f * n.x * (g[8] - g[6]),
+                    g[1] + n.x * g[4] + n.z * g[5] - 2.0f * n.y * (g[8] + g[6]),
+                    g[2] + n.y * g[5] + n.x * g[7] + 2.0f * n.z * (g[6] + g[6]));
+}
+
+/// factor = ambient + environment + sum diffuse * lambert, specular = sum specular * highlight, RGB each.
 static inline void light_point(const LightingParams lp, global const Light* restrict lights, Vec3n position,
                                Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
   *factor = splat3(lp.ambient);
   *specular = zero3n();
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
+    realn basis[DPR_HARMONICS];
+    harmonic_basis(normal, basis);
+#pragma unroll
+    for (int k = 0; k < DPR_HARMONICS; ++k) *factor = mad3n(splat3(lp.harmonics[k]), basis[k], *factor);
+  }
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights[l].position, lp.shininess);
-    *factor = mad3n(splat3(lights[l].diffuse), t.lambert, *factor);
-    *specular = mad3n(splat3(lights[l].specular), t.highlight, *specular);
+    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
+    *factor = mad3n(splat3(lights[l].diffuse), through_cone(t, t.lambert), *factor);
+    *specular = mad3n(splat3(lights[l].specular), through_cone(t, t.highlight), *specular);
   }
 }
 
-/// Gradients of one light's terms: adds to those of the point, the unit normal, the eye and the light's
-/// position.
-static inline void light_term_backward(const LightTerm t, const Light light, float shininess, Vec3n normal,
-                                       Vec3n grad_factor, Vec3n grad_specular, Vec3n* grad_position,
-                                       Vec3n* grad_normal, Vec3n* grad_eye, Vec3n* grad_light) {
+/// Gradients of a point in the light.
+typedef struct {
+  Vec3n position, normal, eye;  // of the unit normal
+} PointGradient;
+
+/// Gradients of what is known of a light: of the unit axis.
+typedef struct {
+  Vec3n position, diffuse, specular, axis;
+  realn cos_inner, cos_outer;
+} LightGradient;
+
+/// Adds those through a light's cone, and returns what reaches the direction to the light.
+static inline Vec3n cone_backward(const LightTerm t, global const Light* light, realn grad_cone,
+                                  LightGradient* g) {
+  const realn grad_edge = grad_cone * 6.0f * t.edge * (1.0f - t.edge);  // smoothstep's slope
+  const realn grad_along = grad_edge * light->inverse_edge;
+  g->cos_inner -= grad_along * t.edge;
+  g->cos_outer -= grad_along * (1.0f - t.edge);
+  g->axis = mad3n(t.to_light, -grad_along, g->axis);
+  return scale3n(splat3(light->axis), -grad_along);
+}
+
+/// Gradients of one light's terms: adds to those of the point and of the light.
+static inline void light_term_backward(const LightTerm t, global const Light* light, float shininess,
+                                       Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+                                       PointGradient* point, LightGradient* g) {
   const realn cosine = t.lambert;
-  const realn grad_highlight = dot3n(grad_specular, splat3(light.specular));
+  const realn by_diffuse = dot3n(grad_factor, splat3(light->diffuse)),
+              by_specular = dot3n(grad_specular, splat3(light->specular));
+  const realn grad_highlight = through_cone(t, by_specular);
   const realn grad_base =
       choose(t.base > 0.0f, grad_highlight * shininess * t.highlight / max(t.base, 1e-30f), (realn)(0.0f));
-  const Vec3n grad_reflected = scale3n(t.to_eye, grad_base);
-  const realn grad_cosine = choose(cosine > 0.0f, dot3n(grad_factor, splat3(light.diffuse)), (realn)(0.0f)) +
-                            2.0f * dot3n(grad_reflected, normal);
-  *grad_normal = mad3n(grad_reflected, 2.0f * cosine, mad3n(t.to_light, grad_cosine, *grad_normal));
-
-  const Vec3n grad_to_light = sub3n(scale3n(normal, grad_cosine), grad_reflected);
+  realn grad_cosine = choose(cosine > 0.0f, through_cone(t, by_diffuse), (realn)(0.0f));
+  Vec3n grad_to_light, grad_to_eye;
+  if (DPR_SHADING == DPR_BLINN) {
+    grad_to_eye = normalize3n_backward(t.mirror, t.inverse_halfway, scale3n(normal, grad_base));
+    grad_to_light = mad3n(normal, grad_cosine, grad_to_eye);
+    point->normal = mad3n(t.mirror, grad_base, mad3n(t.to_light, grad_cosine, point->normal));
+  } else {
+    const Vec3n grad_mirror = scale3n(t.to_eye, grad_base);
+    grad_cosine += 2.0f * dot3n(grad_mirror, normal);
+    grad_to_eye = scale3n(t.mirror, grad_base);
+    grad_to_light = sub3n(scale3n(normal, grad_cosine), grad_mirror);
+    point->normal = mad3n(grad_mirror, 2.0f * cosine, mad3n(t.to_light, grad_cosine, point->normal));
+  }
+  if (DPR_LIGHTS & DPR_LIGHTS_CONES) {
+    const realn grad_cone = by_diffuse * t.lambert + by_specular * t.highlight;
+    grad_to_light = mad3n(cone_backward(t, light, grad_cone, g), (realn)(1.0f), grad_to_light);
+  }
   const Vec3n light_moves = normalize3n_backward(t.to_light, t.inverse_light, grad_to_light);
-  const Vec3n eye_moves = normalize3n_backward(t.to_eye, t.inverse_eye, scale3n(t.reflected, grad_base));
-  *grad_light = mad3n(light_moves, (realn)(1.0f), *grad_light);
-  *grad_eye = mad3n(eye_moves, (realn)(1.0f), *grad_eye);
-  *grad_position = sub3n(sub3n(*grad_position, light_moves), eye_moves);
+  const Vec3n eye_moves = normalize3n_backward(t.to_eye, t.inverse_eye, grad_to_eye);
+  g->position = mad3n(light_moves, (realn)(1.0f), g->position);
+  g->diffuse = mad3n(grad_factor, through_cone(t, t.lambert), g->diffuse);
+  g->specular = mad3n(grad_specular, through_cone(t, t.highlight), g->specular);
+  point->eye = mad3n(eye_moves, (realn)(1.0f), point->eye);
+  point->position = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
+                        ? sub3n(mad3n(light_moves, (realn)(-light->position.w), point->position), eye_moves)
+                        : sub3n(sub3n(point->position, light_moves), eye_moves);
+}
+
+static inline LightGradient zero_light_gradient(void) {
+  LightGradient g;
+  g.position = g.diffuse = g.specular = g.axis = zero3n();
+  g.cos_inner = g.cos_outer = 0.0f;
+  return g;
+}
+
+/// Adds the gradients through the light at a point.
+static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
+                                        float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
+                                        Vec3n grad_specular, PointGradient* point) {
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
+    realn grad_basis[DPR_HARMONICS];
+#pragma unroll
+    for (int k = 0; k < DPR_HARMONICS; ++k) grad_basis[k] = dot3n(grad_factor, splat3(lp.harmonics[k]));
+    point->normal = mad3n(harmonic_basis_backward(normal, grad_basis), (realn)(1.0f), point->normal);
+  }
+  LightGradient unused = zero_light_gradient();
+  for (uint l = 0; l < lp.lights; ++l) {
+    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
+    light_term_backward(t, lights + l, lp.shininess, normal, grad_factor, grad_specular, point, &unused);
+  }
+}
+
+/// Adds the gradients of a light at a point.
+static inline void add_light_gradient(const LightingParams lp, global const Light* light, float4 eye,
+                                      Vec3n position, Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+                                      LightGradient* g) {
+  const LightTerm t = light_term(position, normal, eye, light, lp.shininess);
+  PointGradient unused;
+  unused.position = unused.normal = unused.eye = zero3n();
+  light_term_backward(t, light, lp.shininess, normal, grad_factor, grad_specular, &unused, g);
+}
+
+/// Adds the gradients of the harmonics at a normal.
+static inline void add_harmonics_gradient(Vec3n normal, Vec3n grad_factor, Vec3n grad[DPR_HARMONICS]) {
+  realn basis[DPR_HARMONICS];
+  harmonic_basis(normal, basis);
+#pragma unroll
+  for (int k = 0; k < DPR_HARMONICS; ++k) grad[k] = mad3n(grad_factor, basis[k], grad[k]);
 }
 
 #endif

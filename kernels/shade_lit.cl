@@ -1,20 +1,14 @@
 // Fragment colours with lights: base colour * factor + specular, where factor and specular come from the
-// light at the fragment (flat, Phong) or interpolate those at the corners (Gouraud). DPR_SHADING says which,
-// and DPR_BASE whether the base colour is interpolated here or comes from the surface stage. Loops over the
-// corners are unrolled, as in geometry.h.
+// light at the fragment (flat, Phong, Blinn) or interpolate those at the corners (Gouraud). DPR_SHADING says
+// which, DPR_LIGHTS in what lights, and DPR_BASE whether the base colour is interpolated here or comes from
+// the surface stage. Loops over the corners are unrolled, as in geometry.h.
 #include "tile_lanes.h"
 
 #include "lighting.h"
 
-#ifndef DPR_SHADING
-#define DPR_SHADING DPR_PHONG
-#endif
 #ifndef DPR_BASE
 #define DPR_BASE DPR_BASE_OF_CORNERS
 #endif
-
-/// Channels of a light's gradient: position, diffuse, specular; ambient follows.
-#define DPR_LIGHT_CHANNELS 9
 
 /// A triangle's corners: colours, world positions, normals; and for Gouraud the light there.
 typedef struct {
@@ -145,21 +139,6 @@ static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
   return dot3n(sub3n(corner[k], corner[0]), g);
 }
 
-/// Gradients through the light at a point: of its position and unit normal, and of the eye.
-static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
-                                        float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                        Vec3n grad_specular, Vec3n* grad_position, Vec3n* grad_normal,
-                                        Vec3n* grad_eye) {
-  *grad_position = zero3n();
-  *grad_normal = zero3n();
-  Vec3n grad_light = zero3n();
-  for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights[l].position, lp.shininess);
-    light_term_backward(t, lights[l], lp.shininess, normal, grad_factor, grad_specular, grad_position,
-                        grad_normal, grad_eye, &grad_light);
-  }
-}
-
 /// One fragment's share of everything: the gradients of its base colour, and of the barycentrics, relative to
 /// corner 0's.
 static inline void shade_fragment_backward(const Surface s, const LightingParams lp,
@@ -183,14 +162,16 @@ static inline void shade_fragment_backward(const Surface s, const LightingParams
     *grad_bary2 += along_corner(s.factor, 2, grad_factor) + along_corner(s.specular, 2, grad);
     return;
   }
-  Vec3n grad_position, grad_unit;
-  light_point_backward(lp, lights, s.eye, f.position, f.normal, grad_factor, grad, &grad_position, &grad_unit,
-                       &g->eye);
-  const Vec3n grad_normal = normalize3n_backward(f.normal, f.inverse_normal, grad_unit);
-  add_corners(g->position, grad_position, c);
+  PointGradient point;
+  point.position = point.normal = zero3n();
+  point.eye = g->eye;
+  light_point_backward(lp, lights, s.eye, f.position, f.normal, grad_factor, grad, &point);
+  g->eye = point.eye;
+  const Vec3n grad_normal = normalize3n_backward(f.normal, f.inverse_normal, point.normal);
+  add_corners(g->position, point.position, c);
   add_corners(g->normal, grad_normal, c);
-  *grad_bary1 += along_corner(s.position, 1, grad_position) + along_corner(s.normal, 1, grad_normal);
-  *grad_bary2 += along_corner(s.position, 2, grad_position) + along_corner(s.normal, 2, grad_normal);
+  *grad_bary1 += along_corner(s.position, 1, point.position) + along_corner(s.normal, 1, grad_normal);
+  *grad_bary2 += along_corner(s.position, 2, point.position) + along_corner(s.normal, 2, grad_normal);
 }
 
 static inline float4 sum_vec3n(Vec3n v) {
@@ -216,8 +197,13 @@ static inline void corners_backward(const Surface s, const LightingParams lp,
   for (int k = 0; k < 3; ++k) {
     const Vec3n grad_factor = scale3n(splat3(sum_vec3n(g->factor[k])), share);
     const Vec3n grad_specular = scale3n(splat3(sum_vec3n(g->specular[k])), share);
-    light_point_backward(lp, lights, s.eye, s.position[k], s.normal[k], grad_factor, grad_specular,
-                         &g->position[k], &g->normal[k], &g->eye);
+    PointGradient point;
+    point.position = point.normal = zero3n();
+    point.eye = g->eye;
+    light_point_backward(lp, lights, s.eye, s.position[k], s.normal[k], grad_factor, grad_specular, &point);
+    g->position[k] = point.position;
+    g->normal[k] = point.normal;
+    g->eye = point.eye;
   }
 }
 
@@ -294,20 +280,55 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
   grad_eye[2 * pairs + pair] = eye.z;
 }
 
-/// Adds the gradients of light `l` at a point.
-static inline void add_light_gradient(const LightingParams lp, const Light light, float4 eye, Vec3n position,
-                                      Vec3n normal, Vec3n grad_factor, Vec3n grad_specular, Vec3n sum[3]) {
-  const LightTerm t = light_term(position, normal, eye, light.position, lp.shininess);
-  Vec3n unused_position = sum[0], unused_normal = sum[0], unused_eye = sum[0];
-  light_term_backward(t, light, lp.shininess, normal, grad_factor, grad_specular, &unused_position,
-                      &unused_normal, &unused_eye, &sum[0]);
-  sum[1] = mad3n(grad_factor, t.lambert, sum[1]);
-  sum[2] = mad3n(grad_specular, t.highlight, sum[2]);
+/// Gradients of the environment and of one light.
+typedef struct {
+  Vec3n ambient, harmonics[DPR_HARMONICS];
+  LightGradient light;
+} LightSums;
+
+static inline LightSums zero_light_sums(void) {
+  LightSums sums;
+  sums.ambient = zero3n();
+#pragma unroll
+  for (int k = 0; k < DPR_HARMONICS; ++k) sums.harmonics[k] = zero3n();
+  sums.light = zero_light_gradient();
+  return sums;
 }
 
-/// Gradients of one `light` and of the ambient light, per pair. One work-item per pair, up to `last_pair`;
-/// one launch per light. Inputs as shade_lit_backward.
-/// out  channels  float[light][DPR_LIGHT_CHANNELS + 3][pair]  position, diffuse, specular, ambient
+/// Adds those at a point in the light; `l` is the light.
+static inline void add_light_sums(const LightingParams lp, uint l, global const Light* restrict lights,
+                                  float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
+                                  Vec3n grad_specular, LightSums* sums) {
+  if ((DPR_LIGHTS & DPR_LIGHTS_HARMONICS) && l == 0)
+    add_harmonics_gradient(normal, grad_factor, sums->harmonics);
+  if (l < lp.lights)
+    add_light_gradient(lp, lights + l, eye, position, normal, grad_factor, grad_specular, &sums->light);
+}
+
+static inline void store_channels(Vec3n v, uint channel, uint pairs, uint pair, global float* channels) {
+  const float4 sum = sum_vec3n(v);
+  channels[(size_t)channel * pairs + pair] = sum.x;
+  channels[(size_t)(channel + 1) * pairs + pair] = sum.y;
+  channels[(size_t)(channel + 2) * pairs + pair] = sum.z;
+}
+
+/// The environment's channels go before those of the lights.
+static inline void store_light_sums(const LightSums sums, global const Light* light, uint pairs, uint pair,
+                                    global float* channels) {
+  const LightGradient g = sums.light;
+  store_channels(g.position, DPR_CHANNEL_POSITION, pairs, pair, channels);
+  store_channels(g.diffuse, DPR_CHANNEL_DIFFUSE, pairs, pair, channels);
+  store_channels(g.specular, DPR_CHANNEL_SPECULAR, pairs, pair, channels);
+  if (!(DPR_LIGHTS & DPR_LIGHTS_CONES)) return;
+  const Vec3n axis = normalize3n_backward(splat3(light->axis), (realn)(light->axis.w), g.axis);
+  store_channels(axis, DPR_CHANNEL_AXIS, pairs, pair, channels);
+  channels[(size_t)DPR_CHANNEL_COS_INNER * pairs + pair] = sum_lanes(g.cos_inner);
+  channels[(size_t)DPR_CHANNEL_COS_OUTER * pairs + pair] = sum_lanes(g.cos_outer);
+}
+
+/// Gradients of one `light`, and with light 0 those of the environment, per pair. One work-item per pair, up
+/// to `last_pair`; one launch per light, or for light 0 where there is none. Inputs as shade_lit_backward.
+/// out  channels  float[DPR_ENVIRONMENT_CHANNELS][pair], then float[light][DPR_LIGHT_CHANNELS][pair]
 kernel void shade_lit_backward_lights(
     const FrameParams p, const LightingParams lp, const uint pairs, const uint last_pair, const uint light,
     global const ViewParams* restrict views, global const Light* restrict lights,
@@ -323,7 +344,7 @@ kernel void shade_lit_backward_lights(
   if (pair >= last_pair) return;
   const Surface s =
       load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
-  Vec3n sum[4] = {zero3n(), zero3n(), zero3n(), zero3n()};
+  LightSums sums = zero_light_sums();
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; i += DPR_WIDTH) {
     const intn in_run = lanes_before(last, i);
@@ -332,25 +353,27 @@ kernel void shade_lit_backward_lights(
     const Vec3n base = load_base(in_run, i, base_red, base_green, base_blue);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
     const Vec3n grad_factor = mul3n(grad, f.base);
-    sum[3] = mad3n(grad_factor, (realn)(1.0f), sum[3]);
-    if (light >= lp.lights) continue;
+    sums.ambient = mad3n(grad_factor, (realn)(1.0f), sums.ambient);
     if (DPR_SHADING != DPR_GOURAUD) {
-      add_light_gradient(lp, lights[light], s.eye, f.position, f.normal, grad_factor, grad, sum);
+      add_light_sums(lp, light, lights, s.eye, f.position, f.normal, grad_factor, grad, &sums);
       continue;
     }
     const realn c[3] = {1.0f - c1 - c2, c1, c2};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      add_light_gradient(lp, lights[light], s.eye, s.position[k], s.normal[k], scale3n(grad_factor, c[k]),
-                         scale3n(grad, c[k]), sum);
+      add_light_sums(lp, light, lights, s.eye, s.position[k], s.normal[k], scale3n(grad_factor, c[k]),
+                     scale3n(grad, c[k]), &sums);
     }
   }
-  global float* of_light = channels + (size_t)light * (DPR_LIGHT_CHANNELS + 3) * pairs;
+  if (light == 0) {
+    store_channels(sums.ambient, 0, pairs, pair, channels);
+    if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
 #pragma unroll
-  for (uint k = 0; k < 4; ++k) {
-    const float4 v = sum_vec3n(sum[k]);
-    of_light[(3 * k) * pairs + pair] = v.x;
-    of_light[(3 * k + 1) * pairs + pair] = v.y;
-    of_light[(3 * k + 2) * pairs + pair] = v.z;
+      for (uint k = 0; k < DPR_HARMONICS; ++k)
+        store_channels(sums.harmonics[k], 3 + 3 * k, pairs, pair, channels);
+    }
   }
+  if (light >= lp.lights) return;
+  channels += (size_t)(DPR_ENVIRONMENT_CHANNELS(DPR_LIGHTS) + light * DPR_LIGHT_CHANNELS(DPR_LIGHTS)) * pairs;
+  store_light_sums(sums, lights + light, pairs, pair, channels);
 }

@@ -57,6 +57,27 @@ using float4 = cl_float4;
 #define DPR_FLAT 1
 #define DPR_PHONG 2
 #define DPR_GOURAUD 3
+#define DPR_BLINN 4
+
+/// What lights ask of the kernels beyond points: bits of DPR_LIGHTS.
+#define DPR_LIGHTS_DISTANT 1   /* infinitely far away: position.w is 0 */
+#define DPR_LIGHTS_CONES 2     /* within a cone about an axis */
+#define DPR_LIGHTS_HARMONICS 4 /* an environment */
+
+/// Coefficients of the environment: spherical harmonics up to the second order.
+#define DPR_HARMONICS 9
+
+/// Channels that shading's backward pass leaves per pair: of the environment (ambient light, harmonics), then
+/// of each light (position, diffuse, specular; with cones the axis, and the cosines of the inner and outer
+/// angle). RGB or x, y, z each.
+#define DPR_ENVIRONMENT_CHANNELS(lights) ((lights)&DPR_LIGHTS_HARMONICS ? 3 + 3 * DPR_HARMONICS : 3)
+#define DPR_LIGHT_CHANNELS(lights) ((lights)&DPR_LIGHTS_CONES ? 14 : 9)
+#define DPR_CHANNEL_POSITION 0
+#define DPR_CHANNEL_DIFFUSE 3
+#define DPR_CHANNEL_SPECULAR 6
+#define DPR_CHANNEL_AXIS 9
+#define DPR_CHANNEL_COS_INNER 12
+#define DPR_CHANNEL_COS_OUTER 13
 
 /// Where the light finds the base colour of a fragment: in its triangle's corners, or in planes of fragments.
 #define DPR_BASE_OF_CORNERS 0
@@ -142,9 +163,9 @@ typedef struct ViewParams {
 /// A triangle of a view after projection, if it is not dropped.
 typedef struct Triangle {
   DPR_SHARED_NAME(Triangle)
-  float x0, y0, x1, y1, x2, y2; /* NDC */
-  float z0, z1, z2;             /* view depth, positive in front */
-  float orientation;            /* +1 counter-clockwise, -1 clockwise */
+  float x0, y0, x1, y1, x2, y2;   /* NDC */
+  float z0, z1, z2;               /* view depth, positive in front */
+  float orientation;              /* +1 counter-clockwise, -1 clockwise */
   uint first_sample, last_sample; /* column | row << 16, inclusive; of the blurred bounding box */
 } Triangle;
 
@@ -155,13 +176,18 @@ typedef struct LightingParams {
   uint lights;
   float shininess;
   uint unused0, unused1;
+  float4 harmonics[DPR_HARMONICS]; /* RGB, times the constants of the basis and of the cosine lobe */
 } LightingParams;
 
-/// A point light.
+/// A light of any kind.
 typedef struct Light {
   DPR_SHARED_NAME(Light)
-  float4 position; /* world */
+  float4 position; /* world; w = 1, or 0: the direction to a light infinitely far away */
   float4 diffuse, specular;
+  float4 axis; /* of the cone, unit, away from the light; w = 1 / length of the axis given */
+  float cos_outer;
+  float inverse_edge; /* 1 / (cos_inner - cos_outer) */
+  uint unused0, unused1;
 } Light;
 
 /// A texture, and where its texels lie among those of all.
@@ -200,8 +226,8 @@ typedef struct AggregateParams {
   float sigma, gamma, alpha, background_depth;
   Sampling sampling;
   uint pixels_per_view;
-  uint pixels; /* of all views */
-  uint faces;  /* of one view */
+  uint pixels;     /* of all views */
+  uint faces;      /* of one view */
   uint first_view; /* of the batch that names the noise */
   uint last_pixel; /* where those of the launch end */
   uint unused;
@@ -247,8 +273,8 @@ typedef struct MeshLossParams {
 /// that there are. With the steps exchanged and symmetric weights it is its own transpose.
 typedef struct BlurPass {
   DPR_SHARED_NAME(BlurPass)
-  uint lines; /* along rows: rows of all images; along columns: images */
-  uint width; /* along columns: pixels of a row */
+  uint lines;                 /* along rows: rows of all images; along columns: images */
+  uint width;                 /* along columns: pixels of a row */
   uint out_length, in_length; /* pixels along the pass */
   int out_step, in_step, offset, taps;
 } BlurPass;

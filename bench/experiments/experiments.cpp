@@ -15,6 +15,7 @@ void run_gallery(const Settings& settings);
 void run_estimators(const Settings& settings);
 void run_devices(const Settings& settings);
 void run_shapes(const Settings& settings);
+void run_lights(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -26,7 +27,8 @@ std::span<const Experiment> experiments() {
       {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators},
       {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices},
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
-       run_shapes}};
+       run_shapes},
+      {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights}};
   return k_experiments;
 }
 

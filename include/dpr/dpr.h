@@ -92,24 +92,46 @@ typedef struct dpr_mesh {
 #define DPR_MESH_INIT \
   { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL }
 
-typedef enum dpr_shading { DPR_SHADING_FLAT = 0, DPR_SHADING_PHONG = 1, DPR_SHADING_GOURAUD = 2 } dpr_shading;
+typedef enum dpr_shading {
+  DPR_SHADING_FLAT = 0,
+  DPR_SHADING_PHONG = 1,
+  DPR_SHADING_GOURAUD = 2,
+  DPR_SHADING_BLINN = 3
+} dpr_shading;
 
 /* World space, without attenuation. */
 typedef struct dpr_point_light {
   float position[3], diffuse[3], specular[3];
 } dpr_point_light;
 
+/* Directions point away from the light; their length does not matter. */
+typedef struct dpr_directional_light {
+  float direction[3], diffuse[3], specular[3];
+} dpr_directional_light;
+
+/* A point light that fades from the inner angle to the angle, both from the axis; at least 0.1 apart. */
+typedef struct dpr_spot_light {
+  float position[3], direction[3];
+  float angle_degrees, inner_angle_degrees;
+  float diffuse[3], specular[3];
+} dpr_spot_light;
+
 typedef struct dpr_lights {
   size_t size;
   float ambient[3];
   const dpr_point_light* point; /* [point_count]; NULL if that is 0 */
   size_t point_count;
-  float shininess; /* >= 1 */
-  int shading; /* a dpr_shading */
+  float shininess;                          /* >= 1 */
+  int shading;                              /* a dpr_shading */
+  const dpr_directional_light* directional; /* [directional_count] */
+  size_t directional_count;
+  const dpr_spot_light* spot; /* [spot_count] */
+  size_t spot_count;
+  const float* harmonics; /* [9][3], the environment's as in the scene format; or NULL */
 } dpr_lights;
 
 #define DPR_LIGHTS_INIT \
-  { sizeof(dpr_lights), {0.5f, 0.5f, 0.5f}, NULL, 0, 64.0f, DPR_SHADING_PHONG }
+  { sizeof(dpr_lights), {0.5f, 0.5f, 0.5f}, NULL, 0, 64.0f, DPR_SHADING_PHONG, NULL, 0, NULL, 0, NULL }
 
 /* A scene without meshes, for images of that many pixels (1 to 16384 a side). */
 DPR_API dpr_status dpr_scene_create(int width, int height, dpr_scene** scene);

@@ -1,13 +1,15 @@
-// Lights and the shading model.
+// Lights and the shading model, and the lights' gradients.
 #pragma once
 
+#include <cstddef>
 #include <glm/glm.hpp>
 #include <vector>
 
 namespace dpr {
 
-/// Where lighting is evaluated: per face, per fragment with interpolated normals, or per vertex.
-enum class Shading { flat, phong, gouraud };
+/// Where lighting is evaluated: per face, per fragment with interpolated normals, or per vertex; blinn is as
+/// phong, with Blinn's highlight.
+enum class Shading { flat, phong, gouraud, blinn };
 
 /// A point light in world space, without attenuation.
 struct PointLight {
@@ -16,17 +18,64 @@ struct PointLight {
   glm::vec3 specular{0.2F};
 };
 
-/// colour = base * (ambient + sum_l diffuse_l max(n.l, 0)) + sum_l specular_l [n.l > 0] max(v.r,
-/// 0)^shininess, r = 2 (n.l) n - l (Phong 1975). Normals follow the winding of the faces and are not turned
-/// to the viewer.
+/// A light infinitely far away.
+struct DirectionalLight {
+  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
+  glm::vec3 diffuse{0.3F};
+  glm::vec3 specular{0.2F};
+};
+
+/// A point light within a cone: times smoothstep((c - c_outer) / (c_inner - c_outer)), smoothstep(t) = t^2 (3
+/// - 2 t) for t clamped to [0, 1]; c is the cosine of the angle between the direction and the way to the
+/// point, c_inner and c_outer those of the angles.
+struct SpotLight {
+  glm::vec3 position{0.0F};
+  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
+  float angle_degrees = 30.0F;             ///< from the axis to where the light ends; at most 180
+  float inner_angle_degrees = 0.0F;        ///< to where it begins to fade; at least 0.1 less
+  glm::vec3 diffuse{0.3F};
+  glm::vec3 specular{0.2F};
+};
+
+/// Coefficients of an environment's spherical harmonics, up to the second order.
+inline constexpr std::size_t k_harmonics = 9;
+
+/// colour = base * (ambient + environment + sum_l a_l diffuse_l max(n.l, 0)) + sum_l a_l specular_l [n.l > 0]
+/// max(m, 0)^shininess; a_l is 1 but in a spot's cone; m = v.r, r = 2 (n.l) n - l (Phong 1975), or of blinn
+/// n.h, h = (l + v) / |l + v| (Blinn 1977). Normals follow the winding of the faces and are not turned to the
+/// viewer.
+///
+/// The environment is distant light of radiance sum L_lm Y_lm(w) from the direction w, and what a white
+/// diffuse surface reflects of it (Ramamoorthi and Hanrahan 2001): sum a_l L_lm Y_lm(n), a = 1, 2/3, 1/4,
+/// which is the irradiance over pi, not clamped. Y_lm is the real orthonormal basis in world axes: Y_00 = 1/2
+/// sqrt(1/pi); Y_1m = sqrt(3/(4 pi)) (y, z, x); Y_2m = 1/2 sqrt(15/pi) (x y, y z, (2 z^2 - x^2 - y^2) /
+/// sqrt(12), x z, (x^2 - y^2) / 2), m from -l to l. Light of radiance 1 from everywhere is L_00 = sqrt(4 pi).
 struct Lights {
   glm::vec3 ambient{0.5F};
   std::vector<PointLight> point;
   float shininess = 64.0F;  ///< >= 1
   Shading shading = Shading::phong;
+  std::vector<DirectionalLight> directional{};
+  std::vector<SpotLight> spot{};
+  std::vector<glm::vec3> harmonics{};  ///< [k_harmonics] RGB of L_lm by l, then m from -l to l; or empty
 };
 
-/// Throws InvalidArgument where a value is not finite or shininess is below 1.
+struct PointLightGradient {
+  glm::dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
+};
+
+struct DirectionalLightGradient {
+  glm::dvec3 direction{0.0}, diffuse{0.0}, specular{0.0};
+};
+
+struct SpotLightGradient {
+  glm::dvec3 position{0.0}, direction{0.0};
+  double angle_degrees = 0, inner_angle_degrees = 0;
+  glm::dvec3 diffuse{0.0}, specular{0.0};
+};
+
+/// Throws InvalidArgument where a value is not finite, a direction has no length, a cone no edge, or
+/// shininess is below 1.
 void validate(const Lights& lights);
 
 }  // namespace dpr

@@ -38,6 +38,7 @@ class MultiDeviceRenderer {
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_lights(const std::optional<Lights>& lights);
 
   /// The image of every view. Blocks, as the calls below.
   std::vector<Image> render();

@@ -46,10 +46,6 @@ struct MeshGradient {
   std::vector<std::vector<glm::vec3>> textures;  ///< [texture][height * width]; empty if not requested
 };
 
-struct PointLightGradient {
-  glm::dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
-};
-
 /// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the
 /// scene's or none is requested.
 struct ShapesGradient {
@@ -63,7 +59,11 @@ struct SceneGradient {
   ShapesGradient shapes;
   std::vector<ViewGradient> views;
   glm::dvec3 ambient{0.0};
-  std::vector<PointLightGradient> lights;  ///< summed over the views
+  // Of lights, summed over the views.
+  std::vector<PointLightGradient> lights;
+  std::vector<DirectionalLightGradient> directional;
+  std::vector<SpotLightGradient> spot;
+  std::vector<glm::vec3> harmonics;  ///< [k_harmonics], or empty without any
   double sigma = 0, gamma = 0, alpha = 0;
   glm::dvec3 background{0.0};
 };
@@ -109,6 +109,8 @@ class Renderer {
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other. Empty: the scene's own for all views, to which set_views() returns as well.
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
+  /// New lights, or none.
+  void set_lights(const std::optional<Lights>& lights);
   /// A new background colour, linear RGB.
   void set_background(const glm::vec3& background);
   /// Replaces what the next backward() computes.

@@ -27,7 +27,7 @@ struct GradientRequest {
   bool colors = true;      ///< vertex or face colours
   bool transform = true;   ///< rotation and translation of every mesh
   bool camera = true;      ///< rotation and translation of the view, field of view or intrinsics
-  bool lights = false;     ///< positions and colours of the lights
+  bool lights = false;     ///< everything of the lights but shininess
   bool smoothing = true;   ///< sigma, gamma, alpha
   bool background = true;  ///< background colour
   bool texture = false;    ///< texels of every texture

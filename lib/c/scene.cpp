@@ -1,10 +1,10 @@
 // Scenes of the C interface.
-#include <array>
 #include <cmath>
 
 #include "base/checks.hpp"
 #include "c/handles.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 
 using dpr::InvalidArgument;
@@ -82,23 +82,42 @@ Instance to_instance(const dpr_mesh* given) {
   return instance;
 }
 
-Lights to_lights(const dpr_lights* given) {
-  const dpr_lights lights = versioned<dpr_lights>(given, DPR_LIGHTS_INIT, "lights");
-  if (lights.point_count > 0) deref(lights.point, "lights.point");
+/// The lights of a kind.
+template <class Light>
+std::span<const Light> span_of(const Light* lights, std::size_t count, const std::string& argument) {
+  if (count > 0) deref(lights, argument.c_str());
   constexpr std::size_t k_most_lights = 1U << 16U;
-  if (lights.point_count > k_most_lights) {
-    throw InvalidArgument("lights.point_count", std::to_string(lights.point_count),
+  if (count > k_most_lights) {
+    throw InvalidArgument(argument + "_count", std::to_string(count),
                           "at most " + std::to_string(k_most_lights));
   }
-  constexpr std::array k_shadings{Shading::flat, Shading::phong, Shading::gouraud};
+  return {lights, count};
+}
+
+Lights to_lights(const dpr_lights* given) {
+  const dpr_lights lights = versioned<dpr_lights>(given, DPR_LIGHTS_INIT, "lights");
   const auto shading = static_cast<std::size_t>(lights.shading);
   if (shading >= k_shadings.size())
     throw InvalidArgument("lights.shading", std::to_string(shading), "a dpr_shading");
-  Lights converted{to_vector(lights.ambient), {}, lights.shininess, k_shadings[shading]};
-  for (const dpr_point_light& light : std::span(lights.point, lights.point_count)) {
+  Lights converted;
+  converted.ambient = to_vector(lights.ambient);
+  converted.shininess = lights.shininess;
+  converted.shading = static_cast<Shading>(shading);
+  for (const dpr_point_light& light : span_of(lights.point, lights.point_count, "lights.point")) {
     converted.point.push_back(
         {to_vector(light.position), to_vector(light.diffuse), to_vector(light.specular)});
   }
+  for (const dpr_directional_light& light :
+       span_of(lights.directional, lights.directional_count, "lights.directional")) {
+    converted.directional.push_back(
+        {to_vector(light.direction), to_vector(light.diffuse), to_vector(light.specular)});
+  }
+  for (const dpr_spot_light& light : span_of(lights.spot, lights.spot_count, "lights.spot")) {
+    converted.spot.push_back({to_vector(light.position), to_vector(light.direction), light.angle_degrees,
+                              light.inner_angle_degrees, to_vector(light.diffuse),
+                              to_vector(light.specular)});
+  }
+  if (lights.harmonics) converted.harmonics = triples(lights.harmonics, k_harmonics);
   validate(converted);
   return converted;
 }

@@ -13,6 +13,7 @@
 #include "mesh/bounding_box.hpp"
 #include "mesh/mesh_facts.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/light_table.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -153,7 +154,11 @@ Json scene_to_json(const fs::path& file) {
     meshes.push_back(mesh);
   }
   Json lights;
-  if (scene.lights) lights = {{"point", scene.lights->point.size()}};
+  if (scene.lights) {
+    for_each_light_kind(
+        [&](auto kind) { lights[std::string(kind.key)] = ((*scene.lights).*kind.lights).size(); });
+    lights["harmonics"] = scene.lights->harmonics.size();
+  }
   return {{"file", file.string()},
           {"kind", "scene"},
           {"width", scene.width},
@@ -248,13 +253,20 @@ std::string camera_text(const Json& camera) {
   return lens + ", depths from " + camera["znear"].dump() + " to " + camera["zfar"].dump();
 }
 
+std::string lights_text(const Json& lights) {
+  if (lights.is_null()) return "none: colours as they are";
+  std::string text = "ambient";
+  for (const auto& [kind, count] : lights.items()) {
+    if (kind == "point" || count != 0) text += " and " + count.dump() + " " + kind;
+  }
+  return text;
+}
+
 void print_scene(const Json& scene) {
   print_line("size", scene["width"].dump() + "x" + scene["height"].dump());
   print_line("camera", camera_text(scene["camera"]));
   print_line("background", list_text(scene["background"]));
-  print_line("lights", scene["lights"].is_null()
-                           ? "none: colours as they are"
-                           : "ambient and " + scene["lights"]["point"].dump() + " point");
+  print_line("lights", lights_text(scene["lights"]));
   std::string smoothing;
   for (const auto& [name, value] : scene["smoothing"].items())
     smoothing += (smoothing.empty() ? "" : ", ") + name + " " + list_text(Json::array({value}));

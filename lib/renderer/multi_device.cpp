@@ -82,7 +82,7 @@ class GradientSum {
 
 /// How often each part of the scene has been set.
 struct Versions {
-  std::uint64_t scene = 0, smoothing = 0;
+  std::uint64_t scene = 0, smoothing = 0, lights = 0;
   std::vector<std::uint64_t> positions, colors, texcoords;  // [mesh]
   std::vector<std::vector<std::uint64_t>> texels;           // [mesh][texture]
 
@@ -127,6 +127,10 @@ struct MultiDeviceRenderer::Impl {
     if (worker.has.smoothing != now.smoothing) {
       renderer.set_smoothing(scene.smoothing);
       worker.has.smoothing = now.smoothing;
+    }
+    if (worker.has.lights != now.lights) {
+      renderer.set_lights(scene.lights);
+      worker.has.lights = now.lights;
     }
     for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
       if (worker.has.positions[m] != now.positions[m]) {
@@ -279,6 +283,13 @@ void MultiDeviceRenderer::set_texcoords(std::size_t mesh, std::span<const glm::v
   check_texcoords(impl_->scene, mesh, texcoords);
   std::ranges::copy(texcoords, impl_->scene.meshes[mesh].mesh.texcoords.begin());
   ++impl_->now.texcoords[mesh];
+}
+
+void MultiDeviceRenderer::set_lights(const std::optional<Lights>& lights) {
+  impl_->require_views("MultiDeviceRenderer::set_lights");
+  check_lights(impl_->scene, impl_->views, lights);
+  impl_->scene.lights = lights;
+  ++impl_->now.lights;
 }
 
 std::vector<Image> MultiDeviceRenderer::render() {

@@ -257,7 +257,7 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
     }
   }
   if (wanted.lights && shade.lit()) {
-    for (std::size_t light = 0; light < shade.light_sets(); ++light) {
+    for (std::size_t light = 0; light < shade.light_launches(); ++light) {
       shade.backward_light(shade_inputs(), aggregate.grad_color, light);
     }
   }

@@ -72,6 +72,12 @@ void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const 
   m.set_shapes(positions, colors);
 }
 
+void Renderer::set_lights(const std::optional<Lights>& lights) {
+  impl_->require_scene("Renderer::set_lights");
+  check_lights(impl_->scene, impl_->views, lights);
+  impl_->set_lights(lights);
+}
+
 void Renderer::set_background(const glm::vec3& background) {
   impl_->require_scene("Renderer::set_background");
   checks::require_finite(background, "background");

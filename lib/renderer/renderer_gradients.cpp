@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "renderer/renderer_impl.hpp"
+#include "scene/light_table.hpp"
 
 namespace dpr {
 
@@ -127,17 +128,6 @@ void add_eye_gradients(const std::vector<float>& sums, std::span<const View> vie
   }
 }
 
-/// From sums by [light][k_light_channels].
-void add_light_gradients(const std::vector<float>& sums, std::size_t lights, SceneGradient& gradient) {
-  const auto sum3 = [&](std::size_t at) { return dvec3(sums[at], sums[at + 1], sums[at + 2]); };
-  gradient.lights.resize(lights);
-  for (std::size_t light = 0; light < lights; ++light) {
-    const std::size_t at = light * k_light_channels;
-    gradient.lights[light] = {sum3(at), sum3(at + 3), sum3(at + 6)};
-  }
-  gradient.ambient = sum3(k_light_channels - 3);  // the same in every light's channels
-}
-
 }  // namespace
 
 /// One segment of all pixels, uploaded anew where they have become more or less.
@@ -178,8 +168,8 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
                    {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
                     view_vertex_starts, transform.channels},
                    {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
-                   {bin.pairs, channels(lights, k_light_channels * shade.light_sets()), 1, faces,
-                    bin.pair_starts, shade.light_channels}});
+                   {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
+                    shade.light_channels}});
   const std::vector<float>& pixel_sums = sums[0];
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
@@ -192,7 +182,7 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
   }
   if (poses) add_pose_gradients(sums[2], scene, views, gradient);
   if (eye) add_eye_gradients(sums[3], views, gradient);
-  if (lights) add_light_gradients(sums[4], shade.lights(), gradient);
+  if (lights) read_light_gradients(*scene.lights, sums[4], gradient);
 }
 
 }  // namespace dpr

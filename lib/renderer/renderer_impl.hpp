@@ -66,6 +66,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_lights(const std::optional<Lights>& lights);
   /// For images of the scene's size, and so many views.
   SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {

@@ -225,6 +225,13 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   rendered = false;
 }
 
+void Renderer::Impl::set_lights(const std::optional<Lights>& lights) {
+  std::optional<Lights> new_lights = lights;
+  shade.set(shade.prepare(lights, is_textured(scene)));
+  std::swap(scene.lights, new_lights);
+  rendered = false;
+}
+
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
   replace(geometry->positions, geometry->meshes[mesh].first_vertex, positions);
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());

@@ -30,6 +30,12 @@ void check_views(const Scene& scene, std::span<const View> views) {
   }
 }
 
+void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights) {
+  if (!lights) return;
+  validate(*lights);
+  for (const View& view : views) require_scales(view.camera, scene.smoothing, true);
+}
+
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected) {
   if (values.size() != expected) {
     throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));

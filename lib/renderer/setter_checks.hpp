@@ -18,6 +18,7 @@ void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec
 void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
                   std::span<const glm::vec3> texels);
 void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords);
+void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights);
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
 

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "base/checks.hpp"
+#include "scene/light_table.hpp"
 
 namespace dpr {
 namespace {
@@ -22,60 +23,83 @@ constexpr std::array k_names{
 bool has_field_of_view(const Scene& scene) { return !scene.camera.intrinsics; }
 bool has_intrinsics(const Scene& scene) { return scene.camera.intrinsics.has_value(); }
 bool has_lights(const Scene& scene) { return scene.lights.has_value(); }
+bool has_harmonics(const Scene& scene) { return has_lights(scene) && !scene.lights->harmonics.empty(); }
 
 template <std::size_t k>
 GradientArray intrinsic(G& g, I i) {
   return &g.views[i.view].camera.intrinsics[k];
 }
 
+/// Rows of a kind of light. Files have the list of point lights even where there are none.
+template <typename Kind>
+void add_rows(Kind, std::vector<GradientRow>& rows) {
+  const auto exists = [](const Scene& scene) {
+    return has_lights(scene) && (Kind::needs == 0 || !((*scene.lights).*Kind::lights).empty());
+  };
+  const auto count = [](const SceneGradient& gradient) { return (gradient.*Kind::gradients).size(); };
+  Kind::for_each_member([&](std::string_view key, auto, auto member, auto...) {
+    const auto array = [member](G& g, I i) -> GradientArray {
+      return &((g.*Kind::gradients)[i.item].*member);
+    };
+    rows.push_back(
+        {&Request::lights, Of::light, list_of(Kind()) + "[]." + std::string(key), array, exists, count});
+  });
+}
+
 /// In the order of a gradient file.
-constexpr std::array k_rows{
-    GradientRow{&Request::positions, Of::mesh, "meshes[].positions",
-                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].positions; }},
-    GradientRow{&Request::colors, Of::mesh, "meshes[].colors",
-                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].colors; }},
-    GradientRow{&Request::texcoords, Of::mesh, "meshes[].texcoords",
-                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].texcoords; }},
-    GradientRow{&Request::texture, Of::mesh, "meshes[].textures",
-                [](G& g, I i) -> GradientArray { return &g.meshes[i.item].textures; }},
-    GradientRow{&Request::positions, Of::all_views, "shapes.positions",
-                [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
-    GradientRow{&Request::colors, Of::all_views, "shapes.colors",
-                [](G& g, I) -> GradientArray { return &g.shapes.colors; }},
-    GradientRow{&Request::transform, Of::mesh_in_view, "meshes[].rotation",
-                [](G& g, I i) -> GradientArray { return &g.views[i.view].transforms[i.item].rotation; }},
-    GradientRow{&Request::transform, Of::mesh_in_view, "meshes[].translation",
-                [](G& g, I i) -> GradientArray { return &g.views[i.view].transforms[i.item].translation; }},
-    GradientRow{&Request::camera, Of::view, "camera.rotation",
-                [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.view.rotation; }},
-    GradientRow{&Request::camera, Of::view, "camera.translation",
-                [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.view.translation; }},
-    GradientRow{&Request::camera, Of::view, "camera.fov_y_degrees",
-                [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.fov_y_degrees; },
-                has_field_of_view},
-    GradientRow{&Request::camera, Of::view, "camera.intrinsics.fx", intrinsic<0>, has_intrinsics},
-    GradientRow{&Request::camera, Of::view, "camera.intrinsics.fy", intrinsic<1>, has_intrinsics},
-    GradientRow{&Request::camera, Of::view, "camera.intrinsics.cx", intrinsic<2>, has_intrinsics},
-    GradientRow{&Request::camera, Of::view, "camera.intrinsics.cy", intrinsic<3>, has_intrinsics},
-    GradientRow{&Request::lights, Of::scene, "lights.ambient",
-                [](G& g, I) -> GradientArray { return &g.ambient; }, has_lights},
-    GradientRow{&Request::lights, Of::light, "lights.point[].position",
-                [](G& g, I i) -> GradientArray { return &g.lights[i.item].position; }, has_lights},
-    GradientRow{&Request::lights, Of::light, "lights.point[].diffuse",
-                [](G& g, I i) -> GradientArray { return &g.lights[i.item].diffuse; }, has_lights},
-    GradientRow{&Request::lights, Of::light, "lights.point[].specular",
-                [](G& g, I i) -> GradientArray { return &g.lights[i.item].specular; }, has_lights},
-    GradientRow{&Request::smoothing, Of::scene, "sigma", [](G& g, I) -> GradientArray { return &g.sigma; }},
-    GradientRow{&Request::smoothing, Of::scene, "gamma", [](G& g, I) -> GradientArray { return &g.gamma; }},
-    GradientRow{&Request::smoothing, Of::scene, "alpha", [](G& g, I) -> GradientArray { return &g.alpha; }},
-    GradientRow{&Request::background, Of::scene, "background",
-                [](G& g, I) -> GradientArray { return &g.background; }}};
+std::vector<GradientRow> make_rows() {
+  std::vector<GradientRow> rows{
+      GradientRow{&Request::positions, Of::mesh, "meshes[].positions",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].positions; }},
+      GradientRow{&Request::colors, Of::mesh, "meshes[].colors",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].colors; }},
+      GradientRow{&Request::texcoords, Of::mesh, "meshes[].texcoords",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].texcoords; }},
+      GradientRow{&Request::texture, Of::mesh, "meshes[].textures",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].textures; }},
+      GradientRow{&Request::positions, Of::all_views, "shapes.positions",
+                  [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
+      GradientRow{&Request::colors, Of::all_views, "shapes.colors",
+                  [](G& g, I) -> GradientArray { return &g.shapes.colors; }},
+      GradientRow{&Request::transform, Of::mesh_in_view, "meshes[].rotation",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].transforms[i.item].rotation; }},
+      GradientRow{&Request::transform, Of::mesh_in_view, "meshes[].translation",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].transforms[i.item].translation; }},
+      GradientRow{&Request::camera, Of::view, "camera.rotation",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.view.rotation; }},
+      GradientRow{&Request::camera, Of::view, "camera.translation",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.view.translation; }},
+      GradientRow{&Request::camera, Of::view, "camera.fov_y_degrees",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.fov_y_degrees; },
+                  has_field_of_view},
+      GradientRow{&Request::camera, Of::view, "camera.intrinsics.fx", intrinsic<0>, has_intrinsics},
+      GradientRow{&Request::camera, Of::view, "camera.intrinsics.fy", intrinsic<1>, has_intrinsics},
+      GradientRow{&Request::camera, Of::view, "camera.intrinsics.cx", intrinsic<2>, has_intrinsics},
+      GradientRow{&Request::camera, Of::view, "camera.intrinsics.cy", intrinsic<3>, has_intrinsics},
+      GradientRow{&Request::lights, Of::scene, "lights.ambient",
+                  [](G& g, I) -> GradientArray { return &g.ambient; }, has_lights},
+      GradientRow{&Request::lights, Of::scene, "lights.harmonics",
+                  [](G& g, I) -> GradientArray { return &g.harmonics; }, has_harmonics}};
+  for_each_light_kind([&](auto kind) { add_rows(kind, rows); });
+  rows.insert(rows.end(), {GradientRow{&Request::smoothing, Of::scene, "sigma",
+                                       [](G& g, I) -> GradientArray { return &g.sigma; }},
+                           GradientRow{&Request::smoothing, Of::scene, "gamma",
+                                       [](G& g, I) -> GradientArray { return &g.gamma; }},
+                           GradientRow{&Request::smoothing, Of::scene, "alpha",
+                                       [](G& g, I) -> GradientArray { return &g.alpha; }},
+                           GradientRow{&Request::background, Of::scene, "background",
+                                       [](G& g, I) -> GradientArray { return &g.background; }}});
+  return rows;
+}
 
 }  // namespace
 
 std::span<const GradientName> gradient_names() { return k_names; }
 
-std::span<const GradientRow> gradient_rows() { return k_rows; }
+std::span<const GradientRow> gradient_rows() {
+  static const std::vector<GradientRow> rows = make_rows();
+  return rows;
+}
 
 GradientRequest no_gradients() {
   GradientRequest request;
@@ -92,7 +116,7 @@ GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient
     case GradientOf::mesh:
       return {1, gradient.meshes.size()};
     case GradientOf::light:
-      return {1, gradient.lights.size()};
+      return {1, row.lights(gradient)};
     case GradientOf::view:
       return {views, 1};
     case GradientOf::mesh_in_view:

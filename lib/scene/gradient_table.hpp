@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -38,8 +39,8 @@ struct GradientIndex {
   std::size_t view = 0, item = 0;
 };
 
-/// A number, a vector, one vector for each vertex, colour or texture coordinate, or a list of texels for each
-/// texture.
+/// A number, a vector, one vector for each vertex, colour, texture coordinate or coefficient, or a list of
+/// texels for each texture.
 using GradientArray = std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*, std::vector<glm::vec2>*,
                                    std::vector<std::vector<glm::vec3>>*>;
 
@@ -48,10 +49,12 @@ struct GradientRow {
   GradientOf of;
   /// In a gradient file: members, and [] after a list that has one object for each mesh or light. Views'
   /// arrays are those of the file's only view, and no file has those of `all_views`.
-  std::string_view path;
-  GradientArray (*array)(SceneGradient& gradient, GradientIndex index);
+  std::string path;
+  std::function<GradientArray(SceneGradient& gradient, GradientIndex index)> array;
   /// Whether a scene has what this is the gradient of. None: every scene has.
-  bool (*exists)(const Scene& scene) = nullptr;
+  std::function<bool(const Scene& scene)> exists = nullptr;
+  /// Of lights: how many there are of the kind.
+  std::function<std::size_t(const SceneGradient& gradient)> lights = nullptr;
 };
 std::span<const GradientRow> gradient_rows();
 

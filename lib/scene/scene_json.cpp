@@ -10,6 +10,7 @@
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 #include "smoothing/presets.hpp"
 
@@ -135,29 +136,40 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
   return instance;
 }
 
-Shading parse_shading(const JsonNode& node) {
-  const std::string word = node.string();
-  if (word == "flat") return Shading::flat;
-  if (word == "phong") return Shading::phong;
-  if (word == "gouraud") return Shading::gouraud;
-  node.fail("\"" + word + "\"", "flat, phong or gouraud");
+void read_member(const JsonNode& node, float& value) { value = node.number(); }
+
+void read_member(const JsonNode& node, glm::vec3& value) { value = node.vec3(); }
+
+template <typename Light>
+Light parse_light(const JsonNode& node) {
+  Light light;
+  std::vector<std::string_view> keys;
+  LightKind<Light>::for_each_member([&](std::string_view key, auto...) { keys.push_back(key); });
+  node.require_keys(keys);
+  LightKind<Light>::for_each_member([&](std::string_view key, auto member, auto...) {
+    if (const auto value = node.find(key)) read_member(*value, light.*member);
+  });
+  return light;
 }
 
 Lights parse_lights(const JsonNode& node) {
-  node.require_keys({"ambient", "point", "shininess", "shading"});
+  std::vector<std::string_view> keys{"ambient", "harmonics", "shininess", "shading"};
+  for_each_light_kind([&](auto kind) { keys.push_back(kind.key); });
+  node.require_keys(keys);
   Lights lights;
   take_vec3(node, "ambient", lights.ambient);
   take_number(node, "shininess", lights.shininess);
-  take(node, "shading", lights.shading, parse_shading);
-  if (const auto list = node.find("point")) {
-    for (const JsonNode& element : list->elements()) {
-      element.require_keys({"position", "diffuse", "specular"});
-      PointLight& light = lights.point.emplace_back();
-      take_vec3(element, "position", light.position);
-      take_vec3(element, "diffuse", light.diffuse);
-      take_vec3(element, "specular", light.specular);
-    }
+  take(node, "shading", lights.shading,
+       [](const JsonNode& n) { return parse_shading(n.string(), n.name()); });
+  if (const auto list = node.find("harmonics")) {
+    for (const JsonNode& element : list->elements(k_harmonics)) lights.harmonics.push_back(element.vec3());
   }
+  for_each_light_kind([&](auto kind) {
+    const auto list = node.find(kind.key);
+    if (!list) return;
+    for (const JsonNode& element : list->elements())
+      (lights.*kind.lights).push_back(parse_light<typename decltype(kind)::Light>(element));
+  });
   return lights;
 }
 

@@ -1,25 +1,26 @@
 #include "stages/shade.hpp"
 
+#include "scene/light_table.hpp"
+
 namespace dpr {
 namespace {
 
-std::string shading_options(Shading shading, bool is_textured) {
-  return " -DDPR_SHADING=" + std::to_string(static_cast<int>(shading) + DPR_FLAT) +
-         " -DDPR_BASE=" + std::to_string(is_textured ? DPR_BASE_OF_FRAGMENTS : DPR_BASE_OF_CORNERS);
+std::string shading_options(const ShadingModel& model) {
+  return " -DDPR_SHADING=" + std::to_string(static_cast<int>(model.shading) + DPR_FLAT) +
+         " -DDPR_LIGHTS=" + std::to_string(model.lights) +
+         " -DDPR_BASE=" + std::to_string(model.is_textured ? DPR_BASE_OF_FRAGMENTS : DPR_BASE_OF_CORNERS);
 }
 
 }  // namespace
 
-LitShading::LitShading(Device::Impl& device, Shading model, bool textured)
-    : shading(model),
-      is_textured(textured),
+LitShading::LitShading(Device::Impl& device, const ShadingModel& of)
+    : model(of),
       normals_forward(device, "normals.cl", "normals_forward"),
       normals_backward_normalize(device, "normals.cl", "normals_backward_normalize"),
       normals_backward(device, "normals.cl", "normals_backward"),
-      forward(device, "shade_lit.cl", "shade_lit_forward", shading_options(model, textured)),
-      backward(device, "shade_lit.cl", "shade_lit_backward", shading_options(model, textured)),
-      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_options(model, textured)) {
-}
+      forward(device, "shade_lit.cl", "shade_lit_forward", shading_options(of)),
+      backward(device, "shade_lit.cl", "shade_lit_backward", shading_options(of)),
+      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_options(of)) {}
 
 Shade::Shade(Device::Impl& device)
     : device_(device),
@@ -33,20 +34,20 @@ void Shade::make_surface() {
 Shade::Lighting Shade::prepare(const std::optional<Lights>& lights, bool is_textured) const {
   Lighting prepared;
   if (!lights) return prepared;
-  const bool known =
-      now_.kernels && now_.kernels->shading == lights->shading && now_.kernels->is_textured == is_textured;
-  prepared.kernels =
-      known ? now_.kernels : std::make_shared<LitShading>(device_, lights->shading, is_textured);
-  prepared.params.ambient = to_cl(lights->ambient);
-  prepared.params.lights = static_cast<cl_uint>(lights->point.size());
-  prepared.params.shininess = lights->shininess;
-  std::vector<shared::Light> values;
-  for (const PointLight& light : lights->point) {
-    values.push_back({to_cl(light.position), to_cl(light.diffuse), to_cl(light.specular)});
-  }
+  const ShadingModel model{lights->shading, needs_of(*lights), is_textured};
+  const bool known = now_.kernels && now_.kernels->model == model;
+  prepared.kernels = known ? now_.kernels : std::make_shared<LitShading>(device_, model);
+  prepared.params = lighting_params(*lights);
+  std::vector<shared::Light> values = device_lights(*lights);
+  prepared.params.lights = static_cast<cl_uint>(values.size());
   if (values.empty()) values.emplace_back();  // never read, but an argument all the same
   prepared.lights.upload(device_, values);
   return prepared;
+}
+
+std::size_t Shade::light_channel_count() const {
+  const cl_uint needs = now_.kernels ? now_.kernels->model.lights : 0;
+  return DPR_ENVIRONMENT_CHANNELS(needs) + lights() * DPR_LIGHT_CHANNELS(needs);
 }
 
 void Shade::settle(std::size_t fragments) {
@@ -72,7 +73,7 @@ void Shade::light(const ShadeInputs& in) {
   const Range pairs = in.rasterize.pairs(in.bin);
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   normals_.resize(device_, vertices);
-  if (now_.kernels->shading != Shading::flat) {
+  if (now_.kernels->model.shading != Shading::flat) {
     now_.kernels->normals_forward(vertices, in.p, in.geometry.face_vertices,
                                   in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
                                   in.transform.world, normals_);
@@ -101,7 +102,7 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
 
 void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
   const Range pairs = in.rasterize.pairs(in.bin);
-  if (now_.kernels->is_textured) grad_base_.resize(device_, in.rasterize.fragments);
+  if (now_.kernels->model.is_textured) grad_base_.resize(device_, in.rasterize.fragments);
   grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
@@ -118,7 +119,7 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_,
                   grad_world);
-  if (now_.kernels->shading == Shading::flat) return;
+  if (now_.kernels->model.shading == Shading::flat) return;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_,
                   grad_normals_);
   now_.kernels->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
@@ -129,7 +130,7 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
 
 void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {
   const Range pairs = in.rasterize.pairs(in.bin);
-  light_channels.resize(device_, light_sets() * k_light_channels * in.bin.pairs);
+  light_channels.resize(device_, light_channel_count() * in.bin.pairs);
   now_.kernels->backward_lights(
       pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
       in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,

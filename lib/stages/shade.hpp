@@ -15,16 +15,21 @@
 
 namespace dpr {
 
-/// Channels of shade_lit_backward_lights: a light's position, diffuse, specular, and the ambient light.
-inline constexpr std::size_t k_light_channels = 12;
+/// What the kernels of lit scenes are built for.
+struct ShadingModel {
+  Shading shading = Shading::phong;
+  cl_uint lights = 0;        ///< bits of DPR_LIGHTS
+  bool is_textured = false;  ///< base colours come from the surface stage, not from the corners
 
-/// The kernels of a shading model, for base colours of the corners or of the surface stage.
+  bool operator==(const ShadingModel&) const = default;
+};
+
+/// The kernels of a shading model.
 class LitShading {
  public:
-  LitShading(Device::Impl& device, Shading shading, bool is_textured);
+  LitShading(Device::Impl& device, const ShadingModel& model);
 
-  Shading shading;
-  bool is_textured;
+  ShadingModel model;
   Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
       normals_forward;
   Kernel<shared::FrameParams, In<cl_float4>, Out<cl_float4>> normals_backward_normalize;
@@ -79,8 +84,10 @@ class Shade {
   void set(Lighting&& prepared) noexcept { std::swap(now_, prepared); }
   bool lit() const { return now_.kernels != nullptr; }
   std::size_t lights() const { return now_.params.lights; }
-  /// Of light_channels: without point lights one launch still finds the ambient light's gradient.
-  std::size_t light_sets() const { return std::max<std::size_t>(lights(), 1); }
+  /// Launches that find the lights' gradients: without lights one still finds the environment's.
+  std::size_t light_launches() const { return std::max<std::size_t>(lights(), 1); }
+  /// Of `light_channels`.
+  std::size_t light_channel_count() const;
 
   void forward(const ShadeInputs& in);
   /// Says how many fragments there are, where forward() could not know.
@@ -93,7 +100,7 @@ class Shade {
   /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
-  /// The gradients of one light and of the ambient light, per pair: a set of `light_channels`.
+  /// The gradients of one light, with the first those of the environment, per pair.
   void backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light);
 
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
@@ -105,7 +112,7 @@ class Shade {
   Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
   Buffer<float> grad_corner_colors;      ///< [pair][9]
   Buffer<float> grad_eye;                ///< [3][pair]
-  Buffer<float> light_channels;          ///< [light][k_light_channels][pair]
+  Buffer<float> light_channels;          ///< [light_channel_count()][pair], of the environment, then by light
 
   std::size_t bytes() const;
 

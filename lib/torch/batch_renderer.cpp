@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/checks.hpp"
+#include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 #include "torch/errors.hpp"
 
@@ -51,23 +52,35 @@ OptionValue option_value(const at::IValue& value, const std::string& name) {
   throw InvalidArgument(name + " (dpr::Renderer)", value.tagKind(), "a number or a word");
 }
 
+float number_of(const OptionValue& value, const std::string& name) {
+  if (const auto* const whole = std::get_if<std::int64_t>(&value)) return static_cast<float>(*whole);
+  if (const auto* const number = std::get_if<double>(&value)) return static_cast<float>(*number);
+  throw InvalidArgument(name + " (dpr::Renderer)", "\"" + std::get<std::string>(value) + "\"", "a number");
+}
+
 /// Sets one of the camera's planes; false for another name.
 bool set_clipping(Camera& camera, const std::string& name, const OptionValue& value) {
   float* const plane = name == "znear" ? &camera.znear : name == "zfar" ? &camera.zfar : nullptr;
   if (plane == nullptr) return false;
-  if (const auto* const whole = std::get_if<std::int64_t>(&value)) {
-    *plane = static_cast<float>(*whole);
-  } else if (const auto* const number = std::get_if<double>(&value)) {
-    *plane = static_cast<float>(*number);
-  } else {
-    throw InvalidArgument(name + " (dpr::Renderer)", "\"" + std::get<std::string>(value) + "\"", "a number");
+  *plane = number_of(value, name);
+  return true;
+}
+
+/// Sets how lights shade; false for another name.
+bool set_shading(Lights& lights, const std::string& name, const OptionValue& value) {
+  if (name == "shininess") {
+    lights.shininess = number_of(value, name);
+    return true;
   }
+  if (name != "shading") return false;
+  const auto* const word = std::get_if<std::string>(&value);
+  lights.shading = parse_shading(word ? *word : "a number", name + " (dpr::Renderer)");
   return true;
 }
 
 [[noreturn]] void fail_name(const std::string& name) {
   std::vector<std::string_view> names = option_keys();
-  names.insert(names.end(), {"znear", "zfar"});
+  names.insert(names.end(), {"znear", "zfar", "shading", "shininess"});
   throw InvalidArgument("name (dpr::Renderer.set)", "\"" + name + "\"", one_of(names));
 }
 
@@ -96,8 +109,11 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     Camera clipping;
     clipping.znear = znear_;
     clipping.zfar = zfar_;
+    Lights lights = lights_;
     if (set_clipping(clipping, name, given)) {
       validate(clipping);
+    } else if (set_shading(lights, name, given)) {
+      validate(lights);
     } else if (!set_option(options, name, given, name + " (dpr::Renderer)")) {
       fail_name(name);
     }
@@ -105,6 +121,7 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     options_ = std::move(options);
     znear_ = clipping.znear;
     zfar_ = clipping.zfar;
+    lights_ = std::move(lights);
   });
 }
 

@@ -24,12 +24,15 @@ class BatchRenderer : public torch::CustomClassHolder {
   BatchRenderer(const at::Tensor& faces, std::int64_t width, std::int64_t height, const std::string& preset,
                 const std::string& device);
 
-  /// From the next render() on: any key of a scene's "smoothing", with a number or a word, and "znear" or
-  /// "zfar", which are 1 and 100 unless set. The smoothing is resolved from all that was set, in whatever
-  /// order (dpr/smoothing_options.hpp). Errors are torch's.
+  /// From the next render() on: any key of a scene's "smoothing", with a number or a word, "znear" or "zfar",
+  /// which are 1 and 100 unless set, and "shading" or "shininess" of lights. The smoothing is resolved from
+  /// all that was set, in whatever order (dpr/smoothing_options.hpp). Errors are torch's.
   void set(const std::string& name, const at::IValue& value);
   /// Instead of the preset and what was set until now.
   void set_smoothing(const Smoothing& smoothing);
+
+  /// How lights shade, for render_lit().
+  const Lights& lights() const { return lights_; }
 
   /// Spent in render() and its backward passes until now.
   double seconds() const { return seconds_; }
@@ -53,6 +56,7 @@ class BatchRenderer : public torch::CustomClassHolder {
   std::optional<Smoothing> otherwise_;  // what they leave open
   Smoothing smoothing_;                 // what they come to
   float znear_ = 1.0F, zfar_ = 100.0F;
+  Lights lights_;  // without their numbers
   Device device_;
   Topology topology_;           // of the free renderers
   std::vector<Renderer> free_;  // each remembers its last frame only, so every graph in flight has its own

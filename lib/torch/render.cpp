@@ -4,11 +4,15 @@
 #include <torch/csrc/autograd/custom_function.h>
 #include <torch/library.h>
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 
+#include "base/name_list.hpp"
+#include "scene/light_table.hpp"
 #include "torch/errors.hpp"
 
 namespace dpr::torch_op {
@@ -49,6 +53,67 @@ at::Tensor adopt(std::vector<glm::vec3>& own, std::vector<glm::vec3>& shared, st
   return at::from_blob(
       vectors->data(), {batch, count / batch, 3}, [vectors](void*) { delete vectors; },
       at::TensorOptions(at::kFloat));
+}
+
+/// Lights whose numbers are yet to come, and a tensor of these, in their order.
+struct PackedLights {
+  Lights lights;
+  at::Tensor numbers;
+};
+
+/// The numbers of a kind's light, one after the other.
+template <typename Kind>
+std::int64_t count_numbers(Kind) {
+  std::int64_t count = 0;
+  typename Kind::Light light;
+  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
+    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
+  });
+  return count;
+}
+
+void require_known(const LightTensors& given) {
+  std::vector<std::string_view> keys{"ambient", "harmonics"};
+  for_each_light_kind([&](auto kind) { keys.push_back(kind.key); });
+  for (const auto& entry : given) {
+    if (std::ranges::find(keys, entry.key()) == keys.end())
+      throw InvalidArgument("lights (dpr::render_lit)", "\"" + entry.key() + "\"", one_of(keys));
+  }
+}
+
+/// By torch's own operations, which differentiate the packing.
+PackedLights pack(const LightTensors& given, const Lights& model) {
+  require_known(given);
+  PackedLights packed{model, {}};
+  std::vector<at::Tensor> parts;
+  const auto take = [&](std::string_view key, std::initializer_list<std::int64_t> shape,
+                        const std::string& expected) {
+    const std::string name(key);
+    if (!given.contains(name)) return std::int64_t{0};
+    const at::Tensor tensor = given.at(name);
+    parts.push_back(checked(tensor, "lights." + name, shape, expected.c_str()).flatten());
+    return tensor.size(0);
+  };
+  if (take("ambient", {3}, "[3]") == 0) {
+    const glm::vec3& ambient = model.ambient;
+    parts.push_back(at::tensor({ambient.x, ambient.y, ambient.z}, at::kFloat));
+  }
+  packed.lights.harmonics.resize(
+      static_cast<std::size_t>(take("harmonics", {static_cast<std::int64_t>(k_harmonics), 3}, "[9, 3]")));
+  for_each_light_kind([&](auto kind) {
+    const std::int64_t count = count_numbers(kind);
+    (packed.lights.*kind.lights)
+        .resize(
+            static_cast<std::size_t>(take(kind.key, {-1, count}, "[light, " + std::to_string(count) + "]")));
+  });
+  packed.numbers = at::cat(parts);
+  return packed;
+}
+
+Lights unpack(Lights lights, const at::Tensor& numbers) {
+  const float* next = numbers.data_ptr<float>();
+  for_each_light_number(lights, [&](std::string_view, float& number) { number = *next++; });
+  return lights;
 }
 
 struct Inputs {
@@ -110,6 +175,23 @@ at::Tensor view_gradients(const at::Tensor& views, const at::Tensor& vertices,
   return at::constant_pad_nd(grad, {0, 0, 0, 1}).to(at::kFloat);
 }
 
+/// d loss / d M for rigid motions of M = [A t; 0 1]: G with <G, [r]x A> = g . r for the gradient g of every
+/// rotation r, which is 1/2 [g]x A^-T, and the translation's gradient.
+at::Tensor rigid_view_gradients(std::span<const View> views, const SceneGradient& gradient) {
+  at::Tensor grad = at::zeros({static_cast<std::int64_t>(views.size()), 4, 4}, at::kFloat);
+  float* out = grad.data_ptr<float>();
+  for (std::size_t v = 0; v < views.size(); ++v, out += 16) {
+    const PoseGradient& pose = gradient.views[v].camera.view;
+    const glm::dmat3 inverse = glm::transpose(glm::inverse(glm::dmat3(glm::dmat4(views[v].camera.view))));
+    for (int column = 0; column < 4; ++column) {
+      const glm::dvec3 values =
+          column < 3 ? 0.5 * glm::cross(pose.rotation, inverse[column]) : pose.translation;
+      for (int row = 0; row < 3; ++row) out[4 * row + column] = static_cast<float>(values[row]);
+    }
+  }
+  return grad;
+}
+
 using Clock = std::chrono::steady_clock;
 
 /// Adds the time of its life to a sum.
@@ -144,7 +226,8 @@ class Lease : public torch::CustomClassHolder {
 struct RenderFunction : public torch::autograd::Function<RenderFunction> {
   static at::Tensor forward(AutogradContext* ctx, const c10::intrusive_ptr<BatchRenderer>& batch,
                             const at::Tensor& vertices, const at::Tensor& colors, const at::Tensor& views,
-                            const at::Tensor& intrinsics, const at::Tensor& background) {
+                            const at::Tensor& intrinsics, const at::Tensor& background,
+                            const at::Tensor& light_numbers, const std::optional<Lights>& lights) {
     const Timer timer(batch->seconds_);
     return with_torch_errors([&] {
       const Inputs in = check({vertices, colors, views, intrinsics, background},
@@ -153,13 +236,20 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       auto lease = c10::make_intrusive<Lease>(
           batch, BatchRenderer::Topology{static_cast<std::size_t>(in.vertices.size(1)), of_faces});
       GradientRequest wanted{};
-      wanted.positions = vertices.requires_grad() || views.requires_grad();
+      const bool by_vertices = views.requires_grad() && !lights;
+      wanted.positions = vertices.requires_grad() || by_vertices;
       wanted.colors = colors.requires_grad();
-      wanted.camera = intrinsics.requires_grad();
+      wanted.camera = intrinsics.requires_grad() || (views.requires_grad() && lights);
       wanted.background = background.requires_grad();
-      wanted.transform = wanted.lights = wanted.smoothing = false;
+      wanted.lights = light_numbers.requires_grad();
+      wanted.transform = wanted.smoothing = false;
       lease->renderer.set_gradients(wanted);
-      upload(*batch, lease->renderer, in, views.requires_grad());
+      if (lights) {
+        lease->renderer.set_lights(unpack(*lights, light_numbers));
+      } else if (lease->renderer.scene().lights) {
+        lease->renderer.set_lights({});
+      }
+      upload(*batch, lease->renderer, in, by_vertices);
 
       lease->renderer.forward();
       at::Tensor image = at::empty({in.views.size(0), batch->height_, batch->width_, 4}, at::kFloat);
@@ -183,7 +273,7 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       auto& lease = static_cast<Lease&>(*ctx->saved_data["lease"].toCapsule());
       const at::Tensor grad_image = grad_outputs[0].contiguous();
       SceneGradient gradient = lease.renderer.backward_pixels(rows<glm::vec4>(grad_image));
-      return collect(*ctx, lease.renderer.scene().gradients, gradient);
+      return collect(*ctx, lease.renderer, gradient);
     });
   }
 
@@ -205,17 +295,21 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
     renderer.set_shapes(rows<glm::vec3>(shapes), rows<glm::vec3>(colors));
   }
 
-  static variable_list collect(AutogradContext& ctx, const GradientRequest& wanted, SceneGradient& gradient) {
+  static variable_list collect(AutogradContext& ctx, const Renderer& renderer, SceneGradient& gradient) {
+    const GradientRequest& wanted = renderer.scene().gradients;
+    const bool wants_views = ctx.saved_data["wants_views"].toBool(),
+               is_lit = renderer.scene().lights.has_value();
     const variable_list saved = ctx.get_saved_variables();
     const at::Tensor &vertices = saved[0], &views = saved[1];
     const std::int64_t count = views.size(0);
-    variable_list grad(6);  // of the renderer, which has none, and the five tensors
+    variable_list grad(8);  // of the renderer and the lights' structure, which have none, and six tensors
     if (wanted.positions) {
       at::Tensor each = adopt(gradient.shapes.positions, gradient.meshes[0].positions, count);
-      if (ctx.saved_data["wants_views"].toBool()) grad[3] = view_gradients(views, vertices, each);
+      if (wants_views && !is_lit) grad[3] = view_gradients(views, vertices, each);
       grad[1] = each.size(0) == vertices.size(0) ? each : each.sum(0, /*keepdim=*/true);
     }
     if (wanted.colors) grad[2] = adopt(gradient.shapes.colors, gradient.meshes[0].colors, count);
+    if (wants_views && is_lit) grad[3] = rigid_view_gradients(renderer.views(), gradient);
     if (wanted.camera) {
       grad[4] = at::empty({count, 4}, at::kFloat);
       float* out = grad[4].data_ptr<float>();
@@ -227,6 +321,12 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       const glm::dvec3& g = gradient.background;
       grad[5] = at::tensor({g.x, g.y, g.z}, at::kFloat);
     }
+    if (wanted.lights) {
+      std::vector<float> numbers;
+      for_each_light_number(
+          gradient, [&](std::string_view, auto number) { numbers.push_back(static_cast<float>(number)); });
+      grad[6] = at::tensor(numbers, at::kFloat);
+    }
     return grad;
   }
 };
@@ -234,7 +334,16 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
 at::Tensor render(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
                   const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
                   const at::Tensor& background) {
-  return RenderFunction::apply(renderer, vertices, colors, views, intrinsics, background);
+  return RenderFunction::apply(renderer, vertices, colors, views, intrinsics, background,
+                               at::empty({0}, at::kFloat), std::optional<Lights>());
+}
+
+at::Tensor render_lit(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
+                      const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
+                      const at::Tensor& background, const LightTensors& lights) {
+  const PackedLights packed = with_torch_errors([&] { return pack(lights, renderer->lights()); });
+  return RenderFunction::apply(renderer, vertices, colors, views, intrinsics, background, packed.numbers,
+                               std::optional<Lights>(packed.lights));
 }
 
 TORCH_LIBRARY(dpr, m) {
@@ -252,6 +361,11 @@ TORCH_LIBRARY(dpr, m) {
       "render(__torch__.torch.classes.dpr.Renderer renderer, Tensor vertices, Tensor colors, Tensor views, "
       "Tensor intrinsics, Tensor background) -> Tensor",
       &render);
+  m.def(
+      "render_lit(__torch__.torch.classes.dpr.Renderer renderer, Tensor vertices, Tensor colors, Tensor "
+      "views, "
+      "Tensor intrinsics, Tensor background, Dict(str, Tensor) lights) -> Tensor",
+      &render_lit);
 }
 
 }  // namespace dpr::torch_op

@@ -1,4 +1,4 @@
-// The renderer as a libtorch operator, torch.ops.dpr.render, with gradients.
+// The renderer as a libtorch operator, torch.ops.dpr.render and render_lit, with gradients.
 #pragma once
 
 #include "torch/batch_renderer.hpp"
@@ -21,5 +21,16 @@ namespace dpr::torch_op {
 at::Tensor render(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
                   const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
                   const at::Tensor& background);
+
+/// Tensors by the keys of a scene's "lights".
+using LightTensors = c10::Dict<std::string, at::Tensor>;
+
+/// The same in the light of a scene file: ambient [3], harmonics [9, 3], and for every kind of light [light,
+/// number], the members one after the other as the README has them; what is left out is as in a scene file.
+/// Differentiable with respect to them too, and to the matrices of the views as rigid motions: with lights,
+/// which stay in the world, an image does not depend on the vertices in camera space alone.
+at::Tensor render_lit(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
+                      const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
+                      const at::Tensor& background, const LightTensors& lights);
 
 }  // namespace dpr::torch_op

@@ -57,6 +57,20 @@ TEST_SUITE("bench-smoke") {
     }
   }
 
+  TEST_CASE("lights: every kind has its errors") {
+    const TempDir folder;
+    const Json data = run(folder, "lights");
+    if (data.is_null()) return;
+    CHECK(data["rows"].size() == 4);
+    for (const Json& row : data["rows"]) {
+      CHECK_FALSE(row["errors"].empty());
+      for (const Json& error : row["errors"]) {
+        CHECK(std::isfinite(error["median"].get<double>()));
+        CHECK(error["largest"].get<double>() < 2 * error["start_median"].get<double>());
+      }
+    }
+  }
+
   TEST_CASE("gradient-noise: means agree with the exact derivative, and more samples spread less") {
     const TempDir folder;
     const Json data = run(folder, "gradient-noise");

@@ -228,6 +228,9 @@ static void test_wrong_scenes(void) {
   const float black[3] = {0, 0, INFINITY};
   const char* const names[] = {"positions", "position"};
   dpr_point_light light = {{0, 0, 0}, {1, 1, 1}, {0, 0, NAN}};
+  dpr_directional_light sun = {{0, 0, 0}, {1, 1, 1}, {0, 0, 0}};
+  dpr_spot_light spot = {{0, 0, 3}, {0, 0, -1}, 20, 20, {1, 1, 1}, {0, 0, 0}};
+  const float harmonics[27] = {1, 1, 1};
   dpr_lights lights = DPR_LIGHTS_INIT;
   dpr_camera camera = three_units_away();
   dpr_scene *scene = NULL, *none = NULL;
@@ -254,6 +257,22 @@ static void test_wrong_scenes(void) {
   lights.point_count = (size_t)-1;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point_count");
   lights.point_count = 0;
+  lights.directional_count = 1;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "lights.directional");
+  lights.directional = &sun;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "direction (lights.directional[0])");
+  lights.directional_count = 0;
+  lights.spot = &spot;
+  lights.spot_count = 1;
+  REFUSED(dpr_scene_set_lights(scene, &lights), "inner_angle_degrees (lights.spot[0])");
+  spot.inner_angle_degrees = 10;
+  lights.harmonics = harmonics;
+  OK(dpr_scene_set_lights(scene, &lights));
+  lights.size = offsetof(dpr_lights, directional); /* a program compiled before there were more kinds */
+  lights.spot = NULL;
+  OK(dpr_scene_set_lights(scene, &lights));
+  lights.size = sizeof lights;
+  lights.spot_count = 0;
   lights.shading = 7;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.shading");
   OK(dpr_scene_set_lights(scene, NULL));

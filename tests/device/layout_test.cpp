@@ -71,10 +71,14 @@ std::vector<Entry> entries() {
           DPR_FIELD(LightingParams, ambient),
           DPR_FIELD(LightingParams, lights),
           DPR_FIELD(LightingParams, shininess),
+          DPR_FIELD(LightingParams, harmonics),
           DPR_SIZE(Light),
           DPR_FIELD(Light, position),
           DPR_FIELD(Light, diffuse),
           DPR_FIELD(Light, specular),
+          DPR_FIELD(Light, axis),
+          DPR_FIELD(Light, cos_outer),
+          DPR_FIELD(Light, inverse_edge),
           DPR_SIZE(Texture),
           DPR_FIELD(Texture, first),
           DPR_FIELD(Texture, width),
@@ -178,9 +182,10 @@ TEST_SUITE("unit") {
     REQUIRE(at != std::string::npos);
     header.insert(at, "  uint surplus;\n");
     const std::vector<std::string> wrong = differences(header);
-    REQUIRE(wrong.size() == 3);
-    CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 48");
+    REQUIRE(wrong.size() == 4);
+    CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 192");
     CHECK(wrong[1] == "offset_of(LightingParams, lights) is 20");
     CHECK(wrong[2] == "offset_of(LightingParams, shininess) is 24");
+    CHECK(wrong[3] == "offset_of(LightingParams, harmonics) is 48");
   }
 }

@@ -108,6 +108,7 @@ std::vector<Operation> operations(const Device& device) {
       {"set_smoothing", [](Renderer& r) { r.set_smoothing(new_smoothing()); }},
       {"set_positions", [mesh](Renderer& r) { r.set_positions(0, moved(mesh.positions, 0.7F)); }},
       {"set_colors", [mesh](Renderer& r) { r.set_colors(0, moved(mesh.face_colors, 0.7F)); }},
+      {"set_lights", [](Renderer& r) { r.set_lights(every_light(Shading::blinn)); }},
       {"set_shapes",
        [mesh](Renderer& r) { r.set_shapes(moved(mesh.positions, 1.1F), moved(mesh.face_colors, 0.4F)); }},
       {"set_background",
@@ -145,9 +146,10 @@ std::vector<Operation> operations(const Device& device) {
   };
 }
 
-/// The operation with every fault of a kind, on the old scene with room for more. Returns how many there were.
+/// The operation with every fault of a kind, on the old scene with room for more. Returns how many there
+/// were.
 std::size_t check_operation(const Operation& operation, const FaultKind& kind, Renderer& renderer,
-                     std::size_t most) {
+                            std::size_t most) {
   CAPTURE(operation.name);
   const auto prepare = [&] {
     renderer.set_scene(old_scene());

@@ -138,7 +138,31 @@ TEST_SUITE("robustness") {
     lights.shininess = 0.5F;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "shininess (lights): got 0.5");
     lights.shininess = 2;
+    lights.directional.resize(1);
+    lights.spot.resize(2);
+    lights.harmonics.resize(k_harmonics);
+    CHECK_NOTHROW(validate(lights));
+    lights.harmonics[8].b = k_nan;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "lights.harmonics[8]");
+    lights.harmonics.resize(4);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "harmonics (lights): got 4 colours, expected 9");
+    lights.harmonics.clear();
+    lights.directional[0].direction = glm::vec3(0);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "direction (lights.directional[0])");
+    lights.directional.clear();
+    lights.spot[1].direction = glm::vec3(1e20F);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "direction (lights.spot[1])");
+    lights.spot[1].direction = glm::vec3(1);
+    lights.spot[1].angle_degrees = 181;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "angle_degrees (lights.spot[1]): got 181");
+    lights.spot[1].angle_degrees = 20;
+    lights.spot[1].inner_angle_degrees = 20;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "inner_angle_degrees (lights.spot[1]): got 20");
+    lights.spot[1].inner_angle_degrees = k_nan;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "inner_angle_degrees (lights.spot[1])");
+    lights.spot[1].inner_angle_degrees = 0;
+    CHECK_NOTHROW(validate(lights));
     lights.shading = static_cast<Shading>(7);
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong or gouraud");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud or blinn");
   }
 }

@@ -10,6 +10,7 @@
 
 #include "dpr/renderer.hpp"
 #include "reference/renderer.hpp"
+#include "scene/light_table.hpp"
 
 namespace dpr::test::pipeline {
 
@@ -65,14 +66,30 @@ inline reference::Smoothing to_reference(const Smoothing& s) {
                                               : reference::DistanceMetric::squared};
 }
 
+template <typename LightsOrGradient>
+std::vector<double> light_numbers(LightsOrGradient from) {
+  std::vector<double> numbers;
+  for_each_light_number(from, [&](std::string_view, auto number) { numbers.push_back(number); });
+  return numbers;
+}
+
+/// As many lights of every kind, with these numbers.
+inline reference::Lights reference_lights(const std::vector<double>& numbers, std::size_t harmonics,
+                                          std::size_t point, std::size_t directional, std::size_t spot) {
+  reference::Lights lights;
+  lights.harmonics.resize(harmonics);
+  lights.point.resize(point);
+  lights.directional.resize(directional);
+  lights.spot.resize(spot);
+  return displaced(zero_like(lights), numbers);
+}
+
 inline reference::Lights to_reference(const Lights& lights) {
-  reference::Lights result{to_reference(lights.ambient), {}, lights.shininess, reference::Shading::phong};
-  if (lights.shading == Shading::flat) result.shading = reference::Shading::flat;
-  if (lights.shading == Shading::gouraud) result.shading = reference::Shading::gouraud;
-  for (const PointLight& light : lights.point) {
-    result.point.push_back(
-        {to_reference(light.position), to_reference(light.diffuse), to_reference(light.specular)});
-  }
+  reference::Lights result =
+      reference_lights(light_numbers(lights), lights.harmonics.size(), lights.point.size(),
+                       lights.directional.size(), lights.spot.size());
+  result.shininess = lights.shininess;
+  result.shading = static_cast<reference::Shading>(lights.shading);  // in the same order
   return result;
 }
 
@@ -154,6 +171,16 @@ inline bool is_sensitivity(const Block& block) {
   return block.name == "sigma" || block.name == "gamma" || block.name == "alpha";
 }
 
+/// Gradients of lights: a block for what has one name of one light.
+inline std::vector<Block> blocks_of(const reference::Lights& grad) {
+  std::vector<Block> blocks;
+  reference::for_each_light_value(grad, [&](const char* name, const auto& value) {
+    if (blocks.empty() || blocks.back().name != name) blocks.push_back({name, {}, {}});
+    append(blocks.back().found, value);
+  });
+  return blocks;
+}
+
 /// Every gradient of a scene with one view, by block.
 inline std::vector<Block> blocks_of(const SceneGradient& found) {
   std::vector<Block> blocks;
@@ -178,10 +205,10 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
   add("gamma", {found.gamma});
   add("alpha", {found.alpha});
   add("background", flat<glm::dvec3>({found.background}));
-  add("ambient", flat<glm::dvec3>({found.ambient}));
-  for (const PointLightGradient& light : found.lights) {
-    add("light position", flat<glm::dvec3>({light.position}));
-    add("light colors", flat<glm::dvec3>({light.diffuse, light.specular}));
+  for (Block& block :
+       blocks_of(reference_lights(light_numbers(found), found.harmonics.size(), found.lights.size(),
+                                  found.directional.size(), found.spot.size()))) {
+    blocks.push_back(std::move(block));
   }
   return blocks;
 }
@@ -208,11 +235,7 @@ inline std::vector<Block> blocks_of(const SceneGradient& found, const reference:
   set({expected.gamma});
   set({expected.alpha});
   set(flat<reference::Vec3d>({expected.background}));
-  set(flat<reference::Vec3d>({expected.lights.ambient}));
-  for (const reference::PointLight& light : expected.lights.point) {
-    set(flat<reference::Vec3d>({light.position}));
-    set(flat<reference::Vec3d>({light.diffuse, light.specular}));
-  }
+  for (Block& block : blocks_of(expected.lights)) set(std::move(block.found));
   return blocks;
 }
 

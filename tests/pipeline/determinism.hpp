@@ -72,7 +72,7 @@ inline Scene sampled_joint_scene() {
 inline Scene joint_scene() {
   Scene scene = test_scene();
   scene.smoothing.composition = Composition::joint;
-  scene.lights = two_lights(Shading::phong);
+  scene.lights = every_light(Shading::phong);
   scene.gradients.lights = true;
   return scene;
 }

@@ -22,7 +22,7 @@ namespace {
 Scene small_scene() {
   const int size = reduced(24, 6);
   Scene scene = cube_scene(size, size + 1);
-  scene.lights = two_lights(Shading::phong);
+  scene.lights = every_light(Shading::phong);
   scene.gradients.lights = true;
   return scene;
 }

@@ -253,6 +253,39 @@ void check_gradients(const Device& device, const Scene& scene, double length_ste
   }
 }
 
+/// Relative to the largest of the same key.
+void check_light_gradients(const Device& device, const Scene& scene, double tolerance) {
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  const Image grad = smooth_image(scene.width, scene.height);
+  const std::vector<double> found = light_numbers(renderer.backward(std::span(&grad, 1)));
+  std::map<std::string, Block> by_key;
+  std::size_t i = 0;
+  Lights lights = *scene.lights;
+  for_each_light_number(lights, [&](std::string_view key, float) {
+    const double step = key.ends_with("degrees") ? 0.2 : 1e-2;
+    const auto move = [i](Scene& m, double by) {
+      std::size_t at = 0;
+      for_each_light_number(*m.lights, [&](std::string_view, float& number) {
+        if (at++ == i) number += static_cast<float>(by);
+      });
+    };
+    Block& block = by_key[std::string(key)];
+    block.found.push_back(found.at(i++));
+    block.expected.push_back(difference(device, scene, grad, step, move));
+  });
+  CHECK(i == found.size());
+  for (const auto& [key, block] : by_key) {
+    CAPTURE(key);
+    CHECK(norm(block.expected) > 1e-3);
+    CHECK(block_error(block, tolerance) < tolerance);
+    Block wrong = block;
+    for (double& value : wrong.found) value *= 1 + 2 * tolerance;
+    CHECK_FALSE(block_error(wrong, tolerance) < tolerance);
+  }
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
@@ -461,6 +494,20 @@ TEST_SUITE("gradient") {
       scene.lights = two_lights(Shading::phong);
       scene.gradients.lights = true;
       check_gradients(open_device(), scene, 5e-5, 5e-3);
+    }
+  }
+
+  TEST_CASE("pixel noise: every number of every kind of light, and shapes in their light") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    for (const Shading shading : {Shading::phong, Shading::blinn}) {
+      CAPTURE(static_cast<int>(shading));
+      Scene scene = cube_of_eight(96);
+      scene.smoothing.gamma = 1e-8F;
+      scene.lights = every_light(shading);
+      scene.gradients.lights = true;
+      check_light_gradients(device, scene, 2e-3);
+      check_gradients(device, scene, 5e-5, 5e-3);
     }
   }
 }

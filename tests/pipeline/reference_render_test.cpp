@@ -174,12 +174,12 @@ TEST_SUITE("pipeline") {
   TEST_CASE("reference: lights, metrics, interpolation, coloured faces, the preset gaussian") {
     const int size = reduced(30, 7);
     std::vector<NamedScene> scenes;
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
       const std::string name = "shading " + std::to_string(static_cast<int>(shading));
       Scene& cube = scenes.emplace_back(name + ", cube", cube_scene(size, size)).second;
-      cube.lights = two_lights(shading);
+      cube.lights = every_light(shading);
       cube.gradients.lights = true;
-      if (reduced(1, 0) == 0) break;
+      if (reduced(1, 0) == 0) continue;
       Scene& sphere =
           scenes.emplace_back(name + ", icosphere", scene_of(make_icosphere(1, 1.3F), size, size)).second;
       sphere.lights = two_lights(shading);
@@ -226,14 +226,14 @@ TEST_SUITE("pipeline") {
                                                            random_texture(1, 4, wrap, filter), size, size));
       }
     }
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
       Scene& lit =
           scenes
               .emplace_back("lit " + std::to_string(static_cast<int>(shading)),
                             textured_scene(make_cube(), random_texture(6, 5, Wrap::mirror, Filter::bilinear),
                                            size, size))
               .second;
-      lit.lights = two_lights(shading);
+      lit.lights = every_light(shading);
       lit.gradients.lights = true;
       lit.smoothing.composition = Composition::joint;
     }

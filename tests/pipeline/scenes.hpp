@@ -137,4 +137,16 @@ inline Lights two_lights(Shading shading) {
   return lights;
 }
 
+/// The same with a light of every other kind, and an environment. The edge of the cone falls on what is seen.
+inline Lights every_light(Shading shading) {
+  Lights lights = two_lights(shading);
+  lights.directional = {{{-1.0F, -2.5F, -1.5F}, {0.2F, 0.3F, 0.4F}, {0.4F, 0.3F, 0.2F}}};
+  lights.spot = {
+      {{3.5F, 2.5F, 4.0F}, {-3.3F, -2.2F, -4.1F}, 18.0F, 4.0F, {0.6F, 0.4F, 0.3F}, {0.2F, 0.5F, 0.4F}}};
+  Random random(21);
+  for (std::size_t k = 0; k < k_harmonics; ++k) lights.harmonics.push_back(random.vector(-0.3F, 0.3F));
+  lights.harmonics[0] += glm::vec3(0.9F, 0.7F, 0.8F);
+  return lights;
+}
+
 }  // namespace dpr::test::pipeline

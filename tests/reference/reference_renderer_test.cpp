@@ -129,17 +129,8 @@ void append_mesh_blocks(const Gradients& g, std::size_t m, std::vector<Block>& b
 }
 
 void append_light_blocks(const Gradients& g, std::vector<Block>& blocks) {
-  blocks.push_back({"ambient", flat({g.lights.ambient}),
-                    [](Scene& s, const std::vector<double>& v) { s.lights->ambient += take(v, 0); }});
-  for (std::size_t i = 0; i < g.lights.point.size(); ++i) {
-    const PointLight& light = g.lights.point[i];
-    blocks.push_back({"light " + std::to_string(i), flat({light.position, light.diffuse, light.specular}),
-                      [i](Scene& s, const std::vector<double>& v) {
-                        s.lights->point[i].position += take(v, 0);
-                        s.lights->point[i].diffuse += take(v, 3);
-                        s.lights->point[i].specular += take(v, 6);
-                      }});
-  }
+  blocks.push_back({"lights", numbers_of(g.lights),
+                    [](Scene& s, const std::vector<double>& v) { s.lights = displaced(*s.lights, v); }});
 }
 
 std::vector<Block> blocks_of(const Scene& scene, const Gradients& g) {

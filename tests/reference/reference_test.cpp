@@ -215,6 +215,9 @@ TEST_SUITE("gradient") {
     lights.ambient = {0.4, 0.5, 0.6};
     lights.point = {{{0.5, 0.3, 2.0}, {0.3, 0.4, 0.2}, {0.5, 0.2, 0.3}},
                     {{2.0, 1.0, 1.5}, {0.1, 0.4, 0.5}, {0.3, 0.4, 0.1}}};
+    lights.directional = {{{-0.3, 0.2, -1.0}, {0.2, 0.1, 0.3}, {0.4, 0.3, 0.2}}};
+    lights.spot = {{{0.3, 1.2, 1.8}, {0.2, -0.5, -1.7}, 50.0, 5.0, {0.4, 0.1, 0.2}, {0.3, 0.2, 0.1}}};
+    for (int k = 0; k < 9; ++k) lights.harmonics.push_back(random.vector(-0.5, 0.5));
     lights.shininess = 4.0;
     const Vec3d camera = {0.4, 0.6, 3.0};
     const Vec3d weight = {0.3, 0.8, -0.4};
@@ -226,18 +229,13 @@ TEST_SUITE("gradient") {
     for (const Vec3d& v : corners) append(at, v);
     for (const Vec3d& v : world) append(at, v);
     append(at, camera);
-    append(at, lights.ambient);
-    for (const PointLight& light : lights.point) {
-      for (const Vec3d& v : {light.position, light.diffuse, light.specular}) append(at, v);
-    }
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+    const std::vector<double> numbers = numbers_of(lights);
+    at.insert(at.end(), numbers.begin(), numbers.end());
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
       CAPTURE(static_cast<int>(shading));
       const auto unpack = [&](const std::vector<double>& v) {
-        Lights l = lights;
+        Lights l = displaced(zero_like(lights), {v.begin() + 36, v.end()});
         l.shading = shading;
-        l.ambient = take(v, 36);
-        for (std::size_t i = 0; i < 2; ++i)
-          l.point[i] = {take(v, 39 + 9 * i), take(v, 42 + 9 * i), take(v, 45 + 9 * i)};
         std::vector<Vec3d> w;
         for (std::size_t i = 0; i < 5; ++i) w.push_back(take(v, 18 + 3 * i));
         return shade_prepare(w, faces, l, take(v, 33));
@@ -264,18 +262,51 @@ TEST_SUITE("gradient") {
       for (const Vec3d& v : grad_corners) append(gradient, v);
       for (const Vec3d& v : total.world) append(gradient, v);
       append(gradient, total.camera);
-      append(gradient, total.lights.ambient);
-      for (const PointLight& light : total.lights.point) {
-        for (const Vec3d& v : {light.position, light.diffuse, light.specular}) append(gradient, v);
-      }
+      const std::vector<double> of_lights = numbers_of(total.lights);
+      for (const double number : of_lights) CHECK(number != 0.0);
+      gradient.insert(gradient.end(), of_lights.begin(), of_lights.end());
       CHECK_GRADIENT(f, at, gradient, 1e-6, 1e-8);
       gradient[33] += 1e-3;  // as if the view direction did not depend on the camera
       CHECK_FALSE(check_gradient(f, at, gradient, 1e-6, 1e-8).passed);
     }
   }
 
+  TEST_CASE("shade: harmonics give what a diffuse surface reflects of the environment's radiance") {
+    Random random(5);
+    Lights lights;
+    lights.ambient = {};
+    for (int k = 0; k < 9; ++k) lights.harmonics.push_back(random.vector(-0.5, 0.5));
+    const Vec3d normal = unit({0.3, -0.5, 0.8});
+    // Radiance times the cosine over pi, summed over the sphere by midpoints in height and angle. The basis
+    // is checked too: orthonormal, with integrals of the squares.
+    constexpr int k_heights = 400, k_angles = 400;
+    constexpr std::array k_lobe{1.0, 2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 0.25, 0.25, 0.25, 0.25, 0.25};
+    const double area = 4.0 * std::numbers::pi / (k_heights * k_angles);
+    Vec3d reflected;
+    std::array<double, 9> squares{};
+    for (int row = 0; row < k_heights; ++row) {
+      for (int column = 0; column < k_angles; ++column) {
+        const double z = (2.0 * row + 1.0) / k_heights - 1.0, side = std::sqrt(1.0 - z * z),
+                     angle = 2.0 * std::numbers::pi * (column + 0.5) / k_angles;
+        const Vec3d w{side * std::cos(angle), side * std::sin(angle), z};
+        const std::array<double, 9> terms = harmonic_terms(w);
+        Vec3d radiance;
+        for (std::size_t k = 0; k < 9; ++k) {
+          const double y = terms[k] / k_lobe[k];
+          radiance += y * lights.harmonics[k];
+          squares[k] += area * y * y;
+        }
+        reflected += area / std::numbers::pi * std::max(dot(normal, w), 0.0) * radiance;
+      }
+    }
+    const LightTerms found = light_terms(lights, {}, {1.0, 2.0, 3.0}, normal);
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      CHECK(found.factor[channel] == doctest::Approx(reflected[channel]).epsilon(1e-4));
+    for (const double square : squares) CHECK(square == doctest::Approx(1.0).epsilon(1e-4));
+  }
+
   TEST_CASE("shade: normals without a direction give no light and no NaN") {
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
       Lights lights;
       lights.point.resize(1);
       lights.shading = shading;

@@ -40,7 +40,7 @@ struct CameraGradient {
 struct Gradients {
   std::vector<MeshGradient> meshes;
   CameraGradient camera;
-  Lights lights{{}, {}, 0.0, Shading::phong};  ///< ambient; position, diffuse and specular of every light
+  Lights lights = zero_like({});  ///< every number but shininess
   double sigma = 0.0;
   double gamma = 0.0;
   double alpha = 0.0;

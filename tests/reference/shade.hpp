@@ -1,13 +1,8 @@
-/// Reference for the shade stage: interpolated colours and Phong's lighting, evaluated per face normal, per
-/// fragment or per vertex.
-///
-///     colour = base * (ambient + sum_l diffuse_l max(n.l, 0)) + sum_l specular_l [n.l > 0] max(v.r,
-///     0)^shininess
-///
-/// l, v: unit vectors to the light and to the camera; r = 2 (n.l) n - l (Phong 1975). Normals are not turned
-/// to the viewer.
+/// Reference for the shade stage: interpolated colours and lighting (lighting.hpp), evaluated per face
+/// normal, per fragment or per vertex.
 #pragma once
 
+#include "lighting.hpp"
 #include "rasterize.hpp"
 #include "texture.hpp"
 #include "vec.hpp"
@@ -21,44 +16,6 @@
 
 namespace dpr::reference {
 
-/// flat: the normal of the face; phong: vertex normals interpolated; both at the fragment's interpolated
-/// world position. gouraud: light at the vertices, interpolated.
-enum class Shading { flat, phong, gouraud };
-
-struct PointLight {
-  Vec3d position;  ///< world space
-  Vec3d diffuse{0.3, 0.3, 0.3};
-  Vec3d specular{0.2, 0.2, 0.2};
-};
-
-struct Lights {
-  Vec3d ambient{0.5, 0.5, 0.5};
-  std::vector<PointLight> point;
-  double shininess = 64.0;
-  Shading shading = Shading::phong;
-};
-
-/// colour = base * factor + specular.
-struct LightTerms {
-  Vec3d factor;
-  Vec3d specular;
-};
-
-inline LightTerms light_terms(const Lights& lights, const Vec3d& camera, const Vec3d& position,
-                              const Vec3d& normal) {
-  LightTerms terms{lights.ambient, {}};
-  const Vec3d v = unit(camera - position);
-  for (const PointLight& light : lights.point) {
-    const Vec3d l = unit(light.position - position);
-    const double cosine = dot(normal, l);
-    if (!(cosine > 0.0)) continue;
-    terms.factor += cosine * light.diffuse;
-    const double mirror = dot(v, 2.0 * cosine * normal - l);
-    if (mirror > 0.0) terms.specular += std::pow(mirror, lights.shininess) * light.specular;
-  }
-  return terms;
-}
-
 /// Gradients of the shading of a whole mesh or scene, accumulated over fragments.
 struct ShadeGradient {
   std::vector<Vec3d> world;              ///< world positions of the vertices
@@ -66,52 +23,8 @@ struct ShadeGradient {
   std::vector<Vec3d> vertex_normals;     ///< unit normals, phong and gouraud
   std::vector<LightTerms> vertex_light;  ///< gouraud
   Vec3d camera;
-  Lights lights{{}, {}, 0.0, Shading::phong};  ///< ambient, and position, diffuse, specular of every light
+  Lights lights = zero_like({});  ///< every number but shininess
 };
-
-/// Derivatives of `light_terms` for position and normal; camera and lights are accumulated into `total`.
-struct SurfaceGradient {
-  Vec3d position;
-  Vec3d normal;
-};
-
-inline SurfaceGradient light_terms_backward(const Lights& lights, const Vec3d& camera, const Vec3d& position,
-                                            const Vec3d& normal, const LightTerms& grad,
-                                            ShadeGradient& total) {
-  SurfaceGradient surface;
-  total.lights.ambient += grad.factor;
-  const Vec3d v = unit(camera - position);
-  Vec3d grad_v;
-  for (std::size_t i = 0; i < lights.point.size(); ++i) {
-    const PointLight& light = lights.point[i];
-    PointLight& grad_light = total.lights.point[i];
-    const Vec3d l = unit(light.position - position);
-    const double cosine = dot(normal, l);
-    if (!(cosine > 0.0)) continue;
-    grad_light.diffuse += cosine * grad.factor;
-    double grad_cosine = dot(grad.factor, light.diffuse);
-    Vec3d grad_l;
-    const Vec3d r = 2.0 * cosine * normal - l;
-    const double mirror = dot(v, r);
-    if (mirror > 0.0) {
-      grad_light.specular += std::pow(mirror, lights.shininess) * grad.specular;
-      const double grad_mirror =
-          dot(grad.specular, light.specular) * lights.shininess * std::pow(mirror, lights.shininess - 1.0);
-      grad_v += grad_mirror * r;
-      grad_cosine += 2.0 * grad_mirror * dot(v, normal);
-      surface.normal += 2.0 * grad_mirror * cosine * v;
-      grad_l += -grad_mirror * v;
-    }
-    surface.normal += grad_cosine * l;
-    const Vec3d grad_to_light = unit_backward(light.position - position, grad_l + grad_cosine * normal);
-    grad_light.position += grad_to_light;
-    surface.position += -grad_to_light;
-  }
-  const Vec3d grad_to_camera = unit_backward(camera - position, grad_v);
-  total.camera += grad_to_camera;
-  surface.position += -grad_to_camera;
-  return surface;
-}
 
 /// World-space geometry and what the lighting prepares once for all pixels. Without lights only colours are
 /// interpolated.
@@ -243,7 +156,7 @@ inline ShadeGradient make_shade_gradient(const ShadeScene& scene) {
   grad.face_normals.resize(scene.faces.size());
   grad.vertex_normals.resize(scene.world.size());
   grad.vertex_light.resize(scene.world.size());
-  if (scene.lights) grad.lights.point.assign(scene.lights->point.size(), PointLight{{}, {}, {}});
+  if (scene.lights) grad.lights = zero_like(*scene.lights);
   return grad;
 }
 
@@ -263,8 +176,10 @@ inline Vec3d fragment_light_backward(const ShadeScene& scene, std::size_t face_i
   }
   const bool flat = scene.lights->shading == Shading::flat;
   const Vec3d normal_sum = flat ? scene.face_areas[face_index] : fragment_normal_sum(scene, face, c);
-  const SurfaceGradient surface = light_terms_backward(
-      *scene.lights, scene.camera, fragment_position(scene, face, c), unit(normal_sum), grad_light, total);
+  const SurfaceGradient surface =
+      light_terms_backward(*scene.lights, scene.camera, fragment_position(scene, face, c), unit(normal_sum),
+                           grad_light, total.lights);
+  total.camera += surface.camera;
   if (flat) total.face_normals[face_index] += surface.normal;
   const Vec3d grad_sum = flat ? Vec3d{} : unit_backward(normal_sum, surface.normal);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -328,7 +243,8 @@ inline void shade_finish_backward(const ShadeScene& scene, ShadeGradient& total)
     for (std::size_t i = 0; i < scene.world.size(); ++i) {
       const SurfaceGradient surface =
           light_terms_backward(*scene.lights, scene.camera, scene.world[i], unit(scene.vertex_areas[i]),
-                               total.vertex_light[i], total);
+                               total.vertex_light[i], total.lights);
+      total.camera += surface.camera;
       total.world[i] += surface.position;
       total.vertex_normals[i] += surface.normal;
     }

@@ -12,7 +12,7 @@ using namespace dpr;
 
 namespace {
 
-/// Two views of two meshes and two lights.
+/// Two views of two meshes, two point lights, three directional ones, one spot, and an environment.
 SceneGradient sample_gradient() {
   SceneGradient gradient;
   gradient.meshes = {{std::vector<glm::vec3>(3),
@@ -22,6 +22,9 @@ SceneGradient sample_gradient() {
                      {std::vector<glm::vec3>(4), {}, {}, {}}};
   gradient.shapes = {std::vector<glm::vec3>(5), std::vector<glm::vec3>(1)};
   gradient.lights.resize(2);
+  gradient.directional.resize(3);
+  gradient.spot.resize(1);
+  gradient.harmonics.resize(k_harmonics);
   gradient.views.resize(2);
   for (ViewGradient& view : gradient.views) view.transforms.resize(2);
   return gradient;
@@ -38,7 +41,7 @@ TEST_SUITE("unit") {
       return ++count;
     });
     constexpr int k_meshes = 3 * (3 + 2 + 4) + 2 * 5 + 3 * (6 + 1), k_shapes = 3 * (5 + 1),
-                  k_lights = 3 + 2 * 9;
+                  k_lights = 3 + 3 * 9 + (2 + 3) * 9 + 14;
     constexpr int k_views = 2 * (6 + 1 + 4 + 2 * 6), k_rest = 3 + 3;
     CHECK(count == k_meshes + k_shapes + k_lights + k_views + k_rest);
     CHECK(gradient.meshes[0].texcoords[4].y != 0);
@@ -58,6 +61,10 @@ TEST_SUITE("unit") {
     CHECK(names.size() == arrays);
     CHECK(names.contains("views[1].meshes[0].rotation"));
     CHECK(names.contains("lights.point[1].diffuse"));
+    CHECK(names.contains("lights.directional[2].direction"));
+    CHECK(names.contains("lights.spot[0].inner_angle_degrees"));
+    CHECK(names.contains("lights.harmonics"));
+    CHECK_FALSE(names.contains("lights.spot[1].position"));
     CHECK_FALSE(names.contains("meshes[2].positions"));
     for (const GradientName& name : gradient_names()) {
       CAPTURE(name.word);

@@ -96,7 +96,33 @@ TEST_SUITE("unit") {
     CHECK(scene.gradients.positions);
     CHECK_FALSE(scene.gradients.lights);
     CHECK(read(folder, with(R"("lights": {"shading": "gouraud"})")).lights->shading == Shading::gouraud);
+    CHECK(read(folder, with(R"("lights": {"shading": "blinn"})")).lights->shading == Shading::blinn);
     CHECK_FALSE(read(folder, with(R"("gradients": [])")).gradients.camera);
+  }
+
+  TEST_CASE("lights of every kind") {
+    const TempDir folder;
+    const Lights lights = *read(folder, with(R"("lights": {
+      "directional": [{"direction": [1, -2, 3], "diffuse": [0.1, 0.2, 0.3], "specular": [0.4, 0.5, 0.6]}, {}],
+      "spot": [{"position": [4, 5, 6], "direction": [0, 0, -1], "angle_degrees": 25,
+                "inner_angle_degrees": 15, "diffuse": [1, 0, 0]}, {"angle_degrees": 3}],
+      "harmonics": [[1,2,3], [4,5,6], [7,8,9], [1,0,0], [2,0,0], [3,0,0], [4,0,0], [5,0,0], [6,0,7]]})"))
+                               .lights;
+    CHECK(lights.point.empty());
+    REQUIRE(lights.directional.size() == 2);
+    CHECK(lights.directional[0].direction == glm::vec3(1, -2, 3));
+    CHECK(lights.directional[0].specular == glm::vec3(0.4F, 0.5F, 0.6F));
+    CHECK(lights.directional[1].direction == DirectionalLight{}.direction);
+    REQUIRE(lights.spot.size() == 2);
+    CHECK(lights.spot[0].position == glm::vec3(4, 5, 6));
+    CHECK(lights.spot[0].direction == glm::vec3(0, 0, -1));
+    CHECK(lights.spot[0].angle_degrees == 25);
+    CHECK(lights.spot[0].inner_angle_degrees == 15);
+    CHECK(lights.spot[0].diffuse == glm::vec3(1, 0, 0));
+    CHECK(lights.spot[1].angle_degrees == 3);
+    REQUIRE(lights.harmonics.size() == k_harmonics);
+    CHECK(lights.harmonics[1] == glm::vec3(4, 5, 6));
+    CHECK(lights.harmonics[8] == glm::vec3(6, 0, 7));
   }
 
   TEST_CASE("matrices are rows; intrinsics instead of the field of view") {
@@ -217,6 +243,12 @@ TEST_SUITE("robustness") {
     check(with(R"("camera": {"fov": 60})"), "got the unknown key \"fov\"");
     check(with(R"("camera": {"intrinsics": {"f": 1}})"), "camera.intrinsics (");
     check(with(R"("lights": {"point": [{}, {"colour": 1}]})"), "lights.point[1] (");
+    check(with(R"("lights": {"spot": [{"angle": 1}]})"), "lights.spot[0] (");
+    check(with(R"("lights": {"area": []})"), "\"area\", expected keys out of ambient, harmonics");
+    check(with(R"("lights": {"harmonics": [[1, 1, 1]]})"), "lights.harmonics (");
+    check(with(R"("lights": {"directional": [{"direction": [0, 0, 0]}]})"),
+          "direction (lights.directional[0])");
+    check(with(R"("lights": {"shading": "matt"})"), "flat, phong, gouraud or blinn");
     check(with(R"("smoothing": {"Sigma": 1})"), "smoothing (");
     check(with_mesh(R"("file": "a", "colour": 1)"), "meshes[0] (");
     check(R"({"camera": {"view": 1, "znear": 1, "view": 2}})", "camera.view (");
@@ -245,7 +277,7 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"occupancy_width": "wide"})"),
           "got \"wide\", expected fixed, variable or zero");
     check(with(R"("smoothing": {"occupancy_width": "variable"})"), "occupancy_width (smoothing)");
-    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong or gouraud");
+    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong, gouraud or blinn");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
     const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";
     check(with_mesh(k_triangle + R"(, "transform": )" + rows), "meshes[0].transform[2] (");

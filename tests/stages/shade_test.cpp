@@ -3,9 +3,10 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <map>
 
 #include "dpr/dpr.hpp"
-#include "reference/shade.hpp"
+#include "pipeline/comparison.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/aggregate_errors.hpp"
 #include "support/probe.hpp"
@@ -22,31 +23,45 @@ using dpr::test::poison;
 using dpr::test::RandomFloat;
 using dpr::test::Worst;
 
-ref::Vec3d to_reference(const glm::vec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
 ref::Vec3d to_reference(const cl_float4& v) { return {number(v.s[0]), number(v.s[1]), number(v.s[2])}; }
 
 struct Model {
   std::string_view name;
   std::optional<Shading> shading;
+  bool has_every_light = false;
 };
-constexpr std::array<Model, 4> k_models{{{"unlit", std::nullopt},
+/// With point lights alone, as most scenes are, and with lights of every kind.
+constexpr std::array<Model, 9> k_models{{{"unlit", std::nullopt},
                                          {"flat", Shading::flat},
                                          {"phong", Shading::phong},
-                                         {"gouraud", Shading::gouraud}}};
+                                         {"gouraud", Shading::gouraud},
+                                         {"blinn", Shading::blinn},
+                                         {"flat, every light", Shading::flat, true},
+                                         {"phong, every light", Shading::phong, true},
+                                         {"gouraud, every light", Shading::gouraud, true},
+                                         {"blinn, every light", Shading::blinn, true}}};
 
 /// Tolerances, about twice the errors measured, relative to the largest of their kind. Colours 2.5e-6
 /// (Phong's power); gradients: colours 1.1e-7, barycentrics 1.1e-6, positions 3.3e-6 (flat), eye 2.1e-6,
-/// lights 6.8e-7.
-constexpr double k_color = 5e-6, k_gradient = 6.5e-6;
+/// lights 6.8e-7; the angles of a cone, between whose cosines there is little, 4.7e-5.
+constexpr double k_color = 5e-6, k_gradient = 6.5e-6, k_angle = 1e-4;
 
-dpr::Lights make_lights(Shading shading) {
+dpr::Lights make_lights(const Model& model) {
   dpr::Lights lights;
-  lights.shading = shading;
+  lights.shading = *model.shading;
   lights.ambient = glm::vec3(0.4F, 0.5F, 0.3F);
   lights.shininess = 12;
   lights.point = {{glm::vec3(1, 3, 4), glm::vec3(0.5F, 0.3F, 0.4F), glm::vec3(0.6F, 0.5F, 0.4F)},
                   {glm::vec3(-4, 1, 2), glm::vec3(0.2F, 0.4F, 0.3F), glm::vec3(0.3F, 0.2F, 0.5F)},
                   {glm::vec3(0, -1, -9), glm::vec3(0.5F), glm::vec3(0.5F)}};  // from behind
+  if (!model.has_every_light) return lights;
+  lights.directional = {{glm::vec3(-0.4F, -0.7F, -0.9F), glm::vec3(0.3F, 0.2F, 0.4F), glm::vec3(0.2F)},
+                        {glm::vec3(2, -0.5F, 0.3F), glm::vec3(0.2F, 0.5F, 0.1F), glm::vec3(0.4F)}};
+  lights.spot = {
+      {glm::vec3(2, 2, 3), glm::vec3(-1.7F, -2.1F, -3), 25, 5, glm::vec3(0.4F), glm::vec3(0.3F)},
+      {glm::vec3(-3.1F, 2.2F, -1.3F), glm::vec3(3, -2, 1.5F), 120, 0, glm::vec3(0.3F), glm::vec3(0.2F)}};
+  RandomFloat random(4);
+  for (std::size_t k = 0; k < dpr::k_harmonics; ++k) lights.harmonics.push_back(random.color() - 0.5F);
   return lights;
 }
 
@@ -67,7 +82,7 @@ dpr::Scene make_scene(const Model& model) {
   glm::mat4 aside(1.0F);
   aside[3] = glm::vec4(1.2F, 0.5F, -0.8F, 1);
   scene.meshes = {{sphere, glm::mat4(1.0F)}, {cube, aside}};
-  if (model.shading) scene.lights = make_lights(*model.shading);
+  if (model.shading) scene.lights = make_lights(model);
   scene.smoothing.blur_radius = 0.02F;
   return scene;
 }
@@ -146,14 +161,7 @@ class Shaded {
 
   std::optional<ref::Lights> reference_lights() const {
     if (!scene_.lights) return std::nullopt;
-    ref::Lights lights;
-    lights.ambient = to_reference(scene_.lights->ambient);
-    lights.shininess = number(scene_.lights->shininess);
-    lights.shading = static_cast<ref::Shading>(scene_.lights->shading);
-    for (const dpr::PointLight& l : scene_.lights->point) {
-      lights.point.push_back({to_reference(l.position), to_reference(l.diffuse), to_reference(l.specular)});
-    }
-    return lights;
+    return dpr::test::pipeline::to_reference(*scene_.lights);
   }
 
   dpr::Renderer renderer_;
@@ -187,7 +195,8 @@ struct Kind {
 };
 
 struct ShadeErrors {
-  Kind color, corner_colors, bary, world, eye, lights, ambient;
+  Kind color, corner_colors, bary, world, eye;
+  std::map<std::string, Kind> lights;  // by key
 };
 
 ShadeErrors all_errors(const Model& model) {
@@ -255,29 +264,29 @@ ShadeErrors all_errors(const Model& model) {
     }
   }
   for (std::size_t v = 0; v < views; ++v) errors.eye.add(eye_sums[v], totals[v].camera);
-  for (std::size_t l = 0; l < m.shade.lights(); ++l) {
-    poison(m.shade.light_channels, m.shade.light_sets() * dpr::k_light_channels * m.bin.pairs);
-    m.shade.backward_light(s.inputs(), device_grad, l);
-    const std::vector<float> channels = m.shade.light_channels.download();
-    std::array<ref::Vec3d, 4> sums{};  // position, diffuse, specular, ambient
-    for (std::size_t k = 0; k < dpr::k_light_channels; ++k) {
-      for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
-        sums[k / 3][k % 3] += number(channels[(l * dpr::k_light_channels + k) * m.bin.pairs + pair]);
-      }
-    }
-    ref::PointLight wanted{{}, {}, {}};
-    ref::Vec3d ambient;
-    for (const ref::ShadeGradient& total : totals) {
-      wanted.position += total.lights.point[l].position;
-      wanted.diffuse += total.lights.point[l].diffuse;
-      wanted.specular += total.lights.point[l].specular;
-      ambient += total.lights.ambient;
-    }
-    errors.lights.add(sums[0], wanted.position);
-    errors.lights.add(sums[1], wanted.diffuse);
-    errors.lights.add(sums[2], wanted.specular);
-    errors.ambient.add(sums[3], ambient);  // the same with every light
+  poison(m.shade.light_channels, m.shade.light_channel_count() * m.bin.pairs);
+  for (std::size_t l = 0; l < m.shade.lights(); ++l) m.shade.backward_light(s.inputs(), device_grad, l);
+  const std::vector<float> channels = m.shade.light_channels.download();
+  std::vector<float> sums;
+  for (std::size_t k = 0; k < m.shade.light_channel_count(); ++k) {
+    double sum = 0;
+    for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) sum += number(channels[k * m.bin.pairs + pair]);
+    sums.push_back(static_cast<float>(sum));
   }
+  dpr::SceneGradient found;
+  dpr::read_light_gradients(*m.scene.lights, sums, found);
+  const std::vector<double> numbers = dpr::test::pipeline::light_numbers(found);
+  std::vector<double> wanted(numbers.size());
+  for (const ref::ShadeGradient& total : totals) {
+    std::size_t i = 0;
+    for (const double value : numbers_of(total.lights)) wanted.at(i++) += value;
+  }
+  // Angles count degrees, the rest lengths and colours: each kind of number against the largest of its own.
+  std::size_t i = 0;
+  for_each_light_number(found, [&](std::string_view key, auto) {
+    errors.lights[std::string(key)].add(numbers[i], wanted[i]);
+    ++i;
+  });
   return errors;
 }
 
@@ -298,12 +307,14 @@ TEST_SUITE("gradient") {
       if (!model.shading) continue;
       DPR_CHECK_WORST(errors.world.worst(), k_gradient);
       DPR_CHECK_WORST(errors.eye.worst(), k_gradient);
-      DPR_CHECK_WORST(errors.lights.worst(), k_gradient);
-      DPR_CHECK_WORST(errors.ambient.worst(), k_gradient);
+      for (const auto& [key, kind] : errors.lights) {
+        CAPTURE(key);
+        const double tolerance = key.ends_with("degrees") ? k_angle : k_gradient;
+        DPR_CHECK_WORST(kind.worst(), tolerance);
+        CHECK(kind.worst(1.01).error > tolerance);
+      }
       CHECK(errors.world.worst(1.01).error > k_gradient);
       CHECK(errors.eye.worst(1.01).error > k_gradient);
-      CHECK(errors.lights.worst(1.01).error > k_gradient);
-      CHECK(errors.ambient.worst(1.01).error > k_gradient);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <torch/torch.h>
 
 #include <functional>
+#include <map>
 
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
@@ -104,6 +105,10 @@ reference::Scene reference_scene(const std::vector<std::vector<double>>& values,
   scene.camera.znear = 1;
   scene.camera.zfar = 20;
   scene.background = vector(4, 0);
+  if (values.size() > 5) {
+    scene.lights =
+        displaced(zero_like(pipeline::to_reference(pipeline::every_light(Shading::blinn))), values[5]);
+  }
   return scene;
 }
 
@@ -161,6 +166,103 @@ void check_against_finite_differences(const char* preset, bool face_colors) {
   }
 }
 
+torch_op::LightTensors to_tensors(Lights lights) {
+  torch_op::LightTensors tensors;
+  std::map<std::string, std::vector<float>> numbers;
+  const auto append = [&](std::string_view key, auto& value) {
+    visit_numbers(key, value,
+                  [&](std::string_view, float number) { numbers[std::string(key)].push_back(number); });
+  };
+  append("ambient", lights.ambient);
+  for (glm::vec3& color : lights.harmonics) append("harmonics", color);
+  for_each_light_kind([&](auto kind) {
+    for (auto& light : lights.*kind.lights)
+      kind.for_each_member([&](std::string_view, auto member, auto...) { append(kind.key, light.*member); });
+  });
+  for (const auto& [key, list] : numbers) tensors.insert(key, torch::tensor(list));
+  const auto shape = [&](const std::string& key, std::int64_t rows) {
+    tensors.insert_or_assign(key, tensors.at(key).reshape({rows, -1}));
+  };
+  shape("harmonics", k_harmonics);
+  for_each_light_kind([&](auto kind) {
+    shape(std::string(kind.key), static_cast<std::int64_t>((lights.*kind.lights).size()));
+  });
+  return tensors;
+}
+
+/// With the lights' numbers, in the order of their keys in `order`, as one more tensor. The views are moved
+/// rigidly.
+void check_lit_against_finite_differences() {
+  constexpr double k_step = 1e-5, k_tolerance = 1e-3;
+  const Smoothing smoothing = smoothing_for_tests("joint_gaussian");
+  const Lights lights = pipeline::every_light(Shading::blinn);
+  Inputs in = make_inputs();
+  torch_op::LightTensors tensors = to_tensors(lights);
+  std::vector<std::vector<double>> values;
+  for (at::Tensor* tensor : in.all()) {
+    values.push_back(to_doubles(*tensor));
+    tensor->requires_grad_();
+  }
+  values.push_back(pipeline::light_numbers(lights));
+  for (const auto& entry : tensors) entry.value().requires_grad_();
+  const auto renderer = make_renderer(smoothing);
+  renderer->set("shading", "blinn");
+  renderer->set("shininess", lights.shininess);
+  const at::Tensor image =
+      torch_op::render_lit(renderer, in.vertices, in.colors, in.views, in.intrinsics, in.background, tensors);
+  const at::Tensor weights = random_like(image.detach(), -1.0F, 1.0F, 3);
+  const auto loss_of = [&](const std::vector<std::vector<double>>& at) {
+    return reference_loss(at, to_doubles(weights), smoothing, false);
+  };
+  CHECK((image * weights).sum().item<float>() == doctest::Approx(loss_of(values)).epsilon(1e-4));
+  (image * weights).sum().backward();
+
+  std::vector<std::vector<double>> found;
+  for (at::Tensor* tensor : in.all()) found.push_back(to_doubles(tensor->grad()));
+  found.emplace_back();
+  for (const char* key : {"ambient", "harmonics", "point", "directional", "spot"}) {
+    for (const double number : to_doubles(tensors.at(key).grad())) found.back().push_back(number);
+  }
+  for (const std::size_t t :
+       {std::size_t{0}, std::size_t{1}, std::size_t{3}, std::size_t{4}, std::size_t{5}}) {
+    const auto f = [&](const std::vector<double>& x) {
+      std::vector<std::vector<double>> moved = values;
+      moved[t] = x;
+      return loss_of(moved);
+    };
+    const reference::GradientCheck check =
+        reference::check_gradient(f, values[t], found[t], k_step, k_tolerance);
+    CHECK_MESSAGE(check.passed, "lit, tensor " << t << ", element " << check.worst << ": " << check.found
+                                               << ", not " << check.expected);
+    found[t][check.worst] *= 1.5;
+    CHECK_FALSE(reference::check_gradient(f, values[t], found[t], k_step, k_tolerance / 4).passed);
+  }
+  // A turn about an axis through the camera: M <- exp([r]x) A, and a shift.
+  const auto moved_view = [&](const std::vector<double>& x) {
+    std::vector<std::vector<double>> moved = values;
+    double* m = moved[2].data();
+    for (std::size_t column = 0; column < 3; ++column) {
+      const reference::Vec3d a{m[column], m[4 + column], m[8 + column]};
+      const reference::Vec3d turned = a + cross(reference::Vec3d{x[0], x[1], x[2]}, a);
+      for (std::size_t row = 0; row < 3; ++row) m[4 * row + column] = turned[row];
+    }
+    for (std::size_t row = 0; row < 3; ++row) m[4 * row + 3] += x[3 + row];
+    return moved;
+  };
+  std::vector<double> along(6);
+  for (std::size_t k = 0; k < 6; ++k) {
+    std::vector<double> unit(6);
+    unit[k] = 1;
+    const std::vector<double> there = moved_view(unit)[2];
+    for (std::size_t i = 0; i < there.size(); ++i) along[k] += found[2][i] * (there[i] - values[2][i]);
+  }
+  const auto f = [&](const std::vector<double>& x) { return loss_of(moved_view(x)); };
+  const reference::GradientCheck check =
+      reference::check_gradient(f, std::vector<double>(6), along, k_step, k_tolerance);
+  CHECK_MESSAGE(check.passed,
+                "lit, views, element " << check.worst << ": " << check.found << ", not " << check.expected);
+}
+
 std::string message_of(const std::function<void()>& action) {
   try {
     action();
@@ -178,6 +280,10 @@ TEST_SUITE("gradient") {
   TEST_CASE("operator: all five gradients agree with differences in double precision") {
     check_against_finite_differences("joint_gaussian", /*face_colors*/ false);
     check_against_finite_differences("softras", /*face_colors*/ true);
+  }
+
+  TEST_CASE("operator: every number of every kind of light, and shapes and views in their light") {
+    check_lit_against_finite_differences();
   }
 }
 
@@ -268,11 +374,9 @@ TEST_SUITE("pipeline") {
       for (const auto& [name, value] : values) renderer->set(name, value);
       return render(renderer, make_inputs());
     };
-    const Smoothing expected = resolve_smoothing({.preset = "softras",
-                                                  .depth_prior = Prior::gaussian,
-                                                  .sigma = 5e-3F,
-                                                  .blur_radius = 0.02F},
-                                                 k_width, k_height);
+    const Smoothing expected = resolve_smoothing(
+        {.preset = "softras", .depth_prior = Prior::gaussian, .sigma = 5e-3F, .blur_radius = 0.02F}, k_width,
+        k_height);
     const at::Tensor image = render(make_renderer(expected), make_inputs());
     const std::vector<std::pair<std::string, at::IValue>> values{
         {"blur_radius", 0.02}, {"sigma", 5e-3}, {"depth_prior", "gaussian"}, {"preset", "softras"}};
@@ -295,6 +399,29 @@ TEST_SUITE("pipeline") {
 }
 
 TEST_SUITE("robustness") {
+  TEST_CASE("operator: lights of an unknown kind or shape, and none after some") {
+    const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
+    const Inputs in = make_inputs();
+    const at::Tensor unlit = render(renderer, in);
+    const auto lit = [&](const char* key, const at::Tensor& tensor) {
+      torch_op::LightTensors lights;
+      lights.insert(key, tensor);
+      return torch_op::render_lit(renderer, in.vertices, in.colors, in.views, in.intrinsics, in.background,
+                                  lights);
+    };
+    const auto message = [&](const char* key, const at::Tensor& tensor) {
+      return message_of([&] { lit(key, tensor); });
+    };
+    CHECK_FALSE(lit("point", torch::ones({1, 9})).equal(unlit));
+    CHECK(render(renderer, in).equal(unlit));
+    CHECK(lit("ambient", torch::ones({3})).allclose(unlit, 1e-6, 1e-6));
+    CHECK(has(message("lamp", torch::ones({1, 9})), "ambient, harmonics, point, directional or spot"));
+    CHECK(has(message("spot", torch::ones({1, 9})), "[light, 14]"));
+    CHECK(has(message("directional", torch::zeros({1, 9})), "direction (lights.directional[0])"));
+    CHECK(has(message_of([&] { renderer->set("shading", "matt"); }), "flat, phong, gouraud or blinn"));
+    CHECK(has(message_of([&] { renderer->set("shininess", 0); }), "shininess"));
+  }
+
   TEST_CASE("operator: wrong tensors are torch errors with our words, and the renderer goes on") {
     const auto renderer = make_renderer(smoothing_for_tests("joint_gaussian"));
     const Inputs good = make_inputs();
