@@ -72,6 +72,11 @@ void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const 
   m.set_shapes(positions, colors);
 }
 
+void Renderer::set_cull(Cull cull) {
+  impl_->require_scene("Renderer::set_cull");
+  impl_->set_cull(cull);
+}
+
 void Renderer::set_background(const glm::vec3& background) {
   impl_->require_scene("Renderer::set_background");
   checks::require_finite(background, "background");

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/checks.hpp"
+#include "scene/cull.hpp"
 #include "smoothing/option_fields.hpp"
 #include "torch/errors.hpp"
 
@@ -65,9 +66,16 @@ bool set_clipping(Camera& camera, const std::string& name, const OptionValue& va
   return true;
 }
 
+Cull cull_value(const OptionValue& value) {
+  constexpr const char* k_where = "cull (dpr::Renderer)";
+  const auto* const word = std::get_if<std::string>(&value);
+  if (word == nullptr) throw InvalidArgument(k_where, "a number", "none, back or front");
+  return parse_cull(*word, k_where);
+}
+
 [[noreturn]] void fail_name(const std::string& name) {
   std::vector<std::string_view> names = option_keys();
-  names.insert(names.end(), {"znear", "zfar"});
+  names.insert(names.end(), {"znear", "zfar", "cull"});
   throw InvalidArgument("name (dpr::Renderer.set)", "\"" + name + "\"", one_of(names));
 }
 
@@ -96,8 +104,11 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     Camera clipping;
     clipping.znear = znear_;
     clipping.zfar = zfar_;
+    Cull cull = cull_;
     if (set_clipping(clipping, name, given)) {
       validate(clipping);
+    } else if (name == "cull") {
+      cull = cull_value(given);
     } else if (!set_option(options, name, given, name + " (dpr::Renderer)")) {
       fail_name(name);
     }
@@ -105,6 +116,7 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     options_ = std::move(options);
     znear_ = clipping.znear;
     zfar_ = clipping.zfar;
+    cull_ = cull;
   });
 }
 

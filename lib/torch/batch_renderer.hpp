@@ -53,6 +53,7 @@ class BatchRenderer : public torch::CustomClassHolder {
   std::optional<Smoothing> otherwise_;  // what they leave open
   Smoothing smoothing_;                 // what they come to
   float znear_ = 1.0F, zfar_ = 100.0F;
+  Cull cull_ = Cull::none;
   Device device_;
   Topology topology_;           // of the free renderers
   std::vector<Renderer> free_;  // each remembers its last frame only, so every graph in flight has its own

@@ -25,8 +25,7 @@ constexpr int k_width = 20, k_height = 16;
 
 /// With 4x4 samples a pixel, what lies between the raster and the reference is a sixteenth of what one would
 /// leave.
-Scene blurred(double pixels, float gamma) {
-  Scene scene = scene_of(test::welded_cube(), reduced(k_width, 8), reduced(k_height, 6));
+Scene blurred(Scene scene, double pixels, float gamma) {
   scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
   scene.smoothing.supersampling = 4;
   scene.smoothing.gamma = gamma;
@@ -34,6 +33,11 @@ Scene blurred(double pixels, float gamma) {
   scene.smoothing.sigma = static_cast<float>(ndc * ndc);
   return scene;
 }
+
+Scene whole_cube() { return scene_of(test::welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
+
+/// The near plane cuts it open, in sight.
+Scene cut_cube() { return scene_cut_open(test::welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
 reference::Scene twin_of(const Scene& scene, bool is_opaque) {
   reference::Scene twin = to_reference(scene);
@@ -171,7 +175,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("pixel noise: the image is the reference's, opaque and mixed by depth") {
     for (const double pixels : {1.0, 2.0}) {
       for (const float gamma : {1e-8F, 3e-2F}) {
-        const Scene scene = blurred(pixels, gamma);
+        const Scene scene = blurred(whole_cube(), pixels, gamma);
         Renderer renderer(open_device());
         renderer.set_scene(scene);
         renderer.forward();
@@ -184,12 +188,30 @@ TEST_SUITE("pipeline") {
       }
     }
   }
+
+  TEST_CASE("pixel noise: the image of what the near plane cuts is the reference's") {
+    const Scene scene = blurred(cut_cube(), 2, 1e-8F);
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    CHECK(largest_difference(renderer.image(), reference::render_pixel_noise(twin_of(scene, true))) < 1.5e-3);
+  }
 }
 
 TEST_SUITE("gradient") {
   TEST_CASE("pixel noise: gradients against differences of the reference") {
     for (const bool has_creases : {false, true}) {
-      Scene scene = blurred(2, 1e-8F);
+      Scene scene = blurred(whole_cube(), 2, 1e-8F);
+      std::vector<glm::vec3>& colors = scene.meshes[0].mesh.face_colors;
+      if (!has_creases) std::ranges::fill(colors, colors[0]);
+      CAPTURE(has_creases);
+      check_gradients(scene, has_creases);
+    }
+  }
+
+  TEST_CASE("pixel noise: gradients of what the near plane cuts against differences of the reference") {
+    for (const bool has_creases : {false, true}) {
+      Scene scene = blurred(cut_cube(), 2, 1e-8F);
       std::vector<glm::vec3>& colors = scene.meshes[0].mesh.face_colors;
       if (!has_creases) std::ranges::fill(colors, colors[0]);
       CAPTURE(has_creases);
