@@ -192,21 +192,53 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
 /// in the same vertex.
 #define DPR_LEAST_CORNERED 2.5f
 
-/// Whether all contours that end in a vertex are that long. The ends of cuts have no corners.
-static inline int has_corner(const FrameParams p, const EdgeScene s, const ViewEdge e, uint end,
-                             uint first_edge, global const uint* end_starts, global const uint* ends,
-                             global const uint* offsets) {
-  if (e.cut[end] != DPR_NO_CUT) return 0;
-  const uint vertex = end == 0 ? e.record.x : e.record.y;
+/// The contours of a view.
+typedef struct {
+  EdgeScene edges;
+  global const uint *end_starts, *ends;  // edge * 2 + end, by vertex
+  global const uint* offsets;            // of the view's edges: equal where an edge is no contour
+} Contours;
+
+/// Whether an edge that is a contour is that long.
+static inline int is_long(const FrameParams p, const Contours c, uint edge) {
+  if (c.offsets[edge] == c.offsets[edge + 1]) return 1;
+  const ViewEdge e = view_edge(c.edges, edge);
+  const float2 d = e.end[1].xy - e.end[0].xy;
   const float least = DPR_LEAST_CORNERED * p.pixel_size;
-  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
-    const uint edge = ends[k] / 2;
-    if (offsets[first_edge + edge] == offsets[first_edge + edge + 1]) continue;
-    const ViewEdge other = view_edge(s, edge);
-    const float2 d = other.end[1].xy - other.end[0].xy;
-    if (!(dot(d, d) >= least * least)) return 0;
+  return dot(d, d) >= least * least;
+}
+
+/// The edge of a face between two of its vertices.
+static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
+  for (uint k = c.end_starts[a]; k < c.end_starts[a + 1]; ++k) {
+    const uint4 record = c.edges.edges[c.ends[k] / 2];
+    const int is_of_face = own_face(record) == face || (has_other_face(record) && other_face(record) == face);
+    if (is_of_face && (record.x == b || record.y == b)) return c.ends[k] / 2;
   }
-  return 1;
+  return c.edges.mesh_edges;
+}
+
+/// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
+/// plane, the edge that is cut there, and the cuts of its faces.
+static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
+  const uint mesh_edges = c.edges.mesh_edges;
+  if (e.cut[end] == DPR_NO_CUT) {
+    const uint vertex = end == 0 ? e.record.x : e.record.y;
+    for (uint k = c.end_starts[vertex]; k < c.end_starts[vertex + 1]; ++k) {
+      if (!is_long(p, c, c.ends[k] / 2)) return 0;
+    }
+    return 1;
+  }
+  if (edge >= mesh_edges) {
+    const ClippedFace of = c.edges.clipped[e.cut_face];
+    const uint4 face = c.edges.faces[e.cut_face];
+    edge = edge_between(c, e.cut_face, component(face, kept_corner(of, e.cut[end])),
+                        component(face, lost_corner(of, e.cut[end])));
+    if (edge == mesh_edges) return 0;
+  }
+  const uint4 record = c.edges.edges[edge];
+  return is_long(p, c, edge) && is_long(p, c, mesh_edges + own_face(record)) &&
+         (!has_other_face(record) || is_long(p, c, mesh_edges + other_face(record)));
 }
 
 /// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as
@@ -240,10 +272,9 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const ViewEdge edge = view_edge(s.edges, i - first_edge);
   uint contour = DPR_CONTOUR_FLAGS * i;
   if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
-  if (has_corner(p, s.edges, edge, 0, first_edge, end_starts, ends, offsets))
-    contour |= DPR_CONTOUR_FIRST_END;
-  if (has_corner(p, s.edges, edge, 1, first_edge, end_starts, ends, offsets))
-    contour |= DPR_CONTOUR_SECOND_END;
+  const Contours contours = {s.edges, end_starts, ends, offsets + first_edge};
+  if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
+  if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
