@@ -141,7 +141,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       for (std::size_t v = 0; v < views.size(); ++v) CHECK(same_bits(renderer.image(v), first.image));
       Device small = open_device();
-      small.set_memory_budget(std::max<std::size_t>(renderer.statistics().fragments * 50 / 3, 40000));
+      small.set_memory_budget(std::max<std::size_t>(renderer.statistics().fragments * 50 / 3, 14000));
       Renderer in_bands(small);
       in_bands.set_scene(scene);
       CHECK(same_bits(render(in_bands), first));
