@@ -74,7 +74,6 @@ TEST_SUITE("pipeline") {
     for (const bool of_pixel : {false, true}) {
       for (Scene scene : scenes()) {
         scene = with_noise(scene, of_pixel);
-        const Image whole = render(device, scene).image;
         for (const Cull cull : {Cull::back, Cull::front}) {
           scene.cull = cull;
           const Scene rest = without_culled(scene);
@@ -88,7 +87,6 @@ TEST_SUITE("pipeline") {
           for (std::size_t i = 0; i < positions.size(); ++i) difference[i] -= positions[i];
           CHECK(norm(positions) > 0);
           CHECK(norm(difference) <= (of_pixel ? 1e-5 : 0) * norm(positions));
-          if (cull == Cull::front) CHECK_FALSE(same_bits(found.image, whole));
         }
       }
     }
