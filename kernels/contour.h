@@ -103,15 +103,20 @@ static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
   }
   const ClippedFace c = s.clipped[e->cut_face];
   const uint4 face = s.faces[e->cut_face];
-  const uint corner[2] = {corner_of_vertex(face, e->record.x), corner_of_vertex(face, e->record.y)};
+  const uint first = corner_of_vertex(face, e->record.x), second = corner_of_vertex(face, e->record.y);
   // Vertices that only coincide with the face's: its own edge there stands for both.
-  if (corner[0] == 3 || corner[1] == 3) return;
-  const int lost[2] = {is_lost(c, corner[0]), is_lost(c, corner[1])};
-  e->is_there = !(lost[0] && lost[1]);
-  if (lost[0] == lost[1]) return;
-  const uint end = lost[0] ? 0 : 1;
-  e->cut[end] = cut_between(c, corner[1 - end], corner[end]);
-  e->end[end] = c.cut[e->cut[end]].xyz;
+  if (first == 3 || second == 3) return;
+  const int loses_first = is_lost(c, first), loses_second = is_lost(c, second);
+  e->is_there = !(loses_first && loses_second);
+  if (loses_first == loses_second) return;
+  // Written out: an index that varies would put the edge into memory.
+  if (loses_first) {
+    e->cut[0] = cut_between(c, second, first);
+    e->end[0] = c.cut[e->cut[0]].xyz;
+  } else {
+    e->cut[1] = cut_between(c, first, second);
+    e->end[1] = c.cut[e->cut[1]].xyz;
+  }
 }
 
 static inline ViewEdge view_edge(const EdgeScene s, uint edge) {
