@@ -18,7 +18,8 @@ struct Definition {
   std::vector<std::uint32_t> samples;
   bool softras, own;  // rows of SoftRas' priors; of the joint composition and of the library's defaults
   unsigned views;
-  float pixel_sigma = 0;  // of a row with noise of the pixel; 0: none
+  float pixel_sigma = 0;     // of a row with noise of the pixel; 0: none
+  bool from_within = false;  // faces cross the near plane
 };
 
 /// Noise of the pixel's rows: a blur of four pixels at 256x256, whatever the size.
@@ -54,6 +55,7 @@ const std::vector<Definition>& definitions() {
         {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
         {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
         {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1, k_pixel_sigma},
+        {"room256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma, true},
         {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
         {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
         {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
@@ -68,12 +70,18 @@ Scene make_scene(const Definition& d) {
   // The published program's blur radius, and the cameras of its demos.
   constexpr float k_blur_radius_in_sigma = 9.21F;
   constexpr float k_cube_distance = 6.7F, k_sphere_distance = 2.7F;
+  // Nearer to the wall behind than the near plane is to the camera.
+  constexpr float k_room_distance = 0.8F, k_room_near = 0.3F;
   Scene scene;
   scene.width = scene.height = d.size;
   const bool cube = d.subdivisions == 0;
   scene.meshes.push_back({cube ? make_cube() : make_icosphere(d.subdivisions)});
   scene.camera = orbit_camera(cube ? k_cube_distance : k_sphere_distance, 30.0F, 120.0F);
   scene.smoothing = smoothing_preset("gaussian");
+  if (d.from_within) {
+    scene.camera = orbit_camera(k_room_distance, 30.0F, 120.0F);
+    scene.camera.znear = k_room_near;
+  }
   scene.smoothing.sigma = d.sigma;
   scene.smoothing.gamma = d.gamma;
   scene.smoothing.blur_radius = k_blur_radius_in_sigma * d.sigma;
@@ -151,6 +159,7 @@ std::string_view describe(std::string_view name) {
       {"sphere64", "1,280 triangles, 64x64; exact, M = 8, 32, SoftRas"},
       {"sphere128", "the same, 128x128"},
       {"sphere256", "the same, 256x256"},
+      {"room256", "sphere256 from within, through the near plane; exact, M = 8"},
       {"views24", "sphere128 from 24 cameras in one batch"},
       {"sphere20k", "20,480 triangles, 256x256; exact, M = 8"},
       {"sphere80k", "81,920 triangles, 512x512; exact, M = 8"},

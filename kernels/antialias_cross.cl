@@ -47,18 +47,20 @@ typedef struct {
   float by_rows;  // how much it counts by rows
 } TileContour;
 
-static inline TileContour load_contour(const FrameParams p, uint edges_of_view, uint contour,
-                                       global const uint4* restrict edges, global const uint* restrict facing,
-                                       global const float4* restrict ndc) {
+static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
+                                       global const uint4* restrict edges, global const uint4* restrict faces,
+                                       global const uint* restrict facing, global const float4* restrict ndc,
+                                       global const ClippedFace* restrict clipped) {
   TileContour c;
-  const uint view_edge = contour / DPR_CONTOUR_FLAGS;
+  const uint numbered = contour / DPR_CONTOUR_FLAGS;
   c.flags = contour % DPR_CONTOUR_FLAGS;
-  c.view = view_edge / edges_of_view;
-  c.record = edges[view_edge - c.view * edges_of_view];
-  const float3 a = ndc[c.view * p.vertices + c.record.x].xyz, b = ndc[c.view * p.vertices + c.record.y].xyz;
-  c.a = a.xy;
-  c.b = b.xy;
-  c.depths = (float2)(a.z, b.z);
+  c.view = numbered / a.edges;
+  const ViewEdge e = view_edge(edges_of_view(p, c.view, a.mesh_edges, edges, faces, ndc, clipped),
+                               numbered - c.view * a.edges);
+  c.record = e.record;
+  c.a = e.end[0].xy;
+  c.b = e.end[1].xy;
+  c.depths = (float2)(e.end[0].z, e.end[1].z);
   c.inner = inner_side(edge_sides(c.record, facing + c.view * p.faces));
   c.by_rows = weight_by_rows(c.b - c.a);
   return c;
@@ -154,10 +156,11 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
 }
 
 /// Finds what crosses the steps of a tile. One work-item per tile of all views. Deterministic.
-/// in   edges         uint4[edge]           see DPR_EDGE_FLAG
+/// in   edges         uint4[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
 /// in   facing        uint[view][face]
 /// in   ndc           float4[view][vertex]
+/// in   clipped       ClippedFace[view][face]  read where p.clips is set
 /// in   tile_starts   uint[view * tile + 1] runs of pairs
 /// in   pair_contour  uint[pair]            see DPR_CONTOUR_FLAGS, ascending within a tile
 /// in   front         float[pixel]
@@ -168,9 +171,10 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
                             global const ViewParams* restrict views, global const uint4* restrict edges,
                             global const uint4* restrict faces, global const uint* restrict facing,
-                            global const float4* restrict ndc, global const uint* restrict tile_starts,
-                            global const uint* restrict pair_contour, global const float* restrict front,
-                            global uint* restrict winner, global float* restrict cut) {
+                            global const float4* restrict ndc, global const ClippedFace* restrict clipped,
+                            global const uint* restrict tile_starts, global const uint* restrict pair_contour,
+                            global const float* restrict front, global uint* restrict winner,
+                            global float* restrict cut) {
   const uint tile = (uint)get_global_id(0);
   const uint tiles = p.tiles_x * p.tiles_y, view = tile / tiles;
   if (view >= p.views || !is_near_contour(p, tile, tile_starts)) return;
@@ -186,7 +190,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
   float nearest[2 * DPR_TILE * DPR_TILE];
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
-    const TileContour c = load_contour(p, a.edges, contour, edges, facing, ndc);
+    const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
       const float weight = by_rows ? c.by_rows : 1.0f - c.by_rows;
       if (weight == 0.0f) continue;
@@ -212,14 +216,15 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps
 /// that it won. One work-item per pair. Deterministic.
-/// in   edges, facing, ndc, winner, cut  as antialias_cross
+/// in   edges, faces, facing, ndc, clipped, winner, cut  as antialias_cross
 /// in   pair_contour   uint[pair]       of so many `pairs`
 /// in   pair_tile      uint[pair]       view * tiles + tile
 /// in   grad_cut       float[2][pixel]
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
 kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams a, const uint pairs,
-                                     global const uint4* restrict edges, global const uint* restrict facing,
-                                     global const float4* restrict ndc,
+                                     global const uint4* restrict edges, global const uint4* restrict faces,
+                                     global const uint* restrict facing, global const float4* restrict ndc,
+                                     global const ClippedFace* restrict clipped,
                                      global const uint* restrict pair_contour,
                                      global const uint* restrict pair_tile,
                                      global const uint* restrict winner, global const float* restrict cut,
@@ -228,7 +233,7 @@ kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams 
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs) return;
   const uint contour = pair_contour[pair];
-  const TileContour c = load_contour(p, a.edges, contour, edges, facing, ndc);
+  const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
   const TileSamples s = tile_samples(p, pair_tile[pair]);
   float2 grad_a = 0.0f, grad_b = 0.0f;
   float grad_weight = 0.0f;  // of what counts by rows

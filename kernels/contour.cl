@@ -6,6 +6,9 @@
 // Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once.
 // Where both faces have vertices of their own, there are two edges, one on each face's: as long as they
 // coincide one of them stands for both, and when they part each is a boundary.
+//
+// Where faces cross the near plane, edges end there, and what the plane cuts of a face is a boundary: the
+// cuts of all faces are numbered behind the edges of the scene.
 #include "contour.h"
 
 /// What rounding may move a crossing by, in samples.
@@ -14,14 +17,16 @@
 /// The sine of the angle between faces from which they count as shaded differently.
 #define DPR_LEAST_CREASE 1e-4f
 
-/// How faces look. Dropped is what setup drops for its depth or its area. One work-item per (view, face).
+/// How faces look. Dropped is what setup drops for its depth, its area or its facing. One work-item per
+/// (view, face).
 /// in   views   ViewParams[view]
 /// in   faces   uint4[face]            vertex indices
 /// in   ndc     float4[view][vertex]
+/// in   clipped ClippedFace[view][face]  read where p.clips is set
 /// out  facing  uint[view][face]
 kernel void contour_facing(const FrameParams p, global const ViewParams* restrict views,
                            global const uint4* restrict faces, global const float4* restrict ndc,
-                           global uint* restrict facing) {
+                           global const ClippedFace* restrict clipped, global uint* restrict facing) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
@@ -31,7 +36,9 @@ kernel void contour_facing(const FrameParams p, global const ViewParams* restric
   // Written so that a NaN fails.
   const int in_view =
       fmin(fmin(a.z, b.z), c.z) >= views[view].znear && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY;
-  const int side = in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
+  int side = in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
+  if (p.clips && clipped[i].corners != 0) side = (int)clipped[i].orientation;
+  if ((float)side == p.culled) side = 0;
   facing[i] = side > 0 ? DPR_FACE_FRONT : side < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
 }
 
@@ -41,6 +48,7 @@ typedef struct {
   global const float4 *ndc, *world;  // [vertex]
   global const uint4 *faces, *face_colors;
   global const float4* colors;
+  EdgeScene edges;
 } ContourScene;
 
 static inline int is_same(float4 a, float4 b) { return all(a.xyz == b.xyz); }
@@ -83,7 +91,9 @@ static inline int stands_for_both(uint4 edge, global const uint* facing) {
   return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
 }
 
-static inline int contour_kind(const ContourScene s, uint4 edge, uint shading) {
+static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shading) {
+  const uint4 edge = e.record;
+  if (!e.is_there) return DPR_NO_CONTOUR;
   EdgeSides sides = edge_sides(edge, s.facing);
   if (!has_other_face(edge)) return sides.own != 0 ? DPR_OCCLUDES : DPR_NO_CONTOUR;
   int is_split = 0;
@@ -105,10 +115,11 @@ static inline int contour_kind(const ContourScene s, uint4 edge, uint shading) {
   return color_jumps(s, edge, edge.x) || color_jumps(s, edge, edge.y) ? DPR_CREASE : DPR_NO_CONTOUR;
 }
 
-static inline ContourScene scene_of_view(const FrameParams p, uint view, global const uint* facing,
+static inline ContourScene scene_of_view(const FrameParams p, const ContourParams c, uint view,
+                                         global const uint4* edges, global const uint* facing,
                                          global const float4* ndc, global const float4* world,
-                                         global const uint4* faces, global const uint4* face_colors,
-                                         global const float4* colors) {
+                                         global const uint4* faces, global const ClippedFace* clipped,
+                                         global const uint4* face_colors, global const float4* colors) {
   ContourScene s;
   s.facing = facing + view * p.faces;
   s.ndc = ndc + view * p.vertices;
@@ -116,13 +127,14 @@ static inline ContourScene scene_of_view(const FrameParams p, uint view, global 
   s.faces = faces;
   s.face_colors = face_colors;
   s.colors = colors + view * p.color_stride;
+  s.edges = edges_of_view(p, view, c.mesh_edges, edges, faces, ndc, clipped);
   return s;
 }
 
 /// An edge over tiles.
 typedef struct {
-  float2 a, d;         // an end and the way to the other, in samples
-  uint2 columns, rows; // of tiles, [x, y]: those with a sample from which a step may cross the edge's extent
+  float2 a, d;          // an end and the way to the other, in samples
+  uint2 columns, rows;  // of tiles, [x, y]: those with a sample from which a step may cross the edge's extent
 } TiledEdge;
 
 static inline TiledEdge tiled_edge(const FrameParams p, float2 a, float2 b) {
@@ -145,25 +157,28 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 }
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
-/// in   edges        uint4[edge]           see DPR_EDGE_FLAG
+/// in   edges        uint4[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   facing       uint[view][face]
 /// in   ndc, world   float4[view][vertex]
 /// in   faces, face_colors  uint4[face]    vertices and colours of the corners
+/// in   clipped      ClippedFace[view][face]  read where p.clips is set
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// out  counts       uint[view][edge]
 kernel void contour_count(const FrameParams p, const ContourParams c, global const uint4* restrict edges,
                           global const uint* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
+                          global const ClippedFace* restrict clipped,
                           global const uint4* restrict face_colors, global const float4* restrict colors,
                           global uint* restrict counts) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * c.edges) return;
   const uint view = i / c.edges;
-  const uint4 edge = edges[i - view * c.edges];
-  const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
+  const ContourScene s =
+      scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);
+  const ViewEdge edge = view_edge(s.edges, i - view * c.edges);
   uint count = 0;
   if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
-    const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
+    const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
     for (uint row = t.rows.x; row <= t.rows.y; ++row) {
       for (uint column = t.columns.x; column <= t.columns.y; ++column)
         count += line_meets_tile(t, column, row) ? 1 : 0;
@@ -177,18 +192,53 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
 /// in the same vertex.
 #define DPR_LEAST_CORNERED 2.5f
 
-/// Whether all contours that end in a vertex are that long.
-static inline int has_corner(const FrameParams p, uint first_edge, uint vertex, global const uint4* edges,
-                             global const uint* end_starts, global const uint* ends,
-                             global const uint* offsets, global const float4* ndc) {
+/// The contours of a view.
+typedef struct {
+  EdgeScene edges;
+  global const uint *end_starts, *ends;  // edge * 2 + end, by vertex
+  global const uint* offsets;            // of the view's edges: equal where an edge is no contour
+} Contours;
+
+/// Whether an edge that is a contour is that long.
+static inline int is_long(const FrameParams p, const Contours c, uint edge) {
+  if (c.offsets[edge] == c.offsets[edge + 1]) return 1;
+  const ViewEdge e = view_edge(c.edges, edge);
+  const float2 d = e.end[1].xy - e.end[0].xy;
   const float least = DPR_LEAST_CORNERED * p.pixel_size;
-  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
-    const uint edge = ends[k] / 2;
-    if (offsets[first_edge + edge] == offsets[first_edge + edge + 1]) continue;
-    const float2 d = ndc[edges[edge].y].xy - ndc[edges[edge].x].xy;
-    if (!(dot(d, d) >= least * least)) return 0;
+  return dot(d, d) >= least * least;
+}
+
+/// The edge of a face between two of its vertices.
+static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
+  for (uint k = c.end_starts[a]; k < c.end_starts[a + 1]; ++k) {
+    const uint4 record = c.edges.edges[c.ends[k] / 2];
+    const int is_of_face = own_face(record) == face || (has_other_face(record) && other_face(record) == face);
+    if (is_of_face && (record.x == b || record.y == b)) return c.ends[k] / 2;
   }
-  return 1;
+  return c.edges.mesh_edges;
+}
+
+/// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
+/// plane, the edge that is cut there, and the cuts of its faces.
+static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
+  const uint mesh_edges = c.edges.mesh_edges;
+  if (e.cut[end] == DPR_NO_CUT) {
+    const uint vertex = end == 0 ? e.record.x : e.record.y;
+    for (uint k = c.end_starts[vertex]; k < c.end_starts[vertex + 1]; ++k) {
+      if (!is_long(p, c, c.ends[k] / 2)) return 0;
+    }
+    return 1;
+  }
+  if (edge >= mesh_edges) {
+    const ClippedFace of = c.edges.clipped[e.cut_face];
+    const uint4 face = c.edges.faces[e.cut_face];
+    edge = edge_between(c, e.cut_face, component(face, kept_corner(of, e.cut[end])),
+                        component(face, lost_corner(of, e.cut[end])));
+    if (edge == mesh_edges) return 0;
+  }
+  const uint4 record = c.edges.edges[edge];
+  return is_long(p, c, edge) && is_long(p, c, mesh_edges + own_face(record)) &&
+         (!has_other_face(record) || is_long(p, c, mesh_edges + other_face(record)));
 }
 
 /// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as
@@ -205,26 +255,27 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
                          global const uint4* restrict edges, global const uint* restrict end_starts,
                          global const uint* restrict ends, global const uint* restrict facing,
                          global const float4* restrict ndc, global const float4* restrict world,
-                         global const uint4* restrict faces, global const uint4* restrict face_colors,
-                         global const float4* restrict colors, global const uint* restrict offsets,
-                         global uint* restrict pairs, global uint* restrict place_contour,
-                         global uint* restrict place_tile, global uint* restrict places) {
+                         global const uint4* restrict faces, global const ClippedFace* restrict clipped,
+                         global const uint4* restrict face_colors, global const float4* restrict colors,
+                         global const uint* restrict offsets, global uint* restrict pairs,
+                         global uint* restrict place_contour, global uint* restrict place_tile,
+                         global uint* restrict places) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * c.edges) return;
   const uint total = offsets[p.views * c.edges];
   if (i == 0) pairs[0] = total > capacity ? 0 : total;
   if (total > capacity || offsets[i] == offsets[i + 1]) return;
   const uint view = i / c.edges;
-  const uint4 edge = edges[i - view * c.edges];
-  const ContourScene s = scene_of_view(p, view, facing, ndc, world, faces, face_colors, colors);
+  const ContourScene s =
+      scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);
   const uint first_edge = view * c.edges;
+  const ViewEdge edge = view_edge(s.edges, i - first_edge);
   uint contour = DPR_CONTOUR_FLAGS * i;
   if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
-  if (has_corner(p, first_edge, edge.x, edges, end_starts, ends, offsets, s.ndc))
-    contour |= DPR_CONTOUR_FIRST_END;
-  if (has_corner(p, first_edge, edge.y, edges, end_starts, ends, offsets, s.ndc))
-    contour |= DPR_CONTOUR_SECOND_END;
-  const TiledEdge t = tiled_edge(p, s.ndc[edge.x].xy, s.ndc[edge.y].xy);
+  const Contours contours = {s.edges, end_starts, ends, offsets + first_edge};
+  if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
+  if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
+  const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
   for (uint row = t.rows.x; row <= t.rows.y; ++row) {
@@ -262,4 +313,65 @@ kernel void contour_gather(const FrameParams p, const ContourParams c,
     }
   }
   grad_ndc[i] += (float4)(sum, 0.0f, 0.0f);
+}
+
+/// The gradients of a contour's ends, summed over its pairs.
+static inline float4 sum_of_pairs(uint contour, global const uint* pair_starts, global const uint* edge_pairs,
+                                  global const float4* grad_ends) {
+  float4 sum = 0.0f;
+  for (uint place = pair_starts[contour]; place < pair_starts[contour + 1]; ++place)
+    sum += grad_ends[edge_pairs[place]];
+  return sum;
+}
+
+/// What the end of a contour that is a cut gives to one of the corners that it lies between.
+static inline float3 share_of_cut(const ClippedFace c, uint cut, int to_lost, float2 grad) {
+  const float part = c.cut[cut].w;
+  return (to_lost ? part : 1.0f - part) * cut_gradient(c, cut, grad, 0.0f);
+}
+
+/// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between, and
+/// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
+/// per (view, vertex). Deterministic. Inputs as contour_gather and contour_count, and
+/// in      corner_starts  uint[vertex + 1]      runs of `corners`
+/// in      corners        uint[corner]          face * 3 + corner, by vertex
+/// in out  grad_ndc       float4[view][vertex]
+/// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates
+kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
+                                global const uint4* restrict edges, global const uint4* restrict faces,
+                                global const float4* restrict ndc, global const ClippedFace* restrict clipped,
+                                global const uint* restrict corner_starts,
+                                global const uint* restrict corners, global const uint* restrict pair_starts,
+                                global const uint* restrict edge_pairs,
+                                global const uint* restrict end_starts, global const uint* restrict ends,
+                                global const float4* restrict grad_ends, global float4* restrict grad_ndc,
+                                global float4* restrict grad_clip) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * c.edges;
+  const EdgeScene s = edges_of_view(p, view, c.mesh_edges, edges, faces, ndc, clipped);
+  float3 sum = 0.0f;
+  int is_near = 0;
+  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
+    const uint face = corners[k] / 3, corner = corners[k] % 3;
+    if (s.clipped[face].corners == 0) continue;
+    const ClippedFace of = s.clipped[face];
+    const float4 grad = sum_of_pairs(first_edge + c.mesh_edges + face, pair_starts, edge_pairs, grad_ends);
+    for (uint cut = 0; cut < 2; ++cut) {
+      const int to_lost = lost_corner(of, cut) == corner;
+      if (to_lost || kept_corner(of, cut) == corner)
+        sum += share_of_cut(of, cut, to_lost, cut == 0 ? grad.xy : grad.zw);
+    }
+    is_near = is_near || is_lost(of, corner);
+  }
+  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
+    const uint edge = ends[k] / 2, own_end = ends[k] % 2;
+    const ViewEdge e = view_edge(s, edge);
+    const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1;
+    if (!e.is_there || e.cut[end] == DPR_NO_CUT) continue;
+    const float4 grad = sum_of_pairs(first_edge + edge, pair_starts, edge_pairs, grad_ends);
+    sum += share_of_cut(s.clipped[e.cut_face], e.cut[end], own_end == end, end == 0 ? grad.xy : grad.zw);
+  }
+  if (is_near) grad_ndc[i] = 0.0f;
+  grad_clip[i] += (float4)(sum, 0.0f);
 }

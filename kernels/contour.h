@@ -3,6 +3,7 @@
 #ifndef DPR_CONTOUR_H
 #define DPR_CONTOUR_H
 
+#include "clip.h"
 #include "geometry.h"
 
 /// How a face looks from a view.
@@ -47,6 +48,83 @@ static inline int inner_side(EdgeSides s) { return s.own != 0 ? s.own : s.other;
 static inline uint corner_across(uint4 face, uint first, uint second) {
   const uint x_is_end = face.x == first || face.x == second, y_is_end = face.y == first || face.y == second;
   return !x_is_end ? face.x : !y_is_end ? face.y : face.z;
+}
+
+/// Which corner of a face a vertex is; 3 where it is none.
+static inline uint corner_of_vertex(uint4 face, uint vertex) {
+  return face.x == vertex ? 0 : face.y == vertex ? 1 : face.z == vertex ? 2 : 3;
+}
+
+/// What the edges of a view are read from.
+typedef struct {
+  global const uint4 *edges, *faces;
+  global const float4* ndc;           // [vertex] of the view
+  global const ClippedFace* clipped;  // [face] of the view; not read where no face is clipped
+  uint mesh_edges, clips;
+} EdgeScene;
+
+static inline EdgeScene edges_of_view(const FrameParams p, uint view, uint mesh_edges,
+                                      global const uint4* edges, global const uint4* faces,
+                                      global const float4* ndc, global const ClippedFace* clipped) {
+  const EdgeScene s = {edges,      faces,  ndc + view * p.vertices, clipped + (p.clips ? view * p.faces : 0),
+                       mesh_edges, p.clips};
+  return s;
+}
+
+/// The number of a cut that an edge's end is none of.
+#define DPR_NO_CUT 2
+
+/// An edge as a view has it.
+typedef struct {
+  uint4 record;   // as in the list of edges; of the cut of a face (face, none) without vertices
+  float3 end[2];  // x, y in NDC, depth
+  int is_there;   // 0: all of it is nearer than the near plane
+  uint cut_face;  // whose cuts the ends are
+  uint cut[2];    // which of them, or DPR_NO_CUT: then the end is the vertex
+} ViewEdge;
+
+/// The edge on the near plane that a face has got there, in the direction in which the face winds.
+static inline ViewEdge edge_of_cut(const EdgeScene s, uint face) {
+  ViewEdge e = {(uint4)(0, 0, face, DPR_NO_FACE), {0.0f, 0.0f}, 0, face, {0, 1}};
+  if (s.clipped[face].corners == 0) return e;
+  e.is_there = 1;
+  e.end[0] = s.clipped[face].cut[0].xyz;
+  e.end[1] = s.clipped[face].cut[1].xyz;
+  return e;
+}
+
+/// Puts an end that is nearer than the near plane on it, where one of the edge's faces is clipped.
+static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
+  e->cut_face = own_face(e->record);
+  if (s.clipped[e->cut_face].corners == 0) {
+    if (!has_other_face(e->record)) return;
+    e->cut_face = other_face(e->record);
+    if (s.clipped[e->cut_face].corners == 0) return;
+  }
+  const ClippedFace c = s.clipped[e->cut_face];
+  const uint4 face = s.faces[e->cut_face];
+  const uint first = corner_of_vertex(face, e->record.x), second = corner_of_vertex(face, e->record.y);
+  // Vertices that only coincide with the face's: its own edge there stands for both.
+  if (first == 3 || second == 3) return;
+  const int loses_first = is_lost(c, first), loses_second = is_lost(c, second);
+  e->is_there = !(loses_first && loses_second);
+  if (loses_first == loses_second) return;
+  // Written out: an index that varies would put the edge into memory.
+  if (loses_first) {
+    e->cut[0] = cut_between(c, second, first);
+    e->end[0] = c.cut[e->cut[0]].xyz;
+  } else {
+    e->cut[1] = cut_between(c, first, second);
+    e->end[1] = c.cut[e->cut[1]].xyz;
+  }
+}
+
+static inline ViewEdge view_edge(const EdgeScene s, uint edge) {
+  if (edge >= s.mesh_edges) return edge_of_cut(s, edge - s.mesh_edges);
+  const uint4 record = s.edges[edge];
+  ViewEdge e = {record, {s.ndc[record.x].xyz, s.ndc[record.y].xyz}, 1, 0, {DPR_NO_CUT, DPR_NO_CUT}};
+  if (s.clips) clip_edge(s, &e);
+  return e;
 }
 
 /// NDC to samples: the centre of column c or row r is at c or r.

@@ -1,8 +1,5 @@
 // Triangles of a view: assembled from projected vertices, culled, bounded, and the tiles of each counted.
-#include "tiles.h"
-
-/// Corners further away than this, NDC, have squared distances that single precision does not hold.
-#define DPR_MAX_NDC 1e18f
+#include "setup.h"
 
 /// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 for what is dropped: what
 /// reaches nearer than znear, lies wholly beyond zfar, has exactly no area, or reaches beyond DPR_MAX_NDC.
@@ -16,25 +13,6 @@ static inline int orientation_of(float3 a, float3 b, float3 c, float znear, floa
                       fmax(fmax(a.z, b.z), c.z) < INFINITY;
   return in_range && in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
 }
-
-/// Blurred bounds in pixels.
-typedef struct {
-  float left, top, right, bottom;
-} PixelBounds;
-
-static inline PixelBounds bounds_of(const FrameParams p, float3 a, float3 b, float3 c) {
-  const float2 low = fmin(fmin(a.xy, b.xy), c.xy) - p.blur_distance;
-  const float2 high = fmax(fmax(a.xy, b.xy), c.xy) + p.blur_distance;
-  const float scale = 1.0f / p.pixel_size;
-  // A centre lies half a pixel from its corner.
-  const float x = 0.5f * (float)p.width - 0.5f, y = 0.5f * (float)p.height - 0.5f;
-  const PixelBounds bounds = {low.x * scale + x, y - high.y * scale, high.x * scale + x, y - low.y * scale};
-  return bounds;
-}
-
-/// Whether [low, high], pixels, comes within a pixel of the image along one axis. Written so that a NaN does
-/// not.
-static inline int meets_image(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
 
 static inline uint count_tiles(const FrameParams p, const Triangle t) {
   const uint2 columns = columns_of(t) / DPR_TILE, rows = rows_of(t) / DPR_TILE;
@@ -66,10 +44,9 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   global const float4* vertices = ndc + view * p.vertices;
   const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
   const int orientation = orientation_of(a, b, c, views[view].znear, views[view].zfar);
-  const PixelBounds bounds = bounds_of(p, a, b, c);
-  const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
-                      meets_image(bounds.left, bounds.right, p.width) &&
-                      meets_image(bounds.top, bounds.bottom, p.height);
+  const PixelBounds bounds = bounds_of(p, fmin(fmin(a.xy, b.xy), c.xy), fmax(fmax(a.xy, b.xy), c.xy));
+  const int is_kept = orientation != 0 && (float)orientation != p.culled &&
+                      (float)orientation != hidden[view * p.meshes + face.w] && meets_image(p, bounds);
   kept[i] = is_kept ? 1 : 0;
   counts[i] = 0;
   if (!is_kept) return;

@@ -146,7 +146,9 @@ typedef struct FrameParams {
   float blur_distance;   /* NDC: triangles further than this from a pixel are not in its list */
   uint euclidean;        /* distances are NDC, not NDC^2 */
   uint perspective_correct;
-  uint sharp; /* distances have no noise: triangles cover what they own, and distances are not needed */
+  uint sharp;   /* distances have no noise: triangles cover what they own, and distances are not needed */
+  float culled; /* the orientation of faces that are left out, +1 or -1; 0: none are */
+  uint clips;   /* some face may cross the near plane: ClippedFace says which; 0: none is read */
 } FrameParams;
 
 /// A camera, ready for the kernels.
@@ -168,6 +170,20 @@ typedef struct Triangle {
   float orientation;              /* +1 counter-clockwise, -1 clockwise */
   uint first_sample, last_sample; /* column | row << 16, inclusive; of the blurred bounding box */
 } Triangle;
+
+/// What is left of a face that crosses the near plane: a triangle or a quadrilateral. Its corners are those
+/// of the face that are not nearer than the plane, from `first` on, then the two cuts: of four the first cut
+/// lies between the face's corners first + 1 and first + 2, the second between first and first + 2; of three
+/// between first and first + 1, and first and first + 2 (all modulo 3).
+typedef struct ClippedFace {
+  DPR_SHARED_NAME(ClippedFace)
+  float4 corner[3];  /* of the face: x, y in NDC times depth, depth; w unused */
+  float4 cut[2];     /* x, y in NDC; depth, which is znear; the part of the way to the corner that is lost */
+  float orientation; /* +1 counter-clockwise, -1 clockwise */
+  uint corners;      /* 3 or 4; 0: the face is not clipped, and the rest not written */
+  uint first;
+  uint unused;
+} ClippedFace;
 
 /// The light that all shading models share.
 typedef struct LightingParams {
@@ -246,17 +262,18 @@ typedef struct Slot {
 /// What contours are looked for.
 typedef struct ContourParams {
   DPR_SHARED_NAME(ContourParams)
-  uint edges;   /* of the scene */
-  uint shading; /* DPR_UNLIT, DPR_FLAT, ...: whose creases count */
-  uint unused0, unused1;
+  uint edges;      /* of a view: those of the scene, then, where faces are clipped, the cut of every face */
+  uint mesh_edges; /* of the scene */
+  uint shading;    /* DPR_UNLIT, DPR_FLAT, ...: whose creases count */
+  uint unused0;
 } ContourParams;
 
 /// What crossings are looked for.
 typedef struct AntialiasParams {
   DPR_SHARED_NAME(AntialiasParams)
-  uint edges;        /* of the scene */
-  float depth_reach; /* normalised depth: surfaces that much behind the nearest may still be seen */
-  uint unused0, unused1;
+  uint edges, mesh_edges; /* as in ContourParams */
+  float depth_reach;      /* normalised depth: surfaces that much behind the nearest may still be seen */
+  uint unused0;
 } AntialiasParams;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its

@@ -4,7 +4,8 @@
 
 static inline SurfaceScene make_scene(global const uint4* face_colors, global const float4* colors,
                                       global const uint4* face_texcoords, global const float4* texcoords,
-                                      global const Texture* textures, global const Triangle* triangles) {
+                                      global const Texture* textures, global const Triangle* triangles,
+                                      global const ClippedFace* clipped) {
   SurfaceScene s;
   s.face_colors = face_colors;
   s.colors = colors;
@@ -12,6 +13,7 @@ static inline SurfaceScene make_scene(global const uint4* face_colors, global co
   s.texcoords = texcoords;
   s.textures = textures;
   s.triangles = triangles;
+  s.clipped = clipped;
   return s;
 }
 
@@ -25,6 +27,7 @@ static inline SurfaceScene make_scene(global const uint4* face_colors, global co
 /// in   textures         Texture[texture]
 /// in   texels           float4[texel]   linear RGB, every level; w unused
 /// in   triangles        Triangle[view][face]
+/// in   clipped          ClippedFace[view][face]  read where p.clips is set
 /// in   bary1, bary2     float[fragment]  barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
 kernel void surface_forward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
@@ -33,14 +36,15 @@ kernel void surface_forward(const FrameParams p, const uint last_pair, global co
                             global const uint4* restrict face_texcoords,
                             global const float4* restrict texcoords, global const Texture* restrict textures,
                             global const float4* restrict texels, global const Triangle* restrict triangles,
-                            global const float* restrict bary1, global const float* restrict bary2,
-                            global float* restrict red, global float* restrict green,
-                            global float* restrict blue) {
+                            global const ClippedFace* restrict clipped, global const float* restrict bary1,
+                            global const float* restrict bary2, global float* restrict red,
+                            global float* restrict green, global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
-  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const SurfaceScene scene =
+      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   for (uint i = first; i < last; ++i) {
     const float c1 = bary1[i], c2 = bary2[i];
@@ -69,7 +73,7 @@ static inline DetailGradient detail_backward(const TexturedFace f, const Detail 
   g.bary2 = (d.z[2] - d.z[0]) * by_depth - d.depth * along[2] * d.sum_q;
   for (int k = 0; k < 3; ++k) {
     g.q[k] = d.depth * (along[k] - mean);
-    g.z[k] = c[k] * by_depth - g.q[k] * d.q[k] / d.z[k];
+    g.z[k] = f.is_clipped ? c[k] * by_depth : c[k] * by_depth - g.q[k] * d.q[k] / d.z[k];
   }
   return g;
 }
@@ -87,14 +91,15 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
                              global const uint4* restrict face_texcoords,
                              global const float4* restrict texcoords, global const Texture* restrict textures,
                              global const float4* restrict texels, global const Triangle* restrict triangles,
-                             global const float* restrict bary1, global const float* restrict bary2,
-                             global const float* restrict grad_red, global const float* restrict grad_green,
-                             global const float* restrict grad_blue, global float* restrict grad_bary1,
-                             global float* restrict grad_bary2, global float* restrict grad_colors,
-                             global float* restrict grad_texcoords) {
+                             global const ClippedFace* restrict clipped, global const float* restrict bary1,
+                             global const float* restrict bary2, global const float* restrict grad_red,
+                             global const float* restrict grad_green, global const float* restrict grad_blue,
+                             global float* restrict grad_bary1, global float* restrict grad_bary2,
+                             global float* restrict grad_colors, global float* restrict grad_texcoords) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const SurfaceScene scene =
+      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   float3 color[3] = {0.0f, 0.0f, 0.0f};
   float2 place[3] = {0.0f, 0.0f, 0.0f};
@@ -131,29 +136,64 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
   }
 }
 
+/// From there to the corners of a whole triangle on the screen.
+static inline void add_to_corners(const FrameParams p, const Triangle t, const Detail d,
+                                  const DetailGradient g, float3 corner[3]) {
+  const float inverse_area = 1.0f / doubled_area(t);
+  float steps[2][3];
+  screen_steps(t, 0, steps[0]);
+  screen_steps(t, 1, steps[1]);
+  float of_step[3], of_area = 0.0f;
+  for (int k = 0; k < 3; ++k) {
+    of_step[k] = g.q[k] * inverse_area / d.z[k];
+    of_area -= g.q[k] * d.q[k] * inverse_area;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const float turned = of_step[(k + 2) % 3] - of_step[(k + 1) % 3];
+    // The doubled area changes with x and y as the steps along y and x say, exchanged.
+    corner[k].x += of_area * steps[0][k] - (d.along_y ? turned : 0.0f);
+    corner[k].y += of_area * steps[1][k] + (d.along_y ? 0.0f : turned);
+    if (p.perspective_correct) corner[k].z += g.z[k];
+  }
+}
+
+/// To the homogeneous corners of a clipped face.
+static inline void add_to_clipped_corners(const ClippedFace c, const Detail d, const DetailGradient g,
+                                          float3 corner[3]) {
+  const float inverse = 1.0f / determinant(c);
+  float of_determinant = 0.0f;
+  for (int k = 0; k < 3; ++k) of_determinant -= g.q[k] * d.q[k] * inverse;
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const float of_step = g.q[k] * inverse;
+    const float3 of_cofactor = d.along_y ? (float3)(0.0f, of_step, 0.0f) : (float3)(of_step, 0.0f, 0.0f);
+    corner[k] += of_determinant * cofactor(c, k) + (float3)(0.0f, 0.0f, g.z[k]);
+    corner[i] += cross(c.corner[j].xyz, of_cofactor);
+    corner[j] += cross(of_cofactor, c.corner[i].xyz);
+  }
+}
+
 /// From the levels of detail to the corners on the screen: what a triangle that turns or goes away does to
 /// the texture's sharpness. One work-item per pair, up to `last_pair`. Deterministic. Inputs as
 /// surface_backward, and
 /// in out  grad_corners  float[pair][9]  x, y (NDC) and view depth of the corners
+/// in out  grad_clip     float[pair][9]  of the homogeneous corners of clipped faces, if p.clips is set
 kernel void surface_detail_backward(
     const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
     global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
     global const float4* restrict colors, global const uint4* restrict face_texcoords,
     global const float4* restrict texcoords, global const Texture* restrict textures,
     global const float4* restrict texels, global const Triangle* restrict triangles,
-    global const float* restrict bary1, global const float* restrict bary2,
-    global const float* restrict grad_red, global const float* restrict grad_green,
-    global const float* restrict grad_blue, global float* restrict grad_corners) {
+    global const ClippedFace* restrict clipped, global const float* restrict bary1,
+    global const float* restrict bary2, global const float* restrict grad_red,
+    global const float* restrict grad_green, global const float* restrict grad_blue,
+    global float* restrict grad_corners, global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const SurfaceScene scene =
+      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   if (!face.is_textured || face.texture.levels == 1) return;
-  const Triangle t = face.triangle;
-  const float inverse_area = 1.0f / doubled_area(t);
-  float steps[2][3];
-  screen_steps(t, 0, steps[0]);
-  screen_steps(t, 1, steps[1]);
   float3 corner[3] = {0.0f, 0.0f, 0.0f};
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
     const float c1 = bary1[i], c2 = bary2[i];
@@ -164,21 +204,15 @@ kernel void surface_detail_backward(
         (float3)(grad_red[i], grad_green[i], grad_blue[i]) * base_of_corners(face, c1, c2).xyz;
     const DetailGradient g =
         detail_backward(face, detail, c1, c2, dot(grad_sample, sample.by_detail.xyz) * detail.by_step);
-    float of_step[3], of_area = 0.0f;
-    for (int k = 0; k < 3; ++k) {
-      of_step[k] = g.q[k] * inverse_area / detail.z[k];
-      of_area -= g.q[k] * detail.q[k] * inverse_area;
-    }
-    for (int k = 0; k < 3; ++k) {
-      const float turned = of_step[(k + 2) % 3] - of_step[(k + 1) % 3];
-      // The doubled area changes with x and y as the steps along y and x say, exchanged.
-      corner[k].x += of_area * steps[0][k] - (detail.along_y ? turned : 0.0f);
-      corner[k].y += of_area * steps[1][k] + (detail.along_y ? 0.0f : turned);
-      if (p.perspective_correct) corner[k].z += g.z[k];
+    if (face.is_clipped) {
+      add_to_clipped_corners(face.clipped, detail, g, corner);
+    } else {
+      add_to_corners(p, face.triangle, detail, g, corner);
     }
   }
+  global float* grad = face.is_clipped ? grad_clip : grad_corners;
   for (int k = 0; k < 3; ++k) {
-    global float* place = grad_corners + 9 * pair + 3 * k;
+    global float* place = grad + 9 * pair + 3 * k;
     vstore3(vload3(0, place) + corner[k], 0, place);
   }
 }
@@ -197,14 +231,15 @@ kernel void surface_list(const FrameParams p, const uint last_pair, const uint n
                          global const uint4* restrict face_colors, global const float4* restrict colors,
                          global const uint4* restrict face_texcoords, global const float4* restrict texcoords,
                          global const Texture* restrict textures, global const Triangle* restrict triangles,
-                         global const float* restrict bary1, global const float* restrict bary2,
-                         global const float* restrict grad_red, global const float* restrict grad_green,
-                         global const float* restrict grad_blue, global uint* restrict cells,
-                         global uint* restrict numbers, global float2* restrict parts,
-                         global float4* restrict grad_seen) {
+                         global const ClippedFace* restrict clipped, global const float* restrict bary1,
+                         global const float* restrict bary2, global const float* restrict grad_red,
+                         global const float* restrict grad_green, global const float* restrict grad_blue,
+                         global uint* restrict cells, global uint* restrict numbers,
+                         global float2* restrict parts, global float4* restrict grad_seen) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const SurfaceScene scene = make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles);
+  const SurfaceScene scene =
+      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
     const float c1 = bary1[i], c2 = bary2[i];

@@ -4,6 +4,7 @@
 #ifndef DPR_TEXTURE_H
 #define DPR_TEXTURE_H
 
+#include "clip.h"
 #include "geometry.h"
 #include "pyramid.h"
 
@@ -15,7 +16,8 @@ typedef struct {
       face_texcoords;              // [face] indices into texcoords, by corner; w = texture or DPR_NO_TEXTURE
   global const float4* texcoords;  // u, v
   global const Texture* textures;
-  global const Triangle* triangles;  // [view][face]
+  global const Triangle* triangles;   // [view][face]
+  global const ClippedFace* clipped;  // [view][face]; read where p.clips is set
 } SurfaceScene;
 
 /// A triangle's corners: colours, and places in its texture. Places are in units of the whole texture, from
@@ -26,6 +28,8 @@ typedef struct {
   Texture texture;
   int is_textured;
   Triangle triangle;
+  int is_clipped;
+  ClippedFace clipped;
 } TexturedFace;
 
 static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0f - texcoord.y); }
@@ -40,6 +44,8 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   f.is_textured = corner.w != DPR_NO_TEXTURE;
   f.texture = s.textures[f.is_textured ? corner.w : 0];
   f.triangle = s.triangles[view_face];
+  f.is_clipped = p.clips && s.clipped[view_face].corners != 0;
+  if (f.is_clipped) f.clipped = s.clipped[view_face];
   f.place = place_of(s.texcoords[corner.x]);
   f.place1 = place_of(s.texcoords[corner.y]) - f.place;
   f.place2 = place_of(s.texcoords[corner.z]) - f.place;
@@ -141,15 +147,32 @@ static inline void screen_steps(const Triangle t, int along_y, float step[3]) {
   step[2] = along_y ? t.x1 - t.x0 : t.y0 - t.y1;
 }
 
-/// The step of the place along an axis of the image, NDC; fills what it is made of.
+/// The determinant of a clipped face's homogeneous corners, and its derivative by one of them. A barycentric
+/// times 1 / depth is one of these over the determinant, times the sample: q_k is a component of that.
+static inline float3 cofactor(const ClippedFace c, int k) {
+  return cross(c.corner[(k + 1) % 3].xyz, c.corner[(k + 2) % 3].xyz);
+}
+static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyz, cofactor(c, 0)); }
+
+/// The step of the place along an axis of the image, NDC; fills what it is made of. Of clipped faces in
+/// perspective, always: without it the plane has no steps where it passes the camera.
 static inline float2 place_step(const FrameParams p, const TexturedFace f, float c1, float c2, int along_y,
                                 Detail* d) {
-  const float depths[3] = {f.triangle.z0, f.triangle.z1, f.triangle.z2};
-  const float inverse_area = 1.0f / doubled_area(f.triangle);
-  screen_steps(f.triangle, along_y, d->q);
-  for (int k = 0; k < 3; ++k) {
-    d->z[k] = p.perspective_correct ? depths[k] : 1.0f;
-    d->q[k] *= inverse_area / d->z[k];
+  if (f.is_clipped) {
+    const float inverse = 1.0f / determinant(f.clipped);
+    for (int k = 0; k < 3; ++k) {
+      const float3 step = cofactor(f.clipped, k);
+      d->z[k] = f.clipped.corner[k].z;
+      d->q[k] = (along_y ? step.y : step.x) * inverse;
+    }
+  } else {
+    const float depths[3] = {f.triangle.z0, f.triangle.z1, f.triangle.z2};
+    const float inverse_area = 1.0f / doubled_area(f.triangle);
+    screen_steps(f.triangle, along_y, d->q);
+    for (int k = 0; k < 3; ++k) {
+      d->z[k] = p.perspective_correct ? depths[k] : 1.0f;
+      d->q[k] *= inverse_area / d->z[k];
+    }
   }
   d->along_y = along_y;
   d->sum_q = d->q[0] + d->q[1] + d->q[2];

@@ -1,14 +1,6 @@
 // Vertices: object space -> world -> camera -> NDC and view depth; and back.
+#include "affine.h"
 #include "shared_types.h"
-
-static inline float3 apply_affine(float4 row0, float4 row1, float4 row2, float3 v) {
-  return (float3)(dot(row0.xyz, v) + row0.w, dot(row1.xyz, v) + row1.w, dot(row2.xyz, v) + row2.w);
-}
-
-/// The transpose of the linear part: how gradients travel back through an affine map.
-static inline float3 apply_transposed(float4 row0, float4 row1, float4 row2, float3 g) {
-  return row0.xyz * g.x + row1.xyz * g.y + row2.xyz * g.z;
-}
 
 /// Projects vertices. One work-item per (view, vertex).
 /// in   views        ViewParams[view]
@@ -40,13 +32,16 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
 /// no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
 /// in      views, models, vertex_mesh, world  as transform_forward
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
+/// in      grad_clip   float4[view][vertex]  what clipped faces add, of homogeneous coordinates: x times depth,
+///                     y times depth, depth, with x and y in NDC. Read where p.clips is set
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
 /// out     channels    float[DPR_POSE_CHANNELS][view][vertex]
 kernel void transform_backward(const FrameParams p, const uint lit, global const ViewParams* restrict views,
                                global const float4* restrict models, global const uint* restrict vertex_mesh,
                                global const float4* restrict world, global const float4* restrict grad_ndc,
-                               global float4* restrict grad_world, global float* restrict channels) {
+                               global const float4* restrict grad_clip, global float4* restrict grad_world,
+                               global float* restrict channels) {
   const uint i = (uint)get_global_id(0);
   const uint count = p.views * p.vertices;
   if (i >= count) return;
@@ -57,12 +52,21 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   const float3 w = world[i].xyz;
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float3 g = grad_ndc[i].xyz;
-  const int used = any(g != 0.0f);
+  int used = any(g != 0.0f);
   const float inverse_depth = used ? -1.0f / c.z : 0.0f;
   const float2 tangent = used ? c.xy * inverse_depth : (float2)(0.0f);
   const float2 g_tangent = g.xy * camera->projection.xy;
   const float g_depth = g.z - dot(g_tangent, tangent) * inverse_depth;
-  const float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
+  float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
+  float2 g_scale = g.xy * tangent, g_offset = g.xy;
+  if (p.clips && any(grad_clip[i].xyz != 0.0f)) {
+    const float3 h = grad_clip[i].xyz;
+    const float4 projection = camera->projection;
+    used = 1;
+    g_camera += (float3)(h.xy * projection.xy, -h.z - dot(h.xy, projection.zw));
+    g_scale += h.xy * c.xy;
+    g_offset -= h.xy * c.z;
+  }
   float3 g_world = apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera);
   if (lit) g_world += grad_world[i].xyz;
   grad_world[i] = (float4)(g_world, 0.0f);
@@ -71,12 +75,10 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   const float3 turned_in_camera = c - (float3)(camera->row[0].w, camera->row[1].w, camera->row[2].w);
   const float3 model_rotation = any(g_world != 0.0f) ? cross(turned_in_world, g_world) : (float3)(0.0f);
   const float3 view_rotation = used ? cross(turned_in_camera, g_camera) : (float3)(0.0f);
-  const float values[DPR_POSE_CHANNELS] = {model_rotation.x, model_rotation.y, model_rotation.z,
-                                           g_world.x,        g_world.y,        g_world.z,
-                                           view_rotation.x,  view_rotation.y,  view_rotation.z,
-                                           g_camera.x,       g_camera.y,       g_camera.z,
-                                           g.x * tangent.x,  g.y * tangent.y,  g.x,
-                                           g.y};
+  const float values[DPR_POSE_CHANNELS] = {
+      model_rotation.x, model_rotation.y, model_rotation.z, g_world.x,  g_world.y,  g_world.z,
+      view_rotation.x,  view_rotation.y,  view_rotation.z,  g_camera.x, g_camera.y, g_camera.z,
+      g_scale.x,        g_scale.y,        g_offset.x,       g_offset.y};
   for (int k = 0; k < DPR_POSE_CHANNELS; ++k) channels[(uint)k * count + i] = values[k];
 }
 

@@ -141,6 +141,8 @@ DPR_API dpr_status dpr_scene_read(const char* file, dpr_scene** scene);
 DPR_API dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh);
 DPR_API dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera);
 DPR_API dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]);
+/* Leaves out faces that wind clockwise in the image, "back", or the others, "front". "none" unless called. */
+DPR_API dpr_status dpr_scene_set_cull(dpr_scene* scene, const char* word);
 /* NULL: no lights, colours as they are. */
 DPR_API dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights);
 /* Sets a member of "smoothing" in the scene format that is a word: "preset", "occupancy_prior", "estimator",

@@ -71,8 +71,8 @@ struct SceneGradient {
 struct RenderStatistics {
   std::size_t faces = 0;  ///< triangles times views
   std::size_t faces_dropped =
-      0;                  ///< of those: nearer than znear, beyond zfar, without area, or outside the image
-  std::size_t pairs = 0;  ///< (8x8 tile, triangle) pairs
+      0;  ///< of those: nearer than znear, beyond zfar, culled, without area, outside the image
+  std::size_t pairs = 0;         ///< (8x8 tile, triangle) pairs
   std::size_t fragments = 0;     ///< (pixel, triangle) pairs within the blur radius
   std::size_t bands = 0;         ///< that the device's memory budget made of the frame
   std::size_t device_bytes = 0;  ///< held by this renderer
@@ -111,6 +111,8 @@ class Renderer {
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);
+  /// Other faces to leave out.
+  void set_cull(Cull cull);
   /// A new background colour, linear RGB.
   void set_background(const glm::vec3& background);
   /// Replaces what the next backward() computes.

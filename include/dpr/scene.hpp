@@ -21,6 +21,10 @@ struct Instance {
   glm::mat4 transform{1.0F};  ///< object to world; affine, may hold a scale
 };
 
+/// Which faces are left out: none; those that wind clockwise in the image, as the outside of a mesh does seen
+/// from within; or the others. A mirroring transform turns the winding.
+enum class Cull { none, back, front };
+
 /// Which gradients the backward pass computes. Nothing is computed that is not asked for.
 struct GradientRequest {
   bool positions = true;   ///< vertex positions, object space
@@ -42,6 +46,7 @@ struct Scene {
   std::optional<Lights> lights;  ///< none: colours as they are
   Smoothing smoothing;
   bool perspective_correct = true;
+  Cull cull = Cull::none;
   GradientRequest gradients;
 };
 

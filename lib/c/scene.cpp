@@ -3,6 +3,7 @@
 
 #include "base/checks.hpp"
 #include "c/handles.hpp"
+#include "scene/cull.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
@@ -187,6 +188,10 @@ dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]) {
     dpr::checks::require_finite(background, "color");
     scene->scene.background = background;
   });
+}
+
+dpr_status dpr_scene_set_cull(dpr_scene* scene, const char* word) {
+  return guarded([&] { deref(scene, "scene").scene.cull = dpr::parse_cull(&deref(word, "word"), "word"); });
 }
 
 dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights) {

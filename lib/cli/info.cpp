@@ -90,21 +90,24 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
           {"notes", mesh_notes(mesh, facts)}};
 }
 
-/// Triangles that the camera's clipping planes drop.
+/// Triangles that the camera's clipping planes drop or clip.
 void add_clipping_notes(const Scene& scene, const Instance& instance, Json& notes) {
   std::vector<float> depths;
   for (const glm::vec3& p : instance.mesh.positions)
     depths.push_back(-(scene.camera.view * instance.transform * glm::vec4(p, 1)).z);
-  std::size_t near = 0, far = 0;
+  std::size_t near = 0, crossing = 0, far = 0;
   for (const glm::uvec3& face : instance.mesh.faces) {
     const auto [low, high] = std::minmax({depths[face.x], depths[face.y], depths[face.z]});
-    if (low < scene.camera.znear) {
+    if (high < scene.camera.znear) {
       ++near;
+    } else if (low < scene.camera.znear) {
+      ++crossing;
     } else if (low > scene.camera.zfar) {
       ++far;
     }
   }
   if (near > 0) notes.push_back(counted(near, "triangle") + " nearer than znear: dropped when rendered");
+  if (crossing > 0) notes.push_back(counted(crossing, "triangle") + " clipped at znear");
   if (far > 0) notes.push_back(counted(far, "triangle") + " beyond zfar: dropped when rendered");
 }
 

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
@@ -11,6 +13,7 @@
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
+#include "scene/cull.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -19,6 +22,7 @@ struct RenderOptions {
   std::string mesh, scene, output;
   std::vector<std::string> aovs;
   bool rigid = false;
+  std::optional<std::string> cull;
   float elevation = 25, azimuth = 35;  // degrees: three sides of a box are in sight
 };
 
@@ -97,7 +101,8 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
 
 void run(const RenderOptions& options, CommonOptions& common) {
   if (options.rigid) common.smoothing.preset = "rigid";
-  const Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  if (options.cull) scene.cull = parse_cull(*options.cull, "--cull");
   const AovFiles aovs(options.aovs, options.output, scene);
   Renderer renderer(open_device(common));
   renderer.set_scene(scene);
@@ -116,8 +121,9 @@ void run(const RenderOptions& options, CommonOptions& common) {
     std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,
                 statistics.faces);
     if (statistics.faces_dropped > 0) {
-      std::printf(", %zu of them dropped: outside the image, nearer than znear, beyond zfar or without area",
-                  statistics.faces_dropped);
+      std::printf(
+          ", %zu of them dropped: outside the image, nearer than znear, beyond zfar, culled or without area",
+          statistics.faces_dropped);
     }
     std::printf("\n");
   }
@@ -146,6 +152,10 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->type_name("OUT.png");
   command->add_flag("--rigid", options->rigid,
                     "The nearest triangle wins, without any smoothing: --preset rigid");
+  command
+      ->add_option("--cull", options->cull,
+                   "Leaves out faces that wind clockwise in the image (back), the others (front), or none")
+      ->type_name("none|back|front");
   command
       ->add_option("--elevation", options->elevation,
                    "Of the camera fitted to MESH, in degrees above the horizon")

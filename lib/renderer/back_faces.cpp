@@ -1,10 +1,5 @@
 #include "renderer/back_faces.hpp"
 
-#include <algorithm>
-#include <limits>
-
-#include "mesh/bounding_box.hpp"
-
 namespace dpr {
 
 BackFaces::BackFaces(std::vector<Solid> solids, bool are_placed) : states_(solids.size()) {
@@ -24,32 +19,20 @@ void BackFaces::measure(State& state, const Mesh& mesh) {
   const bool is_closed =
       state.solid.is_closed() && (state.solid.is_closed_by_indices() || !state.may_have_parted);
   state.winding = is_closed ? state.solid.winding(mesh.positions, mesh.faces) : 0;
-  if (state.winding == 0) return;
-  const Bounds box = bounding_box(mesh.positions);
-  state.corners.clear();
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    state.corners.emplace_back((corner & 1U) != 0 ? box.high.x : box.low.x,
-                               (corner & 2U) != 0 ? box.high.y : box.low.y,
-                               (corner & 4U) != 0 ? box.high.z : box.low.z);
-  }
+  if (state.winding != 0) state.box = box_corners(mesh.positions);
 }
 
 float BackFaces::hidden_of(const State& state, const Camera& camera, const glm::mat4& model,
                            float depth_reach) {
-  constexpr double k_rounding = 1e-5, k_least_thickness = 10;  // of the depth; of the noise's reach
+  constexpr double k_least_thickness = 10;  // of the noise's reach
   if (state.winding == 0) return 0;
-  const glm::dmat4 to_view = glm::dmat4(camera.view) * glm::dmat4(model);
-  double nearest = std::numeric_limits<double>::infinity(), furthest = -nearest;
-  for (const glm::dvec3& corner : state.corners) {
-    const double depth = -(to_view * glm::dvec4(corner, 1)).z;
-    nearest = std::min(nearest, depth);
-    furthest = std::max(furthest, depth);
-  }
-  const double thickness =
-      (furthest - nearest) / (static_cast<double>(camera.zfar) - static_cast<double>(camera.znear));
-  const bool is_in_front = nearest > static_cast<double>(camera.znear) + k_rounding * furthest;
-  if (!is_in_front || !(thickness > k_least_thickness * static_cast<double>(depth_reach))) return 0;
-  const double determinant = glm::determinant(glm::dmat3(to_view));
+  const DepthRange range = depth_range(state.box, camera, model);
+  const double thickness = (range.furthest - range.nearest) /
+                           (static_cast<double>(camera.zfar) - static_cast<double>(camera.znear));
+  if (!is_beyond_near_plane(range, camera) ||
+      !(thickness > k_least_thickness * static_cast<double>(depth_reach)))
+    return 0;
+  const double determinant = glm::determinant(glm::dmat3(glm::dmat4(camera.view) * glm::dmat4(model)));
   if (determinant == 0) return 0;
   return determinant * state.winding > 0 ? -1.0F : 1.0F;
 }

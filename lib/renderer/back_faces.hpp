@@ -6,6 +6,7 @@
 
 #include "dpr/renderer.hpp"
 #include "mesh/solid.hpp"
+#include "renderer/depth_range.hpp"
 
 namespace dpr {
 
@@ -29,7 +30,7 @@ class BackFaces {
     Solid solid;
     bool may_have_parted = false, is_measured = false;
     int winding = 0;
-    std::vector<glm::dvec3> corners;  // of its box, object space
+    BoxCorners box{};  // object space
   };
   static void measure(State& state, const Mesh& mesh);
   static float hidden_of(const State& state, const Camera& camera, const glm::mat4& model, float depth_reach);

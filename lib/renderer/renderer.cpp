@@ -32,6 +32,7 @@ Renderer::Impl::Impl(Device device_)
     : OnDevice{std::move(device_)},
       transform(device.impl()),
       setup(device.impl()),
+      clip(device.impl()),
       bin(device.impl()),
       rasterize(device.impl()),
       shade(device.impl()),
@@ -57,7 +58,7 @@ void Renderer::Impl::forward() {
   transform.forward(frame, device_views, *geometry);
   find_edges();
   hide_back_faces();
-  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
+  set_up();
   capacity.reset();
   capacity = expected_capacity();
   if (capacity) {
@@ -84,7 +85,7 @@ void Renderer::Impl::find_edges() {
 /// Of views with shapes of their own none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
-  const bool may_hide = pixel_noise && frame.position_stride == 0;
+  const bool may_hide = pixel_noise && frame.position_stride == 0 && scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
     return;
@@ -94,6 +95,13 @@ void Renderer::Impl::hide_back_faces() {
   uploaded_hidden_.clear();
   hidden_.upload(device.impl(), hidden);
   uploaded_hidden_ = std::move(hidden);
+}
+
+void Renderer::Impl::set_up() {
+  frame.clips = near_plane.may_be_crossed(scene, views) ? 1 : 0;
+  rasterize.clip = frame.clips != 0 ? &clip : nullptr;
+  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
+  if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
 }
 
 std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
@@ -115,9 +123,13 @@ std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
 }
 
 ContourInputs Renderer::Impl::contour_inputs() const {
-  return {frame,     device_views,
-          *geometry, *pixel_noise->edges,
-          transform, scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
+  return {frame,
+          device_views,
+          *geometry,
+          *pixel_noise->edges,
+          transform,
+          clip.faces,
+          scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
 }
 
 Blur::Size Renderer::Impl::image_size() const {
@@ -212,10 +224,13 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
   if (is_geometric(wanted)) {
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
                     grad_ndc);
+    if (frame.clips != 0) {
+      gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, clip.grad_corners, clip.grad);
+    }
     if (pixel_noise)
-      pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc);
+      pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc, clip.grad);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
-    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, grad_world);
+    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, clip.grad, grad_world);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
   SceneGradient gradient;
@@ -253,7 +268,7 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
                        aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
     if (textured) {
       shade.surface->backward_detail(shade_inputs().surface(), shade.grad_base(aggregate.grad_color),
-                                     rasterize.grad_corners);
+                                     rasterize.grad_corners, clip.grad_corners);
     }
   }
   if (wanted.lights && shade.lit()) {
@@ -264,7 +279,7 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
 }
 
 std::size_t Renderer::Impl::bytes() const {
-  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + bin.bytes() +
+  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
          (texels ? texels->bytes() : 0) + reduce.bytes() + (aov ? aov->bytes() : 0) +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +

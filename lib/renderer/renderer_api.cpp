@@ -78,6 +78,11 @@ void Renderer::set_lights(const std::optional<Lights>& lights) {
   impl_->set_lights(lights);
 }
 
+void Renderer::set_cull(Cull cull) {
+  impl_->require_scene("Renderer::set_cull");
+  impl_->set_cull(cull);
+}
+
 void Renderer::set_background(const glm::vec3& background) {
   impl_->require_scene("Renderer::set_background");
   checks::require_finite(background, "background");

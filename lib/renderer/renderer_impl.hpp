@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
+#include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
+#include "stages/clip.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
 #include "stages/occupancy.hpp"
@@ -62,6 +64,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views, std::size_t first_view);
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
+  void set_cull(Cull cull) noexcept;
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
@@ -101,6 +104,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   Transform transform;
   Setup setup;
+  NearPlane near_plane;
+  Clip clip;  // of frames with faces that may cross the near plane
   Bin bin;
   Rasterize rasterize;
   Shade shade;
@@ -126,7 +131,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
 
   ShadeInputs shade_inputs() const {
-    return {frame, device_views, *geometry, transform, setup.triangles, bin, rasterize};
+    return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};
   }
   ContourInputs contour_inputs() const;
   Blur::Size image_size() const;
@@ -135,6 +140,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void build_pyramids();
   void find_edges();
   void hide_back_faces();
+  void set_up();
   std::vector<glm::vec3> shape_of_first_view() const;
   std::optional<FrameCounts> expected_capacity() const;
   void forward_within(const FrameCounts& expected);

@@ -11,7 +11,8 @@ namespace dpr {
 namespace {
 
 // Without these the second half of a setter could fail.
-static_assert(std::is_nothrow_swappable_v<Scene> && std::is_nothrow_swappable_v<ViewSet>);
+static_assert(std::is_nothrow_swappable_v<Scene> && std::is_nothrow_swappable_v<ViewSet> &&
+              std::is_nothrow_swappable_v<NearPlane>);
 static_assert(std::is_nothrow_move_constructible_v<Geometry> && std::is_nothrow_move_assignable_v<Geometry>);
 
 /// A row of an affine matrix: linear part and translation.
@@ -57,6 +58,12 @@ void set_raster(shared::FrameParams& p, const Scene& scene, const Raster& raster
   p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height) * raster.supersampling);
 }
 
+/// Of faces that are left out; 0: none are. Front faces wind counter-clockwise.
+float culled_orientation(Cull cull) noexcept {
+  if (cull == Cull::none) return 0;
+  return cull == Cull::front ? 1.0F : -1.0F;
+}
+
 shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
                                  std::size_t first_view, const Raster& raster) {
   shared::FrameParams p{};
@@ -70,6 +77,7 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.blur_distance = blur_distance(scene.smoothing);
   p.perspective_correct = scene.perspective_correct ? 1 : 0;
   p.sharp = is_sharp(scene.smoothing) ? 1 : 0;
+  p.culled = culled_orientation(scene.cull);
   return p;
 }
 
@@ -119,6 +127,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   check_frame_size(wanted, 1, 0);
   Scene new_scene = wanted;
   Geometry new_geometry(device.impl(), wanted);
+  NearPlane new_near_plane(wanted.meshes.size());
   if (is_textured(wanted)) {
     shade.make_surface();
     if (!texels) texels.emplace(device.impl());
@@ -132,6 +141,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   shade.set(std::move(lighting));
   set(spare_views_);
   set(std::move(smoothing));
+  std::swap(near_plane, new_near_plane);
   last_counts.reset();
   if (pixel_noise) {
     pixel_noise->edges.reset();
@@ -171,6 +181,7 @@ void Renderer::Impl::set(ViewSet& prepared) noexcept {
     if (pixel_noise) pixel_noise->last_contours.reset();
   }
   std::swap(static_cast<ViewSet&>(*this), prepared);
+  near_plane.set_boxes_of_views({});
   rendered = false;
 }
 
@@ -217,9 +228,11 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   spare_view_colors_.resize(device.impl(), colors.size());
   write_range(device.impl(), spare_view_positions_, 0, positions);
   write_range(device.impl(), spare_view_colors_, 0, colors);
+  std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, geometry->meshes);
 
   std::swap(geometry->view_positions, spare_view_positions_);
   std::swap(geometry->view_colors, spare_view_colors_);
+  near_plane.set_boxes_of_views(std::move(boxes));
   frame.position_stride = positions.empty() ? 0 : frame.vertices;
   frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
   rendered = false;
@@ -232,9 +245,16 @@ void Renderer::Impl::set_lights(const std::optional<Lights>& lights) {
   rendered = false;
 }
 
+void Renderer::Impl::set_cull(Cull cull) noexcept {
+  scene.cull = cull;
+  frame.culled = culled_orientation(cull);
+  rendered = false;
+}
+
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
   replace(geometry->positions, geometry->meshes[mesh].first_vertex, positions);
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
+  near_plane.move(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
   rendered = false;
 }

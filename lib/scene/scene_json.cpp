@@ -9,6 +9,7 @@
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
+#include "scene/cull.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
@@ -210,7 +211,7 @@ void read_option(const JsonNode& node, std::optional<Number>& option) {
 /// All but the smoothing.
 Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   node.require_keys({"width", "height", "camera", "background", "meshes", "lights", "smoothing",
-                     "perspective_correct", "gradients"});
+                     "perspective_correct", "cull", "gradients"});
   Scene scene;
   take_size(node, "width", scene.width);
   take_size(node, "height", scene.height);
@@ -220,6 +221,7 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Not
     scene.meshes.push_back(parse_instance(mesh, folder, notes));
   take(node, "lights", scene.lights, parse_lights);
   take(node, "perspective_correct", scene.perspective_correct, [](const JsonNode& n) { return n.boolean(); });
+  take(node, "cull", scene.cull, [](const JsonNode& n) { return parse_cull(n.string(), n.name()); });
   take(node, "gradients", scene.gradients, parse_gradients);
   return scene;
 }

@@ -9,7 +9,8 @@ std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views}
 
 shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
   shared::AntialiasParams a{};
-  a.edges = static_cast<cl_uint>(in.edges.count);
+  a.edges = static_cast<cl_uint>(edges_of_view(in));
+  a.mesh_edges = static_cast<cl_uint>(in.edges.count);
   a.depth_reach = depth_reach;
   return a;
 }
@@ -35,7 +36,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
   cross_(tiles_of(in.p), in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
-         in.geometry.face_vertices, contour.facing, in.transform.ndc, contour.tile_starts,
+         in.geometry.face_vertices, contour.facing, in.transform.ndc, in.clipped, contour.tile_starts,
          contour.pair_contour, front, winner, cut);
 }
 
@@ -54,8 +55,8 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
             grad_cut_, grad_raster);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
-                  contour.facing, in.transform.ndc, contour.pair_contour, contour.pair_tile, winner, cut,
-                  grad_cut_, grad_ends);
+                  in.geometry.face_vertices, contour.facing, in.transform.ndc, in.clipped,
+                  contour.pair_contour, contour.pair_tile, winner, cut, grad_cut_, grad_ends);
 }
 
 std::size_t Antialias::bytes() const {

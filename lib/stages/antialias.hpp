@@ -35,14 +35,16 @@ class Antialias {
   Device::Impl& device_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
-         In<cl_uint>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, Out<cl_uint>, Out<float>>
+         In<cl_uint>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
+         Out<cl_uint>, Out<float>>
       cross_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, Out<cl_float4>> forward_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
          Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<cl_float4>>
+  Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
+         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
+         Out<cl_float4>>
       cross_backward_;
   Buffer<float> grad_cut_;  // [2][view][height][width]
 };

@@ -100,16 +100,22 @@ Contour::Contour(Device::Impl& device)
       fill_(device, "contour.cl", "contour_fill"),
       link_(device, "bin.cl", "bin_link"),
       gather_(device, "contour.cl", "contour_gather"),
+      gather_cuts_(device, "contour.cl", "contour_gather_cuts"),
       scan_(device),
       sort_(device) {}
 
+std::size_t edges_of_view(const ContourInputs& in) {
+  return in.edges.count + (in.p.clips != 0 ? in.p.faces : 0);
+}
+
 namespace {
 
-std::size_t view_edges(const ContourInputs& in) { return std::size_t{in.p.views} * in.edges.count; }
+std::size_t view_edges(const ContourInputs& in) { return in.p.views * edges_of_view(in); }
 
 shared::ContourParams params(const ContourInputs& in) {
   shared::ContourParams c{};
-  c.edges = index(in.edges.count);
+  c.edges = index(edges_of_view(in));
+  c.mesh_edges = index(in.edges.count);
   c.shading = in.shading ? static_cast<cl_uint>(*in.shading) + DPR_FLAT : DPR_UNLIT;
   return c;
 }
@@ -154,10 +160,11 @@ void Contour::count(const ContourInputs& in) {
                           "fewer, so that they can be counted");
   }
   facing.resize(device_, faces);
-  facing_(faces, in.p, in.views.cameras, in.geometry.face_vertices, in.transform.ndc, facing);
+  facing_(faces, in.p, in.views.cameras, in.geometry.face_vertices, in.transform.ndc, in.clipped, facing);
   counts_.resize(device_, view_edges(in));
   count_(view_edges(in), in.p, params(in), in.edges.edges, facing, in.transform.ndc, in.transform.world,
-         in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p), counts_);
+         in.geometry.face_vertices, in.clipped, in.geometry.face_colors, in.geometry.colors_of(in.p),
+         counts_);
   scan_(view_edges(in), counts_, pair_starts_);
 }
 
@@ -167,17 +174,24 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
   fill_(view_edges(in), in.p, params(in), index(capacity), in.edges.edges, in.edges.end_starts, in.edges.ends,
-        facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.geometry.face_colors,
-        in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_, pair_tile, places_);
+        facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
+        in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_,
+        pair_tile, places_);
   sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
   link_(pairs, index(capacity), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
 }
 
-void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends,
-                     Buffer<cl_float4>& grad_ndc) {
-  gather_(std::size_t{in.p.views} * in.p.vertices, in.p, params(in), pair_starts_, edge_pairs_,
-          in.edges.end_starts, in.edges.ends, grad_ends, grad_ndc);
+void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
+                     Buffer<cl_float4>& grad_clip) {
+  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
+  gather_(vertices, in.p, params(in), pair_starts_, edge_pairs_, in.edges.end_starts, in.edges.ends,
+          grad_ends, grad_ndc);
+  if (in.p.clips == 0) return;
+  const Incidence& corners = in.geometry.vertex_corners;
+  gather_cuts_(vertices, in.p, params(in), in.edges.edges, in.geometry.face_vertices, in.transform.ndc,
+               in.clipped, corners.starts, corners.corners, pair_starts_, edge_pairs_, in.edges.end_starts,
+               in.edges.ends, grad_ends, grad_ndc, grad_clip);
 }
 
 std::size_t Contour::bytes() const {

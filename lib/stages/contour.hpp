@@ -35,8 +35,12 @@ struct ContourInputs {
   const Geometry& geometry;
   const Edges& edges;
   const Transform& transform;
-  std::optional<Shading> shading;  ///< of a lit scene
+  const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set
+  std::optional<Shading> shading;              ///< of a lit scene
 };
+
+/// The edges of a view: the scene's, then, where faces are clipped, the cut of every face.
+std::size_t edges_of_view(const ContourInputs& in);
 
 class Contour {
  public:
@@ -53,8 +57,10 @@ class Contour {
   void settle(std::size_t known_pairs);
   /// Room for so many and a few more, in the buffers that are there.
   std::size_t capacity_for(std::size_t count) const;
-  /// Adds the gradients of the pairs' ends to those of the vertices.
-  void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc);
+  /// Adds the gradients of the pairs' ends to those of the vertices; where faces are clipped, those of ends
+  /// on the near plane to `grad_clip`, as Transform::backward() has it.
+  void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
+              Buffer<cl_float4>& grad_clip);
 
   std::size_t pairs = 0;         ///< or the capacity, until the number is known
   Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
@@ -69,18 +75,24 @@ class Contour {
   void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>> facing_;
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<shared::ClippedFace>,
+         Out<cl_uint>>
+      facing_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
+         In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
       count_;
   Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_uint>,
-         Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
+         In<cl_uint>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>,
+         In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
          In<cl_float4>, Out<cl_float4>>
       gather_;
+  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint4>, In<cl_float4>,
+         In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
+         In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
+      gather_cuts_;
   Scan scan_;
   Sort sort_;
   PendingRead<cl_uint> total_;

@@ -66,6 +66,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   masks.resize(device_, length(pairs));
   counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
   cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
+  if (clip != nullptr) clip->cover(p, triangles, bin, masks, counts_);
   scan_(length(pairs), counts_, fragment_starts);
   count_(tiles_of(p) * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
@@ -182,6 +183,7 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
   const PairGroups groups(device_, next.pairs);
   forward_(groups.count, p, groups.pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,
            fragment_pair, fragment_pixel, distance, depth, bary1, bary2);
+  if (clip != nullptr) clip->fragments(p, triangles, bin, *this);
 }
 
 void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
@@ -233,6 +235,8 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
   backward_(range, p, range.last(), triangles, bin.pair_face, fragment_starts, fragment_pixel, distance,
             grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
+  if (clip != nullptr)
+    clip->backward(p, triangles, bin, *this, grad_distance, grad_depth, grad_bary1, grad_bary2);
 }
 
 std::size_t Rasterize::bytes() const {

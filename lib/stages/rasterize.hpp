@@ -7,6 +7,7 @@
 
 #include "device/kernel.hpp"
 #include "stages/bin.hpp"
+#include "stages/clip.hpp"
 #include "stages/scan.hpp"
 
 namespace dpr {
@@ -89,6 +90,7 @@ class Rasterize {
   static constexpr std::size_t k_fragment_bytes =
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
 
+  Clip* clip = nullptr;                         ///< of frames with faces that cross the near plane
   std::optional<Band> band;                     ///< whose fragments these are
   std::size_t fragments = 0;                    ///< of the band; or the capacity
   std::size_t frame_fragments = 0;              ///< of all bands

@@ -60,10 +60,11 @@ struct ShadeInputs {
   const Geometry& geometry;
   const Transform& transform;
   const Buffer<shared::Triangle>& triangles;
+  const Buffer<shared::ClippedFace>& clipped;  // where p.clips is set
   const Bin& bin;
   const Rasterize& rasterize;
 
-  SurfaceInputs surface() const { return {p, geometry, triangles, bin, rasterize}; }
+  SurfaceInputs surface() const { return {p, geometry, triangles, clipped, bin, rasterize}; }
 };
 
 class Shade {

@@ -27,7 +27,7 @@ void Surface::forward(const SurfaceInputs& in, ColorPlanes& base) {
   base.resize(device_, in.rasterize.fragment_length());
   forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors,
            in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values, t.textures, t.texel_values,
-           in.triangles, in.rasterize.bary1, in.rasterize.bary2, base.red, base.green, base.blue);
+           in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2, base.red, base.green, base.blue);
 }
 
 void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds,
@@ -38,20 +38,21 @@ void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bo
   grad_corner_texcoords.resize(device_, std::size_t{9} * in.bin.pairs);
   backward_(pairs, in.p, pairs.last(), adds ? 1 : 0, in.bin.pair_face, in.rasterize.fragment_starts,
             in.geometry.face_colors, in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
-            t.textures, t.texel_values, in.triangles, in.rasterize.bary1, in.rasterize.bary2, grad_base.red,
-            grad_base.green, grad_base.blue, grad_bary1, grad_bary2, grad_corner_colors,
+            t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
+            grad_base.red, grad_base.green, grad_base.blue, grad_bary1, grad_bary2, grad_corner_colors,
             grad_corner_texcoords);
 }
 
 void Surface::backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base,
-                              Buffer<float>& grad_corners) {
+                              Buffer<float>& grad_corners, Buffer<float>& grad_clip) {
   const Textures& t = in.geometry.textures;
   if (!t.has_pyramids()) return;
   const Range pairs = in.rasterize.pairs(in.bin);
   backward_detail_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
                    in.geometry.face_colors, in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
-                   t.textures, t.texel_values, in.triangles, in.rasterize.bary1, in.rasterize.bary2,
-                   grad_base.red, grad_base.green, grad_base.blue, grad_corners);
+                   t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1,
+                   in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, grad_corners,
+                   grad_clip);
 }
 
 void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
@@ -63,8 +64,8 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
   grad_seen.resize(device_, places);
   list_(pairs, in.p, pairs.last(), static_cast<cl_uint>(t.texels), static_cast<cl_uint>(levels),
         in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors, in.geometry.colors_of(in.p),
-        t.face_texcoords, t.texcoord_values, t.textures, in.triangles, in.rasterize.bary1, in.rasterize.bary2,
-        grad_base.red, grad_base.green, grad_base.blue, cells, numbers, parts, grad_seen);
+        t.face_texcoords, t.texcoord_values, t.textures, in.triangles, in.clipped, in.rasterize.bary1,
+        in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, cells, numbers, parts, grad_seen);
 }
 
 std::size_t Surface::bytes() const {

@@ -22,6 +22,7 @@ struct SurfaceInputs {
   const shared::FrameParams& p;
   const Geometry& geometry;
   const Buffer<shared::Triangle>& triangles;
+  const Buffer<shared::ClippedFace>& clipped;  // where p.clips is set
   const Bin& bin;
   const Rasterize& rasterize;
 };
@@ -37,8 +38,9 @@ class Surface {
   void backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds, Buffer<float>& grad_bary1,
                 Buffer<float>& grad_bary2, Buffer<float>& grad_corner_colors);
   /// Adds what goes by way of the levels of detail to the gradients of the corners on the screen, [pair][9]
-  /// as Rasterize has them.
-  void backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base, Buffer<float>& grad_corners);
+  /// as Rasterize has them, and of clipped faces as Clip has them.
+  void backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base, Buffer<float>& grad_corners,
+                       Buffer<float>& grad_clip);
   /// What the band's fragments ask of the texels, by fragment and level: for the stage that gathers it.
   void list(const SurfaceInputs& in, const ColorPlanes& grad_base);
 
@@ -56,21 +58,22 @@ class Surface {
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>, In<float>,
-         Out<float>, Out<float>, Out<float>>
+         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<shared::ClippedFace>,
+         In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       forward_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
-         In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>>
+         In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>,
+         In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
+         Out<float>, Out<float>, Out<float>>
       backward_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<float>, In<float>,
-         In<float>, In<float>, In<float>, Out<float>>
+         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<shared::ClippedFace>,
+         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>>
       backward_detail_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>,
-         In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<cl_uint>, Out<cl_uint>, Out<cl_float2>,
-         Out<cl_float4>>
+         In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>,
+         In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<cl_uint>,
+         Out<cl_uint>, Out<cl_float2>, Out<cl_float4>>
       list_;
 };
 

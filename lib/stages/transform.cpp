@@ -16,12 +16,13 @@ void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, 
 }
 
 void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                         bool lit, const Buffer<cl_float4>& grad_ndc, Buffer<cl_float4>& grad_world) {
+                         bool lit, const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
+                         Buffer<cl_float4>& grad_world) {
   const std::size_t count = std::size_t{p.views} * p.vertices;
   grad_world.resize(device_, count);
   channels.resize(device_, DPR_POSE_CHANNELS * count);
   backward_(count, p, lit ? 1 : 0, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc,
-            grad_world, channels);
+            grad_clip, grad_world, channels);
 }
 
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,

@@ -17,10 +17,12 @@ class Transform {
   explicit Transform(Device::Impl& device);
 
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
-  /// `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient. Fills
-  /// `channels`.
+  /// `grad_clip` is what clipped faces add where p.clips is set, [view][vertex] of x times depth, y times
+  /// depth and depth. `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient.
+  /// Fills `channels`.
   void backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry, bool lit,
-                const Buffer<cl_float4>& grad_ndc, Buffer<cl_float4>& grad_world);
+                const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
+                Buffer<cl_float4>& grad_world);
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                           const Buffer<cl_float4>& grad_world);
 
@@ -40,7 +42,7 @@ class Transform {
          Out<cl_float4>, Out<cl_float4>>
       forward_;
   Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>, In<cl_float4>,
-         In<cl_float4>, Out<cl_float4>, Out<float>>
+         In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
       backward_;
   Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> backward_positions_;
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/checks.hpp"
+#include "scene/cull.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 #include "torch/errors.hpp"
@@ -78,9 +79,16 @@ bool set_shading(Lights& lights, const std::string& name, const OptionValue& val
   return true;
 }
 
+Cull cull_value(const OptionValue& value) {
+  constexpr const char* k_where = "cull (dpr::Renderer)";
+  const auto* const word = std::get_if<std::string>(&value);
+  if (word == nullptr) throw InvalidArgument(k_where, "a number", "none, back or front");
+  return parse_cull(*word, k_where);
+}
+
 [[noreturn]] void fail_name(const std::string& name) {
   std::vector<std::string_view> names = option_keys();
-  names.insert(names.end(), {"znear", "zfar", "shading", "shininess"});
+  names.insert(names.end(), {"znear", "zfar", "shading", "shininess", "cull"});
   throw InvalidArgument("name (dpr::Renderer.set)", "\"" + name + "\"", one_of(names));
 }
 
@@ -110,10 +118,13 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     clipping.znear = znear_;
     clipping.zfar = zfar_;
     Lights lights = lights_;
+    Cull cull = cull_;
     if (set_clipping(clipping, name, given)) {
       validate(clipping);
     } else if (set_shading(lights, name, given)) {
       validate(lights);
+    } else if (name == "cull") {
+      cull = cull_value(given);
     } else if (!set_option(options, name, given, name + " (dpr::Renderer)")) {
       fail_name(name);
     }
@@ -122,6 +133,7 @@ void BatchRenderer::set(const std::string& name, const at::IValue& value) {
     znear_ = clipping.znear;
     zfar_ = clipping.zfar;
     lights_ = std::move(lights);
+    cull_ = cull;
   });
 }
 

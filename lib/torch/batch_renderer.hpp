@@ -57,6 +57,7 @@ class BatchRenderer : public torch::CustomClassHolder {
   Smoothing smoothing_;                 // what they come to
   float znear_ = 1.0F, zfar_ = 100.0F;
   Lights lights_;  // without their numbers
+  Cull cull_ = Cull::none;
   Device device_;
   Topology topology_;           // of the free renderers
   std::vector<Renderer> free_;  // each remembers its last frame only, so every graph in flight has its own

@@ -283,6 +283,7 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
   static void upload(const BatchRenderer& batch, Renderer& renderer, const Inputs& in, bool separate) {
     const std::int64_t count = in.views.size(0);
     renderer.set_smoothing(batch.smoothing_);
+    renderer.set_cull(batch.cull_);
     renderer.set_background(rows<glm::vec3>(in.background)[0]);
     renderer.set_views(make_views(in, batch.znear_, batch.zfar_));
     const bool own_shapes = count > 1 && (separate || in.vertices.size(0) > 1);

@@ -56,6 +56,7 @@ static dpr_scene* make_scene(void) {
   OK(dpr_scene_create(SIDE, SIDE, &scene));
   OK(dpr_scene_add_mesh(scene, &mesh));
   OK(dpr_scene_set_camera(scene, &camera));
+  OK(dpr_scene_set_cull(scene, "none"));
   OK(dpr_scene_set_smoothing_word(scene, "preset", "joint_gaussian"));
   OK(dpr_scene_set_smoothing_number(scene, "sigma", 0.01));
   OK(dpr_scene_set_gradients(scene, wanted, 2));
@@ -250,6 +251,8 @@ static void test_wrong_scenes(void) {
   REFUSED(dpr_scene_set_camera(scene, NULL), "camera");
   REFUSED(dpr_scene_set_background(scene, black), "color");
   REFUSED(dpr_scene_set_background(scene, NULL), "color");
+  REFUSED(dpr_scene_set_cull(scene, "both"), "none, back or front");
+  REFUSED(dpr_scene_set_cull(scene, NULL), "word");
   lights.point_count = 1;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point");
   lights.point = &light;

@@ -301,8 +301,11 @@ inline Delicate delicate_pixels(const reference::Scene& scene, double margin = 2
     const int column = static_cast<int>(i) % scene.width;
     const reference::Vec2d point = reference::pixel_center(column, row, {scene.width, scene.height});
     for (const std::size_t face : prepared.candidates[i]) {
-      find_delicate(reference::ndc_triangle(prepared, face), point, reach, margin, delicate.jump[i],
-                    delicate.kink[i]);
+      const std::vector<reference::Vec3d> corners = reference::visible_corners(prepared, face);
+      for (std::size_t k = 1; k + 1 < corners.size(); ++k) {
+        find_delicate({corners[0], corners[k], corners[k + 1]}, point, reach, margin, delicate.jump[i],
+                      delicate.kink[i]);
+      }
     }
   }
   return delicate;

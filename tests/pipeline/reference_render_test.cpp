@@ -283,6 +283,44 @@ TEST_SUITE("pipeline") {
     check_scenes(scenes);
   }
 
+  TEST_CASE("reference: faces that cross the near plane, from within, cut open, down to the horizon") {
+    const int size = reduced(24, 7);
+    std::vector<NamedScene> scenes{{"room", scene_within(make_cube(), size, size)},
+                                   {"cube cut open", scene_cut_open(make_cube(), size, size)},
+                                   {"floor", floor_scene(size, size)}};
+    scenes.emplace_back("sphere from within", scene_within(make_icosphere(1, 1.3F), size, size));
+    scenes.emplace_back("soup", scene_cut_open(random_soup(30, 3), size, size));
+    const std::size_t shapes = scenes.size();
+    for (std::size_t i = 0; i < shapes; ++i) {
+      scenes.emplace_back(scenes[i].first + ", joint",
+                          with_composition(scenes[i].second, Composition::joint));
+    }
+    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+      Scene& lit = scenes
+                       .emplace_back("shading " + std::to_string(static_cast<int>(shading)),
+                                     scene_cut_open(make_icosphere(1, 1.2F), size, size))
+                       .second;
+      lit.lights = two_lights(shading);
+      lit.gradients.lights = true;
+    }
+    Scene& euclidean = scenes.emplace_back("euclidean", scene_cut_open(make_cube(), size, size)).second;
+    euclidean.smoothing.distance = DistanceMetric::euclidean;
+    euclidean.smoothing.sigma = 0.03F;
+    Scene& affine = scenes.emplace_back("not perspective correct", floor_scene(size, size)).second;
+    affine.perspective_correct = false;
+    Scene& intrinsics = scenes.emplace_back("intrinsics", floor_scene(size, size)).second;
+    const auto side = static_cast<float>(size);
+    intrinsics.camera.intrinsics = {0.77F * side, 0.83F * side, 0.61F * side, 0.42F * side};
+    Scene& textured =
+        scenes
+            .emplace_back(
+                "texture",
+                textured_scene(make_cube(), random_texture(5, 3, Wrap::repeat, Filter::bilinear), size, size))
+            .second;
+    textured.camera = scene_cut_open(make_cube(), size, size).camera;
+    check_scenes(scenes);
+  }
+
   TEST_CASE("reference: losses and their gradients") {
     const int size = reduced(25, 7);
     const Device device = open_device();

@@ -55,6 +55,50 @@ inline Scene scene_of(Mesh mesh, int width, int height) {
 
 inline Scene cube_scene(int width, int height) { return scene_of(make_cube(), width, height); }
 
+/// From within: faces at the camera's sides reach behind it.
+inline Scene scene_within(Mesh mesh, int width, int height) {
+  Scene scene = scene_of(std::move(mesh), width, height);
+  scene.camera = orbit_camera(0.55F, 21.0F, 37.0F, {0.1F, -0.07F, 0.05F});
+  scene.camera.fov_y_degrees = 80.0F;
+  scene.camera.znear = 0.2F;
+  scene.camera.zfar = 8.0F;
+  return scene;
+}
+
+/// From outside, with the near plane through the mesh, so that the cut is in sight.
+inline Scene scene_cut_open(Mesh mesh, int width, int height) {
+  Scene scene = scene_of(std::move(mesh), width, height);
+  scene.camera = orbit_camera(2.2F, 24.0F, 37.0F, {0.03F, -0.02F, 0.01F});
+  scene.camera.fov_y_degrees = 80.0F;
+  scene.camera.znear = 1.4F;
+  scene.camera.zfar = 8.0F;
+  return scene;
+}
+
+/// A plane below the camera, from behind it to the horizon, of quads with a row of corners in the camera's
+/// plane.
+inline Scene floor_scene(int width, int height) {
+  Random random(19);
+  Mesh mesh;
+  for (const float z : {6.0F, 0.0F, -9.0F}) {
+    for (const float x : {-7.0F, 0.4F, 8.0F}) {
+      mesh.positions.emplace_back(x, -0.9F, z);
+      mesh.vertex_colors.push_back(random.vector(0.0F, 1.0F));
+    }
+  }
+  for (const unsigned corner : {0U, 1U, 3U, 4U}) {
+    mesh.faces.emplace_back(corner, corner + 1, corner + 4);
+    mesh.faces.emplace_back(corner, corner + 4, corner + 3);
+  }
+  Scene scene = scene_of(std::move(mesh), width, height);
+  scene.meshes[0].transform = glm::mat4(1.0F);
+  scene.camera = Camera{};
+  scene.camera.fov_y_degrees = 70.0F;
+  scene.camera.znear = 0.3F;
+  scene.camera.zfar = 20.0F;
+  return scene;
+}
+
 /// Random numbers in all four channels, for a derivative of the image or for a target.
 inline Image random_image(int width, int height, float low, float high, unsigned seed = 5) {
   Random random(seed);

@@ -59,6 +59,14 @@ Scene tilted_square(int size) {
   return scene;
 }
 
+/// In perspective and not; and with a part of it nearer than the near plane.
+std::vector<Scene> tilted_squares(int size) {
+  std::vector<Scene> scenes(3, tilted_square(size));
+  scenes[1].perspective_correct = false;
+  scenes[2].camera.znear = 5.2F;
+  return scenes;
+}
+
 /// A block of parameters of the reference's scene: moving along a random direction, and the derivative found.
 struct Direction {
   std::string name;
@@ -126,9 +134,7 @@ double error_along(const Scene& scene, const Direction& block, const Image& weig
 TEST_SUITE("pipeline") {
   TEST_CASE("trilinear: images are the reference's") {
     const int size = reduced(20, 7);
-    for (const bool is_perspective : {true, false}) {
-      Scene scene = tilted_square(size);
-      scene.perspective_correct = is_perspective;
+    for (Scene& scene : tilted_squares(size)) {
       const Image image = rendered(scene);
       const reference::Image expected = reference::render(to_reference(scene));
       scene.meshes[0].mesh.textures[0].filter = Filter::bilinear;
@@ -263,9 +269,7 @@ TEST_SUITE("pipeline") {
 TEST_SUITE("gradient") {
   TEST_CASE("trilinear: gradients are differences of the reference") {
     const int size = reduced(20, 7);
-    for (const bool is_perspective : {true, false}) {
-      Scene scene = tilted_square(size);
-      scene.perspective_correct = is_perspective;
+    for (const Scene& scene : tilted_squares(size)) {
       Renderer renderer(open_device());
       renderer.set_scene(scene);
       renderer.forward();

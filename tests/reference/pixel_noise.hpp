@@ -100,7 +100,7 @@ class PixelNoiseRenderer {
         scale_(pixel_noise_scale(scene.smoothing)),
         reach_(scale_ * pixel_noise_reach(scene.smoothing.occupancy_prior) + pixel_) {
     for (std::size_t face = 0; face < prepared_.shade.faces.size(); ++face) {
-      if (!is_discarded(ndc_triangle(prepared_, face), prepared_.rasterize)) faces_.push_back(face);
+      if (!visible_corners(prepared_, face).empty()) faces_.push_back(face);
     }
   }
 
@@ -141,10 +141,10 @@ class PixelNoiseRenderer {
     std::vector<double> corners, result;
     std::vector<Segment> edges;
     for (const std::size_t face : faces_) {
-      const NdcTriangle t = ndc_triangle(prepared_, face);
-      for (std::size_t i = 0; i < 3; ++i) {
+      const std::vector<Vec3d> t = visible_corners(prepared_, face);
+      for (std::size_t i = 0; i < t.size(); ++i) {
         corners.push_back(t[i].y);
-        edges.push_back({screen(t[i]), screen(t[(i + 1) % 3])});
+        edges.push_back({screen(t[i]), screen(t[(i + 1) % t.size()])});
       }
     }
     if (corners.empty()) return result;
@@ -171,9 +171,9 @@ class PixelNoiseRenderer {
     std::vector<std::size_t> crossed;
     for (const std::size_t face : faces_) {
       const std::size_t before = ends.size();
-      const NdcTriangle t = ndc_triangle(prepared_, face);
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Vec2d a = screen(t[i]), b = screen(t[(i + 1) % 3]);
+      const std::vector<Vec3d> t = visible_corners(prepared_, face);
+      for (std::size_t i = 0; i < t.size(); ++i) {
+        const Vec2d a = screen(t[i]), b = screen(t[(i + 1) % t.size()]);
         if ((a.y > y) == (b.y > y)) continue;
         ends.push_back(
             std::clamp(a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x), left - reach_, right + reach_));
@@ -195,8 +195,7 @@ class PixelNoiseRenderer {
   std::vector<double> rigid_color(const Vec2d& point, const std::vector<std::size_t>& faces) const {
     std::vector<FragmentInput> inputs;
     for (const std::size_t face : faces) {
-      const auto fragment =
-          rasterize_forward(ndc_triangle(prepared_, face), face, point, prepared_.rasterize);
+      const auto fragment = face_fragment(prepared_, face, point);
       if (!fragment) continue;
       inputs.push_back({fragment->depth, 1.0, 0.0,
                         shade_forward(prepared_.shade, face, fragment->barycentric,

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "aggregate.hpp"
+#include "clip.hpp"
 #include "loss.hpp"
 #include "occupancy.hpp"
 #include "rasterize.hpp"
@@ -67,6 +68,39 @@ inline NdcTriangle ndc_triangle(const PreparedScene& prepared, std::size_t face)
   return triangle;
 }
 
+inline HomogeneousFace homogeneous_face(const PreparedScene& prepared, std::size_t face) {
+  HomogeneousFace corners;
+  for (std::size_t i = 0; i < 3; ++i)
+    corners[i] = prepared.vertices[prepared.shade.faces[face][i]].homogeneous;
+  return corners;
+}
+
+inline bool is_clipped(const PreparedScene& prepared, std::size_t face) {
+  return crosses_near_plane(homogeneous_face(prepared, face), prepared.rasterize.znear);
+}
+
+/// The corners of what is seen of a face, NDC and depth; none where it is discarded.
+inline std::vector<Vec3d> visible_corners(const PreparedScene& prepared, std::size_t face) {
+  std::vector<Vec3d> corners;
+  if (is_clipped(prepared, face)) {
+    const Outline outline = clip_face(homogeneous_face(prepared, face), prepared.rasterize.znear);
+    if (!(std::fabs(double_area(outline)) > 0.0)) return {};
+    for (const OutlineCorner& corner : outline) corners.push_back(corner.ndc);
+    return corners;
+  }
+  const NdcTriangle t = ndc_triangle(prepared, face);
+  if (!is_discarded(t, prepared.rasterize)) corners.assign(t.begin(), t.end());
+  return corners;
+}
+
+/// The fragment of a face at a point, if it has one. The face must not be discarded.
+inline std::optional<Fragment> face_fragment(const PreparedScene& prepared, std::size_t face,
+                                             const Vec2d& point) {
+  if (is_clipped(prepared, face))
+    return clipped_forward(homogeneous_face(prepared, face), face, point, prepared.rasterize);
+  return rasterize_forward(ndc_triangle(prepared, face), face, point, prepared.rasterize);
+}
+
 /// Lists for every pixel the faces whose bounding box, grown by the blur radius, contains the pixel's centre.
 inline std::vector<std::vector<std::size_t>> candidate_faces(const PreparedScene& prepared,
                                                              const ImageSize& size) {
@@ -75,10 +109,13 @@ inline std::vector<std::vector<std::size_t>> candidate_faces(const PreparedScene
   const RasterizeParameters& p = prepared.rasterize;
   const double reach = p.metric == DistanceMetric::squared ? std::sqrt(p.blur_radius) : p.blur_radius;
   for (std::size_t f = 0; f < prepared.shade.faces.size(); ++f) {
-    const NdcTriangle t = ndc_triangle(prepared, f);
-    if (is_discarded(t, p)) continue;
-    const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
-    const auto [bottom, top] = std::minmax({t[0].y, t[1].y, t[2].y});
+    const std::vector<Vec3d> corners = visible_corners(prepared, f);
+    if (corners.empty()) continue;
+    const auto by_x = [](const Vec3d& a, const Vec3d& b) { return a.x < b.x; };
+    const auto by_y = [](const Vec3d& a, const Vec3d& b) { return a.y < b.y; };
+    const auto [leftmost, rightmost] = std::minmax_element(corners.begin(), corners.end(), by_x);
+    const auto [lowest, highest] = std::minmax_element(corners.begin(), corners.end(), by_y);
+    const double left = leftmost->x, right = rightmost->x, bottom = lowest->y, top = highest->y;
     for (int row = 0; row < size.height; ++row) {
       const double y = pixel_center(0, row, size).y;
       if (y < bottom - reach || y > top + reach) continue;
@@ -166,7 +203,7 @@ inline std::vector<Fragment> pixel_fragments(const Scene& scene, const PreparedS
   const Vec2d point = pixel_center(column, row, {scene.width, scene.height});
   std::vector<Fragment> fragments;
   for (std::size_t face : prepared.candidates[static_cast<std::size_t>(row * scene.width + column)]) {
-    const auto fragment = rasterize_forward(ndc_triangle(prepared, face), face, point, prepared.rasterize);
+    const auto fragment = face_fragment(prepared, face, point);
     if (fragment) fragments.push_back(*fragment);
   }
   return fragments;
@@ -205,7 +242,8 @@ inline Image render(const Scene& scene) {
 
 /// What the pixels accumulate before the transform is differentiated.
 struct PixelSums {
-  std::vector<Vec3d> ndc;  ///< per vertex: x, y in NDC and depth
+  std::vector<Vec3d> ndc;          ///< per vertex: x, y in NDC and depth
+  std::vector<Vec3d> homogeneous;  ///< per vertex, from faces that cross the near plane
   ShadeGradient shade;
 };
 
@@ -248,10 +286,14 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
         shade_backward(prepared.shade, fragment.face, fragment.barycentric,
                        base_of_face(scene, prepared, fragment.face), input.color, sums.shade);
     add_color_gradient(scene, prepared, fragment.face, shade, grad);
-    const NdcTriangle corners =
-        rasterize_backward(ndc_triangle(prepared, fragment.face), point, prepared.rasterize,
-                           {occupancy.distance, input.depth, shade.barycentric});
-    for (std::size_t i = 0; i < 3; ++i) sums.ndc[prepared.shade.faces[fragment.face][i]] += corners[i];
+    const FragmentGradient grad_fragment{occupancy.distance, input.depth, shade.barycentric};
+    const bool clips = is_clipped(prepared, fragment.face);
+    const NdcTriangle corners = clips ? clipped_backward(homogeneous_face(prepared, fragment.face), point,
+                                                         prepared.rasterize, grad_fragment)
+                                      : rasterize_backward(ndc_triangle(prepared, fragment.face), point,
+                                                           prepared.rasterize, grad_fragment);
+    std::vector<Vec3d>& sum = clips ? sums.homogeneous : sums.ndc;
+    for (std::size_t i = 0; i < 3; ++i) sum[prepared.shade.faces[fragment.face][i]] += corners[i];
   }
 }
 
@@ -265,7 +307,7 @@ inline void geometry_backward(const Scene& scene, const PreparedScene& prepared,
       const std::size_t vertex = prepared.first_vertex[m] + i;
       const TransformGradient g =
           transform_backward(mesh.positions[i], mesh.transform, scene.camera.view, prepared.projection,
-                             sums.ndc[vertex], sums.shade.world[vertex]);
+                             sums.ndc[vertex], sums.shade.world[vertex], sums.homogeneous[vertex]);
       grad.meshes[m].positions[i] = g.position;
       grad.meshes[m].rotation += g.model_rotation;
       grad.meshes[m].translation += g.model_translation;
@@ -301,7 +343,8 @@ inline Gradients gradient(const Scene& scene, const Image& grad_image) {
     for (const Texture& texture : mesh.textures)
       grad.meshes.back().textures.emplace_back(texture.texels.size());
   }
-  PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()), make_shade_gradient(prepared.shade)};
+  PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()), std::vector<Vec3d>(prepared.vertices.size()),
+                 make_shade_gradient(prepared.shade)};
   for (int row = 0; row < scene.height; ++row) {
     for (int column = 0; column < scene.width; ++column) {
       const double* rgba = &grad_image.rgba[4 * static_cast<std::size_t>(row * scene.width + column)];

@@ -84,7 +84,8 @@ inline ProjectionGradient projection_backward(const Camera& camera, const ImageS
 struct TransformedVertex {
   Vec3d world;
   Vec3d view;
-  Vec3d ndc;  ///< x, y in NDC; z is the depth, positive in front
+  Vec3d ndc;          ///< x, y in NDC; z is the depth, positive in front
+  Vec3d homogeneous;  ///< x, y in NDC times depth; depth
 };
 
 inline TransformedVertex transform_forward(const Vec3d& position, const Mat4d& model, const Mat4d& view,
@@ -95,6 +96,8 @@ inline TransformedVertex transform_forward(const Vec3d& position, const Mat4d& m
   const double depth = -v.view.z;
   v.ndc = {projection.scale.x * v.view.x / depth + projection.offset.x,
            projection.scale.y * v.view.y / depth + projection.offset.y, depth};
+  v.homogeneous = {projection.scale.x * v.view.x + projection.offset.x * depth,
+                   projection.scale.y * v.view.y + projection.offset.y * depth, depth};
   return v;
 }
 
@@ -109,10 +112,11 @@ struct TransformGradient {
   Projection projection;
 };
 
-/// `grad_ndc` belongs to NDC x, y and depth, `grad_world` to the world position (from the lighting).
+/// `grad_ndc` belongs to NDC x, y and depth, `grad_world` to the world position (from the lighting),
+/// `grad_homogeneous` to the homogeneous coordinates (from faces that cross the near plane).
 inline TransformGradient transform_backward(const Vec3d& position, const Mat4d& model, const Mat4d& view,
                                             const Projection& projection, const Vec3d& grad_ndc,
-                                            const Vec3d& grad_world) {
+                                            const Vec3d& grad_world, const Vec3d& grad_homogeneous = {}) {
   TransformGradient g;
   const TransformedVertex v = transform_forward(position, model, view, projection);
   Vec3d grad_total_world = grad_world;
@@ -130,6 +134,14 @@ inline TransformGradient transform_backward(const Vec3d& position, const Mat4d& 
     g.view_translation = grad_view;
     grad_total_world += transposed_times(linear_part(view), grad_view);
   }
+  const Vec3d& h = grad_homogeneous;
+  const Vec3d grad_view = {h.x * projection.scale.x, h.y * projection.scale.y,
+                           -h.z - h.x * projection.offset.x - h.y * projection.offset.y};
+  g.projection.scale += {h.x * v.view.x, h.y * v.view.y};
+  g.projection.offset += {-h.x * v.view.z, -h.y * v.view.z};
+  g.view_rotation += cross(linear_part(view) * v.world, grad_view);
+  g.view_translation += grad_view;
+  grad_total_world += transposed_times(linear_part(view), grad_view);
   g.model_rotation = cross(linear_part(model) * position, grad_total_world);
   g.model_translation = grad_total_world;
   g.position = transposed_times(linear_part(model), grad_total_world);

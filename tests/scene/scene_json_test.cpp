@@ -93,11 +93,14 @@ TEST_SUITE("unit") {
     CHECK(scene.smoothing == Smoothing{});
     CHECK_FALSE(scene.smoothing.blur_radius);
     CHECK(scene.perspective_correct);
+    CHECK(scene.cull == Cull::none);
     CHECK(scene.gradients.positions);
     CHECK_FALSE(scene.gradients.lights);
     CHECK(read(folder, with(R"("lights": {"shading": "gouraud"})")).lights->shading == Shading::gouraud);
     CHECK(read(folder, with(R"("lights": {"shading": "blinn"})")).lights->shading == Shading::blinn);
     CHECK_FALSE(read(folder, with(R"("gradients": [])")).gradients.camera);
+    CHECK(read(folder, with(R"("cull": "back")")).cull == Cull::back);
+    CHECK(read(folder, with(R"("cull": "front")")).cull == Cull::front);
   }
 
   TEST_CASE("lights of every kind") {
@@ -311,6 +314,7 @@ TEST_SUITE("robustness") {
     check(with(R"("width": 0)"), "width (scene): got 0, expected 1 to 16384");
     check(with(R"("height": 16385)"), "height (scene): got 16385");
     check(with(R"("camera": {"znear": -1})"), "znear (camera)");
+    check(with(R"("cull": "both")"), "got \"both\", expected none, back or front");
     check(with(R"("lights": {"shininess": 0})"), "shininess (lights)");
     check(with(R"("smoothing": {"alpha": 0})"), "alpha (smoothing)");
     check(with(R"("smoothing": {"estimator": "monte_carlo", "depth_prior": "uniform"})"), "uniform");

@@ -272,10 +272,10 @@ TEST_SUITE("gradient") {
     const std::vector<cl_float4> grad = smooth_values(frame, 1);
     static_cast<void>(blend(frame, samples));
     const Buffer<cl_float4> raster(device_impl(), samples.colors), grad_blended(device_impl(), grad);
-    Buffer<cl_float4> grad_raster, grad_ndc;
+    Buffer<cl_float4> grad_raster, grad_ndc, no_clip;
     test::poison(grad_ndc, mesh.positions.size(), cl_float4{});
     frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
-    frame.contour.gather(frame.inputs(), frame.antialias.grad_ends, grad_ndc);
+    frame.contour.gather(frame.inputs(), frame.antialias.grad_ends, grad_ndc, no_clip);
     const std::vector<cl_float4> found = grad_ndc.download();
     const float step = 1e-4F;
     double error = 0, size2 = 0;

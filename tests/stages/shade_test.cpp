@@ -112,7 +112,8 @@ class Shaded {
   dpr::Renderer::Impl& impl() { return renderer_.impl(); }
   dpr::ShadeInputs inputs() {
     dpr::Renderer::Impl& m = impl();
-    return {m.frame, m.device_views, *m.geometry, m.transform, m.setup.triangles, m.bin, m.rasterize};
+    return {m.frame,           m.device_views, *m.geometry, m.transform,
+            m.setup.triangles, m.clip.faces,   m.bin,       m.rasterize};
   }
 
   ref::Vec3d barycentric(std::size_t fragment) const {

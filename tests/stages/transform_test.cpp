@@ -101,32 +101,37 @@ void add_error(Worst& worst, const ref::Vec3d& found, const ref::Vec3d& wanted, 
 
 /// Twice the errors measured: world 2.1e-7, NDC and depth 4.0e-7, gradients 6.5e-8 of the largest of their
 /// kind.
-constexpr double k_world = 4.2e-7, k_ndc = 8e-7, k_gradient = 1.3e-7;
+constexpr double k_world = 4.2e-7, k_ndc = 8e-7, k_gradient = 1.3e-7,
+                 k_clipped_gradient = 6e-7;  // of several sums more
 
 struct TransformErrors {
   Worst world, positions, model, camera, projection;
 };
 
 /// Runs the backward kernels on random gradients. Unlit, what the world gradients hold before does not count.
-/// `flip` is 1, or -1 to show that a wrong sign is noticed.
-TransformErrors backward_errors(bool lit, double flip) {
+/// `clips`: with gradients of clipped faces. `flip` is 1, or -1 to show that a wrong sign is noticed.
+TransformErrors backward_errors(bool lit, bool clips, double flip) {
   TwoMeshes t;
   dpr::Renderer::Impl& m = t.impl();
   m.transform.forward(m.frame, m.device_views, *m.geometry);
   const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
   RandomFloat random(6);
-  std::vector<cl_float4> grad_ndc, grad_world;
+  std::vector<cl_float4> grad_ndc, grad_clip, grad_world;
   for (std::size_t i = 0; i < count; ++i) {
     const bool used = i % 5 != 0;  // no kept triangle uses the others
     grad_ndc.push_back(used ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}} : cl_float4{});
+    const bool clipped = clips && i % 3 == 0;  // a clipped triangle uses these
+    grad_clip.push_back(clipped ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}} : cl_float4{});
     grad_world.push_back(lit ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}}
                              : cl_float4{{NAN, NAN, NAN, NAN}});
   }
   const dpr::Buffer<cl_float4> ndc_buffer(m.device.impl(), std::span<const cl_float4>(grad_ndc));
+  const dpr::Buffer<cl_float4> clip_buffer(m.device.impl(), std::span<const cl_float4>(grad_clip));
   dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
   poison(m.transform.channels, DPR_POSE_CHANNELS * count);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
-  m.transform.backward(m.frame, m.device_views, *m.geometry, lit, ndc_buffer, world_buffer);
+  m.frame.clips = clips ? 1 : 0;
+  m.transform.backward(m.frame, m.device_views, *m.geometry, lit, ndc_buffer, clip_buffer, world_buffer);
   m.transform.backward_positions(m.frame, m.device_views, *m.geometry, world_buffer);
   const std::vector<cl_float4> found_world = world_buffer.download(),
                                found_positions = m.transform.grad_positions.download();
@@ -137,9 +142,10 @@ TransformErrors backward_errors(bool lit, double flip) {
   constexpr double k_size = 5;  // of the largest gradients
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t view = i / vertices, vertex = i % vertices;
-    ref::TransformGradient g = ref::transform_backward(
-        to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view), t.projection(view),
-        to_reference(grad_ndc[i]), lit ? to_reference(grad_world[i]) : ref::Vec3d{});
+    ref::TransformGradient g =
+        ref::transform_backward(to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view),
+                                t.projection(view), to_reference(grad_ndc[i]),
+                                lit ? to_reference(grad_world[i]) : ref::Vec3d{}, to_reference(grad_clip[i]));
     g.view_rotation = flip * g.view_rotation;
     const auto channel = [&](std::size_t c) { return number(channels[c * count + i]); };
     const auto channel3 = [&](std::size_t c) {
@@ -194,15 +200,18 @@ TEST_SUITE("unit") {
 TEST_SUITE("gradient") {
   TEST_CASE("transform: gradients of positions, poses and projections are the reference's") {
     for (const bool lit : {true, false}) {
-      CAPTURE(lit);
-      const TransformErrors errors = backward_errors(lit, 1);
-      DPR_CHECK_WORST(errors.world, k_gradient);
-      DPR_CHECK_WORST(errors.positions, k_gradient);
-      DPR_CHECK_WORST(errors.model, k_gradient);
-      DPR_CHECK_WORST(errors.camera, k_gradient);
-      DPR_CHECK_WORST(errors.projection, k_gradient);
+      for (const bool clips : {false, true}) {
+        CAPTURE(lit);
+        const TransformErrors errors = backward_errors(lit, clips, 1);
+        const double tolerance = clips ? k_clipped_gradient : k_gradient;
+        DPR_CHECK_WORST(errors.world, tolerance);
+        DPR_CHECK_WORST(errors.positions, tolerance);
+        DPR_CHECK_WORST(errors.model, tolerance);
+        DPR_CHECK_WORST(errors.camera, tolerance);
+        DPR_CHECK_WORST(errors.projection, tolerance);
+      }
     }
-    CHECK(backward_errors(true, -1).camera.error > k_gradient);
+    CHECK(backward_errors(true, false, -1).camera.error > k_gradient);
   }
 
   TEST_CASE(
@@ -221,7 +230,7 @@ TEST_SUITE("gradient") {
     const std::vector<cl_float4> zeros(3, cl_float4{});
     const dpr::Buffer<cl_float4> grad_ndc(m.device.impl(), std::span<const cl_float4>(zeros));
     dpr::Buffer<cl_float4> grad_world(m.device.impl(), std::span<const cl_float4>(zeros));
-    m.transform.backward(m.frame, m.device_views, *m.geometry, true, grad_ndc, grad_world);
+    m.transform.backward(m.frame, m.device_views, *m.geometry, true, grad_ndc, {}, grad_world);
     CHECK(m.transform.channels.download() == std::vector<float>(DPR_POSE_CHANNELS * 3, 0.0F));
     for (const cl_float4& g : grad_world.download()) CHECK(g.s[0] == 0.0F);
   }

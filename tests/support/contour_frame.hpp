@@ -44,7 +44,7 @@ class ContourFrame {
     transform.world.upload(device_impl(), values);
   }
 
-  ContourInputs inputs() const { return {p, views, geometry, edges, transform, shading}; }
+  ContourInputs inputs() const { return {p, views, geometry, edges, transform, clipped, shading}; }
 
   std::size_t samples() const { return std::size_t{p.width} * p.height; }
 
@@ -52,6 +52,7 @@ class ContourFrame {
   DeviceViews views;
   Geometry geometry;
   Transform transform;
+  Buffer<shared::ClippedFace> clipped;
   Edges edges;
   std::optional<Shading> shading;
   Contour contour;

@@ -458,6 +458,8 @@ TEST_SUITE("robustness") {
     CHECK(has(message_of([&] { renderer->set("nothing", 1); }), "name (dpr::Renderer.set)"));
     CHECK(has(message_of([&] { renderer->set("depth_prior", "normal"); }), "gaussian, cauchy, logistic"));
     CHECK(has(message_of([&] { renderer->set("znear", "close"); }), "a number"));
+    CHECK(has(message_of([&] { renderer->set("cull", "both"); }), "none, back or front"));
+    CHECK(has(message_of([&] { renderer->set("cull", 1); }), "none, back or front"));
     const at::Tensor faces = torch::tensor({{0, 1, 2}});
     const auto make = [&](const at::Tensor& f, std::int64_t size, const char* preset) {
       return message_of([&] { torch_op::BatchRenderer(f, size, size, preset, ""); });

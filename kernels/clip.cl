@@ -1,0 +1,376 @@
+// Faces that cross the near plane. What is left of such a face is a triangle or a quadrilateral: one face
+// still, with one distance, to its outline, and the barycentrics of the whole face, so that what comes after
+// rasterization knows nothing of it. A quadrilateral is two triangles for coverage and barycentrics; by the
+// rule of ownership the diagonal between them is no seam.
+//
+// These kernels follow those that treat every face as whole, and replace what they left of clipped ones.
+// Gradients go by way of the cuts to the corners on both sides of the plane (clip.h).
+#include "clip.h"
+
+#include "affine.h"
+#include "rasterize.h"
+#include "setup.h"
+
+/// A cut between a corner that is kept and one that is not. The same for all faces that share the two. Not
+/// contracted, so that it is so in every lane.
+static inline float4 make_cut(float3 kept, float3 lost, float znear) {
+#pragma OPENCL FP_CONTRACT OFF
+  const float part = (kept.z - znear) / (kept.z - lost.z);
+  const float2 at = (kept.xy + part * (lost.xy - kept.xy)) / znear;
+  return (float4)(at.x, at.y, znear, part);
+}
+
+/// The corners of the visible part, in order.
+typedef struct {
+  float3 corner[4];  // x, y in NDC, depth; the last is that of a triangle's first
+} Outline;
+
+static inline Outline outline_of(const ClippedFace c, const float3 ndc[3]) {
+  Outline o;
+  o.corner[0] = ndc[c.first];
+  o.corner[1] = c.corners == 4 ? ndc[(c.first + 1) % 3] : c.cut[0].xyz;
+  o.corner[2] = c.corners == 4 ? c.cut[0].xyz : c.cut[1].xyz;
+  o.corner[3] = c.corners == 4 ? c.cut[1].xyz : o.corner[0];
+  return o;
+}
+
+/// The orientation of the larger of its two triangles; 0 where there is no area, or it reaches beyond
+/// DPR_MAX_NDC.
+static inline int orientation_of_outline(const Outline o) {
+  float2 reach = 0.0f;
+  float sum = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    reach = fmax(reach, fabs(o.corner[k].xy));
+    sum += o.corner[k].x + o.corner[k].y + o.corner[k].z;
+  }
+  // Written so that a NaN fails.
+  if (!(fabs(sum) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC)) return 0;
+  const float2 a = o.corner[0].xy, b = o.corner[1].xy - a, c = o.corner[2].xy - a, d = o.corner[3].xy - a;
+  const int is_second = fabs(c.x * d.y - c.y * d.x) > fabs(b.x * c.y - b.y * c.x);
+  return is_second ? side_of_line(a, o.corner[2].xy, o.corner[3].xy)
+                   : side_of_line(a, o.corner[1].xy, o.corner[2].xy);
+}
+
+/// A triangle of an outline's first corner and two more that follow each other.
+static inline Triangle triangle_of(const Outline o, int second, float orientation, uint first_sample,
+                                   uint last_sample) {
+  const float3 a = o.corner[0], b = o.corner[second], c = o.corner[second + 1];
+  const Triangle t = {a.x, a.y, b.x, b.y, c.x, c.y, a.z, b.z, c.z, orientation, first_sample, last_sample};
+  return t;
+}
+
+/// Finds the faces that cross the near plane, and sets up what is left of them. All tiles of the bounds are
+/// listed. One work-item per (view, face). Deterministic.
+/// in      views     ViewParams[view]
+/// in      faces     uint4[face]            vertex indices
+/// in      world     float4[view][vertex]
+/// in      ndc       float4[view][vertex]
+/// out     clipped   ClippedFace[view][face]
+/// in out  kept, counts, triangles  as setup_forward leaves them, which drops these faces: what the raster
+///                   sees of them is set up. Of a quadrilateral the triangle of the first three corners
+kernel void clip_forward(const FrameParams p, global const ViewParams* restrict views,
+                         global const uint4* restrict faces, global const float4* restrict world,
+                         global const float4* restrict ndc, global ClippedFace* restrict clipped,
+                         global uint* restrict kept, global uint* restrict counts,
+                         global Triangle* restrict triangles) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.faces) return;
+  const uint view = i / p.faces;
+  const uint4 face = faces[i - view * p.faces];
+  const uint vertex[3] = {view * p.vertices + face.x, view * p.vertices + face.y, view * p.vertices + face.z};
+  const float znear = views[view].znear;
+  const float4 projection = views[view].projection;
+  clipped[i].corners = 0;
+  float3 corner[3];
+  uint lost = 0;
+  for (uint k = 0; k < 3; ++k) {
+    corner[k] = ndc[vertex[k]].xyz;
+    lost |= corner[k].z < znear ? 1u << k : 0u;
+  }
+  if (lost == 0 || lost == 7) return;
+  ClippedFace c;
+  const uint one = popcount(lost) == 1 ? lost : 7 - lost;  // the corner that is alone on its side
+  c.corners = popcount(lost) == 1 ? 4 : 3;
+  c.first = (one == 1 ? 0 : one == 2 ? 1 : 2) + (c.corners == 4 ? 1 : 0);
+  c.first %= 3;
+  c.unused = 0;
+  for (uint k = 0; k < 3; ++k) {
+    const float3 in_camera =
+        apply_affine(views[view].row[0], views[view].row[1], views[view].row[2], world[vertex[k]].xyz);
+    const float2 homogeneous = in_camera.xy * projection.xy + projection.zw * corner[k].z;
+    c.corner[k] = (float4)(homogeneous.x, homogeneous.y, corner[k].z, 0.0f);
+  }
+  for (uint cut = 0; cut < 2; ++cut)
+    c.cut[cut] = make_cut(c.corner[kept_corner(c, cut)].xyz, c.corner[lost_corner(c, cut)].xyz, znear);
+  const Outline o = outline_of(c, corner);
+  const int orientation = orientation_of_outline(o);
+  if (orientation == 0 || (float)orientation == p.culled) return;
+  c.orientation = (float)orientation;
+  clipped[i] = c;
+
+  float2 lowest = o.corner[0].xy, highest = lowest;
+  for (int k = 1; k < 4; ++k) {
+    lowest = fmin(lowest, o.corner[k].xy);
+    highest = fmax(highest, o.corner[k].xy);
+  }
+  const PixelBounds bounds = bounds_of(p, lowest, highest);
+  if (!meets_image(p, bounds)) return;
+  kept[i] = 1;
+  const uint2 columns = samples_within(bounds.left, bounds.right, p.width);
+  const uint2 rows = samples_within(bounds.top, bounds.bottom, p.height);
+  const uint2 tiles =
+      (uint2)(columns.y / DPR_TILE + 1 - columns.x / DPR_TILE, rows.y / DPR_TILE + 1 - rows.x / DPR_TILE);
+  counts[i] = tiles.x * tiles.y;
+  if (counts[i] == 0) return;
+  triangles[i] = triangle_of(o, 1, c.orientation, columns.x | rows.x << 16, columns.y | rows.y << 16);
+}
+
+/// The two triangles of what is left of a face; of a triangle the first alone.
+typedef struct {
+  Triangle triangle[2];
+  int has_second;
+} ClippedTriangles;
+
+static inline ClippedTriangles load_clipped(const Triangle first, const ClippedFace c) {
+  ClippedTriangles t;
+  t.triangle[0] = first;
+  t.has_second = c.corners == 4;
+  t.triangle[1] = first;
+  if (t.has_second) {
+    t.triangle[1].x1 = first.x2;
+    t.triangle[1].y1 = first.y2;
+    t.triangle[1].z1 = first.z2;
+    t.triangle[1].x2 = c.cut[1].x;
+    t.triangle[1].y2 = c.cut[1].y;
+    t.triangle[1].z2 = c.cut[1].z;
+  }
+  return t;
+}
+
+/// Adds what the second triangles of clipped faces cover to what the first do. One work-item for every pair
+/// within the capacity.
+/// in      pairs      uint[1]      how many there are
+/// in      clipped    ClippedFace[view][face]
+/// in      triangles, pair_face, pair_tile  as rasterize_cover
+/// in out  masks, counts  as rasterize_cover leaves them
+kernel void clip_cover(const FrameParams p, const uint capacity, global const uint* restrict pairs,
+                       global const ClippedFace* restrict clipped, global const Triangle* restrict triangles,
+                       global const uint* restrict pair_face, global const uint* restrict pair_tile,
+                       global uint2* restrict masks, global uint* restrict counts) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= capacity || pair >= pairs[0]) return;
+  const uint face = pair_face[pair];
+  if (clipped[face].corners != 4) return;
+  const ClippedTriangles t = load_clipped(triangles[face], clipped[face]);
+  const uint2 mask = masks[pair] | cover_tile(p, t.triangle[1], pair_tile[pair]);
+  masks[pair] = mask;
+  counts[pair] = popcount(mask.x) + popcount(mask.y);
+}
+
+/// The edge of each of a quadrilateral's triangles that is its diagonal.
+#define DPR_FIRST_DIAGONAL 1
+#define DPR_SECOND_DIAGONAL 2
+
+/// The squared distance to the edges of a triangle, but for one.
+static inline realn outline_distance2(const View3 v, int left_out) {
+  realn least = INFINITY;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) least = lesser(least, k == left_out ? INFINITY : edge_distance2(v.edge[k]));
+  return least;
+}
+
+/// A clipped face seen from samples.
+typedef struct {
+  View3 first, second;
+  realn distance2;     // to the outline
+  intn nearer_second;  // by an edge of the second triangle
+  intn in_second;      // whose barycentrics count: on its side of the diagonal
+} ViewedClip;
+
+static inline ViewedClip view_clipped(const ClippedTriangles t, realn x, realn y) {
+  ViewedClip v;
+  v.first = v.second = view_triangle(t.triangle[0], x, y);
+  v.distance2 = triangle_distance2(v.first);
+  v.nearer_second = v.in_second = 0;
+  if (!t.has_second) return v;
+  v.second = view_triangle(t.triangle[1], x, y);
+  const realn to_first = outline_distance2(v.first, DPR_FIRST_DIAGONAL);
+  const realn to_second = outline_distance2(v.second, DPR_SECOND_DIAGONAL);
+  v.nearer_second = to_second < to_first;
+  v.distance2 = lesser(to_first, to_second);
+  // A sliver has no barycentrics, and the other triangle reaches where it would.
+  const realn side = v.first.edge[DPR_FIRST_DIAGONAL].side * t.triangle[0].orientation;
+  const realn decisive = is_sliver(t.triangle[0]) ? -1.0f : is_sliver(t.triangle[1]) ? 1.0f : side;
+  v.in_second = decisive < 0.0f;
+  return v;
+}
+
+/// The barycentrics of an outline's corners in the whole face.
+typedef struct {
+  float of[4][3];
+} OutlineWeights;
+
+static inline OutlineWeights weights_of(const ClippedFace c) {
+  OutlineWeights w;
+  for (int k = 0; k < 4; ++k) w.of[k][0] = w.of[k][1] = w.of[k][2] = 0.0f;
+  w.of[0][c.first] = 1.0f;
+  if (c.corners == 4) w.of[1][(c.first + 1) % 3] = 1.0f;
+  for (uint cut = 0; cut < 2; ++cut) {
+    const uint k = c.corners - 2 + cut;
+    w.of[k][kept_corner(c, cut)] = 1.0f - c.cut[cut].w;
+    w.of[k][lost_corner(c, cut)] = c.cut[cut].w;
+  }
+  return w;
+}
+
+/// The clipped barycentrics of a sample in its triangle, by the outline's corners.
+static inline void outline_barycentrics(const ViewedClip v, const BarycentricScale first,
+                                        const BarycentricScale second, realn u[4]) {
+  realn n[3], m[3];
+  raw_barycentrics(v.first, first, n);
+  raw_barycentrics(v.second, second, m);
+  const realn in_first = inverse_of_clipped(n), in_second = inverse_of_clipped(m);
+  const realn n1 = greater(n[1], 0.0f) * in_first, n2 = greater(n[2], 0.0f) * in_first;
+  const realn m1 = greater(m[1], 0.0f) * in_second, m2 = greater(m[2], 0.0f) * in_second;
+  u[0] = choose(v.in_second, 1.0f - m1 - m2, 1.0f - n1 - n2);
+  u[1] = choose(v.in_second, (realn)(0.0f), n1);
+  u[2] = choose(v.in_second, m1, n2);
+  u[3] = choose(v.in_second, m2, (realn)(0.0f));
+}
+
+/// Distances, depths and barycentrics of the fragments of clipped faces. One work-item per pair, up to
+/// `last_pair`. Deterministic.
+/// in   clipped  as clip_cover
+/// in   triangles, pair_face, fragment_starts  as rasterize_forward
+/// in   pixels   uint[fragment]  x | y << 16
+/// out  distance, depth  float[fragment]  as rasterize_forward; not written for other faces
+/// out  bary1, bary2     float[fragment]  of the whole face
+kernel void clip_fragments(const FrameParams p, const uint last_pair,
+                           global const ClippedFace* restrict clipped,
+                           global const Triangle* restrict triangles, global const uint* restrict pair_face,
+                           global const uint* restrict fragment_starts, global const uint* restrict pixels,
+                           global float* restrict distance, global float* restrict depth,
+                           global float* restrict bary1, global float* restrict bary2) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const uint face = pair_face[pair], last = fragment_starts[pair + 1];
+  if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;
+  const ClippedFace c = clipped[face];
+  const ClippedTriangles t = load_clipped(triangles[face], c);
+  const BarycentricScale first = barycentric_scale(t.triangle[0], p.perspective_correct);
+  const BarycentricScale second = barycentric_scale(t.triangle[1], p.perspective_correct);
+  const OutlineWeights w = weights_of(c);
+  const float error[2] = {side_error(p, t.triangle[0]), side_error(p, t.triangle[1])};
+  const float z[4] = {t.triangle[0].z0, t.triangle[0].z1, t.triangle[0].z2, t.triangle[1].z2};
+  for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
+    const uintn packed = load_pixels(lanes_before(last, i), i, pixels);
+    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+    const ViewedClip v = view_clipped(t, x, y);
+    if (!p.sharp) {
+      intn inside = is_inside(p, t.triangle[0], v.first, error[0], packed);
+      if (t.has_second) inside = inside || is_inside(p, t.triangle[1], v.second, error[1], packed);
+      store_run(with_sign(p, v.distance2, inside), i, last, distance);
+    }
+    realn u[4], b1 = 0.0f, b2 = 0.0f, d = z[0];
+    outline_barycentrics(v, first, second, u);
+    for (int k = 0; k < 4; ++k) {
+      b1 += w.of[k][1] * u[k];
+      b2 += w.of[k][2] * u[k];
+      d += u[k] * (z[k] - z[0]);
+    }
+    store_run(b1, i, last, bary1);
+    store_run(b2, i, last, bary2);
+    store_run(d, i, last, depth);
+  }
+}
+
+/// What the fragments of a clipped face add up to: gradients of the outline's corners, and of the cuts' parts
+/// by the barycentrics.
+typedef struct {
+  float3 corner[4];
+  float part[2];
+} OutlineGradients;
+
+/// From there to the face's own corners: of those that are kept in NDC, and of all by way of the cuts.
+static inline void store_corners(const ClippedFace c, const OutlineGradients g,
+                                 global float* restrict grad_corners, global float* restrict grad_clip) {
+  float3 own[3] = {0.0f, 0.0f, 0.0f}, by_cuts[3] = {0.0f, 0.0f, 0.0f};
+  own[c.first] = g.corner[0];
+  if (c.corners == 4) own[(c.first + 1) % 3] = g.corner[1];
+  for (uint cut = 0; cut < 2; ++cut) {
+    const float3 grad = cut_gradient(c, cut, g.corner[c.corners - 2 + cut].xy, g.part[cut]);
+    by_cuts[kept_corner(c, cut)] += (1.0f - c.cut[cut].w) * grad;
+    by_cuts[lost_corner(c, cut)] += c.cut[cut].w * grad;
+  }
+  for (uint k = 0; k < 3; ++k) {
+    vstore3(own[k], k, grad_corners);
+    vstore3(by_cuts[k], k, grad_clip);
+  }
+}
+
+/// Gradients of the corners of clipped faces, summed over a pair's fragments. One work-item per pair, up to
+/// `last_pair`. Deterministic. Inputs as clip_fragments and rasterize_backward.
+/// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
+/// out     grad_clip     float[pair][9]   of the corners' homogeneous coordinates, by way of the cuts
+kernel void clip_backward(const FrameParams p, const uint last_pair,
+                          global const ClippedFace* restrict clipped,
+                          global const Triangle* restrict triangles, global const uint* restrict pair_face,
+                          global const uint* restrict fragment_starts, global const uint* restrict pixels,
+                          global const float* restrict distance, global const float* restrict grad_distance,
+                          global const float* restrict grad_depth, global const float* restrict grad_bary1,
+                          global const float* restrict grad_bary2, global float* restrict grad_corners,
+                          global float* restrict grad_clip) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= last_pair) return;
+  const uint face = pair_face[pair], last = fragment_starts[pair + 1];
+  for (uint k = 0; k < 9; ++k) grad_clip[9 * pair + k] = 0.0f;
+  if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;
+  const ClippedFace c = clipped[face];
+  const ClippedTriangles t = load_clipped(triangles[face], c);
+  const BarycentricScale first = barycentric_scale(t.triangle[0], p.perspective_correct);
+  const BarycentricScale second = barycentric_scale(t.triangle[1], p.perspective_correct);
+  const OutlineWeights w = weights_of(c);
+  CornerGradients g[2];
+  realn part[2];
+  for (int k = 0; k < 3; ++k) g[0].x[k] = g[0].y[k] = g[0].z[k] = g[1].x[k] = g[1].y[k] = g[1].z[k] = 0.0f;
+  part[0] = part[1] = 0.0f;
+  for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
+    const intn in_run = lanes_before(last, i);
+    const uintn packed = load_pixels(in_run, i, pixels);
+    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
+    const ViewedClip v = view_clipped(t, x, y);
+    const realn zero = 0.0f;
+    if (!p.sharp) {
+      const intn inside = as_intn(load_run(in_run, i, distance)) >= 0;
+      const realn grad = load_run(in_run, i, grad_distance);
+      add_distance_gradient(v.first, t.has_second ? DPR_FIRST_DIAGONAL : DPR_NO_EDGE, inside, p.euclidean,
+                            choose(v.nearer_second, zero, grad), &g[0]);
+      add_distance_gradient(v.second, DPR_SECOND_DIAGONAL, inside, p.euclidean,
+                            choose(v.nearer_second, grad, zero), &g[1]);
+    }
+    const realn to_depth = load_run(in_run, i, grad_depth);
+    const realn b1 = load_run(in_run, i, grad_bary1), b2 = load_run(in_run, i, grad_bary2);
+    // Of the outline's corners, as if they had weights of their own.
+    realn h[4], u[4];
+    for (int k = 0; k < 4; ++k) h[k] = w.of[k][1] * b1 + w.of[k][2] * b2;
+    add_barycentric_gradient(v.first, t.triangle[0], first, choose(v.in_second, zero, to_depth),
+                             choose(v.in_second, zero, h[1] - h[0]), choose(v.in_second, zero, h[2] - h[0]),
+                             &g[0]);
+    add_barycentric_gradient(v.second, t.triangle[1], second, choose(v.in_second, to_depth, zero),
+                             choose(v.in_second, h[2] - h[0], zero), choose(v.in_second, h[3] - h[0], zero),
+                             &g[1]);
+    outline_barycentrics(v, first, second, u);
+    const realn of_corner[3] = {zero, b1, b2};
+    for (uint cut = 0; cut < 2; ++cut) {
+      part[cut] += u[c.corners - 2 + cut] * (of_corner[lost_corner(c, cut)] - of_corner[kept_corner(c, cut)]);
+    }
+  }
+  float3 sum[2][3];
+  for (int k = 0; k < 2; ++k) {
+    for (int j = 0; j < 3; ++j)
+      sum[k][j] = (float3)(sum_lanes(g[k].x[j]), sum_lanes(g[k].y[j]), sum_lanes(g[k].z[j]));
+  }
+  const OutlineGradients of_outline = {{sum[0][0] + sum[1][0], sum[0][1], sum[0][2] + sum[1][1], sum[1][2]},
+                                       {sum_lanes(part[0]), sum_lanes(part[1])}};
+  store_corners(c, of_outline, grad_corners + 9 * pair, grad_clip + 9 * pair);
+}

@@ -1,0 +1,40 @@
+// Faces that cross the near plane, and gradients by way of the cuts that they get there. A cut divides the
+// way between two corners in homogeneous coordinates, NDC times depth, where that way is straight: part =
+// (z_kept - znear) / (z_kept - z_lost).
+#ifndef DPR_CLIP_H
+#define DPR_CLIP_H
+
+#include "shared_types.h"
+
+/// The corner of the face that a cut lies between, on the side that is kept, and on the other.
+static inline uint kept_corner(const ClippedFace c, uint cut) {
+  return (c.first + (c.corners == 4 && cut == 0 ? 1 : 0)) % 3;
+}
+static inline uint lost_corner(const ClippedFace c, uint cut) {
+  return (c.first + (c.corners == 4 ? 2 : 1 + cut)) % 3;
+}
+
+/// Which of its corners a clipped face loses.
+static inline int is_lost(const ClippedFace c, uint corner) {
+  const uint place = (corner + 3 - c.first) % 3;
+  return c.corners == 4 ? place == 2 : place > 0;
+}
+
+/// The cut between two corners of a face; 2 where there is none.
+static inline uint cut_between(const ClippedFace c, uint kept, uint lost) {
+  for (uint cut = 0; cut < 2; ++cut) {
+    if (kept_corner(c, cut) == kept && lost_corner(c, cut) == lost) return cut;
+  }
+  return 2;
+}
+
+/// What a cut's gradient, of x and y in NDC and of the part, adds to those of its corners' homogeneous
+/// coordinates: 1 - part of it to that which is kept, part of it to the other. For the depths,
+/// d part / d z_kept = (1 - part) / (z_kept - z_lost) and d part / d z_lost = part / (z_kept - z_lost).
+static inline float3 cut_gradient(const ClippedFace c, uint cut, float2 grad, float grad_part) {
+  const float3 kept = c.corner[kept_corner(c, cut)].xyz, lost = c.corner[lost_corner(c, cut)].xyz;
+  const float2 g = grad / c.cut[cut].z;
+  return (float3)(g, (grad_part + dot(g, lost.xy - kept.xy)) / (kept.z - lost.z));
+}
+
+#endif

@@ -1,0 +1,26 @@
+// How near and how far the boxes around meshes lie from cameras: what is known of a mesh before its vertices
+// are projected.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <span>
+
+#include "dpr/camera.hpp"
+
+namespace dpr {
+
+/// The corners of the box around points, of which there must be some.
+using BoxCorners = std::array<glm::dvec3, 8>;
+BoxCorners box_corners(std::span<const glm::vec3> points);
+
+/// Depths between which all that lies in a box has its own, but for rounding.
+struct DepthRange {
+  double nearest, furthest;
+};
+DepthRange depth_range(const BoxCorners& box, const Camera& camera, const glm::mat4& model);
+
+/// Whether no rounding of single precision takes anything of the box to the near plane.
+bool is_beyond_near_plane(const DepthRange& range, const Camera& camera);
+
+}  // namespace dpr

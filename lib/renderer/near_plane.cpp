@@ -1,0 +1,33 @@
+#include "renderer/near_plane.hpp"
+
+namespace dpr {
+
+std::vector<BoxCorners> NearPlane::boxes_of(std::span<const glm::vec3> positions,
+                                            std::span<const MeshRange> meshes) {
+  std::vector<BoxCorners> boxes;
+  while (!positions.empty()) {
+    for (const MeshRange& mesh : meshes)
+      boxes.push_back(box_corners(positions.subspan(mesh.first_vertex, mesh.vertices)));
+    positions = positions.subspan(meshes.back().first_vertex + meshes.back().vertices);
+  }
+  return boxes;
+}
+
+const BoxCorners& NearPlane::box_of(const Scene& scene, std::size_t view, std::size_t mesh) {
+  if (!boxes_of_views_.empty()) return boxes_of_views_[view * boxes_.size() + mesh];
+  std::optional<BoxCorners>& box = boxes_[mesh];
+  if (!box) box = box_corners(scene.meshes[mesh].mesh.positions);
+  return *box;
+}
+
+bool NearPlane::may_be_crossed(const Scene& scene, std::span<const View> views) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::size_t m = 0; m < boxes_.size(); ++m) {
+      const DepthRange range = depth_range(box_of(scene, v, m), views[v].camera, views[v].transforms[m]);
+      if (!is_beyond_near_plane(range, views[v].camera)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace dpr

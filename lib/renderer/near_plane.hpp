@@ -1,0 +1,37 @@
+// Whether a frame may have faces that cross the near plane: frames that have none are spared the clipping.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+#include "renderer/depth_range.hpp"
+#include "stages/geometry.hpp"
+
+namespace dpr {
+
+class NearPlane {
+ public:
+  NearPlane() = default;
+  explicit NearPlane(std::size_t meshes) : boxes_(meshes) {}
+
+  /// The mesh's positions are others than before.
+  void move(std::size_t mesh) noexcept { boxes_[mesh].reset(); }
+  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][vertex]. O(positions).
+  static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions,
+                                          std::span<const MeshRange> meshes);
+  /// [view][mesh]; empty: the views share the scene's meshes.
+  void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept { boxes_of_views_ = std::move(boxes); }
+
+  /// False only if every vertex lies beyond the near plane. O(vertices of meshes moved + views * meshes).
+  bool may_be_crossed(const Scene& scene, std::span<const View> views);
+
+ private:
+  const BoxCorners& box_of(const Scene& scene, std::size_t view, std::size_t mesh);
+
+  std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured
+  std::vector<BoxCorners> boxes_of_views_;
+};
+
+}  // namespace dpr

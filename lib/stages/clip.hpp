@@ -1,0 +1,67 @@
+// Faces that cross the near plane: found, and rasterized in place of the whole triangles that other stages
+// know.
+#pragma once
+
+#include <optional>
+
+#include "device/kernel.hpp"
+#include "stages/bin.hpp"
+#include "stages/geometry.hpp"
+#include "stages/setup.hpp"
+#include "stages/transform.hpp"
+
+namespace dpr {
+
+class Rasterize;
+
+class Clip {
+ public:
+  explicit Clip(Device::Impl& device) : device_(device) {}
+
+  /// Finds the faces, and sets up what is left of them, after Setup::forward(), which drops them.
+  void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+               const Transform& transform, Setup& setup);
+  /// Adds what is missing of their coverage, [pair] as rasterize_cover leaves it.
+  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+             Buffer<cl_uint2>& masks, Buffer<cl_uint>& counts);
+  /// Replaces the distances, depths and barycentrics of their fragments: those are of the whole face, so that
+  /// shading needs to know nothing.
+  void fragments(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+                 Rasterize& rasterize);
+  /// Replaces the gradients of their corners, and adds those that go by way of the near plane. The gradients
+  /// of fragments are those that Rasterize::backward() was given.
+  void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+                Rasterize& rasterize, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
+                const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
+
+  Buffer<shared::ClippedFace> faces;  ///< [view][face] which of them are clipped, and to what
+  Buffer<float> grad_corners;         ///< [pair][9] of the corners' x times depth, y times depth, depth
+  Buffer<cl_float4> grad;             ///< [view][vertex] the same, gathered
+
+  std::size_t bytes() const {
+    return faces.capacity_bytes() + grad_corners.capacity_bytes() + grad.capacity_bytes();
+  }
+
+ private:
+  struct Kernels {
+    explicit Kernels(Device::Impl& device);
+    Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
+           Out<shared::ClippedFace>, Out<cl_uint>, Out<cl_uint>, Out<shared::Triangle>>
+        forward;
+    Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::ClippedFace>, In<shared::Triangle>,
+           In<cl_uint>, In<cl_uint>, Out<cl_uint2>, Out<cl_uint>>
+        cover;
+    Kernel<shared::FrameParams, cl_uint, In<shared::ClippedFace>, In<shared::Triangle>, In<cl_uint>,
+           In<cl_uint>, In<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
+        fragments;
+    Kernel<shared::FrameParams, cl_uint, In<shared::ClippedFace>, In<shared::Triangle>, In<cl_uint>,
+           In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
+           Out<float>>
+        backward;
+  };
+
+  Device::Impl& device_;
+  std::optional<Kernels> kernels_;  // made for the first frame that may have such faces
+};
+
+}  // namespace dpr

@@ -1,0 +1,135 @@
+/// Reference for faces that cross the near plane: what is left of them, their fragments and the gradients of
+/// these.
+///
+/// Corners are homogeneous: NDC times depth, and depth. So the way between two of them is straight, whichever
+/// side of the camera they lie on.
+#pragma once
+
+#include "rasterize.hpp"
+
+#include <limits>
+#include <vector>
+
+namespace dpr::reference {
+
+using HomogeneousFace = std::array<Vec3d, 3>;
+
+/// A corner of what is left: x, y in NDC and depth; and its barycentrics in the whole face.
+struct OutlineCorner {
+  Vec3d ndc;
+  Vec3d weights;
+};
+using Outline = std::vector<OutlineCorner>;
+
+inline Vec3d project(const Vec3d& h) { return {h.x / h.z, h.y / h.z, h.z}; }
+
+inline bool crosses_near_plane(const HomogeneousFace& face, double znear) {
+  const auto is_kept = [&](const Vec3d& h) { return h.z >= znear; };
+  return !std::all_of(face.begin(), face.end(), is_kept) && std::any_of(face.begin(), face.end(), is_kept);
+}
+
+/// The corners beyond the plane and on it (Sutherland and Hodgman), from the first kept one behind a lost one
+/// on.
+inline Outline clip_face(const HomogeneousFace& face, double znear) {
+  const auto is_kept = [&](std::size_t i) { return face[i % 3].z >= znear; };
+  const auto corner = [](std::size_t i) {
+    Vec3d weights;
+    weights[i % 3] = 1.0;
+    return weights;
+  };
+  std::size_t first = 0;
+  while (!(is_kept(first) && !is_kept(first + 2))) ++first;
+  Outline outline;
+  for (std::size_t i = first; i < first + 3; ++i) {
+    const Vec3d &a = face[i % 3], &b = face[(i + 1) % 3];
+    if (is_kept(i)) outline.push_back({project(a), corner(i)});
+    if (is_kept(i) == is_kept(i + 1)) continue;
+    const double t = (a.z - znear) / (a.z - b.z);
+    outline.push_back({project(a + t * (b - a)), (1.0 - t) * corner(i) + t * corner(i + 1)});
+  }
+  return outline;
+}
+
+/// Its triangles: one, or two on both sides of the diagonal from the first corner.
+inline std::vector<std::array<std::size_t, 3>> triangles_of(const Outline& outline) {
+  std::vector<std::array<std::size_t, 3>> list;
+  for (std::size_t i = 1; i + 1 < outline.size(); ++i) list.push_back({0, i, i + 1});
+  return list;
+}
+
+inline NdcTriangle triangle_of(const Outline& outline, const std::array<std::size_t, 3>& corners) {
+  return {outline[corners[0]].ndc, outline[corners[1]].ndc, outline[corners[2]].ndc};
+}
+
+inline double double_area(const Outline& outline) {
+  double area = 0.0;
+  for (const auto& corners : triangles_of(outline)) area += double_area(triangle_of(outline, corners));
+  return area;
+}
+
+inline double squared_distance(const Outline& outline, const Vec2d& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vec2d start = screen(outline[i].ndc), along = screen(outline[(i + 1) % outline.size()].ndc) - start;
+    const double squared_length = dot(along, along);
+    const double at =
+        squared_length > 0.0 ? std::clamp(dot(point - start, along) / squared_length, 0.0, 1.0) : 0.0;
+    const Vec2d difference = point - (start + at * along);
+    least = std::min(least, dot(difference, difference));
+  }
+  return least;
+}
+
+/// The fragment of a face that crosses the plane, if it has one: its distance is that to the outline, its
+/// barycentrics are those of the whole face. Beside the outline, those of the triangle on this side of the
+/// diagonal are clipped.
+inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, std::size_t face, const Vec2d& point,
+                                               const RasterizeParameters& p) {
+  const Outline outline = clip_face(h, p.znear);
+  const auto triangles = triangles_of(outline);
+  bool inside = false;
+  for (const auto& corners : triangles) inside = inside || is_inside(triangle_of(outline, corners), point);
+  const double squared = squared_distance(outline, point);
+  const double magnitude = p.metric == DistanceMetric::squared ? squared : std::sqrt(squared);
+  if (!inside && !(magnitude < p.blur_radius)) return std::nullopt;
+
+  const Vec2d diagonal = screen(outline[2].ndc) - screen(outline[0].ndc);
+  const double side = cross(diagonal, point - screen(outline[0].ndc)) * double_area(outline);
+  const auto& corners = triangles.size() > 1 && side > 0.0 ? triangles[1] : triangles[0];
+  const NdcTriangle t = triangle_of(outline, corners);
+  const Vec3d m = clipped(barycentric_numerators(t, screen_barycentric(t, point), p).n, p);
+  Fragment fragment;
+  fragment.face = face;
+  fragment.distance = inside ? magnitude : -magnitude;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double c = m[i] / (m.x + m.y + m.z);
+    fragment.barycentric += c * outline[corners[i]].weights;
+    fragment.depth += c * t[i].z;
+  }
+  return fragment;
+}
+
+/// Gradient to the homogeneous corners: differences of clipped_forward(), which must have a fragment there.
+inline HomogeneousFace clipped_backward(const HomogeneousFace& h, const Vec2d& point, RasterizeParameters p,
+                                        const FragmentGradient& grad_fragment) {
+  constexpr double k_step = 1e-6;  // of the corners' size
+  p.blur_radius = std::numeric_limits<double>::infinity();
+  const auto value = [&](const HomogeneousFace& moved) {
+    const Fragment f = *clipped_forward(moved, 0, point, p);
+    return grad_fragment.distance * f.distance + grad_fragment.depth * f.depth +
+           dot(grad_fragment.barycentric, f.barycentric);
+  };
+  HomogeneousFace grad{};
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const double step = k_step * (1e-3 + length(h[corner]));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      HomogeneousFace above = h, below = h;
+      above[corner][axis] += step;
+      below[corner][axis] -= step;
+      grad[corner][axis] = (value(above) - value(below)) / (2.0 * step);
+    }
+  }
+  return grad;
+}
+
+}  // namespace dpr::reference
