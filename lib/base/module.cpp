@@ -1,6 +1,7 @@
 #include "base/module.hpp"
 
 #include <dlfcn.h>
+#include <link.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -14,9 +15,15 @@ namespace {
 /// The folder of the library or the program that holds this code.
 std::filesystem::path own_folder() {
   Dl_info info{};
-  if (dladdr(reinterpret_cast<const void*>(&module_function), &info) == 0 || !info.dli_fname) return {};
+  link_map* map = nullptr;
+  if (dladdr1(reinterpret_cast<const void*>(&module_function), &info, reinterpret_cast<void**>(&map),
+              RTLD_DL_LINKMAP) == 0) {
+    return {};
+  }
+  // The linker knows no file of the program itself.
+  const char* name = map->l_name[0] == '\0' ? "/proc/self/exe" : map->l_name;
   std::error_code error;
-  const std::filesystem::path file = std::filesystem::canonical(info.dli_fname, error);
+  const std::filesystem::path file = std::filesystem::canonical(name, error);
   return error ? std::filesystem::path() : file.parent_path();
 }
 

@@ -91,6 +91,17 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_image(folder / "a.png").width == 20);
   }
 
+  TEST_CASE("cli: it finds its parts where it is itself found in the PATH") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const std::string own = fs::path(dpr::test::program_path("DPR_CLI")).parent_path().string();
+    const Outcome outcome = dpr::test::run_program(
+        "dpr", folder, {"render", "cube.ply", "-o", "a.exr", "--size", "8x8"}, "PATH=" + own);
+    CHECK(outcome.err.empty());
+    CHECK(outcome.status == 0);
+  }
+
   TEST_CASE("cli: what is mistyped is named, with what is nearest to it") {
     if (is_skipped()) return;
     const TempDir folder;
