@@ -6,7 +6,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # Spot with colours, so that every side looks different.
-awk '$1 == "v" { print $0, 0.55 + 0.4 * sin(4 * $2 + 1), 0.55 + 0.4 * sin(4 * $3), 0.55 + 0.4 * sin(4 * $4 + 2); next }
+awk '$1 == "v" { print $0, 0.3 + 0.28 * sin(4 * $2 + 1), 0.3 + 0.28 * sin(4 * $3), 0.3 + 0.28 * sin(4 * $4 + 2); next }
      { print }' bench/data/spot_low.obj >"$work/spot.obj"
 
 # A scene with Spot turned about y, then tilted about x, by some degrees.
@@ -18,14 +18,14 @@ scene() {
     printf " \"znear\": 1, \"zfar\": 7},\n"
     printf " \"meshes\": [{\"file\": \"spot.obj\", \"transform\": [[%f,0,%f,0],[%f,%f,%f,0],[%f,%f,%f,0],[0,0,0,1]]}],\n",
       cos(a), sin(a), sin(b) * sin(a), cos(b), -sin(b) * cos(a), -cos(b) * sin(a), sin(b), cos(b) * cos(a)
-    printf " \"lights\": {\"ambient\": [0.6,0.6,0.6], \"point\": [{\"position\": [2,4,5], \"diffuse\": [0.4,0.4,0.4]}]},\n"
+    printf " \"lights\": {\"ambient\": [0.5,0.5,0.5], \"point\": [{\"position\": [2,4,5], \"diffuse\": [0.5,0.5,0.5], \"specular\": [0.05,0.05,0.05]}]},\n"
     printf " \"smoothing\": {\"preset\": \"joint_gaussian\", \"sigma\": 1e-2, \"gamma\": 2e-2}}\n"
   }'
 }
 scene 145 0 >"$work/truth.json"
 scene 95 -35 >"$work/start.json"
 dpr render --scene "$work/truth.json" --preset rigid -o "$work/target.exr"
-dpr pose --scene "$work/start.json" --target "$work/target.exr" --method descent --iterations 120 --restarts 0 \
+dpr pose --scene "$work/start.json" --target "$work/target.exr" --method descent --iterations 240 --restarts 0 \
   -o "$work/pose.json" --report "$work/report" --quiet
 
 gnuplot <<END
