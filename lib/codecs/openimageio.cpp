@@ -59,7 +59,9 @@ std::vector<unsigned char> encode(const Image& image, const PixelFormat& format)
   OIIO::ImageSpec spec(image.width, image.height, format.channels,
                        format.bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
   spec.attribute(k_unassociated_alpha, 1);
-  if (format.bytes) spec.attribute("oiio:ColorSpace", format.srgb ? "sRGB" : "Linear");
+  // In a TIFF file this would make a second directory, and OpenImageIO could not read the file again.
+  const bool is_tiff = format.extension.starts_with("tif");
+  if (format.bytes && !is_tiff) spec.attribute("oiio:ColorSpace", format.srgb ? "sRGB" : "Linear");
   spec.attribute("DateTime", "");  // none: equal images are equal files
   OIIO::Filesystem::IOVecOutput bytes;
   if (!output->set_ioproxy(&bytes) || !output->open("image." + format.extension, spec) ||
