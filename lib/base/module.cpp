@@ -48,7 +48,10 @@ void* module_function(const char* name, const char* function) {
   const std::string file = std::string("libdpr_") + name + "-" + DPR_VERSION + ".so";
   void* module = open_module(file);
   void* found = module ? dlsym(module, function) : nullptr;
-  if (!found) throw std::runtime_error("a part of dpr cannot be loaded: " + last_error());
+  if (!found) {
+    throw std::runtime_error("a part of dpr cannot be loaded: " + last_error() +
+                             " (programs that read or write images link dpr::image too)");
+  }
   return found;
 }
 

@@ -123,7 +123,8 @@ Json camera_to_json(const Camera& camera) {
 }
 
 Json smoothing_to_json(const Smoothing& s) {
-  return {{"occupancy_prior", to_string(s.occupancy_prior)},
+  return {{"noise", to_string(s.noise)},
+          {"occupancy_prior", to_string(s.occupancy_prior)},
           {"depth_prior", to_string(s.depth_prior)},
           {"composition", to_string(s.composition)},
           {"occupancy_estimator", to_string(s.occupancy_estimator)},

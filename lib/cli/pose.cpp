@@ -93,14 +93,15 @@ PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rota
   return solver.solve(initial, callback);
 }
 
-void print(const std::string& file, const PoseResult& result) {
+void print(const std::string& file, const PoseResult& result, bool is_light_fixed) {
   std::printf("%s: loss %.6g after %u iterations, %.1f s\n", file.c_str(), result.loss, result.iterations,
               result.seconds);
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
         "be wrong: --search tries all rotations, --translation and --focal find what else is not known. Or "
-        "colours, clutter or occlusion differ from the scene's.\n");
+        "colours, clutter or occlusion differ from the scene's: --robust is for these%s.\n",
+        is_light_fixed ? ", --light harmonics for another light" : "");
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }
@@ -129,7 +130,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
     write_pose_report(options.report, page_source(title, common, device), device, scene, target, result,
                       common.quiet);
   }
-  if (!common.quiet) print(options.output, result);
+  if (!common.quiet) print(options.output, result, options.light == name_of(PoseLight::fixed));
 }
 
 void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {

@@ -7,13 +7,17 @@
 #include <optional>
 #include <string>
 
+#include "base/output_file.hpp"
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/text.hpp"
+#include "dpr/error.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
 #include "scene/cull.hpp"
+#include "scene/light_table.hpp"
+#include "smoothing/option_fields.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -22,7 +26,7 @@ struct RenderOptions {
   std::string mesh, scene, output;
   std::vector<std::string> aovs;
   bool rigid = false;
-  std::optional<std::string> cull;
+  std::optional<std::string> cull, shading;
   float elevation = 25, azimuth = 35;  // degrees: three sides of a box are in sight
 };
 
@@ -89,6 +93,8 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   scene.width = scene.height = k_size;
   Notes notes;
   scene.meshes.push_back({read_mesh(options.mesh, notes), glm::mat4(1.0F)});
+  const std::string note = noise_note({}, common.smoothing);
+  if (!note.empty()) notes.push_back(note);
   print_notes(notes, common);
   const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
   scene.smoothing = picture_smoothing(common.smoothing, size);
@@ -99,9 +105,18 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   return scene;
 }
 
+void set_shading(Scene& scene, const std::string& word) {
+  const Shading shading = parse_shading(word, "--shading");
+  if (!scene.lights)
+    throw InvalidArgument("--shading", "\"" + word + "\" for a scene without lights", "a scene with lights");
+  scene.lights->shading = shading;
+}
+
 void run(const RenderOptions& options, CommonOptions& common) {
+  require_writable(options.output);
   if (options.rigid) common.smoothing.preset = "rigid";
   Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  if (options.shading) set_shading(scene, *options.shading);
   if (options.cull) scene.cull = parse_cull(*options.cull, "--cull");
   const AovFiles aovs(options.aovs, options.output, scene);
   Renderer renderer(open_device(common));
@@ -122,7 +137,9 @@ void run(const RenderOptions& options, CommonOptions& common) {
                 statistics.faces);
     if (statistics.faces_dropped > 0) {
       std::printf(
-          ", %zu of them dropped: outside the image, nearer than znear, beyond zfar, culled or without area",
+          ", %zu of them dropped: outside the image, nearer than znear, beyond zfar, culled, the hidden back "
+          "of "
+          "a closed mesh, or without area",
           statistics.faces_dropped);
     }
     std::printf("\n");
@@ -157,12 +174,18 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
                    "Leaves out faces that wind clockwise in the image (back), the others (front), or none")
       ->type_name("none|back|front");
   command
+      ->add_option(
+          "--shading", options->shading,
+          "Where light is computed: by face (flat), vertex (gouraud) or pixel (phong, the default, and "
+          "blinn); instead of the scene's")
+      ->type_name("flat|gouraud|phong|blinn");
+  command
       ->add_option("--elevation", options->elevation,
-                   "Of the camera fitted to MESH, in degrees above the horizon")
+                   "Of the camera fitted to MESH, in degrees above the horizon; 25 by default")
       ->type_name("FLOAT");
   command
       ->add_option("--azimuth", options->azimuth,
-                   "Of the camera fitted to MESH, in degrees from +z towards +x")
+                   "Of the camera fitted to MESH, in degrees from +z towards +x; 35 by default")
       ->type_name("FLOAT");
   command
       ->add_option(

@@ -185,7 +185,8 @@ Device open_device(const std::string& selector) {
   if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
   if (found.empty())
     throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
-  throw InvalidArgument("device", "'" + wanted + "'", "one of " + names(found));
+  throw InvalidArgument(selector.empty() ? "DPR_DEVICE (environment)" : "device", "'" + wanted + "'",
+                        "one of " + names(found));
 }
 
 Device adopt_device(cl_context context_handle, cl_command_queue queue_handle) {

@@ -291,6 +291,8 @@ Scene parse_scene(const std::filesystem::path& file, std::string_view text, Note
   if (overrides.size) resize(scene, *overrides.size);
   SmoothingOptions smoothing;
   take(node, "smoothing", smoothing, parse_smoothing);
+  const std::string note = noise_note(smoothing, overrides.smoothing);
+  if (!note.empty()) notes.push_back(note);
   scene.smoothing = resolve_smoothing(overlay(smoothing, overrides.smoothing), scene.width, scene.height);
   validate(scene);
   return scene;

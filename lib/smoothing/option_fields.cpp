@@ -90,4 +90,10 @@ bool set_option(SmoothingOptions& options, std::string_view key, const OptionVal
   return is_known;
 }
 
+std::string noise_note(const SmoothingOptions& scene, const SmoothingOptions& options) {
+  if (!says_nothing(scene) || says_nothing(options) || options.noise || options.preset) return {};
+  return "the smoothing that is given has noise of the triangles; --noise pixel keeps that of the pixel, the "
+         "default";
+}
+
 }  // namespace dpr

@@ -39,7 +39,10 @@ void for_each_option(Visit&& visit) {
   visit("distance", "Unit of the distance: NDC^2 or NDC", &O::distance);
   visit("occupancy_width", "Width of the distance noise: sigma, up to the pixel, or none",
         &O::occupancy_width);
-  visit("noise", "What moves edges at random: each triangle's distances, or the pixel's position", &O::noise);
+  visit("noise",
+        "What moves edges at random: each triangle's distances, or the pixel's position. pixel where nothing "
+        "is said of the smoothing, triangle where anything else is",
+        &O::noise);
   visit("supersampling", "Rigid samples of a pixel along each axis (1, 2 or 4), of the pixel's noise",
         &O::supersampling);
 }
@@ -64,5 +67,9 @@ using OptionValue = std::variant<double, std::int64_t, std::string>;
 /// `where`, for a value of the wrong kind.
 bool set_option(SmoothingOptions& options, std::string_view key, const OptionValue& value,
                 std::string_view where);
+
+/// What to tell of options that take the default, noise of the pixel, from a scene that says nothing of its
+/// smoothing, without a word on the noise; empty if these do not.
+std::string noise_note(const SmoothingOptions& scene, const SmoothingOptions& options);
 
 }  // namespace dpr

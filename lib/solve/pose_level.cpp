@@ -92,7 +92,10 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.width = shape.samples * scaled(scene.width, full, shape.short_side);
   result.height = shape.samples * scaled(scene.height, full, shape.short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
-  if (shape.short_side < full) simplify(result, space);  // the answer comes from the mesh itself
+  if (shape.short_side < full) {  // the answer comes from the mesh and the textures themselves
+    simplify(result, space);
+    for (Texture& texture : result.meshes.front().mesh.textures) texture.filter = Filter::trilinear;
+  }
   result.smoothing = level_smoothing(result, space, options, shape.blur);
   result.gradients = no_gradients();
   if (light != PoseLight::fixed) {  // without light, over black: LightFit adds both

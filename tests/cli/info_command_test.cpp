@@ -84,6 +84,7 @@ TEST_SUITE("pipeline") {
     CHECK(scene["kind"] == "scene");
     CHECK(scene["width"] == 20);
     CHECK(scene["smoothing"]["sigma"] == 0.25);
+    CHECK(scene["smoothing"]["noise"] == "triangle");  // of a smoothing that says anything but that
     CHECK(scene["lights"].is_null());
     CHECK(scene["gradients"] == json({"camera"}));
     REQUIRE(scene["meshes"].size() == 2);

@@ -17,7 +17,8 @@ inline bool same_bits(const Image& a, const Image& b) {
 }
 
 inline bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+  if (a.empty() || a.size() != b.size()) return a.size() == b.size();  // memcmp takes no null pointers
+  return std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 inline bool same_bits(const SceneGradient& a, const SceneGradient& b) {

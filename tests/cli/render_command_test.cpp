@@ -1,0 +1,86 @@
+// dpr render: what it says and refuses before it renders.
+#include <doctest/doctest.h>
+
+#include <string>
+
+#include "dpr/mesh.hpp"
+#include "support/command.hpp"
+#include "support/messages.hpp"
+
+namespace {
+
+using dpr::test::contains;
+using dpr::test::is_skipped;
+using dpr::test::run_command;
+using dpr::test::TempDir;
+
+const char* const k_scene = R"({"width": 16, "height": 16, "meshes": [{"file": "cube.ply"}],
+    "camera": {"view": [[1,0,0,0],[0,1,0,0],[0,0,1,-5],[0,0,0,1]]}%})";
+
+std::string scene(const std::string& further) {
+  std::string text = k_scene;
+  return text.replace(text.find('%'), 1, further);
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("dpr render: a smoothing that takes the default's noise away is told") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    folder.write("plain.json", scene(""));
+    folder.write("said.json", scene(R"(, "smoothing": {"sigma": 1e-3})"));
+    const auto is_told = [&](std::vector<std::string> arguments) {
+      arguments.insert(arguments.begin(), "render");
+      arguments.insert(arguments.end(), {"-o", "cube.png", "--size", "16x16"});
+      const auto outcome = run_command(folder, arguments);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      return contains(outcome.err, "--noise pixel keeps");
+    };
+    CHECK(is_told({"cube.ply", "--sigma", "1e-3"}));
+    CHECK(is_told({"--scene", "plain.json", "--sigma", "1e-3"}));
+    CHECK_FALSE(is_told({"cube.ply"}));
+    CHECK_FALSE(is_told({"cube.ply", "--sigma", "1e-3", "--noise", "pixel"}));
+    CHECK_FALSE(is_told({"cube.ply", "--preset", "softras"}));
+    CHECK_FALSE(is_told({"--scene", "said.json", "--sigma", "1e-3"}));
+  }
+
+  TEST_CASE("dpr render: --shading replaces the scene's") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "ball.ply", dpr::make_icosphere(1, 1.0F));
+    const auto render = [&](const std::string& shading) {
+      const auto outcome = run_command(
+          folder, {"render", "ball.ply", "-o", shading + ".png", "--size", "24x24", "--shading", shading});
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      return folder.read(shading + ".png");
+    };
+    const std::string flat = render("flat"), phong = render("phong");
+    CHECK(flat != phong);
+    CHECK(phong != render("gouraud"));
+    folder.write("dark.json", scene(""));
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    const auto dark =
+        run_command(folder, {"render", "--scene", "dark.json", "-o", "dark.png", "--shading", "flat"});
+    CHECK(dark.status == 1);
+    CHECK(contains(dark.err, "without lights"));
+    const auto mistyped = run_command(folder, {"render", "ball.ply", "-o", "x.png", "--shading", "fong"});
+    CHECK(mistyped.status == 1);
+    CHECK(contains(mistyped.err, "--shading"));
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("dpr render: an output that cannot be written is an error before there is a device") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    const auto outcome =
+        run_command(folder, {"render", "cube.ply", "-o", "none/cube.png", "--device", "no such device"});
+    CHECK(outcome.status == 1);
+    CHECK(contains(outcome.err, "none/cube.png"));
+  }
+}
