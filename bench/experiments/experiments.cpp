@@ -16,6 +16,7 @@ void run_estimators(const Settings& settings);
 void run_devices(const Settings& settings);
 void run_shapes(const Settings& settings);
 void run_lights(const Settings& settings);
+void run_textures(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -28,7 +29,8 @@ std::span<const Experiment> experiments() {
       {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices},
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
        run_shapes},
-      {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights}};
+      {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights},
+      {"textures", "A texture found from 24 lit views of a known shape, from grey", run_textures}};
   return k_experiments;
 }
 

@@ -14,13 +14,13 @@
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
 #include "mesh/bounding_box.hpp"
+#include "views.hpp"
 
 namespace dpr::experiments {
 namespace {
 
 constexpr std::uint64_t k_seed = 1;
 constexpr std::size_t k_views = 24, k_held_out = 12, k_shown = 6;
-constexpr float k_distance = 3.2F, k_fov_degrees = 45, k_znear = 1, k_zfar = 6;
 constexpr unsigned k_voxels = 64;
 const Bounds k_box{glm::vec3(-1.1F), glm::vec3(1.1F)};
 
@@ -80,23 +80,6 @@ std::vector<Shape> make_shapes(bool smoke) {
   return shapes;
 }
 
-/// Spread evenly over a sphere (a Fibonacci lattice), turned by an angle.
-std::vector<Camera> make_cameras(std::size_t count, double turn_degrees) {
-  constexpr double k_golden_angle = 137.50776405003785, k_poles = 0.95;  // not quite up to them
-  std::vector<Camera> cameras;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double height = 1 - 2 * (static_cast<double>(i) + 0.5) / static_cast<double>(count);
-    const double azimuth = std::fmod(k_golden_angle * static_cast<double>(i) + turn_degrees, 360);
-    Camera camera = orbit_camera(k_distance, static_cast<float>(glm::degrees(std::asin(k_poles * height))),
-                                 static_cast<float>(azimuth));
-    camera.fov_y_degrees = k_fov_degrees;
-    camera.znear = k_znear;
-    camera.zfar = k_zfar;
-    cameras.push_back(camera);
-  }
-  return cameras;
-}
-
 /// A way to fit, all with the same views and iterations.
 struct Method {
   std::string name;
@@ -130,19 +113,6 @@ std::vector<Method> make_methods(bool smoke) {
           {"direct steps, Laplacian", paper, ""}};
 }
 
-/// Peak signal-to-noise ratio over all pixels and colours, decibels, of a signal of 1.
-double psnr(const std::vector<Image>& images, const std::vector<Image>& targets) {
-  double sum = 0, count = 0;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    for (std::size_t k = 0; k < images[i].pixels.size(); ++k) {
-      const glm::dvec3 difference(images[i].pixels[k] - targets[i].pixels[k]);
-      sum += glm::dot(difference, difference);
-      count += 3;
-    }
-  }
-  return -10 * std::log10(sum / count);
-}
-
 Image row_of(const std::vector<Image>& images) {
   std::vector<Image> shown(images.begin(), images.begin() + k_shown);
   for (Image& image : shown) image = opaque(std::move(image));
@@ -155,10 +125,10 @@ class Trial {
   Trial(const Settings& settings, Shape shape)
       : settings_(settings),
         shape_(std::move(shape)),
-        held_out_(make_cameras(k_held_out, 77)),
+        held_out_(cameras_around(k_held_out, 77)),
         volume_(voxelize(shape_.mesh, k_voxels, k_box)) {
     views_.width = views_.height = settings.smoke ? 32 : 128;
-    const std::vector<Camera> cameras = make_cameras(k_views, 0);
+    const std::vector<Camera> cameras = cameras_around(k_views, 0);
     const std::vector<Image> images = render(shape_.mesh, cameras);
     for (std::size_t i = 0; i < k_views; ++i) views_.views.push_back({images[i], cameras[i]});
     targets_ = render(shape_.mesh, held_out_);

@@ -71,6 +71,13 @@ TEST_SUITE("bench-smoke") {
     }
   }
 
+  TEST_CASE("textures: views that were not used come nearer to the truth") {
+    const TempDir folder;
+    const Json data = run(folder, "textures");
+    if (data.is_null()) return;
+    CHECK(data["held_out_psnr"].get<double>() > data["start_held_out_psnr"].get<double>() + 5);
+  }
+
   TEST_CASE("gradient-noise: means agree with the exact derivative, and more samples spread less") {
     const TempDir folder;
     const Json data = run(folder, "gradient-noise");
