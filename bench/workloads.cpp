@@ -1,6 +1,8 @@
 #include "workloads.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
 
 #include "dpr/error.hpp"
 #include "dpr/mesh.hpp"
@@ -10,6 +12,9 @@ namespace {
 
 constexpr std::uint32_t k_exact = 0;  // in a list of sample counts
 
+/// What the scene has beside its mesh. inside: the camera, so that faces cross the near plane.
+enum class Scenery { plain, inside, textured, lit };
+
 struct Definition {
   std::string_view name;
   unsigned subdivisions;  // of the icosphere; 0: the cube
@@ -18,8 +23,8 @@ struct Definition {
   std::vector<std::uint32_t> samples;
   bool softras, own;  // rows of SoftRas' priors; of the joint composition and of the library's defaults
   unsigned views;
-  float pixel_sigma = 0;     // of a row with noise of the pixel; 0: none
-  bool from_within = false;  // faces cross the near plane
+  float pixel_sigma = 0;  // of a row with noise of the pixel; 0: none
+  Scenery scenery = Scenery::plain;
 };
 
 /// Noise of the pixel's rows: a blur of four pixels at 256x256, whatever the size.
@@ -55,7 +60,9 @@ const std::vector<Definition>& definitions() {
         {"sphere64", 3, 64, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
         {"sphere128", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1},
         {"sphere256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 1, k_pixel_sigma},
-        {"room256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma, true},
+        {"room256", 3, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma, Scenery::inside},
+        {"textured256", 3, 256, 1e-4F, 1e-3F, {k_exact}, false, true, 1, k_pixel_sigma, Scenery::textured},
+        {"lit256", 3, 256, 1e-4F, 1e-3F, {k_exact}, false, true, 1, k_pixel_sigma, Scenery::lit},
         {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
         {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
         {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
@@ -64,6 +71,33 @@ const std::vector<Definition>& definitions() {
     return list;
   }();
   return all;
+}
+
+/// A map of longitudes and latitudes, of a checkered pattern of 256x256 texels.
+void add_texture(Mesh& mesh) {
+  constexpr int k_size = 256, k_square = 16;
+  Texture texture;
+  texture.width = texture.height = k_size;
+  texture.filter = Filter::trilinear;
+  for (int i = 0; i < k_size * k_size; ++i) {
+    const bool dark = (i / k_size / k_square + i % k_size / k_square) % 2 == 0;
+    texture.texels.emplace_back(dark ? 0.2F : 0.8F);
+  }
+  for (const glm::vec3& p : mesh.positions) {
+    mesh.texcoords.emplace_back(std::atan2(p.x, p.z) / glm::two_pi<float>() + 0.5F,
+                                std::asin(std::clamp(p.y, -1.0F, 1.0F)) / glm::pi<float>() + 0.5F);
+  }
+  mesh.face_texcoords = mesh.faces;
+  mesh.textures = {std::move(texture)};
+}
+
+/// A light of each of three kinds.
+Lights make_lights() {
+  Lights lights;
+  lights.point = {{.position = {2, 4, 5}}};
+  lights.directional = {DirectionalLight{}};
+  lights.harmonics.assign(9, glm::vec3(0.1F));
+  return lights;
 }
 
 Scene make_scene(const Definition& d) {
@@ -78,9 +112,15 @@ Scene make_scene(const Definition& d) {
   scene.meshes.push_back({cube ? make_cube() : make_icosphere(d.subdivisions)});
   scene.camera = orbit_camera(cube ? k_cube_distance : k_sphere_distance, 30.0F, 120.0F);
   scene.smoothing = smoothing_preset("gaussian");
-  if (d.from_within) {
+  if (d.scenery == Scenery::inside) {
     scene.camera = orbit_camera(k_room_distance, 30.0F, 120.0F);
     scene.camera.znear = k_room_near;
+  } else if (d.scenery == Scenery::textured) {
+    add_texture(scene.meshes[0].mesh);
+    scene.gradients.texture = scene.gradients.texcoords = true;
+  } else if (d.scenery == Scenery::lit) {
+    scene.lights = make_lights();
+    scene.gradients.lights = true;
   }
   scene.smoothing.sigma = d.sigma;
   scene.smoothing.gamma = d.gamma;
@@ -160,6 +200,8 @@ std::string_view describe(std::string_view name) {
       {"sphere128", "the same, 128x128"},
       {"sphere256", "the same, 256x256"},
       {"room256", "sphere256 from within, through the near plane; exact, M = 8"},
+      {"textured256", "sphere256 with a trilinear texture of 256x256 texels; exact"},
+      {"lit256", "sphere256 with a point light, a directional one and harmonics, Phong; exact"},
       {"views24", "sphere128 from 24 cameras in one batch"},
       {"sphere20k", "20,480 triangles, 256x256; exact, M = 8"},
       {"sphere80k", "81,920 triangles, 512x512; exact, M = 8"},
