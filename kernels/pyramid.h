@@ -9,16 +9,19 @@ typedef struct {
   uint first, width, height;  // number of the first texel
 } Level;
 
+static inline Level next_level(Level l) {
+  l.first += l.width * l.height;
+  l.width = max(l.width / 2, 1u);
+  l.height = max(l.height / 2, 1u);
+  return l;
+}
+
 static inline Level find_level(const Texture t, uint level) {
   Level l;
   l.first = t.first;
   l.width = t.width;
   l.height = t.height;
-  for (uint k = 0; k < level; ++k) {
-    l.first += l.width * l.height;
-    l.width = max(l.width / 2, 1u);
-    l.height = max(l.height / 2, 1u);
-  }
+  for (uint k = 0; k < level; ++k) l = next_level(l);
   return l;
 }
 

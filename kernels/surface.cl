@@ -48,33 +48,35 @@ kernel void surface_forward(const FrameParams p, const uint last_pair, global co
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   for (uint i = first; i < last; ++i) {
     const float c1 = bary1[i], c2 = bary2[i];
-    const float4 base =
-        base_of_corners(face, c1, c2) * sample_face(face, find_detail(p, face, c1, c2), c1, c2, texels).color;
+    const float4 base = base_of_corners(&face, c1, c2) *
+                        sample_face(&face, find_detail(p, &face, c1, c2), c1, c2, texels).color;
     red[i] = base.x;
     green[i] = base.y;
     blue[i] = base.z;
   }
 }
 
-/// Gradients of a level of detail's barycentrics, relative to corner 0's, of the q_k and of the depths, from
-/// that of the place's step, which is the sum of c_k' place_k.
+/// Gradients of a level of detail's barycentrics, relative to corner 0's, and of the corners' places, q_k and
+/// depths, from that of the place's step, which is the sum of c_k' place_k.
 typedef struct {
-  float bary1, bary2, q[3], z[3];
+  float bary1, bary2;
+  float3 along;  // of place_k by the gradient of the step: c_k'
+  float3 q, depth;
 } DetailGradient;
 
-static inline DetailGradient detail_backward(const TexturedFace f, const Detail d, float c1, float c2,
+static inline DetailGradient detail_backward(const TexturedFace* f, const Detail d, float c1, float c2,
                                              float2 grad_step) {
-  const float along[3] = {0.0f, dot(grad_step, f.place1), dot(grad_step, f.place2)},
-              c[3] = {1.0f - c1 - c2, c1, c2};
-  const float mean = c1 * along[1] + c2 * along[2];
-  const float by_depth = along[1] * d.q[1] + along[2] * d.q[2] - mean * d.sum_q;
+  const float along1 = dot(grad_step, f->place1), along2 = dot(grad_step, f->place2);
+  const float3 depth = f->steps.depth, c = (float3)(1.0f - c1 - c2, c1, c2);
+  const float mean = c1 * along1 + c2 * along2;
+  const float by_depth = along1 * d.q.y + along2 * d.q.z - mean * d.sum_q;
   DetailGradient g;
-  g.bary1 = (d.z[1] - d.z[0]) * by_depth - d.depth * along[1] * d.sum_q;
-  g.bary2 = (d.z[2] - d.z[0]) * by_depth - d.depth * along[2] * d.sum_q;
-  for (int k = 0; k < 3; ++k) {
-    g.q[k] = d.depth * (along[k] - mean);
-    g.z[k] = f.is_clipped ? c[k] * by_depth : c[k] * by_depth - g.q[k] * d.q[k] / d.z[k];
-  }
+  g.bary1 = (depth.y - depth.x) * by_depth - d.depth * along1 * d.sum_q;
+  g.bary2 = (depth.z - depth.x) * by_depth - d.depth * along2 * d.sum_q;
+  g.along = d.depth * (d.q - c * d.sum_q);
+  g.along.x = -(g.along.y + g.along.z);
+  g.q = d.depth * ((float3)(0.0f, along1, along2) - mean);
+  g.depth = c * by_depth - (f->is_clipped ? (float3)(0.0f) : g.q * d.q / depth);
   return g;
 }
 
@@ -84,6 +86,9 @@ static inline DetailGradient detail_backward(const TexturedFace f, const Detail 
 /// in out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors     float[pair][9]  RGB of the corners' colours, summed over the pair's fragments
 /// out  grad_texcoords  float[pair][9]  u, v of the corners, and 0
+/// out  grad_steps      float[pair][9]  of the levels of detail's q_k along x, along y, and depths; not
+/// written
+///      for faces whose texture has one level
 kernel void surface_backward(const FrameParams p, const uint last_pair, const uint adds,
                              global const uint* restrict pair_face,
                              global const uint* restrict fragment_starts,
@@ -95,7 +100,8 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
                              global const float* restrict bary2, global const float* restrict grad_red,
                              global const float* restrict grad_green, global const float* restrict grad_blue,
                              global float* restrict grad_bary1, global float* restrict grad_bary2,
-                             global float* restrict grad_colors, global float* restrict grad_texcoords) {
+                             global float* restrict grad_colors, global float* restrict grad_texcoords,
+                             global float* restrict grad_steps) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
   const SurfaceScene scene =
@@ -103,23 +109,28 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   float3 color[3] = {0.0f, 0.0f, 0.0f};
   float2 place[3] = {0.0f, 0.0f, 0.0f};
+  float3 steps[3] = {0.0f, 0.0f, 0.0f};
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
     const float c1 = bary1[i], c2 = bary2[i], c0 = 1.0f - c1 - c2;
-    const Detail detail = find_detail(p, face, c1, c2);
-    const Sample sample = sample_face(face, detail, c1, c2, texels);
+    const Detail detail = find_detail(p, &face, c1, c2);
+    const Sample sample = sample_face(&face, detail, c1, c2, texels);
     const float3 grad = (float3)(grad_red[i], grad_green[i], grad_blue[i]);
-    const float3 grad_color = grad * sample.color.xyz, grad_sample = grad * base_of_corners(face, c1, c2).xyz;
+    const float3 grad_color = grad * sample.color.xyz,
+                 grad_sample = grad * base_of_corners(&face, c1, c2).xyz;
     const float2 grad_place = (float2)(dot(grad_sample, sample.by_x.xyz), dot(grad_sample, sample.by_y.xyz));
     float along1 = dot(grad_color, face.color1.xyz) + dot(grad_place, face.place1);
     float along2 = dot(grad_color, face.color2.xyz) + dot(grad_place, face.place2);
     if (detail.varies) {
       const float2 grad_step = dot(grad_sample, sample.by_detail.xyz) * detail.by_step;
-      const DetailGradient g = detail_backward(face, detail, c1, c2, grad_step);
+      const DetailGradient g = detail_backward(&face, detail, c1, c2, grad_step);
       along1 += g.bary1;
       along2 += g.bary2;
-      place[0] -= (detail.step1 + detail.step2) * grad_step;
-      place[1] += detail.step1 * grad_step;
-      place[2] += detail.step2 * grad_step;
+      place[0] += g.along.x * grad_step;
+      place[1] += g.along.y * grad_step;
+      place[2] += g.along.z * grad_step;
+      steps[0] += detail.along_y ? (float3)(0.0f) : g.q;
+      steps[1] += detail.along_y ? g.q : (float3)(0.0f);
+      steps[2] += g.depth;
     }
     grad_bary1[i] = adds ? grad_bary1[i] + along1 : along1;
     grad_bary2[i] = adds ? grad_bary2[i] + along2 : along2;
@@ -133,88 +144,81 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
   for (int k = 0; k < 3; ++k) {
     vstore3(color[k], 0, grad_colors + 9 * pair + 3 * k);
     vstore3((float3)(place[k].x, -place[k].y, 0.0f), 0, grad_texcoords + 9 * pair + 3 * k);
+    if (face.texture.levels > 1) vstore3(steps[k], 0, grad_steps + 9 * pair + 3 * k);
   }
 }
 
-/// From there to the corners of a whole triangle on the screen.
-static inline void add_to_corners(const FrameParams p, const Triangle t, const Detail d,
-                                  const DetailGradient g, float3 corner[3]) {
+/// From the q_k along an axis to the corners of a whole triangle on the screen, whose depths have their own.
+static inline void add_to_corners(const Triangle t, float3 depth, int along_y, float3 grad_q,
+                                  float3 corner[3]) {
   const float inverse_area = 1.0f / doubled_area(t);
-  float steps[2][3];
-  screen_steps(t, 0, steps[0]);
-  screen_steps(t, 1, steps[1]);
-  float of_step[3], of_area = 0.0f;
-  for (int k = 0; k < 3; ++k) {
-    of_step[k] = g.q[k] * inverse_area / d.z[k];
-    of_area -= g.q[k] * d.q[k] * inverse_area;
-  }
-  for (int k = 0; k < 3; ++k) {
-    const float turned = of_step[(k + 2) % 3] - of_step[(k + 1) % 3];
-    // The doubled area changes with x and y as the steps along y and x say, exchanged.
-    corner[k].x += of_area * steps[0][k] - (d.along_y ? turned : 0.0f);
-    corner[k].y += of_area * steps[1][k] + (d.along_y ? 0.0f : turned);
-    if (p.perspective_correct) corner[k].z += g.z[k];
-  }
+  const float3 of_step = grad_q * inverse_area / depth;
+  const float of_area = -inverse_area * dot(of_step, screen_steps(t, along_y));
+  const float3 turned = of_step.zxy - of_step.yzx, by_x = screen_steps(t, 0), by_y = screen_steps(t, 1);
+  // The doubled area changes with x and y as the steps along y and x say, exchanged.
+  const float3 x = of_area * by_x - (along_y ? turned : (float3)(0.0f)),
+               y = of_area * by_y + (along_y ? (float3)(0.0f) : turned);
+  corner[0].xy += (float2)(x.x, y.x);
+  corner[1].xy += (float2)(x.y, y.y);
+  corner[2].xy += (float2)(x.z, y.z);
 }
 
 /// To the homogeneous corners of a clipped face.
-static inline void add_to_clipped_corners(const ClippedFace c, const Detail d, const DetailGradient g,
-                                          float3 corner[3]) {
+static inline void add_to_clipped_corners(const ClippedFace c, int along_y, float3 grad_q, float3 corner[3]) {
   const float inverse = 1.0f / determinant(c);
+  const float of_step[3] = {grad_q.x * inverse, grad_q.y * inverse, grad_q.z * inverse};
   float of_determinant = 0.0f;
-  for (int k = 0; k < 3; ++k) of_determinant -= g.q[k] * d.q[k] * inverse;
+  for (int k = 0; k < 3; ++k) {
+    const float3 step = cofactor(c, k);
+    of_determinant -= inverse * of_step[k] * (along_y ? step.y : step.x);
+  }
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
-    const float of_step = g.q[k] * inverse;
-    const float3 of_cofactor = d.along_y ? (float3)(0.0f, of_step, 0.0f) : (float3)(of_step, 0.0f, 0.0f);
-    corner[k] += of_determinant * cofactor(c, k) + (float3)(0.0f, 0.0f, g.z[k]);
+    const float3 of_cofactor = along_y ? (float3)(0.0f, of_step[k], 0.0f) : (float3)(of_step[k], 0.0f, 0.0f);
+    corner[k] += of_determinant * cofactor(c, k);
     corner[i] += cross(c.corner[j].xyz, of_cofactor);
     corner[j] += cross(of_cofactor, c.corner[i].xyz);
   }
 }
 
 /// From the levels of detail to the corners on the screen: what a triangle that turns or goes away does to
-/// the texture's sharpness. One work-item per pair, up to `last_pair`. Deterministic. Inputs as
-/// surface_backward, and
+/// the texture's sharpness. One work-item per pair, up to `last_pair`. Deterministic.
+/// in   pair_face, face_texcoords, textures, triangles, clipped  as surface_forward has them
+/// in   grad_steps     as surface_backward leaves them
 /// in out  grad_corners  float[pair][9]  x, y (NDC) and view depth of the corners
 /// in out  grad_clip     float[pair][9]  of the homogeneous corners of clipped faces, if p.clips is set
-kernel void surface_detail_backward(
-    const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
-    global const uint* restrict fragment_starts, global const uint4* restrict face_colors,
-    global const float4* restrict colors, global const uint4* restrict face_texcoords,
-    global const float4* restrict texcoords, global const Texture* restrict textures,
-    global const float4* restrict texels, global const Triangle* restrict triangles,
-    global const ClippedFace* restrict clipped, global const float* restrict bary1,
-    global const float* restrict bary2, global const float* restrict grad_red,
-    global const float* restrict grad_green, global const float* restrict grad_blue,
-    global float* restrict grad_corners, global float* restrict grad_clip) {
+kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
+                                    global const uint* restrict pair_face,
+                                    global const uint4* restrict face_texcoords,
+                                    global const Texture* restrict textures,
+                                    global const Triangle* restrict triangles,
+                                    global const ClippedFace* restrict clipped,
+                                    global const float* restrict grad_steps,
+                                    global float* restrict grad_corners, global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const SurfaceScene scene =
-      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
-  const TexturedFace face = load_face(scene, p, pair_face[pair]);
-  if (!face.is_textured || face.texture.levels == 1) return;
+  const uint view_face = pair_face[pair], texture = face_texcoords[view_face % p.faces].w;
+  if (texture == DPR_NO_TEXTURE || textures[texture].levels == 1) return;
+  const float3 depth = vload3(2, grad_steps + 9 * pair);
+  const int is_clipped = p.clips && clipped[view_face].corners != 0;
   float3 corner[3] = {0.0f, 0.0f, 0.0f};
-  for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
-    const float c1 = bary1[i], c2 = bary2[i];
-    const Detail detail = find_detail(p, face, c1, c2);
-    if (!detail.varies) continue;
-    const Sample sample = sample_face(face, detail, c1, c2, texels);
-    const float3 grad_sample =
-        (float3)(grad_red[i], grad_green[i], grad_blue[i]) * base_of_corners(face, c1, c2).xyz;
-    const DetailGradient g =
-        detail_backward(face, detail, c1, c2, dot(grad_sample, sample.by_detail.xyz) * detail.by_step);
-    if (face.is_clipped) {
-      add_to_clipped_corners(face.clipped, detail, g, corner);
+  if (is_clipped || p.perspective_correct) {
+    corner[0].z = depth.x;
+    corner[1].z = depth.y;
+    corner[2].z = depth.z;
+  }
+  for (int along_y = 0; along_y < 2; ++along_y) {
+    const float3 grad_q = vload3((size_t)along_y, grad_steps + 9 * pair);
+    if (is_clipped) {
+      add_to_clipped_corners(clipped[view_face], along_y, grad_q, corner);
     } else {
-      add_to_corners(p, face.triangle, detail, g, corner);
+      const Triangle t = triangles[view_face];
+      const float3 depths = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
+      add_to_corners(t, depths, along_y, grad_q, corner);
     }
   }
-  global float* grad = face.is_clipped ? grad_clip : grad_corners;
-  for (int k = 0; k < 3; ++k) {
-    global float* place = grad + 9 * pair + 3 * k;
-    vstore3(vload3(0, place) + corner[k], 0, place);
-  }
+  global float* grad = (is_clipped ? grad_clip : grad_corners) + 9 * pair;
+  for (int k = 0; k < 3; ++k) vstore3(vload3((size_t)k, grad) + corner[k], (size_t)k, grad);
 }
 
 /// What every fragment asks of the texels: a cell, which is a texel and its neighbours to the right and
@@ -243,18 +247,17 @@ kernel void surface_list(const FrameParams p, const uint last_pair, const uint n
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
     const float c1 = bary1[i], c2 = bary2[i];
-    const Detail detail = find_detail(p, face, c1, c2);
+    const Detail detail = find_detail(p, &face, c1, c2);
     const float4 grad =
-        (float4)(grad_red[i], grad_green[i], grad_blue[i], 0.0f) * base_of_corners(face, c1, c2);
+        (float4)(grad_red[i], grad_green[i], grad_blue[i], 0.0f) * base_of_corners(&face, c1, c2);
+    const Footprint footprint = find_footprint(face.texture, (uint)detail.level, place_at(&face, c1, c2));
+    const uint2 cell = footprint_cells(footprint);
     for (uint k = 0; k < levels; ++k) {
       const uint place = levels * i + k;
+      const int is_seen = face.is_textured && k < face.texture.levels;
       numbers[place] = place;
-      cells[place] = no_cell;
-      if (!face.is_textured || k >= face.texture.levels) continue;
-      const Footprint footprint =
-          find_footprint(face.texture, (uint)detail.level + k, place_at(face, c1, c2));
-      cells[place] = footprint_cell(footprint);
-      parts[place] = (float2)(footprint.x.part, footprint.y.part);
+      cells[place] = !is_seen ? no_cell : k == 0 ? cell.x : cell.y;
+      parts[place] = k == 0 ? footprint.part.xy : footprint.part.zw;
       grad_seen[place] = (k == 0 ? 1.0f - detail.part : detail.part) * grad;
     }
   }

@@ -20,6 +20,16 @@ typedef struct {
   global const ClippedFace* clipped;  // [view][face]; read where p.clips is set
 } SurfaceScene;
 
+/// What levels of detail are made of. Barycentric c_k changes by z (q_k - c_k Q) from sample to sample along
+/// an axis of the image, where q_k = g_k / z_k, Q = sum q_k, z = sum c_k z_k, z_k is a corner's depth, or 1
+/// without perspective, and g_k is the step of the barycentric on the screen. NDC.
+typedef struct {
+  float3 depth;             // z_k
+  float3 q_x, q_y;          // q_k along either axis
+  float sum_x, sum_y;       // Q
+  float2 along_x, along_y;  // q_1 place1 + q_2 place2
+} Steps;
+
 /// A triangle's corners: colours, and places in its texture. Places are in units of the whole texture, from
 /// its upper left corner to the right and down; c1, c2 of the way along `along1`, `along2` from `base`.
 typedef struct {
@@ -27,10 +37,49 @@ typedef struct {
   float2 place, place1, place2;
   Texture texture;
   int is_textured;
-  Triangle triangle;
   int is_clipped;
-  ClippedFace clipped;
+  Steps steps;  // where the texture has several levels
 } TexturedFace;
+
+/// Steps of the barycentrics on the screen, times the doubled area.
+static inline float3 screen_steps(const Triangle t, int along_y) {
+  return along_y ? (float3)(t.x2 - t.x1, t.x0 - t.x2, t.x1 - t.x0)
+                 : (float3)(t.y1 - t.y2, t.y2 - t.y0, t.y0 - t.y1);
+}
+
+/// The determinant of a clipped face's homogeneous corners, and its derivative by one of them. A barycentric
+/// times 1 / depth is one of these over the determinant, times the sample: q_k is a component of that.
+static inline float3 cofactor(const ClippedFace c, int k) {
+  return cross(c.corner[(k + 1) % 3].xyz, c.corner[(k + 2) % 3].xyz);
+}
+static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyz, cofactor(c, 0)); }
+
+static inline Steps make_steps(float3 depth, float3 q_x, float3 q_y, float2 place1, float2 place2) {
+  Steps s;
+  s.depth = depth;
+  s.q_x = q_x;
+  s.q_y = q_y;
+  s.sum_x = q_x.x + q_x.y + q_x.z;
+  s.sum_y = q_y.x + q_y.y + q_y.z;
+  s.along_x = q_x.y * place1 + q_x.z * place2;
+  s.along_y = q_y.y * place1 + q_y.z * place2;
+  return s;
+}
+
+/// Of a face that is not clipped, and of one that is: in perspective always, as without it the plane has no
+/// steps where it passes the camera.
+static inline Steps triangle_steps(const FrameParams p, const Triangle t, float2 place1, float2 place2) {
+  const float3 depth = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
+  const float3 scale = 1.0f / (doubled_area(t) * depth);
+  return make_steps(depth, screen_steps(t, 0) * scale, screen_steps(t, 1) * scale, place1, place2);
+}
+
+static inline Steps clipped_steps(const ClippedFace c, float2 place1, float2 place2) {
+  const float inverse = 1.0f / determinant(c);
+  const float3 a = cofactor(c, 0), b = cofactor(c, 1), d = cofactor(c, 2);
+  return make_steps((float3)(c.corner[0].z, c.corner[1].z, c.corner[2].z), inverse * (float3)(a.x, b.x, d.x),
+                    inverse * (float3)(a.y, b.y, d.y), place1, place2);
+}
 
 static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0f - texcoord.y); }
 
@@ -43,9 +92,7 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   f.color2 = s.colors[c.z] - f.color;
   f.is_textured = corner.w != DPR_NO_TEXTURE;
   f.texture = s.textures[f.is_textured ? corner.w : 0];
-  f.triangle = s.triangles[view_face];
   f.is_clipped = p.clips && s.clipped[view_face].corners != 0;
-  if (f.is_clipped) f.clipped = s.clipped[view_face];
   f.place = place_of(s.texcoords[corner.x]);
   f.place1 = place_of(s.texcoords[corner.y]) - f.place;
   f.place2 = place_of(s.texcoords[corner.z]) - f.place;
@@ -53,149 +100,105 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   // digits.
   if (f.texture.wrap == DPR_REPEAT) f.place -= floor(f.place);
   if (f.texture.wrap == DPR_MIRROR) f.place -= 2.0f * floor(0.5f * f.place);
+  if (f.texture.levels > 1) {
+    f.steps = f.is_clipped ? clipped_steps(s.clipped[view_face], f.place1, f.place2)
+                           : triangle_steps(p, s.triangles[view_face], f.place1, f.place2);
+  }
   return f;
 }
 
-/// The two texels along an axis whose mixture is seen, `low` and the one after it (the first after the last),
-/// and the part of the latter; and how fast a place moves from the one to the other.
+/// Where a fragment looks into two neighbouring levels of its texture, or twice into its only one. Vectors
+/// hold column and row of the larger level, then of the smaller one: along each axis the two texels whose
+/// mixture is seen, `low` and the one after it (the first after the last), the part of the latter, and how
+/// fast a place moves from the one to the other.
 typedef struct {
-  uint low, high;
-  float part, slope;
-} Tap;
+  uint2 first, width;  // of the levels
+  uint4 low, high;
+  float4 part, slope;
+} Footprint;
 
-static inline Tap make_tap(float place, uint size, uint wrap, uint filter) {
-  const float count = (float)size;
-  float slope = count;
-  if (wrap == DPR_REPEAT) place -= floor(place);
-  if (wrap == DPR_MIRROR) {
+static inline Footprint find_footprint(const Texture t, uint level, float2 at) {
+  const Level large = find_level(t, level), small = level + 1 < t.levels ? next_level(large) : large;
+  const uint4 size = (uint4)(large.width, large.height, small.width, small.height);
+  const float4 count = convert_float4(size);
+  Footprint f;
+  f.first = (uint2)(large.first, small.first);
+  f.width = (uint2)(large.width, small.width);
+  float4 place = at.xyxy;
+  f.slope = count;
+  if (t.wrap == DPR_REPEAT) place -= floor(place);
+  if (t.wrap == DPR_MIRROR) {
     place -= 2.0f * floor(0.5f * place);
-    if (place > 1.0f) slope = -count;
+    f.slope = place > 1.0f ? -count : count;
     place = 1.0f - fabs(1.0f - place);
   }
   // Beyond single precision there is no place: the first texel. Written so that a NaN is one of those.
-  place = place > 0.0f ? fmin(place, 1.0f) : 0.0f;
-  const float from_centre = place * count - (filter == DPR_NEAREST ? 0.0f : 0.5f);
-  Tap tap;
-  if (filter == DPR_NEAREST || (wrap != DPR_REPEAT && !(from_centre > 0.0f && from_centre < count - 1.0f))) {
-    // A single texel: at the borders half of it has no neighbour, or itself as one.
-    tap.low = (uint)clamp(from_centre, 0.0f, count - 1.0f);
-    tap.part = 0.0f;
-    tap.slope = 0.0f;
-  } else {
-    const float below = floor(from_centre);
-    tap.low = below < 0.0f ? size - 1 : min((uint)below, size - 1);
-    tap.part = from_centre - below;
-    tap.slope = slope;
-  }
-  tap.high = tap.low + 1 == size ? 0 : tap.low + 1;
-  return tap;
-}
-
-/// Where a fragment looks into a level of its texture.
-typedef struct {
-  uint first, width;  // of the level
-  Tap x, y;
-} Footprint;
-
-static inline Footprint find_footprint(const Texture t, uint level, float2 place) {
-  const Level l = find_level(t, level);
-  Footprint f;
-  f.first = l.first;
-  f.width = l.width;
-  f.x = make_tap(place.x, l.width, t.wrap, t.filter);
-  f.y = make_tap(place.y, l.height, t.wrap, t.filter);
+  place = place > 0.0f ? fmin(place, 1.0f) : (float4)(0.0f);
+  const float4 from_centre = place * count - (t.filter == DPR_NEAREST ? 0.0f : 0.5f);
+  const float4 last = count - 1.0f, below = floor(from_centre);
+  f.part = from_centre - below;
+  const uint4 nearest = convert_uint4(clamp(from_centre, 0.0f, last));
+  f.low = below < 0.0f ? size - 1 : min(convert_uint4(fmax(below, 0.0f)), size - 1);
+  // A single texel: at the borders half of it has no neighbour, or itself as one.
+  const int4 is_within = from_centre > 0.0f && from_centre < last;
+  const int4 is_mixed = t.filter == DPR_NEAREST ? (int4)(0) : t.wrap == DPR_REPEAT ? (int4)(-1) : is_within;
+  f.low = is_mixed ? f.low : nearest;
+  f.part = is_mixed ? f.part : (float4)(0.0f);
+  f.slope = is_mixed ? f.slope : (float4)(0.0f);
+  f.high = f.low + 1 == size ? (uint4)(0) : f.low + 1;
   return f;
 }
 
-/// The mixture of four texels, named by the first of them.
-static inline uint footprint_cell(const Footprint f) { return f.first + f.y.low * f.width + f.x.low; }
+/// The mixtures of four texels, each named by the first of them.
+static inline uint2 footprint_cells(const Footprint f) { return f.first + f.low.yw * f.width + f.low.xz; }
 
 /// What is seen, and its derivatives by the place and by the level of detail.
 typedef struct {
   float4 color, by_x, by_y, by_detail;
 } Sample;
 
-static inline Sample sample_level(const Footprint f, global const float4* texels) {
-  global const float4 *low = texels + f.first + f.y.low * f.width,
-                      *high = texels + f.first + f.y.high * f.width;
-  const float4 a = low[f.x.low], b = low[f.x.high] - a, c = high[f.x.low], d = high[f.x.high] - c;
-  const float4 upper = a + f.x.part * b, lower = c + f.x.part * d;
+static inline Sample sample_level(uint first, uint width, uint2 low, uint2 high, float2 part, float2 slope,
+                                  global const float4* texels) {
+  global const float4 *upper_row = texels + first + low.y * width,
+                      *lower_row = texels + first + high.y * width;
+  const float4 a = upper_row[low.x], b = upper_row[high.x] - a, c = lower_row[low.x],
+               d = lower_row[high.x] - c;
+  const float4 upper = a + part.x * b, lower = c + part.x * d;
   Sample s;
-  s.color = upper + f.y.part * (lower - upper);
-  s.by_x = f.x.slope * (b + f.y.part * (d - b));
-  s.by_y = f.y.slope * (lower - upper);
+  s.color = upper + part.y * (lower - upper);
+  s.by_x = slope.x * (b + part.y * (d - b));
+  s.by_y = slope.y * (lower - upper);
   s.by_detail = 0.0f;
   return s;
 }
 
 /// How many texels lie between neighbouring samples of the image, as a level of the pyramid: the logarithm to
-/// base 2 of the longer of the steps along the image's axes. By what it depends on: barycentrics' steps c_k'
-/// = z (q_k - c_k Q), where q_k = g_k / z_k, Q = sum q_k, z = sum c_k z_k, and g_k is the step of the
-/// barycentric on the screen.
+/// base 2 of the longer of the place's steps along the image's axes.
 typedef struct {
   float level, part;  // the larger of two levels, and the part of the smaller; 0 where there is one alone
   int along_y;        // which step is the longer
   int varies;         // whether the level follows it
   float2 by_step;     // derivative by the place's step
-  float q[3], z[3], depth, sum_q, step1, step2;
+  float3 q;           // of that axis, as are the sum of them
+  float sum_q, depth;
 } Detail;
 
-/// Steps of the barycentrics on the screen, times the doubled area.
-static inline void screen_steps(const Triangle t, int along_y, float step[3]) {
-  step[0] = along_y ? t.x2 - t.x1 : t.y1 - t.y2;
-  step[1] = along_y ? t.x0 - t.x2 : t.y2 - t.y0;
-  step[2] = along_y ? t.x1 - t.x0 : t.y0 - t.y1;
-}
-
-/// The determinant of a clipped face's homogeneous corners, and its derivative by one of them. A barycentric
-/// times 1 / depth is one of these over the determinant, times the sample: q_k is a component of that.
-static inline float3 cofactor(const ClippedFace c, int k) {
-  return cross(c.corner[(k + 1) % 3].xyz, c.corner[(k + 2) % 3].xyz);
-}
-static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyz, cofactor(c, 0)); }
-
-/// The step of the place along an axis of the image, NDC; fills what it is made of. Of clipped faces in
-/// perspective, always: without it the plane has no steps where it passes the camera.
-static inline float2 place_step(const FrameParams p, const TexturedFace f, float c1, float c2, int along_y,
-                                Detail* d) {
-  if (f.is_clipped) {
-    const float inverse = 1.0f / determinant(f.clipped);
-    for (int k = 0; k < 3; ++k) {
-      const float3 step = cofactor(f.clipped, k);
-      d->z[k] = f.clipped.corner[k].z;
-      d->q[k] = (along_y ? step.y : step.x) * inverse;
-    }
-  } else {
-    const float depths[3] = {f.triangle.z0, f.triangle.z1, f.triangle.z2};
-    const float inverse_area = 1.0f / doubled_area(f.triangle);
-    screen_steps(f.triangle, along_y, d->q);
-    for (int k = 0; k < 3; ++k) {
-      d->z[k] = p.perspective_correct ? depths[k] : 1.0f;
-      d->q[k] *= inverse_area / d->z[k];
-    }
-  }
-  d->along_y = along_y;
-  d->sum_q = d->q[0] + d->q[1] + d->q[2];
-  d->depth = d->z[0] + c1 * (d->z[1] - d->z[0]) + c2 * (d->z[2] - d->z[0]);
-  d->step1 = d->depth * (d->q[1] - c1 * d->sum_q);
-  d->step2 = d->depth * (d->q[2] - c2 * d->sum_q);
-  return d->step1 * f.place1 + d->step2 * f.place2;
-}
-
-static inline Detail find_detail(const FrameParams p, const TexturedFace f, float c1, float c2) {
+static inline Detail find_detail(const FrameParams p, const TexturedFace* f, float c1, float c2) {
   Detail d;
   d.level = d.part = 0.0f;
   d.varies = 0;
-  if (f.texture.levels == 1) return d;
-  const float2 scale = p.pixel_size * (float2)((float)f.texture.width, (float)f.texture.height);
-  Detail other;
-  float2 step = scale * place_step(p, f, c1, c2, 0, &d);
-  const float2 other_step = scale * place_step(p, f, c1, c2, 1, &other);
-  if (dot(other_step, other_step) > dot(step, step)) {
-    d = other;
-    step = other_step;
-  }
-  const float length2 = dot(step, step), most = (float)(f.texture.levels - 1);
+  if (f->texture.levels == 1) return d;
+  const Steps* s = &f->steps;
+  const float2 way = c1 * f->place1 + c2 * f->place2;
+  d.depth = s->depth.x + c1 * (s->depth.y - s->depth.x) + c2 * (s->depth.z - s->depth.x);
+  const float2 scale = p.pixel_size * (float2)((float)f->texture.width, (float)f->texture.height);
+  const float2 x = scale * d.depth * (s->along_x - s->sum_x * way),
+               y = scale * d.depth * (s->along_y - s->sum_y * way);
+  d.along_y = dot(y, y) > dot(x, x);
+  d.q = d.along_y ? s->q_y : s->q_x;
+  d.sum_q = d.along_y ? s->sum_y : s->sum_x;
+  const float2 step = d.along_y ? y : x;
+  const float length2 = dot(step, step), most = (float)(f->texture.levels - 1);
   const float detail = 0.5f * log2(length2);
   d.varies = detail > 0.0f && detail < most;
   const float clamped = detail > 0.0f ? fmin(detail, most) : 0.0f;  // a NaN is 0
@@ -205,25 +208,26 @@ static inline Detail find_detail(const FrameParams p, const TexturedFace f, floa
   return d;
 }
 
-static inline float4 base_of_corners(const TexturedFace f, float c1, float c2) {
-  return f.color + c1 * f.color1 + c2 * f.color2;
+static inline float4 base_of_corners(const TexturedFace* f, float c1, float c2) {
+  return f->color + c1 * f->color1 + c2 * f->color2;
 }
 
-static inline float2 place_at(const TexturedFace f, float c1, float c2) {
-  return f.place + c1 * f.place1 + c2 * f.place2;
+static inline float2 place_at(const TexturedFace* f, float c1, float c2) {
+  return f->place + c1 * f->place1 + c2 * f->place2;
 }
 
 /// White where there is no texture.
-static inline Sample sample_face(const TexturedFace f, const Detail d, float c1, float c2,
+static inline Sample sample_face(const TexturedFace* f, const Detail d, float c1, float c2,
                                  global const float4* texels) {
   Sample s;
   s.color = 1.0f;
   s.by_x = s.by_y = s.by_detail = 0.0f;
-  if (!f.is_textured) return s;
-  const float2 place = place_at(f, c1, c2);
-  s = sample_level(find_footprint(f.texture, (uint)d.level, place), texels);
-  if (f.texture.levels == 1) return s;
-  const Sample next = sample_level(find_footprint(f.texture, (uint)d.level + 1, place), texels);
+  if (!f->is_textured) return s;
+  const Footprint at = find_footprint(f->texture, (uint)d.level, place_at(f, c1, c2));
+  s = sample_level(at.first.x, at.width.x, at.low.xy, at.high.xy, at.part.xy, at.slope.xy, texels);
+  if (f->texture.levels == 1) return s;
+  const Sample next =
+      sample_level(at.first.y, at.width.y, at.low.zw, at.high.zw, at.part.zw, at.slope.zw, texels);
   s.by_detail = next.color - s.color;
   s.color += d.part * s.by_detail;
   s.by_x += d.part * (next.by_x - s.by_x);

@@ -267,8 +267,7 @@ void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
                                          : occupancy.grad_distance,
                        aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
     if (textured) {
-      shade.surface->backward_detail(shade_inputs().surface(), shade.grad_base(aggregate.grad_color),
-                                     rasterize.grad_corners, clip.grad_corners);
+      shade.surface->backward_detail(shade_inputs().surface(), rasterize.grad_corners, clip.grad_corners);
     }
   }
   if (wanted.lights && shade.lit()) {

@@ -36,23 +36,21 @@ void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bo
   const Textures& t = in.geometry.textures;
   const Range pairs = in.rasterize.pairs(in.bin);
   grad_corner_texcoords.resize(device_, std::size_t{9} * in.bin.pairs);
+  grad_steps_.resize(device_, std::size_t{9} * in.bin.pairs);
   backward_(pairs, in.p, pairs.last(), adds ? 1 : 0, in.bin.pair_face, in.rasterize.fragment_starts,
             in.geometry.face_colors, in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
             t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
             grad_base.red, grad_base.green, grad_base.blue, grad_bary1, grad_bary2, grad_corner_colors,
-            grad_corner_texcoords);
+            grad_corner_texcoords, grad_steps_);
 }
 
-void Surface::backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base,
-                              Buffer<float>& grad_corners, Buffer<float>& grad_clip) {
+void Surface::backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corners,
+                              Buffer<float>& grad_clip) {
   const Textures& t = in.geometry.textures;
   if (!t.has_pyramids()) return;
   const Range pairs = in.rasterize.pairs(in.bin);
-  backward_detail_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
-                   in.geometry.face_colors, in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
-                   t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1,
-                   in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, grad_corners,
-                   grad_clip);
+  backward_detail_(pairs, in.p, pairs.last(), in.bin.pair_face, t.face_texcoords, t.textures, in.triangles,
+                   in.clipped, grad_steps_, grad_corners, grad_clip);
 }
 
 void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
@@ -69,8 +67,8 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
 }
 
 std::size_t Surface::bytes() const {
-  return grad_corner_texcoords.capacity_bytes() + cells.capacity_bytes() + numbers.capacity_bytes() +
-         parts.capacity_bytes() + grad_seen.capacity_bytes();
+  return grad_corner_texcoords.capacity_bytes() + grad_steps_.capacity_bytes() + cells.capacity_bytes() +
+         numbers.capacity_bytes() + parts.capacity_bytes() + grad_seen.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -37,10 +37,9 @@ class Surface {
   /// barycentrics, to which they are added where the light has left its own there.
   void backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds, Buffer<float>& grad_bary1,
                 Buffer<float>& grad_bary2, Buffer<float>& grad_corner_colors);
-  /// Adds what goes by way of the levels of detail to the gradients of the corners on the screen, [pair][9]
-  /// as Rasterize has them, and of clipped faces as Clip has them.
-  void backward_detail(const SurfaceInputs& in, const ColorPlanes& grad_base, Buffer<float>& grad_corners,
-                       Buffer<float>& grad_clip);
+  /// Adds what goes by way of the levels of detail, as backward() found it, to the gradients of the corners
+  /// on the screen, [pair][9] as Rasterize has them, and of clipped faces as Clip has them.
+  void backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corners, Buffer<float>& grad_clip);
   /// What the band's fragments ask of the texels, by fragment and level: for the stage that gathers it.
   void list(const SurfaceInputs& in, const ColorPlanes& grad_base);
 
@@ -57,6 +56,7 @@ class Surface {
 
  private:
   Device::Impl& device_;
+  Buffer<float> grad_steps_;  // [pair][9] of the levels of detail: from backward() to backward_detail()
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
          In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<shared::ClippedFace>,
          In<float>, In<float>, Out<float>, Out<float>, Out<float>>
@@ -64,11 +64,10 @@ class Surface {
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
          In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>,
          In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>>
+         Out<float>, Out<float>, Out<float>, Out<float>>
       backward_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<shared::ClippedFace>,
-         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint4>, In<shared::Texture>, In<shared::Triangle>,
+         In<shared::ClippedFace>, In<float>, Out<float>, Out<float>>
       backward_detail_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>,
          In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>,
