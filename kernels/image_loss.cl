@@ -1,44 +1,97 @@
-// Losses between images and targets, and their gradients: the weighted sum of those in image_losses.h. The
-// pixels' sums are reduced by reduce.cl in between.
+// Losses between images and targets, and their gradients: the weighted sum of those in image_losses.h, of the
+// images and, in a pyramid, of smaller versions of them. The pixels' sums are reduced by reduce.cl in
+// between.
 #include "image_losses.h"
+
+static inline LossPixel make_pixel(float4 image, float4 target, float inverse_scale_squared) {
+  LossPixel p;
+  p.image = image;
+  p.target = target;
+  p.inverse_scale_squared = inverse_scale_squared;
+  return p;
+}
 
 /// What every pixel adds to the sums of its view. One work-item per pixel.
 /// in   pixels         of all views
+/// in   inverse_scale_squared  of the robust loss
 /// in   image, target  float4[view][pixel]  RGBA
+/// in   mask           float[view][pixel]   how much a pixel counts
 /// out  channels       float[DPR_LOSS_SUMS][view][pixel]
-kernel void image_loss_forward(const uint pixels, global const float4* restrict image,
-                               global const float4* restrict target, global float* restrict channels) {
+kernel void image_loss_forward(const uint pixels, const float inverse_scale_squared,
+                               global const float4* restrict image, global const float4* restrict target,
+                               global const float* restrict mask, global float* restrict channels) {
   const uint i = (uint)get_global_id(0);
   if (i >= pixels) return;
+  const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
   float sums[DPR_LOSS_SUMS];
-#define DPR_ADD_PIXEL(name) name##_add(image[i], target[i], sums + name##_first);
+#define DPR_ADD_PIXEL(name) name##_add(pixel, sums + name##_first);
   DPR_IMAGE_LOSSES(DPR_ADD_PIXEL)
 #pragma unroll
-  for (uint k = 0; k < DPR_LOSS_SUMS; ++k) channels[k * pixels + i] = sums[k];
+  for (uint k = 0; k < DPR_LOSS_SUMS; ++k) channels[k * pixels + i] = mask[i] * sums[k];
 }
 
-/// d loss / d image of the mean over the views. One work-item per pixel.
-/// in   views, pixels_per_view
+/// d loss / d image of the mean over the views and levels. One work-item per pixel.
+/// in   views, pixels_per_view, levels
+/// in   inverse_scale_squared  of the robust loss
 /// in   image, target  float4[view][pixel]  RGBA
+/// in   mask           float[view][pixel]   how much a pixel counts
 /// in   sums           float[DPR_LOSS_SUMS][view]
 /// in   weights        float[view][DPR_LOSS_COUNT]
+/// in   channels       float[view]  the sum of the mask times the colour channels
 /// out  grad_image     float4[view][pixel]
-kernel void image_loss_backward(const uint views, const uint pixels_per_view,
-                                global const float4* restrict image, global const float4* restrict target,
+kernel void image_loss_backward(const uint views, const uint pixels_per_view, const uint levels,
+                                const float inverse_scale_squared, global const float4* restrict image,
+                                global const float4* restrict target, global const float* restrict mask,
                                 global const float* restrict sums, global const float* restrict weights,
-                                global float4* restrict grad_image) {
+                                global const float* restrict channels, global float4* restrict grad_image) {
   const uint i = (uint)get_global_id(0);
   if (i >= views * pixels_per_view) return;
   const uint view = i / pixels_per_view;
+  const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
   float of_view[DPR_LOSS_SUMS];
 #pragma unroll
   for (uint k = 0; k < DPR_LOSS_SUMS; ++k) of_view[k] = sums[k * views + view];
   global const float* weight = weights + view * DPR_LOSS_COUNT;
   float4 grad = 0.0f;
-#define DPR_ADD_GRADIENT(name)     \
+#define DPR_ADD_GRADIENT(name)       \
   if (weight[name##_number] != 0.0f) \
-    grad += name##_gradient(weight[name##_number], image[i], target[i], of_view + name##_first);
+    grad += name##_gradient(weight[name##_number], pixel, of_view + name##_first);
   DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
-  const float mean = 1.0f / (3.0f * (float)pixels_per_view);
-  grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)views;
+  const float mean = 1.0f / channels[view];
+  grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)(views * levels) * mask[i];
+}
+
+/// A level of a pyramid from the one before: means of blocks of 2x2 pixels, at the border of those that are
+/// there. One work-item per pixel of it. in   width, height  of the level before in   pixels         of all
+/// views, of this level in   large          float4[view][height][width]  RGBA out  small float4[view][(height
+/// + 1) / 2][(width + 1) / 2]
+kernel void image_loss_shrink(const uint width, const uint height, const uint pixels,
+                              global const float4* restrict large, global float4* restrict small) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= pixels) return;
+  const uint small_width = (width + 1) / 2, small_height = (height + 1) / 2;
+  const uint view = i / (small_width * small_height), place = i - view * small_width * small_height;
+  const uint x = place % small_width * 2, y = place / small_width * 2;
+  const uint columns = min(width - x, 2u), rows = min(height - y, 2u);
+  float4 sum = 0.0f;
+  for (uint k = 0; k < columns * rows; ++k)
+    sum += large[(view * height + y + k / columns) * width + x + k % columns];
+  small[i] = sum / (float)(columns * rows);
+}
+
+/// Adds the gradients of a level to those of the one before. One work-item per pixel of that.
+/// in   width, height  of the level before
+/// in   pixels         of all views, of that level
+/// in   grad_small     float4[view][(height + 1) / 2][(width + 1) / 2]
+/// in out  grad_large  float4[view][height][width]
+kernel void image_loss_shrink_backward(const uint width, const uint height, const uint pixels,
+                                       global const float4* restrict grad_small,
+                                       global float4* restrict grad_large) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= pixels) return;
+  const uint small_width = (width + 1) / 2, small_height = (height + 1) / 2;
+  const uint view = i / (width * height), place = i - view * width * height;
+  const uint x = place % width / 2, y = place / width / 2;
+  const uint block = min(width - 2 * x, 2u) * min(height - 2 * y, 2u);
+  grad_large[i] += grad_small[(view * small_height + y) * small_width + x] / (float)block;
 }

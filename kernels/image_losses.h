@@ -6,15 +6,18 @@
 //
 // on the device
 //
-//   <name>_add(image, target, sums)               writes what a pixel, RGBA, adds to them
-//   <name>_gradient(weight, image, target, sums)  weight times its derivative by the pixel's RGBA, from the
-//                                                 sums of the view; of RGB, times the number of pixels
-//                                                 and colour channels of a view
+//   <name>_add(pixel, sums)               writes what a pixel adds to them
+//   <name>_gradient(weight, pixel, sums)  weight times its derivative by the pixel's RGBA, from the sums of
+//   the
+//                                         view; of RGB, times the number of pixels and colour channels of a
+//                                         view
 //
 // and on the host
 //
-//   <name>_value(weight, sums, channels)          weight times the loss of a view of so many pixels times
-//                                                 colour channels
+//   <name>_value(weight, sums, channels)  weight times the loss of a view of so many pixels times colour
+//                                         channels
+//
+// Pixels that a mask weighs count as so many pixels.
 #ifndef DPR_IMAGE_LOSSES_H
 #define DPR_IMAGE_LOSSES_H
 
@@ -22,12 +25,21 @@
 namespace dpr::shared {
 #endif
 
+#ifdef __OPENCL_C_VERSION__
+/// What losses see of a pixel.
+typedef struct {
+  float4 image, target;  // RGBA
+  float inverse_scale_squared;
+} LossPixel;
+#endif
+
 #include "loss_l1.h"
 #include "loss_mse.h"
+#include "loss_robust.h"
 #include "loss_silhouette.h"
 
 /// In the order of dpr::LossKind.
-#define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette)
+#define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette) X(robust)
 
 /// Their numbers, and where the sums of each begin.
 #define DPR_LOSS_NUMBER(name) name##_number,

@@ -7,14 +7,14 @@ enum { l1_sums = 1, l1_reads_alpha = 0 };
 
 #ifdef __OPENCL_C_VERSION__
 
-static inline void l1_add(float4 image, float4 target, float* sums) {
-  const float3 difference = image.xyz - target.xyz;
+static inline void l1_add(const LossPixel p, float* sums) {
+  const float3 difference = p.image.xyz - p.target.xyz;
   sums[0] = fabs(difference.x) + fabs(difference.y) + fabs(difference.z);
 }
 
-static inline float4 l1_gradient(float weight, float4 image, float4 target, const float* sums) {
+static inline float4 l1_gradient(float weight, const LossPixel p, const float* sums) {
   (void)sums;
-  const float3 difference = image.xyz - target.xyz;
+  const float3 difference = p.image.xyz - p.target.xyz;
   return (float4)(weight * sign(difference.x), weight * sign(difference.y), weight * sign(difference.z),
                   0.0f);
 }

@@ -7,14 +7,14 @@ enum { mse_sums = 1, mse_reads_alpha = 0 };
 
 #ifdef __OPENCL_C_VERSION__
 
-static inline void mse_add(float4 image, float4 target, float* sums) {
-  const float3 difference = image.xyz - target.xyz;
+static inline void mse_add(const LossPixel p, float* sums) {
+  const float3 difference = p.image.xyz - p.target.xyz;
   sums[0] = dot(difference, difference);
 }
 
-static inline float4 mse_gradient(float weight, float4 image, float4 target, const float* sums) {
+static inline float4 mse_gradient(float weight, const LossPixel p, const float* sums) {
   (void)sums;
-  return (float4)(2.0f * weight * (image.xyz - target.xyz), 0.0f);
+  return (float4)(2.0f * weight * (p.image.xyz - p.target.xyz), 0.0f);
 }
 
 #else

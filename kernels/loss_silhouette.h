@@ -8,16 +8,15 @@ enum { silhouette_sums = 2, silhouette_reads_alpha = 1 };
 
 #ifdef __OPENCL_C_VERSION__
 
-static inline void silhouette_add(float4 image, float4 target, float* sums) {
-  const float a = image.w, b = target.w;
+static inline void silhouette_add(const LossPixel p, float* sums) {
+  const float a = p.image.w, b = p.target.w;
   sums[0] = a * b;
   sums[1] = a + b - a * b;
 }
 
-static inline float4 silhouette_gradient(float weight, float4 image, float4 target, const float* sums) {
-  (void)image;
+static inline float4 silhouette_gradient(float weight, const LossPixel p, const float* sums) {
   const float intersection = sums[0], united = sums[1];
-  const float b = target.w;
+  const float b = p.target.w;
   const float iou = united > 0.0f ? intersection / united : 1.0f;
   return (float4)(0.0f, 0.0f, 0.0f, united > 0.0f ? -weight * (b - iou * (1.0f - b)) / united : 0.0f);
 }

@@ -83,7 +83,7 @@ using float4 = cl_float4;
 #define DPR_BASE_OF_CORNERS 0
 #define DPR_BASE_OF_FRAGMENTS 1
 
-/// What lies beyond a texture, in the order of dpr::Wrap; what lies between its texels, in that of
+/// What lies beyond a texture, in the order of dpr::Wrap (lib/image/texture_words.hpp has the names); what lies between its texels, in that of
 /// dpr::Filter; and the texture of a face that has none.
 #define DPR_REPEAT 0
 #define DPR_MIRROR 1

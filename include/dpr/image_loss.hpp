@@ -14,8 +14,9 @@ namespace dpr {
 class Renderer;
 
 /// mse, l1: means over pixels and the three colour channels. silhouette: 1 - IoU of the alpha channel, eq.
-/// (75).
-enum class LossKind { mse, l1, silhouette };
+/// (75). robust: mse in which pixels of quite another colour hardly count: the mean of s / (1 + s / c^2),
+/// with s a pixel's squared colour difference and c the robust_scale (Geman & McClure 1985).
+enum class LossKind { mse, l1, silhouette, robust };
 
 std::string_view to_string(LossKind);
 /// In the order of LossKind.
@@ -24,17 +25,32 @@ LossKind parse_loss(std::string_view word, std::string_view where);
 
 /// How much each loss counts in the total, eq. (74).
 struct LossWeights {
-  float mse = 0, l1 = 0, silhouette = 0;
+  float mse = 0, l1 = 0, silhouette = 0, robust = 0;
+  float robust_scale = 0.1F;  ///< at least 1e-6, a colour difference
 
   static LossWeights only(LossKind kind);
+};
+
+/// What an ImageLoss compares, and how much of it.
+struct LossOptions {
+  LossWeights weights;
+  /// One value a target, or empty for all: where it is 0 a target has no silhouette, and its view no
+  /// silhouette loss.
+  std::span<const unsigned char> has_alpha = {};
+  /// How much every pixel counts, in the first channel, at least 0: one image a target, of its size, or none.
+  /// Means are over the weights, which are not all 0 in any.
+  std::span<const Image> masks = {};
+  /// Of a pyramid, 1 to 16: the loss is the mean over the images and ever smaller ones, each the means of
+  /// blocks of 2x2 pixels of the one before. Large differences of place get gradients from the small ones.
+  unsigned levels = 1;
 };
 
 /// Weighted sum of losses against fixed targets, mean over the views.
 class ImageLoss {
  public:
-  /// One target a view, all of the same size. `has_alpha`, one value a target or empty for all: where it is
-  /// 0 a target has no silhouette, and its view no silhouette loss. Throws InvalidArgument for sizes that
-  /// differ, values that are not finite, negative weights or none above zero.
+  /// One target a view, all of the same size. Throws InvalidArgument for sizes that differ, values that are
+  /// not finite, negative weights or none above zero.
+  ImageLoss(const Device& device, const LossOptions& options, std::span<const Image> targets);
   ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets,
             std::span<const unsigned char> has_alpha = {});
   ~ImageLoss();

@@ -22,6 +22,7 @@ struct ShapeView {
   Image image;
   Camera camera;
   bool has_alpha = true;  ///< false: the image has no silhouette and is compared in colour alone
+  Image mask = {};  ///< its first channel is how much each pixel counts, at least 0; empty: all the same
 };
 
 /// What a shape is found from.

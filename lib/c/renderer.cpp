@@ -165,7 +165,9 @@ dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* wei
         count, views * static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * dpr::c::k_pixel,
         "targets");
     const std::vector<dpr::Image> images = dpr::c::to_images(values, views, width, height);
-    give(loss, dpr::ImageLoss(device->device, {w.mse, w.l1, w.silhouette}, images));
+    give(loss,
+         dpr::ImageLoss(device->device,
+                        dpr::LossWeights{.mse = w.mse, .l1 = w.l1, .silhouette = w.silhouette}, images));
   });
 }
 

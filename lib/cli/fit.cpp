@@ -148,6 +148,9 @@ void add_loss_options(CLI::App& command, ShapeOptions& solver) {
   add("--silhouette", solver.loss.silhouette, "1 - IoU of the silhouettes");
   add("--l1", solver.loss.l1, "Mean absolute difference of colours");
   add("--mse", solver.loss.mse, "Mean squared difference of colours");
+  add("--robust", solver.loss.robust,
+      "Squared difference of colours that leaves pixels of other colours out");
+  add("--robust-scale", solver.loss.robust_scale, "Colour difference from which on it does");
   add("--laplacian", solver.regularizers.laplacian,
       "Sum of squared distances of vertices from their neighbours' mean");
   add("--edge-length", solver.regularizers.edge_length, "Mean squared length of edges");

@@ -1,6 +1,5 @@
 // dpr info: what is in a mesh file or a scene file, and what dpr does with it.
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
 #include "cli/mesh_materials.hpp"
+#include "image/texture_words.hpp"
 #include "mesh/bounding_box.hpp"
 #include "mesh/mesh_facts.hpp"
 #include "scene/gradient_table.hpp"
@@ -27,16 +27,13 @@ Json to_json(const std::vector<MeshMaterial>& materials) {
   return list;
 }
 
-constexpr std::array k_wraps{"repeat", "mirror", "clamp"};
-constexpr std::array k_filters{"nearest", "bilinear", "trilinear"};
-
 Json to_json(const std::vector<Texture>& textures) {
   Json list = Json::array();
   for (const Texture& t : textures) {
     list.push_back({{"width", t.width},
                     {"height", t.height},
-                    {"wrap", k_wraps.at(static_cast<std::size_t>(t.wrap))},
-                    {"filter", k_filters.at(static_cast<std::size_t>(t.filter))}});
+                    {"wrap", to_string(t.wrap)},
+                    {"filter", to_string(t.filter)}});
   }
   return list;
 }

@@ -3,6 +3,7 @@
 
 #include "base/checks.hpp"
 #include "dpr/image.hpp"
+#include "image/texture_words.hpp"
 
 namespace dpr {
 namespace {
@@ -22,11 +23,10 @@ void validate_size(const Texture& texture, const std::string& name) {
 
 void validate_words(const Texture& texture, const std::string& name) {
   const auto wrap = static_cast<int>(texture.wrap), filter = static_cast<int>(texture.filter);
-  if (wrap < 0 || wrap > static_cast<int>(Wrap::clamp))
-    throw InvalidArgument(checks::in("wrap", name), std::to_string(wrap), "repeat, mirror or clamp");
-  if (filter < 0 || filter > static_cast<int>(Filter::trilinear))
-    throw InvalidArgument(checks::in("filter", name), std::to_string(filter),
-                          "nearest, bilinear or trilinear");
+  if (wrap < 0 || wrap >= static_cast<int>(k_wraps.size()))
+    throw InvalidArgument(checks::in("wrap", name), std::to_string(wrap), one_of(k_wrap_names));
+  if (filter < 0 || filter >= static_cast<int>(k_filter_names.size()))
+    throw InvalidArgument(checks::in("filter", name), std::to_string(filter), one_of(k_filter_names));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
+#include "base/require.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/frame.hpp"
 
@@ -31,6 +32,9 @@ void check_weights(const LossWeights& weights) {
     sum += weight;
   }
   if (sum <= 0) throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
+  constexpr float k_least_scale = 1e-6F;  // its inverse squared is still a number
+  require(weights.robust_scale >= k_least_scale && std::isfinite(weights.robust_scale), "robust_scale (loss)",
+          weights.robust_scale, "a finite number, at least 1e-6");
 }
 
 void check_targets(std::span<const Image> targets) {
@@ -45,11 +49,55 @@ void check_targets(std::span<const Image> targets) {
   }
 }
 
+void check_masks(std::span<const Image> masks, std::span<const Image> targets) {
+  if (masks.empty()) return;
+  if (masks.size() != targets.size()) {
+    throw InvalidArgument("masks (loss)", std::to_string(masks.size()) + " images",
+                          "one for each of the " + std::to_string(targets.size()) + " targets, or none");
+  }
+  for (const Image& mask : masks) require_mask(mask, targets[0], "mask (loss)");
+}
+
+/// The next level of a pyramid, as image_loss_shrink makes it.
+Image shrink(const Image& large) {
+  Image small((large.width + 1) / 2, (large.height + 1) / 2);
+  for (int y = 0; y < small.height; ++y) {
+    for (int x = 0; x < small.width; ++x) {
+      const int columns = std::min(large.width - 2 * x, 2), rows = std::min(large.height - 2 * y, 2);
+      glm::vec4 sum(0);
+      for (int k = 0; k < columns * rows; ++k) sum += large.at(2 * x + k % columns, 2 * y + k / columns);
+      small.at(x, y) = sum / static_cast<float>(columns * rows);
+    }
+  }
+  return small;
+}
+
 }  // namespace
 
-void check_loss(const LossWeights& weights, std::span<const Image> targets) {
-  check_weights(weights);
+void check_loss(const LossOptions& options, std::span<const Image> targets) {
+  constexpr unsigned k_most_levels = 16;
+  check_weights(options.weights);
   check_targets(targets);
+  check_masks(options.masks, targets);
+  require(options.levels >= 1 && options.levels <= k_most_levels, "levels (loss)", options.levels, "1 to 16");
+  if (!options.has_alpha.empty() && options.has_alpha.size() != targets.size()) {
+    throw InvalidArgument("has_alpha (loss)", std::to_string(options.has_alpha.size()) + " values",
+                          "one for each of the " + std::to_string(targets.size()) + " targets, or none");
+  }
+}
+
+void require_mask(const Image& mask, const Image& image, const std::string& name) {
+  if (mask.width != image.width || mask.height != image.height) {
+    throw InvalidArgument("size of the " + name, checks::size(mask.width, mask.height),
+                          checks::size(image.width, image.height) + ", the image's");
+  }
+  double sum = 0;
+  for (const glm::vec4& p : mask.pixels) {
+    if (!(p.x >= 0) || !std::isfinite(p.x))
+      throw InvalidArgument("pixel of the " + name, std::to_string(p.x), "a finite number, at least 0");
+    sum += static_cast<double>(p.x);
+  }
+  if (!(sum > 0)) throw InvalidArgument("sum of the " + name, std::to_string(sum), "a pixel above 0");
 }
 
 std::span<const ImageLossRow> image_losses() { return k_losses; }
@@ -75,44 +123,71 @@ LossWeights LossWeights::only(LossKind kind) {
   return weights;
 }
 
-ImageLoss::Impl::Impl(const Device& device_, LossWeights weights, std::span<const Image> targets,
-                      std::span<const unsigned char> has_alpha)
+ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::span<const Image> targets)
     : device(device_),
       width(targets[0].width),
       height(targets[0].height),
       views(targets.size()),
       per_view(targets.size()),
+      inverse_scale_squared(1 / (options.weights.robust_scale * options.weights.robust_scale)),
       forward(device.impl(), "image_loss.cl", "image_loss_forward"),
       backward(device.impl(), "image_loss.cl", "image_loss_backward"),
+      shrink(device.impl(), "image_loss.cl", "image_loss_shrink"),
+      shrink_backward(device.impl(), "image_loss.cl", "image_loss_shrink_backward"),
       reduce(device.impl()) {
-  const std::size_t pixels = targets[0].pixels.size();
-  std::vector<cl_float4> values;
-  std::vector<cl_uint> starts{0};
-  for (const Image& image : targets) {
-    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
-    starts.push_back(static_cast<cl_uint>(values.size()));
-  }
-  target.upload(device.impl(), values);
-  view_starts.upload(device.impl(), starts);
   for (std::size_t view = 0; view < views; ++view) {
-    const bool shows_alpha = has_alpha.empty() || has_alpha[view] != 0;
+    const bool shows_alpha = options.has_alpha.empty() || options.has_alpha[view] != 0;
     for (const ImageLossRow& loss : k_losses)
-      view_weights.push_back(loss.reads_alpha && !shows_alpha ? 0 : weights.*loss.weight);
+      view_weights.push_back(loss.reads_alpha && !shows_alpha ? 0 : options.weights.*loss.weight);
   }
   device_weights.upload(device.impl(), view_weights);
-  channels.resize(device.impl(), shared::DPR_LOSS_SUMS * pixels * views);
-  grad_image.resize(device.impl(), pixels * views);
+  std::vector<Image> smaller(targets.begin(), targets.end()),
+      masks(options.masks.begin(), options.masks.end());
+  if (masks.empty()) masks.assign(views, Image(width, height, glm::vec4(1)));
+  for (unsigned l = 0; l < options.levels; ++l) {
+    if (l > 0) {
+      std::ranges::transform(smaller, smaller.begin(), dpr::shrink);
+      std::ranges::transform(masks, masks.begin(), dpr::shrink);
+    }
+    levels.push_back(make_level(smaller, masks));
+    if (l > 0) levels[l].image.resize(device.impl(), levels[l].pixels_per_view() * views);
+  }
+}
+
+ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> targets,
+                                                   std::span<const Image> masks) {
+  constexpr float k_channels = 3;
+  Level level;
+  level.width = targets[0].width;
+  level.height = targets[0].height;
+  std::vector<cl_float4> values;
+  std::vector<float> weights;
+  std::vector<cl_uint> starts{0};
+  for (std::size_t view = 0; view < views; ++view) {
+    for (const glm::vec4& p : targets[view].pixels) values.push_back({{p.x, p.y, p.z, p.w}});
+    double sum = 0;
+    for (const glm::vec4& p : masks[view].pixels) sum += static_cast<double>(weights.emplace_back(p.x));
+    level.channels.push_back(k_channels * static_cast<float>(sum));
+    starts.push_back(static_cast<cl_uint>(values.size()));
+  }
+  Device::Impl& d = device.impl();
+  level.target.upload(d, values);
+  level.mask.upload(d, weights);
+  level.device_channels.upload(d, level.channels);
+  level.view_starts.upload(d, starts);
+  level.per_pixel.resize(d, shared::DPR_LOSS_SUMS * values.size());
+  level.grad_image.resize(d, values.size());
+  return level;
+}
+
+ImageLoss::ImageLoss(const Device& device, const LossOptions& options, std::span<const Image> targets) {
+  check_loss(options, targets);
+  impl_ = std::make_unique<Impl>(device, options, targets);
 }
 
 ImageLoss::ImageLoss(const Device& device, LossWeights weights, std::span<const Image> targets,
-                     std::span<const unsigned char> has_alpha) {
-  check_loss(weights, targets);
-  if (!has_alpha.empty() && has_alpha.size() != targets.size()) {
-    throw InvalidArgument("has_alpha (loss)", std::to_string(has_alpha.size()) + " values",
-                          "one for each of the " + std::to_string(targets.size()) + " targets, or none");
-  }
-  impl_ = std::make_unique<Impl>(device, weights, targets, has_alpha);
-}
+                     std::span<const unsigned char> has_alpha)
+    : ImageLoss(device, LossOptions{.weights = weights, .has_alpha = has_alpha}, targets) {}
 
 ImageLoss::~ImageLoss() = default;
 ImageLoss::ImageLoss(ImageLoss&&) noexcept = default;
@@ -130,30 +205,53 @@ double ImageLoss::evaluate(const Renderer& renderer) {
     throw InvalidArgument("target size (loss)", checks::size(m.width, m.height),
                           "the size of the render, " + checks::size(frame.width, frame.height));
   }
-  const std::size_t pixels_per_view = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
-  const std::size_t pixels = pixels_per_view * m.views;
   m.frame_number = 0;  // until everything of this one is there
-  m.forward(pixels, static_cast<cl_uint>(pixels), frame.image, m.target, m.channels);
-  m.reduce({pixels, shared::DPR_LOSS_SUMS, m.views, 1, m.view_starts, m.channels}, m.sums);
-  m.backward(pixels, static_cast<cl_uint>(m.views), static_cast<cl_uint>(pixels_per_view), frame.image,
-             m.target, m.sums, m.device_weights, m.grad_image);
-
-  const std::vector<float> sums = m.sums.download();
-  double total = 0;
-  for (std::size_t view = 0; view < m.views; ++view) {
-    std::array<double, shared::DPR_LOSS_SUMS> of_view{};
-    for (std::size_t k = 0; k < of_view.size(); ++k)
-      of_view[k] = static_cast<double>(sums[k * m.views + view]);
-    m.per_view[view] = 0;
-    for (std::size_t l = 0; l < k_losses.size(); ++l) {
-      m.per_view[view] +=
-          k_losses[l].value(static_cast<double>(m.weight(view, l)), &of_view[k_losses[l].first_sum],
-                            3.0 * static_cast<double>(pixels_per_view));
-    }
-    total += m.per_view[view] / static_cast<double>(m.views);
-  }
+  m.evaluate(frame.image);
   m.frame_number = frame.number;
+  double total = 0;
+  for (const double value : m.per_view) total += value / static_cast<double>(m.views);
   return total;
+}
+
+void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    Level& level = levels[l];
+    const std::size_t pixels = level.pixels_per_view() * views;
+    if (l > 0) {
+      const Level& before = levels[l - 1];
+      shrink(pixels, static_cast<cl_uint>(before.width), static_cast<cl_uint>(before.height),
+             static_cast<cl_uint>(pixels), l == 1 ? full : before.image, level.image);
+    }
+    const Buffer<cl_float4>& image = l == 0 ? full : level.image;
+    forward(pixels, static_cast<cl_uint>(pixels), inverse_scale_squared, image, level.target, level.mask,
+            level.per_pixel);
+    reduce({pixels, shared::DPR_LOSS_SUMS, views, 1, level.view_starts, level.per_pixel}, level.sums);
+    backward(pixels, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
+             static_cast<cl_uint>(levels.size()), inverse_scale_squared, image, level.target, level.mask,
+             level.sums, device_weights, level.device_channels, level.grad_image);
+  }
+  for (std::size_t l = levels.size() - 1; l > 0; --l) {
+    Level& large = levels[l - 1];
+    const std::size_t pixels = large.pixels_per_view() * views;
+    shrink_backward(pixels, static_cast<cl_uint>(large.width), static_cast<cl_uint>(large.height),
+                    static_cast<cl_uint>(pixels), levels[l].grad_image, large.grad_image);
+  }
+  std::ranges::fill(per_view, 0.0);
+  for (const Level& level : levels) add_values(level);
+}
+
+void ImageLoss::Impl::add_values(const Level& level) {
+  const std::vector<float> sums = level.sums.download();
+  for (std::size_t view = 0; view < views; ++view) {
+    std::array<double, shared::DPR_LOSS_SUMS> of_view{};
+    for (std::size_t k = 0; k < of_view.size(); ++k) of_view[k] = static_cast<double>(sums[k * views + view]);
+    for (std::size_t l = 0; l < k_losses.size(); ++l) {
+      per_view[view] +=
+          k_losses[l].value(static_cast<double>(weight(view, l)), &of_view[k_losses[l].first_sum],
+                            static_cast<double>(level.channels[view])) /
+          static_cast<double>(levels.size());
+    }
+  }
 }
 
 std::span<const double> ImageLoss::per_view() const { return impl_->per_view; }

@@ -24,32 +24,59 @@ struct ImageLossRow {
 std::span<const ImageLossRow> image_losses();
 
 /// Throws InvalidArgument for what an ImageLoss refuses.
-void check_loss(const LossWeights& weights, std::span<const Image> targets);
+void check_loss(const LossOptions& options, std::span<const Image> targets);
+
+/// Throws InvalidArgument, which calls the mask `name`, unless its first channel can say how much the pixels
+/// of an image count.
+void require_mask(const Image& mask, const Image& image, const std::string& name);
 
 struct ImageLoss::Impl {
-  Impl(const Device& device, LossWeights weights, std::span<const Image> targets,
-       std::span<const unsigned char> has_alpha);
+  /// The images, or smaller versions of them.
+  struct Level {
+    int width, height;
+    Buffer<cl_float4> target;     // [view][height][width]
+    Buffer<float> mask;           // [view][height][width]
+    std::vector<float> channels;  // [view] sums of the mask times colour channels
+    Buffer<float> device_channels;
+    Buffer<cl_uint> view_starts;    // [view + 1] pixels
+    Buffer<float> per_pixel, sums;  // [DPR_LOSS_SUMS][view][pixel], [DPR_LOSS_SUMS][view]
+    Buffer<cl_float4> image;        // [view][height][width] of smaller levels than the first
+    Buffer<cl_float4> grad_image;   // [view][height][width]
+
+    std::size_t pixels_per_view() const {
+      return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    }
+  };
+
+  Impl(const Device& device, const LossOptions& options, std::span<const Image> targets);
 
   /// The weight of a loss in a view: 0 for one that reads an alpha which the target does not have.
   float weight(std::size_t view, std::size_t loss) const {
     return view_weights[view * shared::DPR_LOSS_COUNT + loss];
   }
+  const Buffer<cl_float4>& grad_image() const { return levels.front().grad_image; }
+
+  Level make_level(std::span<const Image> targets, std::span<const Image> masks);
+  /// Of the mean over the levels: value by view, and gradient.
+  void evaluate(const Buffer<cl_float4>& image);
+  void add_values(const Level& level);
 
   Device device;
   int width, height;
   std::size_t views;
   std::vector<double> per_view;
   std::vector<float> view_weights;  // [view][loss]
-  std::uint64_t frame_number = 0;   // of the render that grad_image belongs to; 0: none
+  float inverse_scale_squared;
+  std::uint64_t frame_number = 0;  // of the render that grad_image belongs to; 0: none
 
-  Kernel<cl_uint, In<cl_float4>, In<cl_float4>, Out<float>> forward;
-  Kernel<cl_uint, cl_uint, In<cl_float4>, In<cl_float4>, In<float>, In<float>, Out<cl_float4>> backward;
+  Kernel<cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, Out<float>> forward;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, In<float>, In<float>,
+         In<float>, Out<cl_float4>>
+      backward;
+  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> shrink, shrink_backward;
   Reduce reduce;
-  Buffer<cl_float4> target;      // [view][height][width]
   Buffer<float> device_weights;  // `view_weights`
-  Buffer<cl_uint> view_starts;   // [view + 1] pixels
-  Buffer<float> channels, sums;  // [DPR_LOSS_SUMS][view][pixel], [DPR_LOSS_SUMS][view]
-  Buffer<cl_float4> grad_image;  // [view][height][width]
+  std::vector<Level> levels;
 };
 
 }  // namespace dpr

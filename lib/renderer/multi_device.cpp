@@ -321,7 +321,7 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
 
 void MultiDeviceRenderer::set_loss(LossWeights weights, std::span<const Image> targets) {
   impl_->require_views("MultiDeviceRenderer::set_loss");
-  check_loss(weights, targets);
+  check_loss({.weights = weights}, targets);
   std::vector<Image> new_targets(targets.begin(), targets.end());
   impl_->weights = weights;
   std::swap(impl_->targets, new_targets);

@@ -185,7 +185,7 @@ void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const c
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");
   require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
-  return impl_->backward(loss.impl().grad_image);
+  return impl_->backward(loss.impl().grad_image());
 }
 
 SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_loss) {
@@ -196,7 +196,7 @@ SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_los
     throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
                           "GradientRequest::positions");
   }
-  return impl_->backward(loss.impl().grad_image,
+  return impl_->backward(loss.impl().grad_image(),
                          [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
                            mesh_loss.impl().add_gradient(positions, grad);
                          });

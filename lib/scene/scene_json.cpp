@@ -9,6 +9,7 @@
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
+#include "image/texture_words.hpp"
 #include "scene/cull.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
@@ -81,20 +82,16 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
   }
 }
 
-Wrap parse_wrap(const JsonNode& node) {
-  const std::string word = node.string();
-  if (word == "repeat") return Wrap::repeat;
-  if (word == "mirror") return Wrap::mirror;
-  if (word == "clamp") return Wrap::clamp;
-  node.fail("\"" + word + "\"", "repeat, mirror or clamp");
-}
-
-Filter parse_filter(const JsonNode& node) {
-  const std::string word = node.string();
-  if (word == "nearest") return Filter::nearest;
-  if (word == "bilinear") return Filter::bilinear;
-  if (word == "trilinear") return Filter::trilinear;
-  node.fail("\"" + word + "\"", "nearest, bilinear or trilinear");
+/// A value of an enumeration, by its name.
+template <typename Word>
+void take_word(const JsonNode& node, std::string_view key, Word& value,
+               std::span<const std::string_view> names) {
+  take(node, key, value, [names](const JsonNode& n) {
+    const std::string word = n.string();
+    const auto found = std::ranges::find(names, word);
+    if (found == names.end()) n.fail("\"" + word + "\"", one_of(names));
+    return static_cast<Word>(found - names.begin());
+  });
 }
 
 // A texture beside a file takes the place of all of the file's.
@@ -111,8 +108,8 @@ void take_texture(const JsonNode& node, const std::filesystem::path& folder, Mes
                   "texcoords and face_texcoords, or a file with some");
   mesh.textures = {read_texture(texture->at("file").file_in(folder))};
   mesh.face_textures.clear();
-  take(*texture, "wrap", mesh.textures[0].wrap, parse_wrap);
-  take(*texture, "filter", mesh.textures[0].filter, parse_filter);
+  take_word(*texture, "wrap", mesh.textures[0].wrap, k_wrap_names);
+  take_word(*texture, "filter", mesh.textures[0].filter, k_filter_names);
 }
 
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {

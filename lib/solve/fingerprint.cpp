@@ -44,9 +44,9 @@ void add(Hash& hash, const ShapeOptions& o) {
                                static_cast<unsigned>(o.steps), static_cast<unsigned>(o.schedule)})
     hash.add(value);
   for (const float value :
-       {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette,
-        o.regularizers.laplacian, o.regularizers.edge_length, o.regularizers.normal_consistency,
-        o.regularizers.flatness, o.regularizers.edge_target}) {
+       {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette, o.loss.robust,
+        o.loss.robust_scale, o.regularizers.laplacian, o.regularizers.edge_length,
+        o.regularizers.normal_consistency, o.regularizers.flatness, o.regularizers.edge_target}) {
     hash.add(value);
   }
   hash.add(o.learning_rate);
@@ -65,6 +65,7 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
     for (const glm::vec4& pixel : view.image.pixels) {
       for (int i = 0; i < 4; ++i) hash.add(pixel[i]);
     }
+    for (const glm::vec4& pixel : view.mask.pixels) hash.add(pixel.x);
     add(hash, view.camera);
     hash.add(static_cast<int>(view.has_alpha));
   }

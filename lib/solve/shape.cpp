@@ -12,6 +12,7 @@
 #include "base/require.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/renderer.hpp"
+#include "loss/image_loss_impl.hpp"
 #include "mesh/remesh.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
@@ -56,17 +57,20 @@ class Batches {
       : width(side(views.width, options, level)), height(side(views.height, options, level)) {
     const std::size_t count = (views.views.size() + options.batch - 1) / options.batch;
     for (std::size_t first = 0; first < count; ++first) {
-      std::vector<Image> images;
+      std::vector<Image> images, masks;
       std::vector<unsigned char> has_alpha;
       std::vector<View>& cameras = cameras_.emplace_back();
       for (std::size_t i = first; i < views.views.size(); i += count) {
         const ShapeView& view = views.views[i];
         images.push_back(resample(view.image, width, height));
         has_alpha.push_back(view.has_alpha ? 1 : 0);
+        masks.push_back(view.mask.pixels.empty() ? Image(width, height, glm::vec4(1))
+                                                 : resample(view.mask, width, height));
         cameras.push_back(
             {resample(view.camera, views.width, views.height, width, height), {glm::mat4(1.0F)}});
       }
-      losses_.emplace_back(device, options.loss, images, has_alpha);
+      losses_.emplace_back(
+          device, LossOptions{.weights = options.loss, .has_alpha = has_alpha, .masks = masks}, images);
     }
   }
 
@@ -281,13 +285,14 @@ void check(const ShapeViews& views) {
     throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
   }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
-    const auto& [image, camera, has_alpha] = views.views[i];
+    const auto& [image, camera, has_alpha, mask] = views.views[i];
     const std::string name = checks::element("views", i);
     if (image.width != views.width || image.height != views.height) {
       throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
                             checks::size(views.width, views.height));
     }
     checks::require_pixels(image, checks::in(name, "shape"));
+    if (!mask.pixels.empty()) require_mask(mask, image, checks::in("mask of " + name, "shape"));
     validate(camera, name + ".camera");
   }
   checks::require_finite(views.background, "background (shape)");
@@ -308,7 +313,7 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
   require(positive(o.blur), "blur (shape)", o.blur, "a finite number above 0");
   require(positive(o.blur_end), "blur_end (shape)", o.blur_end, "a finite number above 0");
   const bool all_have_alpha = std::ranges::all_of(views.views, &ShapeView::has_alpha);
-  if (!all_have_alpha && !(o.loss.mse + o.loss.l1 > 0)) {
+  if (!all_have_alpha && !(o.loss.mse + o.loss.l1 + o.loss.robust > 0)) {
     throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
                           "one of colours too");
   }

@@ -6,6 +6,7 @@
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "dpr/error.hpp"
+#include "loss/image_loss_impl.hpp"
 #include "scene/scene_json.hpp"
 #include "solve/shape_views.hpp"
 
@@ -27,7 +28,7 @@ bool shows_silhouette(const Image& image) {
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
                      Encoding encoding) {
-  node.require_keys({"image", "camera"});
+  node.require_keys({"image", "camera", "mask"});
   ShapeView view;
   const std::filesystem::path file = node.at("image").file_in(folder);
   view.image = read_image(file, &view.has_alpha, encoding);
@@ -35,6 +36,10 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
   if (view.image.width != views.width || view.image.height != views.height) {
     throw InvalidArgument("size (" + file.string() + ")", checks::size(view.image.width, view.image.height),
                           checks::size(views.width, views.height) + ", the views'");
+  }
+  if (const auto mask = node.find("mask")) {
+    view.mask = read_image(mask->file_in(folder), nullptr, Encoding::linear);
+    require_mask(view.mask, view.image, "mask (" + mask->file_in(folder).string() + ")");
   }
   view.camera = parse_camera(node.at("camera"));
   validate(view.camera, checks::element("views", views.views.size()) + ".camera");

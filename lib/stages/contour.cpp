@@ -4,6 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "image/texture_words.hpp"
+
 namespace dpr {
 namespace {
 
@@ -21,8 +23,9 @@ std::uint32_t texture_of(const Mesh& mesh, std::uint32_t face) {
 
 /// Whether two coordinates are one place of a texture.
 bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
-  if (wrap == Wrap::clamp) return a == b;
-  const glm::vec2 periods = (a - b) / (wrap == Wrap::mirror ? 2.0F : 1.0F);
+  const float period = period_of(wrap);
+  if (period == 0) return a == b;
+  const glm::vec2 periods = (a - b) / period;
   return periods == glm::round(periods);
 }
 

@@ -1,5 +1,5 @@
-/// Reference for the losses: mean squared error (19), mean absolute error (76), silhouette (75), on RGBA
-/// images.
+/// Reference for the losses: mean squared error (19), mean absolute error (76), silhouette (75), and the
+/// robust one of Geman & McClure, on RGBA images.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ inline Image make_image(int width, int height) {
           std::vector<double>(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
 }
 
-enum class Loss { mse, l1, silhouette };
+enum class Loss { mse, l1, silhouette, robust };
 
 struct NamedLoss {
   Loss loss;
@@ -33,7 +33,11 @@ struct NamedLoss {
 
 /// Every loss, by its name on the command line.
 inline constexpr std::array k_losses{NamedLoss{Loss::mse, "mse"}, NamedLoss{Loss::l1, "l1"},
-                                     NamedLoss{Loss::silhouette, "silhouette"}};
+                                     NamedLoss{Loss::silhouette, "silhouette"},
+                                     NamedLoss{Loss::robust, "robust"}};
+
+/// Of the robust loss.
+inline constexpr double k_robust_scale = 0.1;
 
 struct LossResult {
   double value = 0.0;
@@ -78,13 +82,30 @@ inline LossResult silhouette_loss(const Image& image, const Image& target) {
   return result;
 }
 
+/// Mean over pixels and channels of s / (1 + s / c^2), s = |a - t|^2.
+inline LossResult robust_loss(const Image& image, const Image& target) {
+  LossResult result{0.0, make_image(image.width, image.height)};
+  const double mean = 1.0 / (3.0 * image.width * image.height);
+  for (std::size_t pixel = 0; pixel < image.rgba.size(); pixel += 4) {
+    double squared = 0.0;
+    for (std::size_t i = pixel; i < pixel + 3; ++i) squared += std::pow(image.rgba[i] - target.rgba[i], 2);
+    const double c2 = k_robust_scale * k_robust_scale;
+    result.value += mean * squared * c2 / (c2 + squared);
+    for (std::size_t i = pixel; i < pixel + 3; ++i)
+      result.grad_image.rgba[i] =
+          mean * 2.0 * (image.rgba[i] - target.rgba[i]) * std::pow(c2 / (c2 + squared), 2);
+  }
+  return result;
+}
+
 /// Value and gradient to the image. Throws std::invalid_argument if the sizes differ.
 inline LossResult evaluate_loss(Loss kind, const Image& image, const Image& target) {
   if (image.width != target.width || image.height != target.height ||
       image.rgba.size() != target.rgba.size()) {
     throw std::invalid_argument("evaluate_loss: image and target differ in size");
   }
-  return kind == Loss::silhouette ? silhouette_loss(image, target) : color_loss(kind, image, target);
+  if (kind == Loss::silhouette) return silhouette_loss(image, target);
+  return kind == Loss::robust ? robust_loss(image, target) : color_loss(kind, image, target);
 }
 
 /// The same by name. Throws std::invalid_argument if there is none.
