@@ -13,10 +13,11 @@
 
 /// A cut between a corner that is kept and one that is not. The same for all faces that share the two. Not
 /// contracted, so that it is so in every lane.
-static inline float4 make_cut(float3 kept, float3 lost, float znear) {
+static inline float4 make_cut(const FrameParams p, global const ViewParams* view, float3 kept, float3 lost) {
 #pragma OPENCL FP_CONTRACT OFF
+  const float znear = view->znear;
   const float part = (kept.z - znear) / (kept.z - lost.z);
-  const float2 at = (kept.xy + part * (lost.xy - kept.xy)) / znear;
+  const float2 at = bend_ndc(view, cut_ndc(p, kept, lost, part, znear));
   return (float4)(at.x, at.y, znear, part);
 }
 
@@ -97,11 +98,13 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   for (uint k = 0; k < 3; ++k) {
     const float3 in_camera =
         apply_affine(views[view].row[0], views[view].row[1], views[view].row[2], world[vertex[k]].xyz);
-    const float2 homogeneous = in_camera.xy * projection.xy + projection.zw * corner[k].z;
-    c.corner[k] = (float4)(homogeneous.x, homogeneous.y, corner[k].z, 0.0f);
+    const float w = p.orthographic ? 1.0f : corner[k].z;
+    const float2 homogeneous = in_camera.xy * projection.xy + projection.zw * w;
+    c.corner[k] = (float4)(homogeneous.x, homogeneous.y, corner[k].z, w);
   }
   for (uint cut = 0; cut < 2; ++cut)
-    c.cut[cut] = make_cut(c.corner[kept_corner(c, cut)].xyz, c.corner[lost_corner(c, cut)].xyz, znear);
+    c.cut[cut] =
+        make_cut(p, views + view, c.corner[kept_corner(c, cut)].xyz, c.corner[lost_corner(c, cut)].xyz);
   const Outline o = outline_of(c, corner);
   const int orientation = orientation_of_outline(o);
   if (orientation == 0 || (float)orientation == p.culled) return;
@@ -292,13 +295,14 @@ typedef struct {
 } OutlineGradients;
 
 /// From there to the face's own corners: of those that are kept in NDC, and of all by way of the cuts.
-static inline void store_corners(const ClippedFace c, const OutlineGradients g,
-                                 global float* restrict grad_corners, global float* restrict grad_clip) {
+static inline void store_corners(const FrameParams p, global const ViewParams* view, const ClippedFace c,
+                                 const OutlineGradients g, global float* restrict grad_corners,
+                                 global float* restrict grad_clip) {
   float3 own[3] = {0.0f, 0.0f, 0.0f}, by_cuts[3] = {0.0f, 0.0f, 0.0f};
   own[c.first] = g.corner[0];
   if (c.corners == 4) own[(c.first + 1) % 3] = g.corner[1];
   for (uint cut = 0; cut < 2; ++cut) {
-    const float3 grad = cut_gradient(c, cut, g.corner[c.corners - 2 + cut].xy, g.part[cut]);
+    const float3 grad = cut_gradient(p, view, c, cut, g.corner[c.corners - 2 + cut].xy, g.part[cut]);
     by_cuts[kept_corner(c, cut)] += (1.0f - c.cut[cut].w) * grad;
     by_cuts[lost_corner(c, cut)] += c.cut[cut].w * grad;
   }
@@ -309,10 +313,10 @@ static inline void store_corners(const ClippedFace c, const OutlineGradients g,
 }
 
 /// Gradients of the corners of clipped faces, summed over a pair's fragments. One work-item per pair, up to
-/// `last_pair`. Deterministic. Inputs as clip_fragments and rasterize_backward.
+/// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward.
 /// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
 /// out     grad_clip     float[pair][9]   of the corners' homogeneous coordinates, by way of the cuts
-kernel void clip_backward(const FrameParams p, const uint last_pair,
+kernel void clip_backward(const FrameParams p, const uint last_pair, global const ViewParams* restrict views,
                           global const ClippedFace* restrict clipped,
                           global const Triangle* restrict triangles, global const uint* restrict pair_face,
                           global const uint* restrict fragment_starts, global const uint* restrict pixels,
@@ -372,5 +376,5 @@ kernel void clip_backward(const FrameParams p, const uint last_pair,
   }
   const OutlineGradients of_outline = {{sum[0][0] + sum[1][0], sum[0][1], sum[0][2] + sum[1][1], sum[1][2]},
                                        {sum_lanes(part[0]), sum_lanes(part[1])}};
-  store_corners(c, of_outline, grad_corners + 9 * pair, grad_clip + 9 * pair);
+  store_corners(p, views + face / p.faces, c, of_outline, grad_corners + 9 * pair, grad_clip + 9 * pair);
 }

@@ -1,9 +1,11 @@
 // Faces that cross the near plane, and gradients by way of the cuts that they get there. A cut divides the
 // way between two corners in homogeneous coordinates, NDC times depth, where that way is straight: part =
-// (z_kept - znear) / (z_kept - z_lost).
+// (z_kept - znear) / (z_kept - z_lost). Orthographic, NDC are such coordinates themselves. A lens distorts
+// what is left: the cuts, not the way to what is behind the camera.
 #ifndef DPR_CLIP_H
 #define DPR_CLIP_H
 
+#include "lens.h"
 #include "shared_types.h"
 
 /// The corner of the face that a cut lies between, on the side that is kept, and on the other.
@@ -28,12 +30,24 @@ static inline uint cut_between(const ClippedFace c, uint kept, uint lost) {
   return 2;
 }
 
+/// By what homogeneous coordinates on the near plane are divided.
+static inline float cut_divisor(const FrameParams p, float znear) { return p.orthographic ? 1.0f : znear; }
+
+/// A cut's NDC, but for the lens.
+static inline float2 cut_ndc(const FrameParams p, float3 kept, float3 lost, float part, float znear) {
+#pragma OPENCL FP_CONTRACT OFF
+  return (kept.xy + part * (lost.xy - kept.xy)) / cut_divisor(p, znear);
+}
+
 /// What a cut's gradient, of x and y in NDC and of the part, adds to those of its corners' homogeneous
 /// coordinates: 1 - part of it to that which is kept, part of it to the other. For the depths,
 /// d part / d z_kept = (1 - part) / (z_kept - z_lost) and d part / d z_lost = part / (z_kept - z_lost).
-static inline float3 cut_gradient(const ClippedFace c, uint cut, float2 grad, float grad_part) {
+static inline float3 cut_gradient(const FrameParams p, global const ViewParams* view, const ClippedFace c,
+                                  uint cut, float2 grad, float grad_part) {
   const float3 kept = c.corner[kept_corner(c, cut)].xyz, lost = c.corner[lost_corner(c, cut)].xyz;
-  const float2 g = grad / c.cut[cut].z;
+  const float znear = c.cut[cut].z;
+  if (view->distorts) grad = bend_ndc_backward(view, cut_ndc(p, kept, lost, c.cut[cut].w, znear), grad);
+  const float2 g = grad / cut_divisor(p, znear);
   return (float3)(g, (grad_part + dot(g, lost.xy - kept.xy)) / (kept.z - lost.z));
 }
 

@@ -325,21 +325,23 @@ static inline float4 sum_of_pairs(uint contour, global const uint* pair_starts, 
 }
 
 /// What the end of a contour that is a cut gives to one of the corners that it lies between.
-static inline float3 share_of_cut(const ClippedFace c, uint cut, int to_lost, float2 grad) {
+static inline float3 share_of_cut(const FrameParams p, global const ViewParams* view, const ClippedFace c,
+                                  uint cut, int to_lost, float2 grad) {
   const float part = c.cut[cut].w;
-  return (to_lost ? part : 1.0f - part) * cut_gradient(c, cut, grad, 0.0f);
+  return (to_lost ? part : 1.0f - part) * cut_gradient(p, view, c, cut, grad, 0.0f);
 }
 
 /// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between, and
 /// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
-/// per (view, vertex). Deterministic. Inputs as contour_gather and contour_count, and
+/// per (view, vertex). Deterministic. Inputs as contour_facing, contour_gather and contour_count, and
 /// in      corner_starts  uint[vertex + 1]      runs of `corners`
 /// in      corners        uint[corner]          face * 3 + corner, by vertex
 /// in out  grad_ndc       float4[view][vertex]
 /// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates
 kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
-                                global const uint4* restrict edges, global const uint4* restrict faces,
-                                global const float4* restrict ndc, global const ClippedFace* restrict clipped,
+                                global const ViewParams* restrict views, global const uint4* restrict edges,
+                                global const uint4* restrict faces, global const float4* restrict ndc,
+                                global const ClippedFace* restrict clipped,
                                 global const uint* restrict corner_starts,
                                 global const uint* restrict corners, global const uint* restrict pair_starts,
                                 global const uint* restrict edge_pairs,
@@ -360,7 +362,7 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
     for (uint cut = 0; cut < 2; ++cut) {
       const int to_lost = lost_corner(of, cut) == corner;
       if (to_lost || kept_corner(of, cut) == corner)
-        sum += share_of_cut(of, cut, to_lost, cut == 0 ? grad.xy : grad.zw);
+        sum += share_of_cut(p, views + view, of, cut, to_lost, cut == 0 ? grad.xy : grad.zw);
     }
     is_near = is_near || is_lost(of, corner);
   }
@@ -370,7 +372,8 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
     const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1;
     if (!e.is_there || e.cut[end] == DPR_NO_CUT) continue;
     const float4 grad = sum_of_pairs(first_edge + edge, pair_starts, edge_pairs, grad_ends);
-    sum += share_of_cut(s.clipped[e.cut_face], e.cut[end], own_end == end, end == 0 ? grad.xy : grad.zw);
+    sum += share_of_cut(p, views + view, s.clipped[e.cut_face], e.cut[end], own_end == end,
+                        end == 0 ? grad.xy : grad.zw);
   }
   if (is_near) grad_ndc[i] = 0.0f;
   grad_clip[i] += (float4)(sum, 0.0f);

@@ -32,7 +32,7 @@ static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, glo
                    ? mad3n(position, (realn)(-light->position.w), splat3(light->position))
                    : sub3n(splat3(light->position), position);
   t.inverse_light = normalize3n(&t.to_light);
-  t.to_eye = sub3n(splat3(eye), position);
+  t.to_eye = mad3n(position, (realn)(-eye.w), splat3(eye));
   t.inverse_eye = normalize3n(&t.to_eye);
   const realn cosine = dot3n(normal, t.to_light);
   realn towards;
@@ -122,8 +122,8 @@ static inline Vec3n cone_backward(const LightTerm t, global const Light* light, 
 }
 
 /// Gradients of one light's terms: adds to those of the point and of the light.
-static inline void light_term_backward(const LightTerm t, global const Light* light, float shininess,
-                                       Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+static inline void light_term_backward(const LightTerm t, float4 eye, global const Light* light,
+                                       float shininess, Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
                                        PointGradient* point, LightGradient* g) {
   const realn cosine = t.lambert;
   const realn by_diffuse = dot3n(grad_factor, splat3(light->diffuse)),
@@ -155,8 +155,9 @@ static inline void light_term_backward(const LightTerm t, global const Light* li
   g->specular = mad3n(grad_specular, through_cone(t, t.highlight), g->specular);
   point->eye = mad3n(eye_moves, (realn)(1.0f), point->eye);
   point->position = (DPR_LIGHTS & DPR_LIGHTS_DISTANT)
-                        ? sub3n(mad3n(light_moves, (realn)(-light->position.w), point->position), eye_moves)
-                        : sub3n(sub3n(point->position, light_moves), eye_moves);
+                        ? mad3n(light_moves, (realn)(-light->position.w), point->position)
+                        : sub3n(point->position, light_moves);
+  point->position = mad3n(eye_moves, (realn)(-eye.w), point->position);
 }
 
 static inline LightGradient zero_light_gradient(void) {
@@ -179,7 +180,7 @@ static inline void light_point_backward(const LightingParams lp, global const Li
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
-    light_term_backward(t, lights + l, lp.shininess, normal, grad_factor, grad_specular, point, &unused);
+    light_term_backward(t, eye, lights + l, lp.shininess, normal, grad_factor, grad_specular, point, &unused);
   }
 }
 
@@ -190,7 +191,7 @@ static inline void add_light_gradient(const LightingParams lp, global const Ligh
   const LightTerm t = light_term(position, normal, eye, light, lp.shininess);
   PointGradient unused;
   unused.position = unused.normal = unused.eye = zero3n();
-  light_term_backward(t, light, lp.shininess, normal, grad_factor, grad_specular, &unused, g);
+  light_term_backward(t, eye, light, lp.shininess, normal, grad_factor, grad_specular, &unused, g);
 }
 
 /// Adds the gradients of the harmonics at a normal.

@@ -98,6 +98,8 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_VIEW 6        /* rotation vector, translation of the view matrix: 6 */
 #define DPR_CHANNEL_PROJECTION 12 /* scale x, y, offset x, y of the projection: 4 */
 #define DPR_POSE_CHANNELS 16
+#define DPR_CHANNEL_DISTORTION 16 /* k1, k2, p1, p2, k3, where some view distorts: 5 */
+#define DPR_LENS_CHANNELS 21
 
 /// Channels that aggregation's backward pass leaves per pixel.
 #define DPR_CHANNEL_GAMMA 0
@@ -149,17 +151,23 @@ typedef struct FrameParams {
   uint sharp;   /* distances have no noise: triangles cover what they own, and distances are not needed */
   float culled; /* the orientation of faces that are left out, +1 or -1; 0: none are */
   uint clips;   /* some face may cross the near plane: ClippedFace says which; 0: none is read */
+  uint orthographic; /* the views are; then perspective_correct is 0 */
+  uint distorts;     /* some view does */
 } FrameParams;
 
 /// A camera, ready for the kernels.
 typedef struct ViewParams {
   DPR_SHARED_NAME(ViewParams)
   float4 row[3];     /* world to camera, affine */
-  float4 projection; /* NDC = (x, y) * projection.xy / depth + projection.zw */
-  float4 eye;        /* camera centre, world */
+  float4 projection; /* NDC = (x, y) * projection.xy / depth + projection.zw; orthographic: depth is 1 */
+  float4 eye;        /* camera centre, world; w = 1, or 0: the direction to a camera infinitely far away */
   float znear, zfar;
-  float inverse_range; /* 1 / (zfar - znear) */
-  float unused;
+  float inverse_range;   /* 1 / (zfar - znear) */
+  uint distorts;         /* 0: the lens is perfect, and the rest not read */
+  float radial[3];       /* k1, k2, k3: of squared tangents, their squares and cubes */
+  float largest_radius2; /* squared tangent from which on points are held: the image folds over there */
+  float tangential[2];   /* OpenCV's p2, -p1: its y axis points down */
+  uint unused0, unused1;
 } ViewParams;
 
 /// A triangle of a view after projection, if it is not dropped.
@@ -177,7 +185,7 @@ typedef struct Triangle {
 /// between first and first + 1, and first and first + 2 (all modulo 3).
 typedef struct ClippedFace {
   DPR_SHARED_NAME(ClippedFace)
-  float4 corner[3];  /* of the face: x, y in NDC times depth, depth; w unused */
+  float4 corner[3];  /* of the face, by a perfect lens: x, y in NDC times w, depth, w: depth, or 1 */
   float4 cut[2];     /* x, y in NDC; depth, which is znear; the part of the way to the corner that is lost */
   float orientation; /* +1 counter-clockwise, -1 clockwise */
   uint corners;      /* 3 or 4; 0: the face is not clipped, and the rest not written */

@@ -176,8 +176,8 @@ static inline void add_to_clipped_corners(const ClippedFace c, int along_y, floa
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     const float3 of_cofactor = along_y ? (float3)(0.0f, of_step[k], 0.0f) : (float3)(of_step[k], 0.0f, 0.0f);
     corner[k] += of_determinant * cofactor(c, k);
-    corner[i] += cross(c.corner[j].xyz, of_cofactor);
-    corner[j] += cross(of_cofactor, c.corner[i].xyz);
+    corner[i] += cross(c.corner[j].xyw, of_cofactor);
+    corner[j] += cross(of_cofactor, c.corner[i].xyw);
   }
 }
 
@@ -217,6 +217,7 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
       add_to_corners(t, depths, along_y, grad_q, corner);
     }
   }
+  if (p.orthographic) corner[0].z = corner[1].z = corner[2].z = 0.0f;  // nothing is divided by depths
   global float* grad = (is_clipped ? grad_clip : grad_corners) + 9 * pair;
   for (int k = 0; k < 3; ++k) vstore3(vload3((size_t)k, grad) + corner[k], (size_t)k, grad);
 }

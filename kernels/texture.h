@@ -50,9 +50,9 @@ static inline float3 screen_steps(const Triangle t, int along_y) {
 /// The determinant of a clipped face's homogeneous corners, and its derivative by one of them. A barycentric
 /// times 1 / depth is one of these over the determinant, times the sample: q_k is a component of that.
 static inline float3 cofactor(const ClippedFace c, int k) {
-  return cross(c.corner[(k + 1) % 3].xyz, c.corner[(k + 2) % 3].xyz);
+  return cross(c.corner[(k + 1) % 3].xyw, c.corner[(k + 2) % 3].xyw);
 }
-static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyz, cofactor(c, 0)); }
+static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyw, cofactor(c, 0)); }
 
 static inline Steps make_steps(float3 depth, float3 q_x, float3 q_y, float2 place1, float2 place2) {
   Steps s;
@@ -77,7 +77,7 @@ static inline Steps triangle_steps(const FrameParams p, const Triangle t, float2
 static inline Steps clipped_steps(const ClippedFace c, float2 place1, float2 place2) {
   const float inverse = 1.0f / determinant(c);
   const float3 a = cofactor(c, 0), b = cofactor(c, 1), d = cofactor(c, 2);
-  return make_steps((float3)(c.corner[0].z, c.corner[1].z, c.corner[2].z), inverse * (float3)(a.x, b.x, d.x),
+  return make_steps((float3)(c.corner[0].w, c.corner[1].w, c.corner[2].w), inverse * (float3)(a.x, b.x, d.x),
                     inverse * (float3)(a.y, b.y, d.y), place1, place2);
 }
 

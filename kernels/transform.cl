@@ -1,5 +1,6 @@
 // Vertices: object space -> world -> camera -> NDC and view depth; and back.
 #include "affine.h"
+#include "lens.h"
 #include "shared_types.h"
 
 /// Projects vertices. One work-item per (view, vertex).
@@ -24,7 +25,7 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float depth = -c.z;
   world[i] = (float4)(w, 1.0f);
-  const float2 xy = c.xy * camera->projection.xy / depth + camera->projection.zw;
+  const float2 xy = project(p, camera, c.xy, depth);
   ndc[i] = (float4)(xy.x, xy.y, depth, 0.0f);
 }
 
@@ -32,11 +33,15 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
 /// no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
 /// in      views, models, vertex_mesh, world  as transform_forward
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
-/// in      grad_clip   float4[view][vertex]  what clipped faces add, of homogeneous coordinates: x times depth,
-///                     y times depth, depth, with x and y in NDC. Read where p.clips is set
+/// in      grad_clip   float4[view][vertex]  what clipped faces add, of homogeneous coordinates: x times
+/// depth,
+///                     y times depth, depth, with x and y in NDC; orthographic: x, y, depth. Where the lens
+///                     distorts, without its distortion: what it does to cuts is left out of its own
+///                     gradients. Read where p.clips is set
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
-/// out     channels    float[DPR_POSE_CHANNELS][view][vertex]
+/// out     channels    float[DPR_POSE_CHANNELS][view][vertex]; float[DPR_LENS_CHANNELS][view][vertex] where
+///                     p.distorts is set
 kernel void transform_backward(const FrameParams p, const uint lit, global const ViewParams* restrict views,
                                global const float4* restrict models, global const uint* restrict vertex_mesh,
                                global const float4* restrict world, global const float4* restrict grad_ndc,
@@ -53,19 +58,28 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float3 g = grad_ndc[i].xyz;
   int used = any(g != 0.0f);
-  const float inverse_depth = used ? -1.0f / c.z : 0.0f;
+  const float inverse_depth = !used ? 0.0f : p.orthographic ? 1.0f : -1.0f / c.z;
   const float2 tangent = used ? c.xy * inverse_depth : (float2)(0.0f);
-  const float2 g_tangent = g.xy * camera->projection.xy;
-  const float g_depth = g.z - dot(g_tangent, tangent) * inverse_depth;
+  const float2 g_seen = g.xy * camera->projection.xy;
+  float2 seen = tangent, g_tangent = g_seen;
+  float g_coefficients[5] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+  if (camera->distorts && used) {
+    seen = bend_tangent(camera, tangent);
+    g_tangent = bend_tangent_backward(camera, tangent, g_seen);
+    coefficients_backward(camera, tangent, g_seen, g_coefficients);
+  }
+  const float g_depth = p.orthographic ? g.z : g.z - dot(g_tangent, tangent) * inverse_depth;
   float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
-  float2 g_scale = g.xy * tangent, g_offset = g.xy;
+  float2 g_scale = g.xy * seen, g_offset = g.xy;
   if (p.clips && any(grad_clip[i].xyz != 0.0f)) {
     const float3 h = grad_clip[i].xyz;
     const float4 projection = camera->projection;
     used = 1;
-    g_camera += (float3)(h.xy * projection.xy, -h.z - dot(h.xy, projection.zw));
-    g_scale += h.xy * c.xy;
-    g_offset -= h.xy * c.z;
+    g_camera += (float3)(h.xy * projection.xy, -h.z - (p.orthographic ? 0.0f : dot(h.xy, projection.zw)));
+    if (!camera->distorts) {
+      g_scale += h.xy * c.xy;
+      g_offset += h.xy * (p.orthographic ? 1.0f : -c.z);
+    }
   }
   float3 g_world = apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera);
   if (lit) g_world += grad_world[i].xyz;
@@ -80,6 +94,9 @@ kernel void transform_backward(const FrameParams p, const uint lit, global const
       view_rotation.x,  view_rotation.y,  view_rotation.z,  g_camera.x, g_camera.y, g_camera.z,
       g_scale.x,        g_scale.y,        g_offset.x,       g_offset.y};
   for (int k = 0; k < DPR_POSE_CHANNELS; ++k) channels[(uint)k * count + i] = values[k];
+  if (!p.distorts) return;
+  for (int k = 0; k < DPR_LENS_CHANNELS - DPR_CHANNEL_DISTORTION; ++k)
+    channels[(uint)(DPR_CHANNEL_DISTORTION + k) * count + i] = g_coefficients[k];
 }
 
 /// Gradients of the object-space positions: the views' contributions in order, or, where every view has a

@@ -1,4 +1,4 @@
-// The pinhole camera.
+// Cameras: a pinhole, with a lens that distorts or without, or orthographic; and those of other programs.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,17 +12,41 @@ struct Intrinsics {
   float fx = 0, fy = 0, cx = 0, cy = 0;
 };
 
+/// Radial and tangential distortion, with OpenCV's coefficients in OpenCV's order: with x and y in its axes
+/// (y down) over depth and r^2 = x^2 + y^2,
+///
+///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y' alike with p1 and p2
+///   exchanged.
+///
+/// It moves vertices. Between them edges and what is on faces stay straight, so that faces should be small
+/// where the image bends: an edge of length l in tangents is off by at most about 3/4 |k1| l^2 r in its
+/// middle. From the radius on where the image would fold over (largest_radius()) points are held at it. Of
+/// faces that cross the near plane what is left is distorted; how the lens moves the cuts is not in its own
+/// gradients, nor in those of the intrinsics beside it, but in all others.
+struct Distortion {
+  float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+};
+
+/// The tangent of the angle from the axis where r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops to rise; infinity
+/// where it never does.
+double largest_radius(const Distortion& distortion);
+
 /// An OpenGL camera: right-handed, looks down -z, y up. Column vectors.
 struct Camera {
   glm::mat4 view{1.0F};         ///< world to camera; affine and invertible
   float fov_y_degrees = 60.0F;  ///< full vertical field of view, in (0, 180); ignored if intrinsics are given
-  std::optional<Intrinsics> intrinsics;  ///< instead of fov_y_degrees
-  float znear = 1.0F;                    ///< > 0, distance along the view direction
-  float zfar = 100.0F;                   ///< > znear
+  std::optional<Intrinsics> intrinsics;    ///< instead of fov_y_degrees
+  float znear = 1.0F;                      ///< > 0, distance along the view direction
+  float zfar = 100.0F;                     ///< > znear
+  std::optional<Distortion> distortion{};  ///< by the lens of a perspective camera
+  /// Orthographic instead of perspective: > 0, world units from the lower to the upper edge of the image.
+  /// Then there are neither intrinsics nor distortion, and fov_y_degrees is ignored.
+  std::optional<float> orthographic_height{};
 };
 
-/// NDC of a camera-space point at depth d = -z: (scale.x * x / d + offset.x, scale.y * y / d + offset.y).
-/// NDC spans [-1, 1] on the short side of the image, x right, y up.
+/// NDC of a camera-space point at depth d = -z: (scale.x * x / d + offset.x, scale.y * y / d + offset.y), of
+/// an orthographic camera without the division. NDC spans [-1, 1] on the short side of the image, x right, y
+/// up. A lens distorts x / d and y / d before.
 struct Projection {
   glm::vec2 scale, offset;
 };
@@ -51,5 +75,26 @@ struct PyTorch3dView {
 };
 PyTorch3dView to_pytorch3d_view(const glm::mat4& view);
 glm::mat4 from_pytorch3d_view(const PyTorch3dView& view);
+
+/// OpenCV's camera matrix counts from the centre of the top-left pixel: its cx and cy are less by a half.
+/// Focal lengths and distortion are the same.
+Intrinsics to_opencv_intrinsics(const Intrinsics& intrinsics);
+Intrinsics from_opencv_intrinsics(const Intrinsics& intrinsics);
+
+/// What PyTorch3D's PerspectiveCameras and OrthographicCameras are made with, in its NDC (in_ndc=True).
+struct PyTorch3dProjection {
+  glm::vec2 focal_length, principal_point;
+};
+PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height);
+/// Of PerspectiveCameras.
+Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height);
+
+/// OpenGL's projection matrix: clip coordinates from camera space, for a viewport of that many pixels.
+/// Without the lens' distortion, which no matrix has.
+glm::mat4 to_opengl_projection(const Camera& camera, int width, int height);
+/// The camera of OpenGL's view and projection matrices: with intrinsics, or orthographic. Throws
+/// InvalidArgument for a matrix that is of neither kind, or skewed; orthographic also if its pixels are not
+/// square or the axis does not pass the image's centre.
+Camera from_opengl(const glm::mat4& view, const glm::mat4& projection, int width, int height);
 
 }  // namespace dpr

@@ -72,10 +72,18 @@ typedef struct dpr_camera {
   float fov_y_degrees;  /* full vertical field of view, in (0, 180); ignored if fx is not 0 */
   float fx, fy, cx, cy; /* intrinsics, pixels; the origin is the corner of the top-left pixel */
   float znear, zfar;    /* 0 < znear < zfar, along the view direction */
+  /* OpenCV's k1, k2, p1, p2, k3 of the lens; NULL: it does not distort. Read during the call. */
+  const float* distortion;
+  /* Not 0: orthographic, with so many world units from the lower to the upper edge; fx is 0 then, and
+   * distortion NULL. */
+  float orthographic_height;
 } dpr_camera;
 
-#define DPR_CAMERA_INIT \
-  { sizeof(dpr_camera), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 60.0f, 0, 0, 0, 0, 1.0f, 100.0f }
+#define DPR_CAMERA_INIT                                                                                    \
+  {                                                                                                        \
+    sizeof(dpr_camera), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 60.0f, 0, 0, 0, 0, 1.0f, 100.0f, \
+        NULL, 0                                                                                            \
+  }
 
 /* At most one of the two colour arrays is given; with neither the mesh is white. */
 typedef struct dpr_mesh {

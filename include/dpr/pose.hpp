@@ -81,6 +81,8 @@ struct PoseOptions {
   std::variant<LeastSquares, Descent> method;
   bool solve_translation = false;
   bool solve_focal = false;  ///< a factor on the camera's focal length too; LeastSquares only
+  /// The lens' k1 and k2 too, from the scene's or none; LeastSquares only, perspective cameras only.
+  bool solve_distortion = false;
   /// In (0, 1): the target counts as explained once the loss is below that part of what a wrong pose leaves:
   /// in descents the initial one, in least squares the median over rotations; both at the finest level.
   float explained = 0.1F;
@@ -96,6 +98,7 @@ struct PoseIteration {
   unsigned hypotheses = 1;    ///< that were turned together
   Pose pose;                  ///< of the best
   double focal_scale = 1;     ///< of the best
+  glm::dvec2 radial{0.0};     ///< of the best
 };
 
 /// A pose that was found, and how well it explains the target.
@@ -103,7 +106,11 @@ struct PoseHypothesis {
   Pose pose;
   double focal_scale = 1;  ///< factor on the scene's focal length
   double loss = 0;         ///< at the finest level
+  glm::dvec2 radial{0.0};  ///< what is added to k1 and k2 of the scene's lens
 };
+
+/// The scene's camera with what was found of it.
+Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& radial);
 
 struct PoseResult : PoseHypothesis {
   Pose start;  ///< the (first) initial pose; in a search the scene's
@@ -111,7 +118,7 @@ struct PoseResult : PoseHypothesis {
   /// what is hidden of it, leaves them open. LeastSquares only.
   std::vector<PoseHypothesis> equals;
   /// Row-major covariance of a small motion: rotation vector on the left (world axes, radians), then, if
-  /// solved for, the translation (world), then, if solved for, the logarithm of the focal length. From the
+  /// solved for, the translation (world), the logarithm of the focal length, and k1 and k2. From the
   /// final Hessian and the residuals at edges, as if pixels erred independently: it knows nothing of errors
   /// of the scene or of another valley. Empty where the image leaves a parameter open. LeastSquares only.
   std::vector<double> covariance;

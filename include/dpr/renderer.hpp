@@ -29,8 +29,10 @@ struct PoseGradient {
 
 struct CameraGradient {
   PoseGradient view;                   ///< of the world-to-camera matrix
-  double fov_y_degrees = 0;            ///< 0 where the camera has intrinsics
-  std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy; 0 where the camera has a field of view
+  double fov_y_degrees = 0;            ///< 0 where the camera has intrinsics or is orthographic
+  std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy; 0 where the camera has none
+  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3; 0 where the camera has none
+  double orthographic_height = 0;      ///< 0 where the camera has none
 };
 
 struct ViewGradient {

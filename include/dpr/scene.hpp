@@ -27,15 +27,16 @@ enum class Cull { none, back, front };
 
 /// Which gradients the backward pass computes. Nothing is computed that is not asked for.
 struct GradientRequest {
-  bool positions = true;   ///< vertex positions, object space
-  bool colors = true;      ///< vertex or face colours
-  bool transform = true;   ///< rotation and translation of every mesh
-  bool camera = true;      ///< rotation and translation of the view, field of view or intrinsics
-  bool lights = false;     ///< everything of the lights but shininess
-  bool smoothing = true;   ///< sigma, gamma, alpha
-  bool background = true;  ///< background colour
-  bool texture = false;    ///< texels of every texture
-  bool texcoords = false;  ///< texture coordinates of textured meshes
+  bool positions = true;    ///< vertex positions, object space
+  bool colors = true;       ///< vertex or face colours
+  bool transform = true;    ///< rotation and translation of every mesh
+  bool camera = true;       ///< the view's rotation and translation, and the projection but for distortion
+  bool lights = false;      ///< everything of the lights but shininess
+  bool smoothing = true;    ///< sigma, gamma, alpha
+  bool background = true;   ///< background colour
+  bool texture = false;     ///< texels of every texture
+  bool texcoords = false;   ///< texture coordinates of textured meshes
+  bool distortion = false;  ///< coefficients of lenses
 };
 
 struct Scene {

@@ -113,8 +113,14 @@ Json camera_to_json(const Camera& camera) {
   if (const auto& k = camera.intrinsics) {
     json["intrinsics"] = {
         {"fx", number(k->fx)}, {"fy", number(k->fy)}, {"cx", number(k->cx)}, {"cy", number(k->cy)}};
+  } else if (camera.orthographic_height) {
+    json["projection"] = "orthographic";
+    json["orthographic_height"] = number(*camera.orthographic_height);
   } else {
     json["fov_y_degrees"] = number(camera.fov_y_degrees);
+  }
+  if (const auto& d = camera.distortion) {
+    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
   }
   return json;
 }
@@ -248,9 +254,15 @@ void print_mesh(const Json& mesh) {
 }
 
 std::string camera_text(const Json& camera) {
-  const std::string lens = camera.contains("intrinsics") ? "fx " + camera["intrinsics"]["fx"].dump() +
-                                                               ", fy " + camera["intrinsics"]["fy"].dump()
-                                                         : camera["fov_y_degrees"].dump() + " degrees high";
+  std::string lens;
+  if (camera.contains("intrinsics")) {
+    lens = "fx " + camera["intrinsics"]["fx"].dump() + ", fy " + camera["intrinsics"]["fy"].dump();
+  } else if (camera.contains("orthographic_height")) {
+    lens = "orthographic, " + camera["orthographic_height"].dump() + " high";
+  } else {
+    lens = camera["fov_y_degrees"].dump() + " degrees high";
+  }
+  if (camera.contains("distortion")) lens += ", distortion " + list_text(camera["distortion"]);
   return lens + ", depths from " + camera["znear"].dump() + " to " + camera["zfar"].dump();
 }
 

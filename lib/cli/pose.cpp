@@ -99,8 +99,8 @@ void print(const std::string& file, const PoseResult& result, bool is_light_fixe
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
-        "be wrong: --search tries all rotations, --translation and --focal find what else is not known. Or "
-        "colours, clutter or occlusion differ from the scene's: --robust is for these%s.\n",
+        "be wrong: --search tries all rotations, --translation, --focal and --distortion find what else is "
+        "not known. Or colours, clutter or occlusion differ from the scene's: --robust is for these%s.\n",
         is_light_fixed ? ", --light harmonics for another light" : "");
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
@@ -163,6 +163,10 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "MASK.png");
   command
       .add_flag("--focal", options.solver.solve_focal, "Look for a factor on the camera's focal length too")
+      ->group(k_least_squares_group);
+  command
+      .add_flag("--distortion", options.solver.solve_distortion,
+                "Look for the lens' k1 and k2 too, from the scene's or none")
       ->group(k_least_squares_group);
 }
 

@@ -33,6 +33,9 @@ void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::
   rows.push_back({"translation", vector_text(result.pose.translation)});
   if (result.focal_scale != 1)
     rows.push_back({"focal length", format("%.6g of the scene's", result.focal_scale)});
+  if (result.radial != glm::dvec2(0))
+    rows.push_back(
+        {"distortion", format("k1 %+.4g, k2 %+.4g to the scene's", result.radial.x, result.radial.y)});
   rows.push_back({"loss", format("%.4g", result.loss)});
   rows.push_back({"target explained", result.explained ? "yes" : "no"});
   rows.push_back({"iterations", std::to_string(result.iterations)});

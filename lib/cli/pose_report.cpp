@@ -30,27 +30,29 @@ glm::dmat3 stretch_of(const Scene& scene) {
 class PoseCamera {
  public:
   PoseCamera(const Device& device, Scene scene)
-      : renderer_(device),
-        stretch_(stretch_of(scene)),
-        camera_(scene.camera),
-        view_{scene.camera, {glm::mat4(1.0F)}} {
+      : renderer_(device), stretch_(stretch_of(scene)), camera_(scene.camera) {
     renderer_.set_scene(scene);
   }
 
-  Image render(const Pose& pose, double focal_scale, const Smoothing& smoothing) {
-    view_.camera = zoomed(camera_, focal_scale);
-    view_.transforms.front() = affine(pose.rotation * stretch_, pose.translation);
-    renderer_.set_views({&view_, 1});
+  /// What was found: of a solver's step or result.
+  template <typename Found>
+  Image render(const Found& found, const Smoothing& smoothing) {
+    return render(calibrated(camera_, found.focal_scale, found.radial), found.pose, smoothing);
+  }
+  Image render_start(const PoseResult& result) { return render(camera_, result.start, rigid_smoothing()); }
+
+ private:
+  Image render(const Camera& camera, const Pose& pose, const Smoothing& smoothing) {
+    const View view{camera, {affine(pose.rotation * stretch_, pose.translation)}};
+    renderer_.set_views({&view, 1});
     renderer_.set_smoothing(smoothing);
     renderer_.forward();
     return renderer_.image();
   }
 
- private:
   Renderer renderer_;
   glm::dmat3 stretch_;
   Camera camera_;
-  View view_;
 };
 
 /// ", 3.20 degrees from the truth" where that is known.
@@ -79,13 +81,13 @@ std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera&
   std::vector<PoseIteration> history;
   std::ranges::copy_if(result.history, std::back_inserter(history),
                        [&](const PoseIteration& step) { return step.descent == result.descent; });
-  std::vector<Image> images{camera.render(result.start, 1, rigid_smoothing())};
+  std::vector<Image> images{camera.render_start(result)};
   std::vector<std::string> captions{"start" + angle_text(result.start, truth)};
   const std::size_t count = std::min(k_strip_length - 1, history.size());
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t last = history.size() - 1;
     const PoseIteration& step = history[count > 1 ? i * last / (count - 1) : last];
-    images.push_back(camera.render(step.pose, step.focal_scale, blur_of(step)));
+    images.push_back(camera.render(step, blur_of(step)));
     captions.push_back(format("iteration %u, %dx%d", step.iteration, step.width, step.height) +
                        angle_text(step.pose, truth));
   }
@@ -112,14 +114,18 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
                {"Smoothing", "scale", true, {sigma, gamma}}});
 }
 
-Json to_json(const PoseHypothesis& hypothesis, const glm::dmat3& stretch) {
+Json to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
   const Pose& pose = hypothesis.pose;
-  return {{"rotation_matrix", rows_to_json(pose.rotation)},
-          {"rotation", cli::to_json(vector_from_rotation(pose.rotation))},
-          {"translation", cli::to_json(pose.translation)},
-          {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch, pose.translation)))},
-          {"focal_scale", hypothesis.focal_scale},
-          {"loss", hypothesis.loss}};
+  Json json{
+      {"rotation_matrix", rows_to_json(pose.rotation)},
+      {"rotation", cli::to_json(vector_from_rotation(pose.rotation))},
+      {"translation", cli::to_json(pose.translation)},
+      {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch_of(scene), pose.translation)))},
+      {"focal_scale", hypothesis.focal_scale},
+      {"loss", hypothesis.loss}};
+  if (const auto& d = calibrated(scene.camera, 1, hypothesis.radial).distortion)
+    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  return json;
 }
 
 Json to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
@@ -174,8 +180,7 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
 }
 
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
-  const glm::dmat3 stretch = stretch_of(scene);
-  Json json = to_json(result, stretch);
+  Json json = to_json(result, scene);
   json["explained"] = result.explained;
   json["light"] = name_of(result.light);
   json["iterations"] = result.iterations;
@@ -186,7 +191,7 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   }
   json["covariance"] = covariance_to_json(result.covariance);
   Json& equals = json["hypotheses"] = Json::array();
-  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis, stretch));
+  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis, scene));
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) history.push_back(to_json(step, truth));
   return json;
@@ -197,8 +202,8 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
                        const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
   PoseCamera camera(device, scene);
-  const Image start = camera.render(result.start, 1, rigid_smoothing());
-  const Image end = camera.render(result.pose, result.focal_scale, rigid_smoothing());
+  const Image start = camera.render_start(result);
+  const Image end = camera.render(result, rigid_smoothing());
   const Differences difference = differences({end}, {target});
   PosePictures pictures{
       write_picture(folder / "target.png", target, "target"),

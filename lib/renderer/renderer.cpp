@@ -13,7 +13,7 @@ namespace {
 
 /// Gradients that come by way of the vertices.
 bool is_geometric(const GradientRequest& wanted) {
-  return wanted.positions || wanted.transform || wanted.camera;
+  return wanted.positions || wanted.transform || wanted.camera || wanted.distortion;
 }
 
 /// Device memory of a fragment: its share of what a band's stages hold, forward and backward.

@@ -77,6 +77,11 @@ namespace {
 void add_projection_gradient(const std::array<double, 4>& grad, const Camera& camera, int width, int height,
                              CameraGradient& out) {
   const double short_side = std::min(width, height);
+  if (camera.orthographic_height) {
+    const double extent = *camera.orthographic_height;
+    out.orthographic_height = -(grad[0] + grad[1]) * 2.0 * height / short_side / (extent * extent);
+    return;
+  }
   if (camera.intrinsics) {
     const double factor = 2.0 / short_side;
     out.intrinsics = {grad[0] * factor, grad[1] * factor, grad[2] * factor, -grad[3] * factor};
@@ -87,7 +92,7 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
   out.fov_y_degrees = (grad[0] + grad[1]) * scale_by_half_angle * glm::radians(0.5);
 }
 
-/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS][view][mesh].
+/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh].
 void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std::span<const View> views,
                         SceneGradient& gradient) {
   const std::size_t meshes = scene.meshes.size(), segments = views.size() * meshes;
@@ -100,6 +105,7 @@ void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std:
   for (std::size_t v = 0; v < views.size(); ++v) {
     CameraGradient camera;
     std::array<double, 4> projected{};
+    std::array<double, 5> distortion{};
     for (std::size_t m = 0; m < meshes; ++m) {
       const std::size_t segment = v * meshes + m;
       if (scene.gradients.transform) {
@@ -109,22 +115,27 @@ void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std:
       camera.view.rotation += sum3(DPR_CHANNEL_VIEW, segment);
       camera.view.translation += sum3(DPR_CHANNEL_VIEW + 3, segment);
       for (std::size_t k = 0; k < 4; ++k) projected[k] += sum(DPR_CHANNEL_PROJECTION + k, segment);
+      for (std::size_t k = 0; k < 5 && views[v].camera.distortion; ++k)
+        distortion[k] += sum(DPR_CHANNEL_DISTORTION + k, segment);
     }
     add_projection_gradient(projected, views[v].camera, scene.width, scene.height, camera);
     if (scene.gradients.camera) gradient.views[v].camera = camera;
+    if (scene.gradients.distortion) gradient.views[v].camera.distortion = distortion;
   }
 }
 
 /// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
-/// translation. From sums by [3][view].
+/// translation. One infinitely far away lies in the direction A^-1 z, which is as if t were -z and fixed.
+/// From sums by [3][view].
 void add_eye_gradients(const std::vector<float>& sums, std::span<const View> views, SceneGradient& gradient) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const dvec3 grad_eye(sums[v], sums[views.size() + v], sums[2 * views.size() + v]);
     const glm::dmat4 view(views[v].camera.view);
     const dvec3 in_camera = glm::transpose(glm::inverse(glm::dmat3(view))) * grad_eye;
     PoseGradient& out = gradient.views[v].camera.view;
-    out.rotation += glm::cross(dvec3(view[3]), in_camera);
-    out.translation -= in_camera;
+    const bool is_distant = views[v].camera.orthographic_height.has_value();
+    out.rotation += glm::cross(is_distant ? dvec3(0, 0, -1) : dvec3(view[3]), in_camera);
+    if (!is_distant) out.translation -= in_camera;
   }
 }
 
@@ -151,8 +162,8 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
   const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
   const std::size_t faces = std::size_t{frame.views} * frame.faces;
-  const bool poses = wanted.transform || wanted.camera, eye = wanted.camera && shade.lit(),
-             lights = wanted.lights && shade.lit();
+  const bool poses = wanted.transform || wanted.camera || wanted.distortion,
+             eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
   const std::size_t sigmas = channels(wanted.smoothing && !pixel_noise, 1);
@@ -165,8 +176,8 @@ void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
       reduce.read({{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1,
                     all_pixels, aggregate.channels},
                    sigma,
-                   {vertices, channels(poses, DPR_POSE_CHANNELS), views.size() * scene.meshes.size(), 1,
-                    view_vertex_starts, transform.channels},
+                   {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
+                    views.size() * scene.meshes.size(), 1, view_vertex_starts, transform.channels},
                    {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
                    {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
                     shade.light_channels}});

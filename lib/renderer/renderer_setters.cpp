@@ -1,4 +1,5 @@
 // The setters of the renderer: each prepares everything that can fail, then swaps it in.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <type_traits>
@@ -18,13 +19,26 @@ static_assert(std::is_nothrow_move_constructible_v<Geometry> && std::is_nothrow_
 /// A row of an affine matrix: linear part and translation.
 cl_float4 matrix_row(const glm::mat4& m, int row) { return {{m[0][row], m[1][row], m[2][row], m[3][row]}}; }
 
+void set_distortion(shared::ViewParams& v, const Distortion& d) {
+  const double radius = largest_radius(d);
+  v.distorts = 1;
+  v.radial[0] = d.k1;
+  v.radial[1] = d.k2;
+  v.radial[2] = d.k3;
+  v.largest_radius2 = static_cast<float>(radius * radius);
+  v.tangential[0] = d.p2;
+  v.tangential[1] = -d.p1;
+}
+
 shared::ViewParams view_params(const Camera& camera, int width, int height) {
   const Projection projected = projection(camera, width, height);
   const glm::dmat4 to_world = glm::inverse(glm::dmat4(camera.view));
   shared::ViewParams v{};
   for (int row = 0; row < 3; ++row) v.row[row] = matrix_row(camera.view, row);
   v.projection = {{projected.scale.x, projected.scale.y, projected.offset.x, projected.offset.y}};
-  v.eye = to_cl(glm::vec3(to_world[3]));
+  v.eye = to_cl(glm::vec3(camera.orthographic_height ? to_world[2] : to_world[3]));
+  v.eye.s[3] = camera.orthographic_height ? 0.0F : 1.0F;
+  if (camera.distortion) set_distortion(v, *camera.distortion);
   v.znear = camera.znear;
   v.zfar = camera.zfar;
   v.inverse_range = 1.0F / (camera.zfar - camera.znear);
@@ -64,10 +78,11 @@ float culled_orientation(Cull cull) noexcept {
   return cull == Cull::front ? 1.0F : -1.0F;
 }
 
-shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::size_t views,
+shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, std::span<const View> views,
                                  std::size_t first_view, const Raster& raster) {
+  const auto distorts = [](const View& view) { return view.camera.distortion.has_value(); };
   shared::FrameParams p{};
-  p.views = static_cast<cl_uint>(views);
+  p.views = static_cast<cl_uint>(views.size());
   p.first_view = static_cast<cl_uint>(first_view);
   p.meshes = static_cast<cl_uint>(scene.meshes.size());
   p.vertices = static_cast<cl_uint>(geometry.vertices);
@@ -75,7 +90,9 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   set_raster(p, scene, raster);
   p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   p.blur_distance = blur_distance(scene.smoothing);
-  p.perspective_correct = scene.perspective_correct ? 1 : 0;
+  p.orthographic = views.front().camera.orthographic_height ? 1 : 0;  // all are, or none
+  p.distorts = std::ranges::any_of(views, distorts) ? 1 : 0;
+  p.perspective_correct = scene.perspective_correct && p.orthographic == 0 ? 1 : 0;
   p.sharp = is_sharp(scene.smoothing) ? 1 : 0;
   p.culled = culled_orientation(scene.cull);
   return p;
@@ -168,7 +185,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
       starts.push_back(starts.back() + static_cast<cl_uint>(its.meshes[m].vertices));
     }
   }
-  prepared.frame = frame_params(of, its, its_views.size(), first_view, raster);
+  prepared.frame = frame_params(of, its, its_views, first_view, raster);
   prepared.views.assign(its_views.begin(), its_views.end());
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);

@@ -19,6 +19,10 @@ void check_views(const Scene& scene, std::span<const View> views) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const View& view = views[v];
     validate(view.camera);
+    if (view.camera.orthographic_height.has_value() != views[0].camera.orthographic_height.has_value()) {
+      throw InvalidArgument(checks::element("views", v) + ".camera.orthographic_height",
+                            "perspective and orthographic cameras in one batch", "all of one kind");
+    }
     require_scales(view.camera, scene.smoothing, scene.lights.has_value());
     const std::string name = checks::element("views", v) + ".transforms";
     if (view.transforms.size() != scene.meshes.size()) {
@@ -92,7 +96,7 @@ std::size_t most_views(const Scene& scene) {
   }
   const std::size_t pixels = static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
   const std::size_t largest =
-      std::max({pixels * DPR_PIXEL_CHANNELS, vertices * DPR_POSE_CHANNELS, faces * 3});
+      std::max({pixels * DPR_PIXEL_CHANNELS, vertices * DPR_LENS_CHANNELS, faces * 3});
   return 0xfffffffeU / largest;
 }
 

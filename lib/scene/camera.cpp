@@ -1,9 +1,12 @@
-// The pinhole camera: its projection, its checks, and its views in the axes of other programs.
+// Cameras: their projection, their checks, and those of other programs.
 #include "dpr/camera.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+#include <utility>
+#include <vector>
 
 #include "base/checks.hpp"
 
@@ -16,10 +19,48 @@ const glm::mat4 k_opengl_to_opencv(glm::vec4(1, 0, 0, 0), glm::vec4(0, -1, 0, 0)
 const glm::mat4 k_opengl_to_pytorch3d(glm::vec4(-1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, -1, 0),
                                       glm::vec4(0, 0, 0, 1));
 
+/// The slope of r (1 + k1 r^2 + k2 r^4 + k3 r^6), by s = r^2.
+double radial_slope(const Distortion& d, double s) {
+  return 1 + s * (3.0 * d.k1 + s * (5.0 * d.k2 + s * 7.0 * d.k3));
+}
+
+/// Where the slope has its own extremes, in [0, most], ascending, and those two ends.
+std::vector<double> slope_extremes(const Distortion& d, double most) {
+  const double a = 21.0 * d.k3, b = 10.0 * d.k2, c = 3.0 * d.k1;  // a s^2 + b s + c
+  std::vector<double> extremes{0.0, most};
+  const auto add = [&](double s) {
+    if (s > 0 && s < most) extremes.push_back(s);  // a NaN is none
+  };
+  const double discriminant = b * b - 4 * a * c;
+  if (discriminant >= 0) {
+    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
+    add(q / a);
+    add(c / q);
+  }
+  std::ranges::sort(extremes);
+  return extremes;
+}
+
 }  // namespace
+
+double largest_radius(const Distortion& distortion) {
+  constexpr double k_most = 1e12;  // squared radius: as good as behind the camera
+  const std::vector<double> extremes = slope_extremes(distortion, k_most);
+  for (std::size_t i = 1; i < extremes.size(); ++i) {
+    double low = extremes[i - 1], high = extremes[i];
+    if (radial_slope(distortion, high) > 0) continue;
+    for (double middle = 0.5 * (low + high); middle > low && middle < high; middle = 0.5 * (low + high))
+      (radial_slope(distortion, middle) > 0 ? low : high) = middle;
+    return std::sqrt(low);
+  }
+  return std::numeric_limits<double>::infinity();
+}
 
 Projection projection(const Camera& camera, int width, int height) {
   const double short_side = std::min(width, height);
+  if (camera.orthographic_height)
+    return {glm::vec2(static_cast<float>(2.0 * height / short_side / *camera.orthographic_height)),
+            glm::vec2(0)};
   if (!camera.intrinsics) {
     // The field of view spans the height; pixels are square; NDC counts in halves of the short side.
     const double half_angle = 0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees));
@@ -34,9 +75,26 @@ Projection projection(const Camera& camera, int width, int height) {
           glm::vec2(ndc_per_pixel * (k.cx - 0.5 * width), ndc_per_pixel * (0.5 * height - k.cy))};
 }
 
+namespace {
+
+void validate(const Distortion& d, const std::string& name) {
+  const std::pair<const char*, float> coefficients[] = {
+      {"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1}, {"p2", d.p2}, {"k3", d.k3}};
+  for (const auto& [key, value] : coefficients) checks::require_finite(value, checks::in(key, name));
+}
+
+}  // namespace
+
 void validate(const Camera& camera, const std::string& name) {
   checks::require_affine(camera.view, checks::in("view", name));
-  if (camera.intrinsics) {
+  if (camera.distortion) validate(*camera.distortion, name + ".distortion");
+  if (camera.orthographic_height) {
+    checks::require_positive(*camera.orthographic_height, checks::in("orthographic_height", name));
+    if (camera.intrinsics || camera.distortion) {
+      throw InvalidArgument(checks::in(camera.intrinsics ? "intrinsics" : "distortion", name),
+                            "one beside orthographic_height", "a perspective camera, or none");
+    }
+  } else if (camera.intrinsics) {
     checks::require_positive(camera.intrinsics->fx, checks::in("fx", name + ".intrinsics"));
     checks::require_positive(camera.intrinsics->fy, checks::in("fy", name + ".intrinsics"));
     checks::require_finite(camera.intrinsics->cx, checks::in("cx", name + ".intrinsics"));
@@ -85,6 +143,82 @@ glm::mat4 from_pytorch3d_view(const PyTorch3dView& view) {
   glm::mat4 turned(glm::transpose(view.R));
   turned[3] = glm::vec4(view.T, 1);
   return k_opengl_to_pytorch3d * turned;
+}
+
+Intrinsics to_opencv_intrinsics(const Intrinsics& k) { return {k.fx, k.fy, k.cx - 0.5F, k.cy - 0.5F}; }
+
+Intrinsics from_opencv_intrinsics(const Intrinsics& k) { return {k.fx, k.fy, k.cx + 0.5F, k.cy + 0.5F}; }
+
+PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height) {
+  const Projection p = projection(camera, width, height);
+  return {p.scale, {-p.offset.x, p.offset.y}};
+}
+
+Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height) {
+  const glm::vec2 size(width, height);
+  const float pixels_per_ndc = 0.5F * std::min(size.x, size.y);
+  const glm::vec2 focal = pixels_per_ndc * projection.focal_length;
+  const glm::vec2 centre = 0.5F * size - pixels_per_ndc * projection.principal_point;
+  return {focal.x, focal.y, centre.x, centre.y};
+}
+
+glm::mat4 to_opengl_projection(const Camera& camera, int width, int height) {
+  const Projection p = projection(camera, width, height);
+  // Clip space spans the whole image, NDC its short side.
+  const glm::vec2 part = static_cast<float>(std::min(width, height)) / glm::vec2(width, height);
+  const float range = camera.zfar - camera.znear, sum = camera.zfar + camera.znear;
+  glm::mat4 m(0.0F);
+  m[0][0] = p.scale.x * part.x;
+  m[1][1] = p.scale.y * part.y;
+  if (camera.orthographic_height) {
+    m[2][2] = -2 / range;
+    m[3] = glm::vec4(0, 0, -sum / range, 1);
+  } else {
+    m[2] = glm::vec4(-p.offset * part, -sum / range, -1);
+    m[3][2] = -2 * camera.zfar * camera.znear / range;
+  }
+  return m;
+}
+
+namespace {
+
+/// Throws unless the numbers that are zero in every projection matrix are.
+void require_projection(const glm::mat4& m) {
+  const bool is_perspective = m[2][3] == -1 && m[3] == glm::vec4(0, 0, m[3][2], 0);
+  const bool is_orthographic = m[2] == glm::vec4(0, 0, m[2][2], 0) && m[3][3] == 1;
+  if (m[0] == glm::vec4(m[0][0], 0, 0, 0) && m[1] == glm::vec4(0, m[1][1], 0, 0) &&
+      (is_perspective || is_orthographic))
+    return;
+  throw InvalidArgument("projection (from_opengl)", "another matrix",
+                        "one of glFrustum or glOrtho, acting on column vectors");
+}
+
+}  // namespace
+
+Camera from_opengl(const glm::mat4& view, const glm::mat4& projection, int width, int height) {
+  const glm::mat4& m = projection;
+  require_projection(m);
+  const double half_width = 0.5 * width, half_height = 0.5 * height, a = m[2][2], b = m[3][2];
+  Camera camera;
+  camera.view = view;
+  if (m[3][3] == 1) {
+    constexpr double k_tolerance = 1e-5;
+    if (m[3][0] != 0 || m[3][1] != 0 ||
+        !(std::abs(m[0][0] * half_width / (m[1][1] * half_height) - 1) < k_tolerance))
+      throw InvalidArgument("projection (from_opengl)", "an orthographic one off the centre or stretched",
+                            "square pixels, and the axis through the image's centre");
+    camera.orthographic_height = static_cast<float>(2.0 / m[1][1]);
+    camera.znear = static_cast<float>((b + 1) / a);
+    camera.zfar = static_cast<float>((b - 1) / a);
+  } else {
+    camera.intrinsics = Intrinsics{
+        static_cast<float>(m[0][0] * half_width), static_cast<float>(m[1][1] * half_height),
+        static_cast<float>(half_width * (1.0 - m[2][0])), static_cast<float>(half_height * (1.0 + m[2][1]))};
+    camera.znear = static_cast<float>(b / (a - 1));
+    camera.zfar = static_cast<float>(b / (a + 1));
+  }
+  validate(camera, "from_opengl");
+  return camera;
 }
 
 }  // namespace dpr

@@ -18,16 +18,25 @@ constexpr std::array k_names{
     GradientName{"transform", &Request::transform},   GradientName{"camera", &Request::camera},
     GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
     GradientName{"background", &Request::background}, GradientName{"texture", &Request::texture},
-    GradientName{"texcoords", &Request::texcoords}};
+    GradientName{"texcoords", &Request::texcoords},   GradientName{"distortion", &Request::distortion}};
 
-bool has_field_of_view(const Scene& scene) { return !scene.camera.intrinsics; }
+bool has_field_of_view(const Scene& scene) {
+  return !scene.camera.intrinsics && !scene.camera.orthographic_height;
+}
 bool has_intrinsics(const Scene& scene) { return scene.camera.intrinsics.has_value(); }
+bool has_distortion(const Scene& scene) { return scene.camera.distortion.has_value(); }
+bool is_orthographic(const Scene& scene) { return scene.camera.orthographic_height.has_value(); }
 bool has_lights(const Scene& scene) { return scene.lights.has_value(); }
 bool has_harmonics(const Scene& scene) { return has_lights(scene) && !scene.lights->harmonics.empty(); }
 
 template <std::size_t k>
 GradientArray intrinsic(G& g, I i) {
   return &g.views[i.view].camera.intrinsics[k];
+}
+
+template <std::size_t k>
+GradientArray coefficient(G& g, I i) {
+  return &g.views[i.view].camera.distortion[k];
 }
 
 /// Rows of a kind of light. Files have the list of point lights even where there are none.
@@ -76,6 +85,14 @@ std::vector<GradientRow> make_rows() {
       GradientRow{&Request::camera, Of::view, "camera.intrinsics.fy", intrinsic<1>, has_intrinsics},
       GradientRow{&Request::camera, Of::view, "camera.intrinsics.cx", intrinsic<2>, has_intrinsics},
       GradientRow{&Request::camera, Of::view, "camera.intrinsics.cy", intrinsic<3>, has_intrinsics},
+      GradientRow{&Request::camera, Of::view, "camera.orthographic_height",
+                  [](G& g, I i) -> GradientArray { return &g.views[i.view].camera.orthographic_height; },
+                  is_orthographic},
+      GradientRow{&Request::distortion, Of::view, "camera.distortion.k1", coefficient<0>, has_distortion},
+      GradientRow{&Request::distortion, Of::view, "camera.distortion.k2", coefficient<1>, has_distortion},
+      GradientRow{&Request::distortion, Of::view, "camera.distortion.p1", coefficient<2>, has_distortion},
+      GradientRow{&Request::distortion, Of::view, "camera.distortion.p2", coefficient<3>, has_distortion},
+      GradientRow{&Request::distortion, Of::view, "camera.distortion.k3", coefficient<4>, has_distortion},
       GradientRow{&Request::lights, Of::scene, "lights.ambient",
                   [](G& g, I) -> GradientArray { return &g.ambient; }, has_lights},
       GradientRow{&Request::lights, Of::scene, "lights.harmonics",

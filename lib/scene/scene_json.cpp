@@ -231,13 +231,45 @@ void validate_side(int value, const std::string& argument) {
 
 }  // namespace
 
+namespace {
+
+Distortion parse_distortion(const JsonNode& node) {
+  const std::vector<JsonNode> k = node.elements(5);
+  return {k[0].number(), k[1].number(), k[2].number(), k[3].number(), k[4].number()};
+}
+
+/// "orthographic" or "perspective", and what belongs to it.
+void take_projection(const JsonNode& node, Camera& camera) {
+  bool is_orthographic = false;
+  if (const auto projection = node.find("projection")) {
+    const std::string word = projection->string();
+    is_orthographic = word == "orthographic";
+    if (!is_orthographic && word != "perspective")
+      projection->fail("\"" + word + "\"", "perspective or orthographic");
+  }
+  if (!is_orthographic) {
+    if (node.find("orthographic_height"))
+      node.fail("orthographic_height without orthographic projection", "\"projection\": \"orthographic\"");
+    return;
+  }
+  for (const char* const key : {"fov_y_degrees", "intrinsics", "distortion"}) {
+    if (node.find(key)) node.fail(std::string(key) + " and an orthographic projection", "one of the two");
+  }
+  camera.orthographic_height = node.at("orthographic_height").number();
+}
+
+}  // namespace
+
 Camera parse_camera(const JsonNode& node) {
-  node.require_keys({"view", "fov_y_degrees", "intrinsics", "znear", "zfar"});
+  node.require_keys({"view", "fov_y_degrees", "intrinsics", "distortion", "projection", "orthographic_height",
+                     "znear", "zfar"});
   Camera camera;
   take(node, "view", camera.view, [](const JsonNode& n) { return n.mat4(); });
   take_number(node, "fov_y_degrees", camera.fov_y_degrees);
   take_number(node, "znear", camera.znear);
   take_number(node, "zfar", camera.zfar);
+  take(node, "distortion", camera.distortion, parse_distortion);
+  take_projection(node, camera);
   const auto intrinsics = node.find("intrinsics");
   if (!intrinsics) return camera;
   if (node.find("fov_y_degrees")) node.fail("fov_y_degrees and intrinsics", "one of the two");

@@ -12,6 +12,11 @@ void add(Hash& hash, const Camera& camera) {
   const Intrinsics k = camera.intrinsics.value_or(Intrinsics{});
   for (const float value : {camera.fov_y_degrees, camera.znear, camera.zfar, k.fx, k.fy, k.cx, k.cy})
     hash.add(value);
+  if (camera.distortion) {
+    const Distortion& d = *camera.distortion;
+    for (const float value : {d.k1, d.k2, d.p1, d.p2, d.k3}) hash.add(value);
+  }
+  if (camera.orthographic_height) hash.add(*camera.orthographic_height);
 }
 
 void add(Hash& hash, const Mesh& mesh) {

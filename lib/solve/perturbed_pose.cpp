@@ -76,6 +76,10 @@ void validate_scale(const Flat& scale, const Camera& camera) {
     require(s >= 0 && std::isfinite(s), "scale (perturbed pose)", s, "finite numbers >= 0");
   }
   require(!perturbed(scale).empty(), "scale (perturbed pose)", 0, "at least one number above 0");
+  if (camera.orthographic_height && scale[k_fov] > 0) {
+    throw InvalidArgument("scale (perturbed pose)", "noise on fov_y_degrees",
+                          "none: the camera is orthographic");
+  }
   const bool has_intrinsics = camera.intrinsics.has_value();
   const bool on_intrinsics =
       std::any_of(scale.begin() + k_intrinsics, scale.end(), [](double s) { return s > 0; });

@@ -55,6 +55,11 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
   require(options_.explained > 0 && options_.explained < 1, "explained (pose)", options_.explained,
           "a number in (0, 1)");
   if (options_.solve_focal) require_least_squares(options_, "focal length (pose)");
+  if (options_.solve_distortion) {
+    require_least_squares(options_, "distortion (pose)");
+    if (scene_.camera.orthographic_height)
+      throw InvalidArgument("distortion (pose)", "an orthographic camera", "a perspective one, with a lens");
+  }
   std::visit([&](const auto& method) { validate(method, scene_); }, options_.method);
   const double determinant = glm::determinant(glm::dmat3(scene_.meshes.front().transform));
   require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,

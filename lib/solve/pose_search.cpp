@@ -46,7 +46,7 @@ class Fit {
         callback_(callback),
         beam_(method_.robust ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
-        space_(scene, initial.front(), options.solve_translation, options.solve_focal),
+        space_(scene, initial.front(), options),
         half_turns_(half_turns(scene.meshes.front())) {}
 
   PoseResult run(bool anywhere);
@@ -266,7 +266,7 @@ bool Fit::report(const PoseLevel& level) {
   result_.history.push_back({static_cast<unsigned>(result_.history.size()), 0, best.equations.loss,
                              level.smoothing(), level.width(), level.height(),
                              static_cast<unsigned>(candidates_.size()), best.hypothesis.pose,
-                             best.hypothesis.focal_scale});
+                             best.hypothesis.focal_scale, best.hypothesis.radial});
   return !callback_ || callback_(result_.history.back());
 }
 
@@ -290,7 +290,8 @@ void Fit::choose_equals(bool anywhere) {
                              [&](const Candidate& c) { return space_.distance(c.hypothesis, first); });
   }
   for (const Candidate& c : candidates_) {
-    result_.equals.push_back({c.hypothesis.pose, c.hypothesis.focal_scale, c.equations.loss});
+    const Hypothesis& h = c.hypothesis;
+    result_.equals.push_back({h.pose, h.focal_scale, c.equations.loss, h.radial});
   }
 }
 

@@ -14,11 +14,24 @@ constexpr std::size_t k_translation = 3;  // where its parameters begin
 
 }  // namespace
 
-PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, bool translation, bool focal)
+Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& radial) {
+  Camera result = focal_scale == 1 ? camera : zoomed(camera, focal_scale);
+  if (radial == glm::dvec2(0)) return result;
+  Distortion distortion = camera.distortion.value_or(Distortion{});
+  distortion.k1 += static_cast<float>(radial.x);
+  distortion.k2 += static_cast<float>(radial.y);
+  result.distortion = distortion;
+  return result;
+}
+
+PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions& options)
     : stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
-      translation_(translation),
-      focal_(focal),
-      size_(k_translation + (translation ? 3 : 0) + (focal ? 1 : 0)) {
+      translation_(options.solve_translation),
+      focal_(options.solve_focal),
+      distortion_(options.solve_distortion),
+      focal_index_(k_translation + (translation_ ? 3 : 0)),
+      radial_index_(focal_index_ + (focal_ ? 1 : 0)),
+      size_(radial_index_ + (distortion_ ? 2 : 0)) {
   const glm::dmat4 view(scene.camera.view);
   camera_axes_ =
       glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
@@ -29,10 +42,13 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, bool translation, 
   }
   radius_ = std::sqrt(std::max(squared_radius, 1e-30));
   // An object about or behind the camera still needs units to move in.
-  distance_ =
-      std::max(-(view * glm::dvec4(initial.translation, 1.0)).z, static_cast<double>(scene.camera.znear));
+  const glm::dvec3 centre(view * glm::dvec4(initial.translation, 1.0));
+  distance_ = std::max(-centre.z, static_cast<double>(scene.camera.znear));
+  rim_ = (glm::length(glm::dvec2(centre)) + radius_) / distance_;
   const glm::vec2 scale = projection(scene.camera, scene.width, scene.height).scale;
-  radius_ndc_ = radius_ / distance_ * static_cast<double>(std::max(scale.x, scale.y));
+  const double divisor = scene.camera.orthographic_height ? 1.0 : distance_;
+  ndc_per_tangent_ = static_cast<double>(std::max(scale.x, scale.y));
+  radius_ndc_ = radius_ / divisor * ndc_per_tangent_;
 }
 
 Hypothesis PoseSpace::moved(const Hypothesis& from, const Step& step) const {
@@ -43,7 +59,8 @@ Hypothesis PoseSpace::moved(const Hypothesis& from, const Step& step) const {
     result.pose.translation +=
         camera_axes_ * glm::dvec3(step[k_translation], step[k_translation + 1], step[k_translation + 2]);
   }
-  if (focal_) result.focal_scale *= std::exp(step[size_ - 1]);
+  if (focal_) result.focal_scale *= std::exp(step[focal_index_]);
+  if (distortion_) result.radial += glm::dvec2(step[radial_index_], step[radial_index_ + 1]);
   return result;
 }
 
@@ -55,7 +72,11 @@ PoseSpace::Step PoseSpace::step_lengths(double ndc) const {
     lengths[k_translation] = lengths[k_translation + 1] = fraction * radius_;
     lengths[k_translation + 2] = fraction * distance_;  // towards the camera an object only grows
   }
-  if (focal_) lengths[size_ - 1] = fraction;
+  if (focal_) lengths[focal_index_] = fraction;
+  if (distortion_) {
+    lengths[radial_index_] = ndc / (ndc_per_tangent_ * std::pow(rim_, 3));
+    lengths[radial_index_ + 1] = ndc / (ndc_per_tangent_ * std::pow(rim_, 5));
+  }
   return lengths;
 }
 
@@ -77,7 +98,7 @@ double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
 }
 
 View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
-  return {focal_ ? zoomed(camera, hypothesis.focal_scale) : camera,
+  return {calibrated(camera, hypothesis.focal_scale, hypothesis.radial),
           {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
 }
 

@@ -10,22 +10,23 @@
 
 namespace dpr {
 
-/// What is looked for: a pose, and the factor on the camera's focal length.
+/// What is looked for: a pose, the factor on the camera's focal length, and what is added to k1 and k2.
 struct Hypothesis {
   Pose pose;
   double focal_scale = 1;
+  glm::dvec2 radial{0.0};
 };
 
 /// Steps in the tangent space at a hypothesis: a rotation vector on the left (radians); then, if asked for,
-/// the translation along the camera's axes; then, if asked for, the logarithm of the focal length.
+/// the translation along the camera's axes; then the logarithm of the focal length; then k1 and k2.
 class PoseSpace {
  public:
-  static constexpr std::size_t k_most_parameters = 7;
+  static constexpr std::size_t k_most_parameters = 9;
   using Step = std::array<double, k_most_parameters>;
   using Matrix = std::array<double, k_most_parameters * k_most_parameters>;  ///< [size()][size()], row-major
 
   /// `initial` tells how far away the object is.
-  PoseSpace(const Scene& scene, const Pose& initial, bool translation, bool focal);
+  PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions& options);
 
   std::size_t size() const { return size_; }
   Hypothesis moved(const Hypothesis& from, const Step& step) const;
@@ -44,9 +45,11 @@ class PoseSpace {
 
  private:
   glm::dmat3 stretch_, camera_axes_;
-  bool translation_, focal_;
-  std::size_t size_;
+  bool translation_, focal_, distortion_;
+  std::size_t focal_index_, radial_index_, size_;  // where their parameters begin, and how many there are
   double radius_, distance_, radius_ndc_;
+  double rim_;  // the largest tangent at which the object is seen, about
+  double ndc_per_tangent_;
 };
 
 }  // namespace dpr

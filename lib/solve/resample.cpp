@@ -55,7 +55,7 @@ Image resample(const Image& image, int width, int height) {
 }
 
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height) {
-  if (width == new_width && height == new_height) return camera;
+  if ((width == new_width && height == new_height) || camera.orthographic_height) return camera;
   // In pixels, whatever the camera was given by: the ratio of the sides may change by rounding.
   const double focal = 0.5 * height / std::tan(0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees)));
   Intrinsics k{static_cast<float>(focal), static_cast<float>(focal), 0.5F * static_cast<float>(width),
@@ -69,7 +69,9 @@ Camera resample(const Camera& camera, int width, int height, int new_width, int 
 }
 
 Camera zoomed(Camera camera, double scale) {
-  if (auto& k = camera.intrinsics) {
+  if (camera.orthographic_height) {
+    *camera.orthographic_height /= static_cast<float>(scale);
+  } else if (auto& k = camera.intrinsics) {
     k->fx *= static_cast<float>(scale);
     k->fy *= static_cast<float>(scale);
   } else {

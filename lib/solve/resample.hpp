@@ -9,10 +9,11 @@ namespace dpr {
 /// The mean over the area of every new pixel; linear in the image, alpha included. Sizes at least 1.
 Image resample(const Image& image, int width, int height);
 
-/// The camera that sees the same picture in images of another size.
+/// The camera that sees the same picture in images of another size. An orthographic one keeps its height:
+/// where rounding changes the ratio of the sides, it sees a little more or less at the left and right.
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);
 
-/// The camera with another focal length, `scale` times as long.
+/// The camera with another focal length, `scale` times as long; orthographic: with so much less height.
 Camera zoomed(Camera camera, double scale);
 
 }  // namespace dpr

@@ -19,6 +19,7 @@ glm::dvec3 meeting_point(const ShapeViews& views) {
     const Projection p = projection(view.camera, views.width, views.height);
     const glm::dmat4 to_world = glm::inverse(glm::dmat4(view.camera.view));
     const glm::dvec3 eye(to_world[3]);
+    // An orthographic camera has no offset.
     const glm::dvec3 axis = glm::normalize(
         glm::dmat3(to_world) * glm::dvec3(-p.offset.x / p.scale.x, -p.offset.y / p.scale.y, -1.0));
     const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
@@ -46,7 +47,8 @@ CommonView common_view(const ShapeViews& views) {
           "a depth of " + checks::text(depth) + " of the point that the cameras look at",
           "between znear, " + checks::text(camera.znear) + ", and zfar, " + checks::text(camera.zfar));
     }
-    const double world_per_ndc = depth / static_cast<double>(std::max(p.scale.x, p.scale.y));
+    const double divisor = camera.orthographic_height ? 1.0 : depth;
+    const double world_per_ndc = divisor / static_cast<double>(std::max(p.scale.x, p.scale.y));
     const double to_planes = std::min(depth - camera.znear, camera.zfar - depth);
     common.radius = std::min({common.radius, k_part_of_view * world_per_ndc, k_part_of_depth * to_planes});
     common.pixel += 2.0 / std::min(views.width, views.height) * world_per_ndc / count;

@@ -13,6 +13,7 @@ Clip::Kernels::Kernels(Device::Impl& device)
 void Clip::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                    const Transform& transform, Setup& setup) {
   if (!kernels_) kernels_.emplace(device_);
+  views_ = &views;
   const std::size_t count = std::size_t{p.views} * p.faces;
   faces.resize(device_, count);
   kernels_->forward(count, p, views.cameras, geometry.face_vertices, transform.world, transform.ndc, faces,
@@ -38,9 +39,9 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                     const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range pairs = rasterize.pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
-  kernels_->backward(pairs, p, pairs.last(), faces, triangles, bin.pair_face, rasterize.fragment_starts,
-                     rasterize.fragment_pixel, rasterize.distance, grad_distance, grad_depth, grad_bary1,
-                     grad_bary2, rasterize.grad_corners, grad_corners);
+  kernels_->backward(pairs, p, pairs.last(), views_->cameras, faces, triangles, bin.pair_face,
+                     rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, grad_distance,
+                     grad_depth, grad_bary1, grad_bary2, rasterize.grad_corners, grad_corners);
 }
 
 }  // namespace dpr

@@ -54,14 +54,15 @@ class Clip {
     Kernel<shared::FrameParams, cl_uint, In<shared::ClippedFace>, In<shared::Triangle>, In<cl_uint>,
            In<cl_uint>, In<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
         fragments;
-    Kernel<shared::FrameParams, cl_uint, In<shared::ClippedFace>, In<shared::Triangle>, In<cl_uint>,
-           In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
-           Out<float>>
+    Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<shared::ClippedFace>,
+           In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
+           In<float>, In<float>, Out<float>, Out<float>>
         backward;
   };
 
   Device::Impl& device_;
-  std::optional<Kernels> kernels_;  // made for the first frame that may have such faces
+  std::optional<Kernels> kernels_;      // made for the first frame that may have such faces
+  const DeviceViews* views_ = nullptr;  // of the frame
 };
 
 }  // namespace dpr

@@ -192,9 +192,9 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
           grad_ends, grad_ndc);
   if (in.p.clips == 0) return;
   const Incidence& corners = in.geometry.vertex_corners;
-  gather_cuts_(vertices, in.p, params(in), in.edges.edges, in.geometry.face_vertices, in.transform.ndc,
-               in.clipped, corners.starts, corners.corners, pair_starts_, edge_pairs_, in.edges.end_starts,
-               in.edges.ends, grad_ends, grad_ndc, grad_clip);
+  gather_cuts_(vertices, in.p, params(in), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
+               in.transform.ndc, in.clipped, corners.starts, corners.corners, pair_starts_, edge_pairs_,
+               in.edges.end_starts, in.edges.ends, grad_ends, grad_ndc, grad_clip);
 }
 
 std::size_t Contour::bytes() const {

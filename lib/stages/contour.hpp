@@ -89,9 +89,9 @@ class Contour {
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
          In<cl_float4>, Out<cl_float4>>
       gather_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint4>, In<cl_float4>,
-         In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
+  Kernel<shared::FrameParams, shared::ContourParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
+         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
+         In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
       gather_cuts_;
   Scan scan_;
   Sort sort_;

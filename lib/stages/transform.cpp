@@ -20,7 +20,7 @@ void Transform::backward(const shared::FrameParams& p, const DeviceViews& views,
                          Buffer<cl_float4>& grad_world) {
   const std::size_t count = std::size_t{p.views} * p.vertices;
   grad_world.resize(device_, count);
-  channels.resize(device_, DPR_POSE_CHANNELS * count);
+  channels.resize(device_, (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * count);
   backward_(count, p, lit ? 1 : 0, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc,
             grad_clip, grad_world, channels);
 }

@@ -28,7 +28,7 @@ class Transform {
 
   Buffer<cl_float4> world;           ///< [view][vertex]
   Buffer<cl_float4> ndc;             ///< [view][vertex] x, y, view depth
-  Buffer<float> channels;            ///< [DPR_POSE_CHANNELS][view][vertex]
+  Buffer<float> channels;            ///< [DPR_POSE_CHANNELS or, distorted, DPR_LENS_CHANNELS][view][vertex]
   Buffer<cl_float4> grad_positions;  ///< [vertex], of views' own shapes [view][vertex]; object space
 
   std::size_t bytes() const {

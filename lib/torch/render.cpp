@@ -5,6 +5,7 @@
 #include <torch/library.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <optional>
 #include <span>
@@ -126,6 +127,17 @@ void require_batch(const at::Tensor& tensor, const char* name, std::int64_t view
                         "1 or " + std::to_string(views) + ", one a view, in the first dimension");
 }
 
+// Numbers of a view's projection: the height of an orthographic one, the intrinsics, or these and the
+// coefficients of the lens.
+constexpr std::int64_t k_orthographic = 1, k_pinhole = 4, k_lens = 9;
+
+void require_projection(const at::Tensor& intrinsics) {
+  const std::int64_t numbers = intrinsics.size(1);
+  if (numbers == k_orthographic || numbers == k_pinhole || numbers == k_lens) return;
+  throw InvalidArgument("intrinsics (dpr::render)", shape_text(intrinsics),
+                        "4 numbers a view, 9 with distortion, or 1 of an orthographic one");
+}
+
 Inputs check(const Inputs& in, std::int64_t faces) {
   Inputs out;
   out.views = checked(in.views, "views", {-1, 4, 4}, "[view, 4, 4]");
@@ -133,7 +145,8 @@ Inputs check(const Inputs& in, std::int64_t faces) {
   if (count == 0) throw InvalidArgument("views (dpr::render)", shape_text(out.views), "at least one view");
   out.vertices = checked(in.vertices, "vertices", {-1, -1, 3}, "[view or 1, vertex, 3]");
   out.colors = checked(in.colors, "colors", {-1, -1, 3}, "[view or 1, vertex or face, 3]");
-  out.intrinsics = checked(in.intrinsics, "intrinsics", {count, 4}, "[view, 4]");
+  out.intrinsics = checked(in.intrinsics, "intrinsics", {count, -1}, "[view, 4, 9 or 1]");
+  require_projection(out.intrinsics);
   out.background = checked(in.background, "background", {3}, "[3]");
   require_batch(out.vertices, "vertices", count);
   require_batch(out.colors, "colors", count);
@@ -146,17 +159,44 @@ Inputs check(const Inputs& in, std::int64_t faces) {
   return out;
 }
 
+void set_projection(Camera& camera, const at::Tensor& numbers) {
+  const float* const k = numbers.data_ptr<float>();
+  if (numbers.size(0) == k_orthographic) {
+    camera.orthographic_height = k[0];
+    return;
+  }
+  camera.intrinsics = Intrinsics{k[0], k[1], k[2], k[3]};
+  if (numbers.size(0) == k_lens) camera.distortion = Distortion{k[4], k[5], k[6], k[7], k[8]};
+}
+
+/// The gradients of what set_projection() takes, [view, number].
+at::Tensor projection_gradients(const SceneGradient& gradient, std::int64_t numbers) {
+  std::vector<float> values;
+  for (const ViewGradient& view : gradient.views) {
+    const CameraGradient& camera = view.camera;
+    const auto add = [&](const auto& list) {
+      for (const double k : list) values.push_back(static_cast<float>(k));
+    };
+    if (numbers == k_orthographic) {
+      add(std::array{camera.orthographic_height});
+    } else {
+      add(camera.intrinsics);
+      if (numbers == k_lens) add(camera.distortion);
+    }
+  }
+  return at::tensor(values, at::kFloat).view({-1, numbers});
+}
+
 std::vector<View> make_views(const Inputs& in, float znear, float zfar) {
-  const auto matrices = rows<glm::vec4>(in.views), intrinsics = rows<glm::vec4>(in.intrinsics);
+  const auto matrices = rows<glm::vec4>(in.views);
   std::vector<View> views;
-  for (std::size_t v = 0; v < intrinsics.size(); ++v) {
+  for (std::size_t v = 0; v < static_cast<std::size_t>(in.views.size(0)); ++v) {
     View view{{}, {glm::mat4(1.0F)}};
     for (int row = 0; row < 4; ++row) {
       const glm::vec4& values = matrices[4 * v + static_cast<std::size_t>(row)];
       for (int column = 0; column < 4; ++column) view.camera.view[column][row] = values[column];
     }
-    const glm::vec4& k = intrinsics[v];
-    view.camera.intrinsics = Intrinsics{k.x, k.y, k.z, k.w};
+    set_projection(view.camera, in.intrinsics.select(0, static_cast<std::int64_t>(v)));
     view.camera.znear = znear;
     view.camera.zfar = zfar;
     views.push_back(view);
@@ -240,6 +280,7 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       wanted.positions = vertices.requires_grad() || by_vertices;
       wanted.colors = colors.requires_grad();
       wanted.camera = intrinsics.requires_grad() || (views.requires_grad() && lights);
+      wanted.distortion = intrinsics.requires_grad();
       wanted.background = background.requires_grad();
       wanted.lights = light_numbers.requires_grad();
       wanted.transform = wanted.smoothing = false;
@@ -258,6 +299,7 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       ctx->saved_data["batch"] = batch;
       ctx->saved_data["lease"] = c10::IValue::make_capsule(std::move(lease));
       ctx->saved_data["wants_views"] = views.requires_grad();
+      ctx->saved_data["projection"] = in.intrinsics.size(1);
       ctx->save_for_backward({in.vertices, in.views});
       return image;
     });
@@ -311,13 +353,7 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
     }
     if (wanted.colors) grad[2] = adopt(gradient.shapes.colors, gradient.meshes[0].colors, count);
     if (wants_views && is_lit) grad[3] = rigid_view_gradients(renderer.views(), gradient);
-    if (wanted.camera) {
-      grad[4] = at::empty({count, 4}, at::kFloat);
-      float* out = grad[4].data_ptr<float>();
-      for (const ViewGradient& view : gradient.views) {
-        for (const double k : view.camera.intrinsics) *out++ = static_cast<float>(k);
-      }
-    }
+    if (wanted.camera) grad[4] = projection_gradients(gradient, ctx.saved_data["projection"].toInt());
     if (wanted.background) {
       const glm::dvec3& g = gradient.background;
       grad[5] = at::tensor({g.x, g.y, g.z}, at::kFloat);

@@ -12,7 +12,10 @@ namespace dpr::torch_op {
 /// faces as
 ///                    vertices
 /// @param views       [view, 4, 4] world to camera, OpenGL axes, acting on column vectors; affine
-/// @param intrinsics  [view, 4] fx, fy, cx, cy in pixels; the origin is the corner of the top-left pixel
+/// @param intrinsics  [view, 4] fx, fy, cx, cy in pixels; the origin is the corner of the top-left pixel.
+/// [view, 9]
+///                    with OpenCV's k1, k2, p1, p2, k3 of the lens. [view, 1]: orthographic, world units from
+///                    the lower to the upper edge
 /// @param background  [3] linear RGB
 /// @return [view, height, width, 4] RGBA over the background; alpha is the silhouette
 /// Differentiable once with respect to all five, the matrices of the views as any affine matrices. A graph

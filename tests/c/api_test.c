@@ -225,6 +225,39 @@ static void test_wrong_meshes(dpr_scene* scene) {
   REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.size");
 }
 
+/* The lens' own gradients, and an orthographic camera's. */
+static void test_cameras(const dpr_device* device) {
+  const float barrel[5] = {-0.2f, 0.1f, 0, 0, 0}, nan[5] = {0, NAN, 0, 0, 0};
+  const char* const wanted[] = {"camera", "distortion"};
+  const char* const names[] = {"views[0].camera.distortion.k1", "views[0].camera.orthographic_height"};
+  float ones[FLOATS];
+  size_t i, kind;
+  for (i = 0; i < FLOATS; ++i) ones[i] = (float)i;
+  for (kind = 0; kind < 2; ++kind) {
+    double slope = 0;
+    dpr_scene* scene = make_scene();
+    dpr_renderer* renderer = NULL;
+    dpr_gradient* gradient = NULL;
+    dpr_camera camera = three_units_away();
+    if (kind == 0) camera.distortion = barrel;
+    if (kind == 1) camera.orthographic_height = 3;
+    OK(dpr_scene_set_gradients(scene, wanted, 2));
+    OK(dpr_scene_set_camera(scene, &camera));
+    OK(dpr_renderer_create(device, &renderer));
+    OK(dpr_renderer_set_scene(renderer, scene));
+    OK(dpr_renderer_forward(renderer));
+    OK(dpr_backward_pixels(renderer, ones, FLOATS, &gradient));
+    OK(dpr_gradient_read(gradient, names[kind], &slope, 1));
+    EXPECT(slope != 0);
+    REFUSED(dpr_gradient_read(gradient, names[1 - kind], &slope, 1), "name (gradient)");
+    camera.distortion = nan;
+    REFUSED(dpr_scene_set_camera(scene, &camera), "k2");
+    dpr_gradient_destroy(gradient);
+    dpr_renderer_destroy(renderer);
+    dpr_scene_destroy(scene);
+  }
+}
+
 static void test_wrong_scenes(void) {
   const float black[3] = {0, 0, INFINITY};
   const char* const names[] = {"positions", "position"};
@@ -358,6 +391,7 @@ int main(void) {
   test_descent(device, scene);
   test_views(device, scene);
   test_own_opencl(scene);
+  test_cameras(device);
   test_wrong_scenes();
   test_wrong_renderers(device, scene);
   dpr_scene_destroy(scene);

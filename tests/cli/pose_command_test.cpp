@@ -101,6 +101,16 @@ TEST_SUITE("pipeline") {
     CHECK(pose["covariance"].size() == 4);
     CHECK(pose["history"][0]["hypotheses"] == 1);
     CHECK(pose["history"][0]["height"] == 24);
+    CHECK_FALSE(pose.contains("distortion"));
+    REQUIRE(run(folder,
+                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --distortion "
+                "--rotations 0 --coarsest 24 -o lens.json --quiet")
+                .status == 0);
+    const json lens = json::parse(folder.read("lens.json"));
+    check_is_truth(lens);
+    REQUIRE(lens["distortion"].size() == 5);
+    CHECK(lens["distortion"][0] != 0);
+    CHECK(lens["covariance"].size() == 5);
   }
 
   TEST_CASE("dpr pose: an option of the descent's, or of the smoothing's, implies it") {

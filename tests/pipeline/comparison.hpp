@@ -44,11 +44,17 @@ inline reference::Image to_reference(const Image& image) {
 inline reference::Prior to_reference(Prior prior) { return static_cast<reference::Prior>(prior); }
 
 inline reference::Camera to_reference(const Camera& camera) {
-  reference::Camera result{to_reference(camera.view), camera.fov_y_degrees, {}, camera.znear, camera.zfar};
+  reference::Camera result{
+      to_reference(camera.view), camera.fov_y_degrees, {}, camera.znear, camera.zfar, {}, {}};
   if (camera.intrinsics) {
     const Intrinsics& k = *camera.intrinsics;
     result.intrinsics = {k.fx, k.fy, k.cx, k.cy};
   }
+  if (camera.distortion) {
+    const Distortion& d = *camera.distortion;
+    result.distortion = {d.k1, d.k2, d.p1, d.p2, d.k3};
+  }
+  if (camera.orthographic_height) result.orthographic_height = *camera.orthographic_height;
   return result;
 }
 
@@ -201,6 +207,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
   add("camera translation", flat<glm::dvec3>({camera.view.translation}));
   add("fov", {camera.fov_y_degrees});
   add("intrinsics", {camera.intrinsics.begin(), camera.intrinsics.end()});
+  add("orthographic height", {camera.orthographic_height});
+  add("distortion", {camera.distortion.begin(), camera.distortion.end()});
   add("sigma", {found.sigma});
   add("gamma", {found.gamma});
   add("alpha", {found.alpha});
@@ -231,6 +239,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found, const reference:
   set({expected.camera.fov_y_degrees});
   const reference::Intrinsics& k = expected.camera.intrinsics;
   set({k.fx, k.fy, k.cx, k.cy});
+  set({expected.camera.orthographic_height});
+  set({expected.camera.distortion.begin(), expected.camera.distortion.end()});
   set({expected.sigma});
   set({expected.gamma});
   set({expected.alpha});

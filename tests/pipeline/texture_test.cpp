@@ -59,11 +59,13 @@ Scene tilted_square(int size) {
   return scene;
 }
 
-/// In perspective and not; and with a part of it nearer than the near plane.
+/// In perspective and not; with a part of it nearer than the near plane; orthographic, and that too, large
+/// enough that no corner shows the centre of a texel of a level.
 std::vector<Scene> tilted_squares(int size) {
-  std::vector<Scene> scenes(3, tilted_square(size));
+  std::vector<Scene> scenes(5, tilted_square(size));
   scenes[1].perspective_correct = false;
-  scenes[2].camera.znear = 5.2F;
+  scenes[2].camera.znear = scenes[4].camera.znear = 5.2F;
+  scenes[3].camera.orthographic_height = scenes[4].camera.orthographic_height = 3.1F;
   return scenes;
 }
 
@@ -101,9 +103,12 @@ std::vector<Direction> directions(const SceneGradient& g) {
              for (std::size_t i = 0; i < 3; ++i) s.meshes[0].transform[i][3] += d[i];
            }},
           // By hundreds of degrees: what a step changes is well above rounding then.
-          {"fov",
-           {100 * g.views[0].camera.fov_y_degrees},
-           [](reference::Scene& s, const std::vector<double>& d) { s.camera.fov_y_degrees += 100 * d[0]; }}};
+          {"projection",
+           {100 * g.views[0].camera.fov_y_degrees, g.views[0].camera.orthographic_height},
+           [](reference::Scene& s, const std::vector<double>& d) {
+             s.camera.fov_y_degrees += 100 * d[0];
+             if (s.camera.orthographic_height) *s.camera.orthographic_height += d[1];
+           }}};
 }
 
 /// The error along a random direction, relative to the gradient's norm times the part of the direction

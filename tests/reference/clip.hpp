@@ -2,10 +2,11 @@
 /// these.
 ///
 /// Corners are homogeneous: NDC times depth, and depth. So the way between two of them is straight, whichever
-/// side of the camera they lie on.
+/// side of the camera they lie on; a lens distorts what is left.
 #pragma once
 
 #include "rasterize.hpp"
+#include "transform.hpp"
 
 #include <limits>
 #include <vector>
@@ -21,8 +22,6 @@ struct OutlineCorner {
 };
 using Outline = std::vector<OutlineCorner>;
 
-inline Vec3d project(const Vec3d& h) { return {h.x / h.z, h.y / h.z, h.z}; }
-
 inline bool crosses_near_plane(const HomogeneousFace& face, double znear) {
   const auto is_kept = [&](const Vec3d& h) { return h.z >= znear; };
   return !std::all_of(face.begin(), face.end(), is_kept) && std::any_of(face.begin(), face.end(), is_kept);
@@ -30,7 +29,7 @@ inline bool crosses_near_plane(const HomogeneousFace& face, double znear) {
 
 /// The corners beyond the plane and on it (Sutherland and Hodgman), from the first kept one behind a lost one
 /// on.
-inline Outline clip_face(const HomogeneousFace& face, double znear) {
+inline Outline clip_face(const HomogeneousFace& face, const Projection& projection, double znear) {
   const auto is_kept = [&](std::size_t i) { return face[i % 3].z >= znear; };
   const auto corner = [](std::size_t i) {
     Vec3d weights;
@@ -42,10 +41,10 @@ inline Outline clip_face(const HomogeneousFace& face, double znear) {
   Outline outline;
   for (std::size_t i = first; i < first + 3; ++i) {
     const Vec3d &a = face[i % 3], &b = face[(i + 1) % 3];
-    if (is_kept(i)) outline.push_back({project(a), corner(i)});
+    if (is_kept(i)) outline.push_back({project(a, projection), corner(i)});
     if (is_kept(i) == is_kept(i + 1)) continue;
     const double t = (a.z - znear) / (a.z - b.z);
-    outline.push_back({project(a + t * (b - a)), (1.0 - t) * corner(i) + t * corner(i + 1)});
+    outline.push_back({project(a + t * (b - a), projection), (1.0 - t) * corner(i) + t * corner(i + 1)});
   }
   return outline;
 }
@@ -83,9 +82,10 @@ inline double squared_distance(const Outline& outline, const Vec2d& point) {
 /// The fragment of a face that crosses the plane, if it has one: its distance is that to the outline, its
 /// barycentrics are those of the whole face. Beside the outline, those of the triangle on this side of the
 /// diagonal are clipped.
-inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, std::size_t face, const Vec2d& point,
+inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, const Projection& projection,
+                                               std::size_t face, const Vec2d& point,
                                                const RasterizeParameters& p) {
-  const Outline outline = clip_face(h, p.znear);
+  const Outline outline = clip_face(h, projection, p.znear);
   const auto triangles = triangles_of(outline);
   bool inside = false;
   for (const auto& corners : triangles) inside = inside || is_inside(triangle_of(outline, corners), point);
@@ -110,12 +110,13 @@ inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, std::si
 }
 
 /// Gradient to the homogeneous corners: differences of clipped_forward(), which must have a fragment there.
-inline HomogeneousFace clipped_backward(const HomogeneousFace& h, const Vec2d& point, RasterizeParameters p,
+inline HomogeneousFace clipped_backward(const HomogeneousFace& h, const Projection& projection,
+                                        const Vec2d& point, RasterizeParameters p,
                                         const FragmentGradient& grad_fragment) {
   constexpr double k_step = 1e-6;  // of the corners' size
   p.blur_radius = std::numeric_limits<double>::infinity();
   const auto value = [&](const HomogeneousFace& moved) {
-    const Fragment f = *clipped_forward(moved, 0, point, p);
+    const Fragment f = *clipped_forward(moved, projection, 0, point, p);
     return grad_fragment.distance * f.distance + grad_fragment.depth * f.depth +
            dot(grad_fragment.barycentric, f.barycentric);
   };

@@ -147,6 +147,46 @@ TEST_SUITE("gradient") {
     }
   }
 
+  TEST_CASE("transform: gradients through a lens that distorts, and of an orthographic camera") {
+    Random random(2);
+    const Mat4d view = moved(k_identity, {0.2, 0.5, -0.1}, {0.1, -0.2, -3.0});
+    const Vec3d position = random.vector(-0.7, 0.7);
+    const Vec3d grad_ndc = random.vector(-1.0, 1.0);
+    const ImageSize size{64, 48};
+    for (const bool is_orthographic : {false, true}) {
+      // view rotation and translation, height, intrinsics, coefficients
+      const auto camera_at = [&](const std::vector<double>& v) {
+        Camera c;
+        c.view = moved(view, take(v, 0), take(v, 3));
+        if (is_orthographic) {
+          c.orthographic_height = 2.3 + v[6];
+        } else {
+          c.intrinsics = Intrinsics{40.0 + v[7], 45.0 + v[8], 20.0 + v[9], 26.0 + v[10]};
+          c.distortion = Distortion{-0.31 + v[11], 0.12 + v[12], 0.02 + v[13], -0.03 + v[14], 0.05 + v[15]};
+        }
+        return c;
+      };
+      const ScalarFunction f = [&](const std::vector<double>& v) {
+        const Camera c = camera_at(v);
+        return dot(grad_ndc, transform_forward(position, k_identity, c.view, make_projection(c, size)).ndc);
+      };
+      const std::vector<double> zero(16);
+      const Camera camera = camera_at(zero);
+      const TransformGradient g =
+          transform_backward(position, k_identity, view, make_projection(camera, size), grad_ndc, {});
+      const ProjectionGradient p = projection_backward(camera, size, g.projection);
+      std::vector<double> gradient;
+      append(gradient, g.view_rotation);
+      append(gradient, g.view_translation);
+      gradient.insert(gradient.end(), {p.orthographic_height, p.intrinsics.fx, p.intrinsics.fy,
+                                       p.intrinsics.cx, p.intrinsics.cy});
+      gradient.insert(gradient.end(), g.distortion.begin(), g.distortion.end());
+      CHECK_GRADIENT(f, zero, gradient, 1e-6, 1e-8);
+      gradient[is_orthographic ? 6 : 13] *= 1.01;
+      CHECK_FALSE(check_gradient(f, zero, gradient, 1e-6, 1e-8).passed);
+    }
+  }
+
   TEST_CASE("transform: conventions and the camera's centre") {
     Camera camera;
     camera.fov_y_degrees = 90.0;
@@ -161,10 +201,14 @@ TEST_SUITE("gradient") {
 
     const Mat4d view = moved(scaled({1.1, 0.9, 1.0}), {0.2, 0.5, -0.1}, {0.1, -0.2, -3.0});
     const Vec3d weight = {0.3, -0.7, 0.2};
+    Camera at_zero;
+    at_zero.view = view;
     const ScalarFunction f = [&](const std::vector<double>& v) {
-      return dot(weight, camera_center(moved(view, take(v, 0), take(v, 3))));
+      Camera c;
+      c.view = moved(view, take(v, 0), take(v, 3));
+      return dot(weight, camera_center(c));
     };
-    const ViewGradient g = camera_center_backward(view, weight);
+    const ViewGradient g = camera_center_backward(at_zero, weight);
     std::vector<double> gradient;
     append(gradient, g.rotation);
     append(gradient, g.translation);

@@ -36,6 +36,8 @@ struct CameraGradient {
   Vec3d translation;
   double fov_y_degrees = 0.0;
   Intrinsics intrinsics;
+  double orthographic_height = 0.0;
+  Distortion distortion{};
 };
 
 struct Gradients {
@@ -83,7 +85,8 @@ inline bool is_clipped(const PreparedScene& prepared, std::size_t face) {
 inline std::vector<Vec3d> visible_corners(const PreparedScene& prepared, std::size_t face) {
   std::vector<Vec3d> corners;
   if (is_clipped(prepared, face)) {
-    const Outline outline = clip_face(homogeneous_face(prepared, face), prepared.rasterize.znear);
+    const Outline outline =
+        clip_face(homogeneous_face(prepared, face), prepared.projection, prepared.rasterize.znear);
     if (!(std::fabs(double_area(outline)) > 0.0)) return {};
     for (const OutlineCorner& corner : outline) corners.push_back(corner.ndc);
     return corners;
@@ -97,7 +100,8 @@ inline std::vector<Vec3d> visible_corners(const PreparedScene& prepared, std::si
 inline std::optional<Fragment> face_fragment(const PreparedScene& prepared, std::size_t face,
                                              const Vec2d& point) {
   if (is_clipped(prepared, face))
-    return clipped_forward(homogeneous_face(prepared, face), face, point, prepared.rasterize);
+    return clipped_forward(homogeneous_face(prepared, face), prepared.projection, face, point,
+                           prepared.rasterize);
   return rasterize_forward(ndc_triangle(prepared, face), face, point, prepared.rasterize);
 }
 
@@ -129,6 +133,10 @@ inline std::vector<std::vector<std::size_t>> candidate_faces(const PreparedScene
   return candidates;
 }
 
+inline bool is_perspective_correct(const Scene& scene) {
+  return scene.perspective_correct && !scene.camera.orthographic_height;
+}
+
 inline PreparedScene prepare(const Scene& scene) {
   PreparedScene prepared;
   const ImageSize size{scene.width, scene.height};
@@ -151,9 +159,9 @@ inline PreparedScene prepare(const Scene& scene) {
     }
   }
   prepared.shade =
-      shade_prepare(std::move(world), std::move(faces), scene.lights, camera_center(scene.camera.view));
+      shade_prepare(std::move(world), std::move(faces), scene.lights, camera_center(scene.camera));
   const Smoothing& s = scene.smoothing;
-  prepared.rasterize = {s.blur_radius, s.distance,         scene.perspective_correct,
+  prepared.rasterize = {s.blur_radius, s.distance,         is_perspective_correct(scene),
                         true,          scene.camera.znear, scene.camera.zfar};
   prepared.aggregate = {s.composition,     s.depth_prior,      s.gamma,         s.alpha, scene.camera.znear,
                         scene.camera.zfar, s.background_depth, scene.background};
@@ -193,7 +201,7 @@ inline BaseColor base_of_face(const Scene& scene, const PreparedScene& prepared,
   for (std::size_t i = 0; i < 3; ++i) base.texcoords[i] = mesh.texcoords[mesh.face_texcoords[local][i]];
   base.triangle = ndc_triangle(prepared, face);
   base.pixel = 2.0 / std::min(scene.width, scene.height);
-  base.perspective_correct = scene.perspective_correct;
+  base.perspective_correct = is_perspective_correct(scene);
   return base;
 }
 
@@ -288,10 +296,11 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
     add_color_gradient(scene, prepared, fragment.face, shade, grad);
     const FragmentGradient grad_fragment{occupancy.distance, input.depth, shade.barycentric};
     const bool clips = is_clipped(prepared, fragment.face);
-    const NdcTriangle corners = clips ? clipped_backward(homogeneous_face(prepared, fragment.face), point,
-                                                         prepared.rasterize, grad_fragment)
-                                      : rasterize_backward(ndc_triangle(prepared, fragment.face), point,
-                                                           prepared.rasterize, grad_fragment);
+    const NdcTriangle corners =
+        clips ? clipped_backward(homogeneous_face(prepared, fragment.face), prepared.projection, point,
+                                 prepared.rasterize, grad_fragment)
+              : rasterize_backward(ndc_triangle(prepared, fragment.face), point, prepared.rasterize,
+                                   grad_fragment);
     std::vector<Vec3d>& sum = clips ? sums.homogeneous : sums.ndc;
     for (std::size_t i = 0; i < 3; ++i) sum[prepared.shade.faces[fragment.face][i]] += corners[i];
   }
@@ -315,15 +324,17 @@ inline void geometry_backward(const Scene& scene, const PreparedScene& prepared,
       grad.camera.translation += g.view_translation;
       grad_projection.scale += g.projection.scale;
       grad_projection.offset += g.projection.offset;
+      for (std::size_t k = 0; k < g.distortion.size(); ++k) grad.camera.distortion[k] += g.distortion[k];
     }
   }
-  const ViewGradient center = camera_center_backward(scene.camera.view, sums.shade.camera);
+  const ViewGradient center = camera_center_backward(scene.camera, sums.shade.camera);
   grad.camera.rotation += center.rotation;
   grad.camera.translation += center.translation;
   const ProjectionGradient projection =
       projection_backward(scene.camera, {scene.width, scene.height}, grad_projection);
   grad.camera.fov_y_degrees = projection.fov_y_degrees;
   grad.camera.intrinsics = projection.intrinsics;
+  grad.camera.orthographic_height = projection.orthographic_height;
 }
 
 /// Gradients of a scalar loss whose derivative for every value of the image is `grad_image` (RGBA, the

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "support/messages.hpp"
@@ -69,6 +70,27 @@ TEST_SUITE("unit") {
     CHECK(glm::length(b.offset) < 1e-6F);
   }
 
+  TEST_CASE("orthographic: world units from the lower to the upper edge") {
+    Camera camera;
+    camera.orthographic_height = 4;
+    CHECK(projection(camera, 200, 100).scale == glm::vec2(0.5F));
+    CHECK(projection(camera, 100, 200).scale == glm::vec2(1.0F));  // the height is 4 in NDC
+    CHECK(projection(camera, 100, 200).offset == glm::vec2(0));
+  }
+
+  TEST_CASE("the radius where an image folds over") {
+    // 1 + 3 k1 r^2 = 0
+    CHECK(largest_radius({-0.3F}) == doctest::Approx(std::sqrt(1 / 0.9)));
+    CHECK(std::isinf(largest_radius({})));
+    CHECK(std::isinf(largest_radius({0.3F, 0.1F, 0.5F, 0.5F, 0.1F})));
+    // 1 + 3 k1 s + 5 k2 s^2 with two roots, 1 and 4, or none.
+    CHECK(largest_radius({-1.25F / 3, 0.25F / 5}) == doctest::Approx(1));
+    CHECK(std::isinf(largest_radius({-0.3F, 0.3F})));
+    // (1 - s) (1 - s / 2) (1 - s / 4)
+    CHECK(largest_radius({-1.75F / 3, 0.875F / 5, 0, 0, -0.125F / 7}) == doctest::Approx(1));
+    CHECK(largest_radius({0, 0, 0, 0, -1.0F / 7}) == doctest::Approx(1));
+  }
+
   TEST_CASE("orbit") {
     CHECK(is_close(orbit_camera(6.7F, 0, 0).view, rows({1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, -6.7F})));
     // Azimuth 90: the camera stands on +x and looks down -x; the world's -z is on its right.
@@ -119,6 +141,29 @@ TEST_SUITE("robustness") {
     camera.view = glm::mat4(1.0F);
     camera.view[3][1] = k_nan;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "view (camera): got nan in row 1, column 3");
+  }
+
+  TEST_CASE("orthographic cameras and lenses that are none") {
+    Camera camera;
+    camera.orthographic_height = 2;
+    CHECK_NOTHROW(validate(camera));
+    camera.intrinsics = Intrinsics{1, 1, 0, 0};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "intrinsics (camera): got one beside");
+    camera.intrinsics.reset();
+    camera.distortion = Distortion{};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "distortion (camera): got one beside");
+    camera.distortion.reset();
+    camera.orthographic_height = 0;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "orthographic_height (camera): got 0");
+    camera.orthographic_height.reset();
+    camera.distortion = Distortion{0, 0, k_nan};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "p1 (camera.distortion): got nan");
+    glm::mat4 projection(1.0F);
+    projection[2][3] = 0.5F;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, from_opengl(k_view, projection, 8, 8), "projection (from_opengl)");
+    projection = glm::mat4(1.0F);
+    projection[3][0] = 0.5F;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, from_opengl(k_view, projection, 8, 8), "off the centre");
   }
 
   TEST_CASE("parameters out of range") {

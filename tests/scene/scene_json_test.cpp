@@ -138,6 +138,21 @@ TEST_SUITE("unit") {
     CHECK(scene.camera.intrinsics->cy == -4);
   }
 
+  TEST_CASE("lenses and orthographic cameras") {
+    const TempDir folder;
+    Scene scene = read(folder, with(R"("camera": {"distortion": [1, 2, 3, 4, 5], "projection": "perspective"},
+                                       "gradients": ["distortion"])"));
+    REQUIRE(scene.camera.distortion);
+    CHECK(scene.camera.distortion->k2 == 2);
+    CHECK(scene.camera.distortion->p1 == 3);
+    CHECK(scene.camera.distortion->k3 == 5);
+    CHECK(scene.gradients.distortion);
+    CHECK_FALSE(scene.gradients.camera);
+    scene = read(folder, with(R"("camera": {"projection": "orthographic", "orthographic_height": 3})"));
+    CHECK(scene.camera.orthographic_height == 3);
+    CHECK_FALSE(scene.camera.distortion);
+  }
+
   TEST_CASE("colours: one for all, one for each, in place of the file's") {
     const TempDir folder;
     Scene scene = read(folder, with_mesh(k_triangle + R"(, "vertex_colors": [[0,1,0]])"));
@@ -303,6 +318,12 @@ TEST_SUITE("robustness") {
     check(with_mesh(k_triangle + R"(, "vertex_colors": [])"), "got 0 colours");
     check(with(R"("camera": {"fov_y_degrees": 60, "intrinsics": {"fx": 1, "fy": 1, "cx": 0, "cy": 0}})"),
           "got fov_y_degrees and intrinsics");
+    check(with(R"("camera": {"projection": "fisheye"})"), "got \"fisheye\", expected perspective or");
+    check(with(R"("camera": {"projection": "orthographic"})"), "got no key \"orthographic_height\"");
+    check(with(R"("camera": {"orthographic_height": 1})"), "got orthographic_height without");
+    check(with(R"("camera": {"projection": "orthographic", "orthographic_height": 1, "fov_y_degrees": 9})"),
+          "got fov_y_degrees and an orthographic projection");
+    check(with(R"("camera": {"distortion": [0, 0]})"), "camera.distortion (");
   }
 
   TEST_CASE("scenes that cannot be rendered") {

@@ -144,6 +144,30 @@ TEST_SUITE("pipeline") {
     CHECK(result.focal_scale == doctest::Approx(expected).epsilon(0.01));
   }
 
+  TEST_CASE("least squares: focal length and distortion") {
+    if (is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(96);
+    scene.camera = dpr::orbit_camera(3.2F, 30, 120);  // near, so that the picture bends
+    scene.camera.fov_y_degrees = 70;
+    scene.camera.distortion = dpr::Distortion{-0.2F, 0.05F};
+    const dpr::Image target = rigid_target(device, scene);
+    scene.camera.distortion.reset();
+    scene.camera.fov_y_degrees = 74;
+    const dpr::PoseSolver solver(device, scene, target,
+                                 {.method = least_squares(), .solve_focal = true, .solve_distortion = true});
+    const dpr::PoseResult result = solver.solve(turned(5));
+    CHECK(result.explained);
+    CHECK(error_degrees(result) < 0.5);
+    const double expected = std::tan(glm::radians(37.0)) / std::tan(glm::radians(35.0));
+    CHECK(result.focal_scale == doctest::Approx(expected).epsilon(0.01));
+    CHECK(result.radial.x == doctest::Approx(-0.2).epsilon(0.1));
+    REQUIRE(result.covariance.size() == 36);
+    const dpr::Camera found = dpr::calibrated(scene.camera, result.focal_scale, result.radial);
+    CHECK(static_cast<double>(found.distortion->k1) == doctest::Approx(result.radial.x));
+    CHECK(static_cast<double>(found.fov_y_degrees) == doctest::Approx(70).epsilon(0.01));
+  }
+
   TEST_CASE("least squares: all poses that give the image are told, the nearest one first") {
     if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
@@ -344,6 +368,10 @@ TEST_SUITE("robustness") {
     refuses(scene, target, {});
     refuses(good, target, {.method = dpr::LeastSquares{}, .explained = 1});
     refuses(good, target, {.method = dpr::Descent{}, .solve_focal = true});
+    refuses(good, target, {.method = dpr::Descent{}, .solve_distortion = true});
+    dpr::Scene orthographic = good;
+    orthographic.camera.orthographic_height = 4.0F;
+    refuses(orthographic, target, {.method = least_squares(), .solve_distortion = true});
 
     refuses_descent([](dpr::Descent& d) { d.iterations = 0; });
     refuses_descent([](dpr::Descent& d) { d.optimizer.learning_rate = -1; });

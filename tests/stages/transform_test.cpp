@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <utility>
 
 #include "dpr/dpr.hpp"
 #include "reference/transform.hpp"
@@ -37,8 +38,14 @@ ref::Vec3d to_reference(const glm::vec3& v) { return {number(v.x), number(v.y), 
 ref::Vec3d to_reference(const cl_float4& v) { return {number(v.s[0]), number(v.s[1]), number(v.s[2])}; }
 
 /// The projection in single precision, as the kernel gets it: the test is of the kernel, not of the camera.
-ref::Projection to_reference(const dpr::Projection& p) {
-  return {{number(p.scale.x), number(p.scale.y)}, {number(p.offset.x), number(p.offset.y)}};
+ref::Projection to_reference(const dpr::Projection& p, const dpr::Camera& camera) {
+  ref::Projection projection{{number(p.scale.x), number(p.scale.y)},
+                             {number(p.offset.x), number(p.offset.y)},
+                             camera.orthographic_height.has_value(),
+                             {}};
+  if (const auto& d = camera.distortion)
+    projection.distortion = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  return projection;
 }
 
 glm::mat4 random_pose(RandomFloat& random) {
@@ -47,10 +54,12 @@ glm::mat4 random_pose(RandomFloat& random) {
   return glm::scale(turned, glm::vec3(random(0.5F, 1.5F), random(0.5F, 1.5F), random(0.5F, 1.5F)));
 }
 
-/// Two meshes in three views: one camera with intrinsics off the centre.
+enum class Lens { perfect, distorting, orthographic };
+
+/// Two meshes in three views: one camera with intrinsics off the centre. Two of the lenses may distort.
 class TwoMeshes {
  public:
-  TwoMeshes() : renderer(dpr::test::test_device()) {
+  explicit TwoMeshes(Lens lens) : renderer(dpr::test::test_device()) {
     RandomFloat random(5);
     scene.width = k_width;
     scene.height = k_height;
@@ -58,7 +67,13 @@ class TwoMeshes {
                     {dpr::make_icosphere(dpr::test::is_reduced() ? 0 : 2), glm::mat4(1.0F)}};
     for (int v = 0; v < 3; ++v) {
       dpr::View view{dpr::orbit_camera(6.0F, 20.0F * static_cast<float>(v), 50.0F), {}};
-      if (v == 1) view.camera.intrinsics = dpr::Intrinsics{20, 24, 12, 5};
+      if (lens == Lens::orthographic) {
+        view.camera.orthographic_height = 5.0F + static_cast<float>(v);
+      } else if (v == 1) {
+        view.camera.intrinsics = dpr::Intrinsics{20, 24, 12, 5};
+      }
+      if (lens == Lens::distorting && v > 0)
+        view.camera.distortion = dpr::Distortion{-0.31F, 0.12F, 0.02F, -0.03F, 0.05F};
       for (int m = 0; m < 2; ++m) {
         glm::mat4 pose = random_pose(random);
         pose[3] = glm::vec4(random(-1, 1), random(-1, 1), random(-1, 1), 1);
@@ -82,7 +97,8 @@ class TwoMeshes {
   }
   ref::Mat4d camera(std::size_t view) const { return to_reference(views[view].camera.view); }
   ref::Projection projection(std::size_t view) const {
-    return to_reference(dpr::projection(views[view].camera, k_width, k_height));
+    const dpr::Camera& of = views[view].camera;
+    return to_reference(dpr::projection(of, k_width, k_height), of);
   }
 
   dpr::Scene scene;
@@ -102,16 +118,17 @@ void add_error(Worst& worst, const ref::Vec3d& found, const ref::Vec3d& wanted, 
 /// Twice the errors measured: world 2.1e-7, NDC and depth 4.0e-7, gradients 6.5e-8 of the largest of their
 /// kind.
 constexpr double k_world = 4.2e-7, k_ndc = 8e-7, k_gradient = 1.3e-7,
-                 k_clipped_gradient = 6e-7;  // of several sums more
+                 k_clipped_gradient = 6e-7,  // of several sums more
+    k_distortion = 6e-7;                     // of products of up to seven tangents
 
 struct TransformErrors {
-  Worst world, positions, model, camera, projection;
+  Worst world, positions, model, camera, projection, distortion;
 };
 
 /// Runs the backward kernels on random gradients. Unlit, what the world gradients hold before does not count.
 /// `clips`: with gradients of clipped faces. `flip` is 1, or -1 to show that a wrong sign is noticed.
-TransformErrors backward_errors(bool lit, bool clips, double flip) {
-  TwoMeshes t;
+TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
+  TwoMeshes t(lens);
   dpr::Renderer::Impl& m = t.impl();
   m.transform.forward(m.frame, m.device_views, *m.geometry);
   const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
@@ -128,7 +145,8 @@ TransformErrors backward_errors(bool lit, bool clips, double flip) {
   const dpr::Buffer<cl_float4> ndc_buffer(m.device.impl(), std::span<const cl_float4>(grad_ndc));
   const dpr::Buffer<cl_float4> clip_buffer(m.device.impl(), std::span<const cl_float4>(grad_clip));
   dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
-  poison(m.transform.channels, DPR_POSE_CHANNELS * count);
+  const std::size_t channel_count = lens == Lens::distorting ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
+  poison(m.transform.channels, channel_count * count);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
   m.frame.clips = clips ? 1 : 0;
   m.transform.backward(m.frame, m.device_views, *m.geometry, lit, ndc_buffer, clip_buffer, world_buffer);
@@ -136,6 +154,7 @@ TransformErrors backward_errors(bool lit, bool clips, double flip) {
   const std::vector<cl_float4> found_world = world_buffer.download(),
                                found_positions = m.transform.grad_positions.download();
   const std::vector<float> channels = m.transform.channels.download();
+  CHECK(channels.size() == channel_count * count);
 
   TransformErrors errors;
   std::vector<ref::Vec3d> positions(vertices);
@@ -161,6 +180,10 @@ TransformErrors backward_errors(bool lit, bool clips, double flip) {
                channel(DPR_CHANNEL_PROJECTION + 2)},
               {g.projection.scale.x, g.projection.scale.y, g.projection.offset.x}, k_size, i);
     errors.projection.add(std::abs(channel(DPR_CHANNEL_PROJECTION + 3) - g.projection.offset.y), "vertex", i);
+    for (std::size_t k = 0; k < 5 && lens == Lens::distorting; ++k) {
+      const double found = channel(DPR_CHANNEL_DISTORTION + k);
+      errors.distortion.add(std::abs(found - flip * g.distortion[k]), "vertex", i, "coefficient", k);
+    }
     positions[vertex] += g.position;
   }
   for (std::size_t v = 0; v < vertices; ++v) {
@@ -173,45 +196,80 @@ TransformErrors backward_errors(bool lit, bool clips, double flip) {
 
 TEST_SUITE("unit") {
   TEST_CASE("transform: world, NDC and depth are the reference's") {
-    TwoMeshes t;
-    dpr::Renderer::Impl& m = t.impl();
-    const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
-    poison(m.transform.world, count, cl_float4{{NAN, NAN, NAN, NAN}});
-    poison(m.transform.ndc, count, cl_float4{{NAN, NAN, NAN, NAN}});
-    m.transform.forward(m.frame, m.device_views, *m.geometry);
-    const std::vector<cl_float4> world = m.transform.world.download(), ndc = m.transform.ndc.download();
-    Worst world_error, ndc_error, shifted;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t view = i / vertices, vertex = i % vertices;
-      const ref::TransformedVertex v = ref::transform_forward(
-          to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view), t.projection(view));
-      add_error(world_error, to_reference(world[i]), v.world, 1, i);
-      add_error(ndc_error, to_reference(ndc[i]), v.ndc, 1, i);
-      add_error(shifted, to_reference(ndc[i]), v.ndc + ref::Vec3d{0, 1e-4, 0}, 1, i);
-      CHECK(world[i].s[3] == 1.0F);
-      CHECK(ndc[i].s[3] == 0.0F);
+    for (const Lens lens : {Lens::perfect, Lens::distorting, Lens::orthographic}) {
+      TwoMeshes t(lens);
+      dpr::Renderer::Impl& m = t.impl();
+      const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
+      poison(m.transform.world, count, cl_float4{{NAN, NAN, NAN, NAN}});
+      poison(m.transform.ndc, count, cl_float4{{NAN, NAN, NAN, NAN}});
+      m.transform.forward(m.frame, m.device_views, *m.geometry);
+      const std::vector<cl_float4> world = m.transform.world.download(), ndc = m.transform.ndc.download();
+      Worst world_error, ndc_error, shifted;
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t view = i / vertices, vertex = i % vertices;
+        const ref::TransformedVertex v = ref::transform_forward(
+            to_reference(t.positions[vertex]), t.model(view, vertex), t.camera(view), t.projection(view));
+        add_error(world_error, to_reference(world[i]), v.world, 1, i);
+        add_error(ndc_error, to_reference(ndc[i]), v.ndc, 1, i);
+        add_error(shifted, to_reference(ndc[i]), v.ndc + ref::Vec3d{0, 1e-4, 0}, 1, i);
+        CHECK(world[i].s[3] == 1.0F);
+        CHECK(ndc[i].s[3] == 0.0F);
+      }
+      DPR_CHECK_WORST(world_error, k_world);
+      DPR_CHECK_WORST(ndc_error, k_ndc);
+      CHECK(shifted.error > k_ndc);
     }
-    DPR_CHECK_WORST(world_error, k_world);
-    DPR_CHECK_WORST(ndc_error, k_ndc);
-    CHECK(shifted.error > k_ndc);
+  }
+
+  TEST_CASE("transform: beyond the radius where the image would fold over points are held at it") {
+    dpr::Scene scene;
+    scene.width = scene.height = 8;
+    scene.camera.distortion = dpr::Distortion{-0.3F};
+    const double radius = dpr::largest_radius(*scene.camera.distortion);
+    const auto along = [&](double r) { return glm::vec3(0.6 * r, 0.8 * r, -1.0) * 2.0F; };
+    dpr::Mesh mesh;
+    mesh.positions = {along(radius), along(1.001 * radius), along(40 * radius), along(0.95 * radius)};
+    mesh.faces = {{0, 1, 2}, {1, 2, 3}};
+    scene.meshes = {{mesh, glm::mat4(1.0F)}};
+    dpr::Renderer renderer(dpr::test::test_device());
+    renderer.set_scene(scene);
+    dpr::Renderer::Impl& m = renderer.impl();
+    m.transform.forward(m.frame, m.device_views, *m.geometry);
+    const std::vector<cl_float4> ndc = m.transform.ndc.download();
+    const ref::Projection p = to_reference(dpr::projection(scene.camera, 8, 8), scene.camera);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const ref::Vec3d wanted = ref::transform_forward(to_reference(along(i < 3 ? radius : 0.95 * radius)),
+                                                       ref::k_identity, ref::k_identity, p)
+                                    .ndc;
+      CHECK(number(ndc[i].s[0]) == doctest::Approx(wanted.x).epsilon(1e-6));
+      CHECK(number(ndc[i].s[1]) == doctest::Approx(wanted.y).epsilon(1e-6));
+    }
+    CHECK(ndc[3].s[0] < ndc[0].s[0] - 1e-4F);
   }
 }
 
 TEST_SUITE("gradient") {
   TEST_CASE("transform: gradients of positions, poses and projections are the reference's") {
-    for (const bool lit : {true, false}) {
+    for (const auto& [lens, lit] : {std::pair{Lens::perfect, true},
+                                    {Lens::perfect, false},
+                                    {Lens::distorting, true},
+                                    {Lens::orthographic, true}}) {
       for (const bool clips : {false, true}) {
+        CAPTURE(static_cast<int>(lens));
         CAPTURE(lit);
-        const TransformErrors errors = backward_errors(lit, clips, 1);
+        const TransformErrors errors = backward_errors(lens, lit, clips, 1);
         const double tolerance = clips ? k_clipped_gradient : k_gradient;
         DPR_CHECK_WORST(errors.world, tolerance);
         DPR_CHECK_WORST(errors.positions, tolerance);
         DPR_CHECK_WORST(errors.model, tolerance);
         DPR_CHECK_WORST(errors.camera, tolerance);
         DPR_CHECK_WORST(errors.projection, tolerance);
+        if (lens == Lens::distorting) DPR_CHECK_WORST(errors.distortion, k_distortion);
       }
     }
-    CHECK(backward_errors(true, false, -1).camera.error > k_gradient);
+    const TransformErrors flipped = backward_errors(Lens::distorting, true, false, -1);
+    CHECK(flipped.camera.error > k_gradient);
+    CHECK(flipped.distortion.error > k_distortion);
   }
 
   TEST_CASE(

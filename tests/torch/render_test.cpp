@@ -100,8 +100,14 @@ reference::Scene reference_scene(const std::vector<std::vector<double>>& values,
   for (const glm::uvec3& face : make_icosphere(0).faces) mesh.faces.push_back({face.x, face.y, face.z});
   scene.meshes.push_back(mesh);
   for (std::size_t i = 0; i < 16; ++i) scene.camera.view[i / 4][i % 4] = values[2][16 * view + i];
-  const double* k = values[3].data() + 4 * view;
-  scene.camera.intrinsics = {k[0], k[1], k[2], k[3]};
+  const std::size_t numbers = values[3].size() / k_views;
+  const double* k = values[3].data() + numbers * view;
+  if (numbers == 1) {
+    scene.camera.orthographic_height = k[0];
+  } else {
+    scene.camera.intrinsics = {k[0], k[1], k[2], k[3]};
+  }
+  if (numbers == 9) scene.camera.distortion = {k[4], k[5], k[6], k[7], k[8]};
   scene.camera.znear = 1;
   scene.camera.zfar = 20;
   scene.background = vector(4, 0);
@@ -130,10 +136,12 @@ double reference_loss(const std::vector<std::vector<double>>& values, const std:
   return loss;
 }
 
-void check_against_finite_differences(const char* preset, bool face_colors) {
+void check_against_finite_differences(const char* preset, bool face_colors,
+                                      const std::vector<float>& intrinsics = {}) {
   constexpr double k_step = 1e-5, k_tolerance = 1e-3;
   const Smoothing smoothing = smoothing_for_tests(preset);
   Inputs in = make_inputs(face_colors);
+  if (!intrinsics.empty()) in.intrinsics = torch::tensor(intrinsics).repeat({k_views, 1});
   std::vector<std::vector<double>> values;
   for (at::Tensor* tensor : in.all()) {
     values.push_back(to_doubles(*tensor));
@@ -280,6 +288,9 @@ TEST_SUITE("gradient") {
   TEST_CASE("operator: all five gradients agree with differences in double precision") {
     check_against_finite_differences("joint_gaussian", /*face_colors*/ false);
     check_against_finite_differences("softras", /*face_colors*/ true);
+    check_against_finite_differences("joint_gaussian", /*face_colors*/ false,
+                                     {19, 20, 7.2F, 5.4F, -0.2F, 0.05F, 0.01F, -0.02F, 0.03F});
+    check_against_finite_differences("joint_gaussian", /*face_colors*/ false, {2.6F});
   }
 
   TEST_CASE("operator: every number of every kind of light, and shapes and views in their light") {
@@ -452,6 +463,7 @@ TEST_SUITE("robustness") {
     CHECK(has(message([](Inputs& in) { in.views = in.views * 0.0; }), "view"));
     CHECK(has(message([](Inputs& in) { in.views = in.views.slice(0, 0, 0); }), "at least one view"));
     CHECK(has(message([](Inputs& in) { in.intrinsics = in.intrinsics * -1.0; }), "fx"));
+    CHECK(has(message([](Inputs& in) { in.intrinsics = in.intrinsics.slice(1, 0, 3); }), "4 numbers a view"));
     CHECK(has(message([](Inputs& in) { in.background = in.background.to(torch::kInt); }), "CPUIntType"));
     CHECK(has(message_of([&] { renderer->set("sigma", -1); }), "sigma"));
     CHECK(has(message_of([&] { renderer->set("samples", 2.5); }), "a whole number"));
