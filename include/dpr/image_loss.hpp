@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 
 namespace dpr {
@@ -17,20 +18,20 @@ class Renderer;
 /// (75).
 enum class LossKind { mse, l1, silhouette };
 
-std::string_view to_string(LossKind);
+DPR_API std::string_view to_string(LossKind);
 /// In the order of LossKind.
-std::vector<std::string_view> loss_names();
-LossKind parse_loss(std::string_view word, std::string_view where);
+DPR_API std::vector<std::string_view> loss_names();
+DPR_API LossKind parse_loss(std::string_view word, std::string_view where);
 
 /// How much each loss counts in the total, eq. (74).
-struct LossWeights {
+struct DPR_API LossWeights {
   float mse = 0, l1 = 0, silhouette = 0;
 
   static LossWeights only(LossKind kind);
 };
 
 /// Weighted sum of losses against fixed targets, mean over the views.
-class ImageLoss {
+class DPR_API ImageLoss {
  public:
   /// One target a view, all of the same size. `has_alpha`, one value a target or empty for all: where it is
   /// 0 a target has no silhouette, and its view no silhouette loss. Throws InvalidArgument for sizes that
@@ -47,7 +48,7 @@ class ImageLoss {
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;
 
-  struct Impl;
+  struct DPR_LOCAL Impl;
   Impl& impl() const { return *impl_; }
 
  private:
