@@ -9,3 +9,7 @@
 #include "gather.cl"
 #include "reduce.cl"
 #include "image_loss.cl"
+#include "contour.cl"
+#include "antialias_cross.cl"
+#include "antialias.cl"
+#include "blur.cl"

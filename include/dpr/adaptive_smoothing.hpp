@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "dpr/export.h"
 #include "dpr/smoothing.hpp"
 
 namespace dpr {
@@ -22,7 +23,7 @@ struct AdaptiveSchedule {
 
 /// Watches d loss / d gamma and shrinks sigma and gamma while less smoothing means less loss. Works with any
 /// member of the family. A blur radius given explicitly shrinks with sigma.
-class AdaptiveSmoothing {
+class DPR_API AdaptiveSmoothing {
  public:
   /// `average` is that of the run it goes on from. Throws InvalidArgument for a schedule out of range.
   explicit AdaptiveSmoothing(const AdaptiveSchedule& schedule = {}, double average = 0);

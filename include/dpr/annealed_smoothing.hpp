@@ -1,6 +1,7 @@
 // Smoothing from coarse to fine on a fixed schedule.
 #pragma once
 
+#include "dpr/export.h"
 #include "dpr/smoothing.hpp"
 
 namespace dpr {
@@ -15,7 +16,7 @@ struct AnnealSchedule {
 
 /// Lets sigma, gamma and the learning rate fall geometrically to their end values, one level after another.
 /// What starts below its end value stays. A blur radius given explicitly shrinks with sigma.
-class AnnealedSmoothing {
+class DPR_API AnnealedSmoothing {
  public:
   /// For a descent of that many iterations. Throws InvalidArgument for a schedule out of range.
   AnnealedSmoothing(const AnnealSchedule& schedule, unsigned iterations, const Smoothing& start,

@@ -3,21 +3,22 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <string_view>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// The auxiliary outputs that an image can show.
 enum class Aov { depth, normal, face_id, barycentrics, uv, effective_faces };
 
-std::string_view to_string(Aov);
+DPR_API std::string_view to_string(Aov);
 /// The inverse; `where` names the argument in the InvalidArgument thrown for an unknown word.
-Aov parse_aov(std::string_view word, std::string_view where);
+DPR_API Aov parse_aov(std::string_view word, std::string_view where);
 
 /// What a view's pixels show. Every list is [height * width], row 0 on top. The fragments of a pixel count by
 /// their weights in its colour, those of the estimator in force; exact weights hold the expectation.
@@ -27,14 +28,14 @@ struct AuxiliaryOutputs {
   std::vector<float> depth;
   /// Expected normal of the faces, world space, of length 1, on the side from which they wind
   /// counter-clockwise; 0 where no face has weight.
-  std::vector<glm::vec3> normal;
+  std::vector<vec3> normal;
   /// The face of the largest weight, counted through the meshes of the scene in order; -1 where the
   /// background has more.
   std::vector<std::int32_t> face_id;
   /// Of that face at the pixel, or at the nearest point of it: >= 0, sum 1; 0 on the background.
-  std::vector<glm::vec3> barycentrics;
+  std::vector<vec3> barycentrics;
   /// Texture coordinates of that face there; 0 on the background. Empty unless all meshes have some.
-  std::vector<glm::vec2> uv;
+  std::vector<vec2> uv;
   /// Participation ratio of the faces' weights, (sum w_j)^2 / sum w_j^2: 1 where one face is seen, n where n
   /// faces share the pixel evenly; 0 where no face has weight.
   std::vector<float> effective_faces;
@@ -42,11 +43,11 @@ struct AuxiliaryOutputs {
 
 /// Of a view of the last forward(). Blocks; costs an aggregation backward pass. Throws InvalidArgument before
 /// the first forward(), and for a view that is not there.
-AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view = 0);
+DPR_API AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view = 0);
 
 /// One of them as an image: numbers in red, green and blue (uv in red and green, single numbers in all three;
 /// face_id is exact up to 2^24), alpha 1 where face_id names a face, 0 on the background. Throws
 /// InvalidArgument for uv of meshes without texture coordinates.
-Image aov_image(const AuxiliaryOutputs& outputs, Aov aov);
+DPR_API Image aov_image(const AuxiliaryOutputs& outputs, Aov aov);
 
 }  // namespace dpr

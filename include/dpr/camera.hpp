@@ -1,9 +1,11 @@
 // Cameras: a pinhole, with a lens that distorts or without, or orthographic; and those of other programs.
 #pragma once
 
-#include <glm/glm.hpp>
 #include <optional>
 #include <string>
+
+#include "dpr/export.h"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -29,11 +31,11 @@ struct Distortion {
 
 /// The tangent of the angle from the axis where r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops to rise; infinity
 /// where it never does.
-double largest_radius(const Distortion& distortion);
+DPR_API double largest_radius(const Distortion& distortion);
 
 /// An OpenGL camera: right-handed, looks down -z, y up. Column vectors.
 struct Camera {
-  glm::mat4 view{1.0F};         ///< world to camera; affine and invertible
+  mat4 view{1.0F};              ///< world to camera; affine and invertible
   float fov_y_degrees = 60.0F;  ///< full vertical field of view, in (0, 180); ignored if intrinsics are given
   std::optional<Intrinsics> intrinsics;    ///< instead of fov_y_degrees
   float znear = 1.0F;                      ///< > 0, distance along the view direction
@@ -48,38 +50,38 @@ struct Camera {
 /// an orthographic camera without the division. NDC spans [-1, 1] on the short side of the image, x right, y
 /// up. A lens distorts x / d and y / d before.
 struct Projection {
-  glm::vec2 scale, offset;
+  vec2 scale, offset;
 };
 
 /// The projection of a camera for an image of that many pixels.
-Projection projection(const Camera& camera, int width, int height);
+DPR_API Projection projection(const Camera& camera, int width, int height);
 
 /// Throws InvalidArgument if the view is singular, not affine or not finite, or a parameter is out of its
 /// range; `name` says which camera it is.
-void validate(const Camera& camera, const std::string& name = "camera");
+DPR_API void validate(const Camera& camera, const std::string& name = "camera");
 
 /// A camera on a sphere about `target`, looking at it, up is +y. At elevation 0 and azimuth 0 it stands on
 /// +z; azimuth turns it towards +x, elevation lifts it. Degrees; elevation strictly between -90 and 90.
-Camera orbit_camera(float distance, float elevation_degrees, float azimuth_degrees,
-                    glm::vec3 target = glm::vec3(0));
+DPR_API Camera orbit_camera(float distance, float elevation_degrees, float azimuth_degrees,
+                            vec3 target = vec3(0));
 
 /// World to camera in OpenCV axes (x right, y down, z forward): the rows y and z change sign.
-glm::mat4 to_opencv_view(const glm::mat4& view);
+DPR_API mat4 to_opencv_view(const mat4& view);
 /// The inverse of to_opencv_view.
-glm::mat4 from_opencv_view(const glm::mat4& view);
+DPR_API mat4 from_opencv_view(const mat4& view);
 
 /// PyTorch3D's R and T (x left, y up, z forward; row vectors: x_cam = x_world R + T).
 struct PyTorch3dView {
-  glm::mat3 R;  ///< PyTorch3D's R[row][column] is element (row, column), which GLM stores as R[column][row]
-  glm::vec3 T;
+  mat3 R;  ///< PyTorch3D's R[row][column] is element (row, column), which GLM stores as R[column][row]
+  vec3 T;
 };
-PyTorch3dView to_pytorch3d_view(const glm::mat4& view);
-glm::mat4 from_pytorch3d_view(const PyTorch3dView& view);
+DPR_API PyTorch3dView to_pytorch3d_view(const mat4& view);
+DPR_API mat4 from_pytorch3d_view(const PyTorch3dView& view);
 
 /// OpenCV's camera matrix counts from the centre of the top-left pixel: its cx and cy are less by a half.
 /// Focal lengths and distortion are the same.
-Intrinsics to_opencv_intrinsics(const Intrinsics& intrinsics);
-Intrinsics from_opencv_intrinsics(const Intrinsics& intrinsics);
+DPR_API Intrinsics to_opencv_intrinsics(const Intrinsics& intrinsics);
+DPR_API Intrinsics from_opencv_intrinsics(const Intrinsics& intrinsics);
 
 /// What PyTorch3D's PerspectiveCameras and OrthographicCameras are made with, in its NDC (in_ndc=True).
 struct PyTorch3dProjection {
@@ -87,14 +89,14 @@ struct PyTorch3dProjection {
 };
 PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height);
 /// Of PerspectiveCameras.
-Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height);
+DPR_API Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height);
 
 /// OpenGL's projection matrix: clip coordinates from camera space, for a viewport of that many pixels.
 /// Without the lens' distortion, which no matrix has.
-glm::mat4 to_opengl_projection(const Camera& camera, int width, int height);
+DPR_API glm::mat4 to_opengl_projection(const Camera& camera, int width, int height);
 /// The camera of OpenGL's view and projection matrices: with intrinsics, or orthographic. Throws
 /// InvalidArgument for a matrix that is of neither kind, or skewed; orthographic also if its pixels are not
 /// square or the axis does not pass the image's centre.
-Camera from_opengl(const glm::mat4& view, const glm::mat4& projection, int width, int height);
+DPR_API Camera from_opengl(const glm::mat4& view, const glm::mat4& projection, int width, int height);
 
 }  // namespace dpr

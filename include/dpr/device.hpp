@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "dpr/export.h"
+
 namespace dpr {
 
 struct DeviceInfo {
@@ -26,15 +28,15 @@ struct DeviceInfo {
 /// Every OpenCL device of every platform, in the order of the ICD loader; empty where there is none. Devices
 /// that do not say what they are, and those of platforms that do not answer, are left out. Throws DeviceError
 /// if for that reason no device is left.
-std::vector<DeviceInfo> list_devices();
+DPR_API std::vector<DeviceInfo> list_devices();
 
 /// A device with its context, its queue and its cache of built kernels. A cheap handle: copies share them,
 /// and they live as long as the last copy. One Device may serve several renderers, each on a thread of its
 /// own; their work shares its queue.
-class Device {
+class DPR_API Device {
  public:
   /// The device's state; lib/device/context.hpp, and opencl.hpp for embedding.
-  struct Impl;
+  struct DPR_LOCAL Impl;
 
   explicit Device(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
@@ -65,6 +67,6 @@ class Device {
 /// that cannot be used is passed over, and the DeviceInfo of the device opened says so. Results are bitwise
 /// the same on one device only: others round differently. Throws InvalidArgument if none matches, DeviceError
 /// if none exists.
-Device open_device(const std::string& selector = "");
+DPR_API Device open_device(const std::string& selector = "");
 
 }  // namespace dpr

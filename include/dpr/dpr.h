@@ -85,7 +85,29 @@ typedef struct dpr_camera {
         NULL, 0                                                                                            \
   }
 
-/* At most one of the two colour arrays is given; with neither the mesh is white. */
+/* What lies beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels. */
+typedef enum dpr_wrap { DPR_WRAP_REPEAT = 0, DPR_WRAP_MIRROR = 1, DPR_WRAP_CLAMP = 2 } dpr_wrap;
+
+/* Between the centres of texels: the nearest, the four around, or those of two levels of a pyramid. */
+typedef enum dpr_filter {
+  DPR_FILTER_NEAREST = 0,
+  DPR_FILTER_BILINEAR = 1,
+  DPR_FILTER_TRILINEAR = 2
+} dpr_filter;
+
+/* Texture coordinates (u, v) have v up: (0, 0) is the lower left corner of the image. */
+typedef struct dpr_texture {
+  int width, height;   /* 1 to 16384 */
+  const float* texels; /* [height][width][3], row 0 on top */
+  int wrap;            /* a dpr_wrap */
+  int filter;          /* a dpr_filter */
+} dpr_texture;
+
+/* The texture of a face that has none. */
+#define DPR_TEXTURE_NONE UINT32_MAX
+
+/* At most one of the two colour arrays is given; with neither the mesh is white. Textures are multiplied by
+ * the colours, and need texcoords and face_texcoords. */
 typedef struct dpr_mesh {
   size_t size;
   const float* positions; /* [vertex][3], object space */
@@ -95,10 +117,16 @@ typedef struct dpr_mesh {
   const float* vertex_colors; /* [vertex][3], or NULL */
   const float* face_colors;   /* [face][3], or NULL */
   const float* transform;     /* [16], object to world; NULL: the identity */
+  const float* texcoords;     /* [texcoord][2], or NULL */
+  size_t texcoord_count;
+  const uint32_t* face_texcoords; /* [face][3], indices of texcoords, or NULL */
+  const dpr_texture* textures;    /* [texture_count], or NULL */
+  size_t texture_count;
+  const uint32_t* face_textures; /* [face], indices of textures or DPR_TEXTURE_NONE; NULL: all the first */
 } dpr_mesh;
 
 #define DPR_MESH_INIT \
-  { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL }
+  { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, 0, NULL }
 
 typedef enum dpr_shading {
   DPR_SHADING_FLAT = 0,
@@ -160,7 +188,7 @@ DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* ke
  * takes the scene. */
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
 /* What backward passes compute: "positions", "colors", "transform", "camera", "lights", "smoothing",
- * "background". Without this call all but "lights". */
+ * "background", "texture" (the texels), "texcoords". Without this call all but "lights" and the last two. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -179,6 +207,12 @@ DPR_API dpr_status dpr_renderer_set_positions(dpr_renderer* renderer, size_t mes
 /* New colours of a mesh, [vertex][3] or [face][3] as it has them, `count` floats. */
 DPR_API dpr_status dpr_renderer_set_colors(dpr_renderer* renderer, size_t mesh, const float* colors,
                                            size_t count);
+/* New texels of a texture of a mesh, [height][width][3], `count` floats. */
+DPR_API dpr_status dpr_renderer_set_texels(dpr_renderer* renderer, size_t mesh, size_t texture,
+                                           const float* texels, size_t count);
+/* New texture coordinates of a mesh that has textures, [texcoord][2], `count` floats: as many as it has. */
+DPR_API dpr_status dpr_renderer_set_texcoords(dpr_renderer* renderer, size_t mesh, const float* texcoords,
+                                              size_t count);
 /* Renders every view; enqueues the work, and seldom waits for it. */
 DPR_API dpr_status dpr_renderer_forward(dpr_renderer* renderer);
 /* The floats of all images: views * height * width * 4. */
@@ -221,7 +255,7 @@ DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad
 DPR_API dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr_gradient** gradient);
 
 /* The arrays that the scene asked for, by names such as "meshes[0].positions", "views[0].camera.rotation" or
- * "sigma". */
+ * "sigma". Those of a mesh's textures are one, "meshes[0].textures": one texture after the other. */
 DPR_API dpr_status dpr_gradient_count(const dpr_gradient* gradient, size_t* count);
 /* Valid as long as the handle. */
 DPR_API dpr_status dpr_gradient_name(const dpr_gradient* gradient, size_t index, const char** name);

@@ -7,15 +7,17 @@
 #include <stdexcept>
 #include <string>
 
+#include "dpr/export.h"
+
 namespace dpr {
 
 /// Base of every error the library throws; what() is one line, "WHAT (WHERE): got ..., expected ...".
-class Error : public std::runtime_error {
+class DPR_API Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 /// An argument, an option or the content of a file has a value that cannot be used.
-class InvalidArgument : public Error {
+class DPR_API InvalidArgument : public Error {
  public:
   /// @param argument what is wrong and where, e.g. "sigma (smoothing)"
   /// @param got      the value found
@@ -31,7 +33,7 @@ class InvalidArgument : public Error {
 };
 
 /// A file that cannot be read, parsed or written.
-class IoError : public Error {
+class DPR_API IoError : public Error {
  public:
   IoError(const std::filesystem::path& file, const std::string& reason, std::optional<std::size_t> line = {});
 
@@ -45,7 +47,7 @@ class IoError : public Error {
 };
 
 /// An OpenCL call failed. `code` is the CL error code, `where` the API call or the kernel with its sizes.
-class DeviceError : public Error {
+class DPR_API DeviceError : public Error {
  public:
   DeviceError(int code, std::string where);
 
@@ -58,7 +60,7 @@ class DeviceError : public Error {
 };
 
 /// A kernel program did not compile. what() is one line; log() is the compiler's whole output.
-class BuildError : public Error {
+class DPR_API BuildError : public Error {
  public:
   BuildError(const std::string& program, std::string device, std::string options, std::string log);
 
@@ -71,6 +73,6 @@ class BuildError : public Error {
 };
 
 /// The name of an OpenCL error code, e.g. "CL_OUT_OF_RESOURCES".
-const char* cl_error_name(int code) noexcept;
+DPR_API const char* cl_error_name(int code) noexcept;
 
 }  // namespace dpr

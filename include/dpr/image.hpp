@@ -3,8 +3,10 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <glm/glm.hpp>
 #include <vector>
+
+#include "dpr/export.h"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -12,16 +14,16 @@ namespace dpr {
 /// silhouette: the colour is not to be blended by it again.
 struct Image {
   int width = 0, height = 0;
-  std::vector<glm::vec4> pixels;  ///< [height * width], row-major
+  std::vector<vec4> pixels;  ///< [height * width], row-major
 
   Image() = default;
-  Image(int width_, int height_, glm::vec4 fill = glm::vec4(0))
+  Image(int width_, int height_, vec4 fill = vec4(0))
       : width(width_),
         height(height_),
         pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), fill) {}
 
-  glm::vec4& at(int column, int row) { return pixels[index(column, row)]; }
-  const glm::vec4& at(int column, int row) const { return pixels[index(column, row)]; }
+  vec4& at(int column, int row) { return pixels[index(column, row)]; }
+  const vec4& at(int column, int row) const { return pixels[index(column, row)]; }
 
  private:
   std::size_t index(int column, int row) const {
@@ -36,24 +38,25 @@ enum class Encoding { srgb, linear };
 /// Reads any format OpenImageIO knows, up to 16384 pixels a side. One and two channels are grey (and alpha),
 /// three get alpha 1. `has_alpha`, if given, tells what the file had. Throws IoError, also for a pixel that
 /// is not finite.
-Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr,
-                 Encoding encoding = Encoding::srgb);
+DPR_API Image read_image(const std::filesystem::path& file, bool* has_alpha = nullptr,
+                         Encoding encoding = Encoding::srgb);
 
 /// Writes by extension: .exr keeps the floats (32 bit, RGBA); .png, .tif, .tiff and .tga clamp to [0, 1] and
 /// round to 8 bits; .bmp, .jpg, .jpeg and .ppm do so without alpha. Written to a temporary file that is
 /// renamed at the end, so that no half-written file stays behind. Throws IoError, and InvalidArgument for an
 /// image without pixels.
-void write_image(const std::filesystem::path& file, const Image& image, Encoding encoding = Encoding::srgb);
+DPR_API void write_image(const std::filesystem::path& file, const Image& image,
+                         Encoding encoding = Encoding::srgb);
 
 /// The same with alpha 1: for viewers, which would blend colours by the silhouette that were blended already.
-Image opaque(Image image);
+DPR_API Image opaque(Image image);
 
 /// Images side by side, with a gap between them (pixels, filled), for strips. Empty in, empty out. Throws
 /// InvalidArgument unless all have the same height and the gap is >= 0.
-Image hstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));
+DPR_API Image hstack(const std::vector<Image>& images, int gap = 2, vec4 fill = vec4(1));
 
 /// Images below each other, the first on top, with a gap between them (pixels, filled), for sheets. Empty in,
 /// empty out. Throws InvalidArgument unless all have the same width and the gap is >= 0.
-Image vstack(const std::vector<Image>& images, int gap = 2, glm::vec4 fill = glm::vec4(1));
+DPR_API Image vstack(const std::vector<Image>& images, int gap = 2, vec4 fill = vec4(1));
 
 }  // namespace dpr

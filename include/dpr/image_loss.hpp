@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 
 namespace dpr {
@@ -18,13 +19,13 @@ class Renderer;
 /// with s a pixel's squared colour difference and c the robust_scale (Geman & McClure 1985).
 enum class LossKind { mse, l1, silhouette, robust };
 
-std::string_view to_string(LossKind);
+DPR_API std::string_view to_string(LossKind);
 /// In the order of LossKind.
-std::vector<std::string_view> loss_names();
-LossKind parse_loss(std::string_view word, std::string_view where);
+DPR_API std::vector<std::string_view> loss_names();
+DPR_API LossKind parse_loss(std::string_view word, std::string_view where);
 
 /// How much each loss counts in the total, eq. (74).
-struct LossWeights {
+struct DPR_API LossWeights {
   float mse = 0, l1 = 0, silhouette = 0, robust = 0;
   float robust_scale = 0.1F;  ///< at least 1e-6, a colour difference
 
@@ -46,7 +47,7 @@ struct LossOptions {
 };
 
 /// Weighted sum of losses against fixed targets, mean over the views.
-class ImageLoss {
+class DPR_API ImageLoss {
  public:
   /// One target a view, all of the same size. Throws InvalidArgument for sizes that differ, values that are
   /// not finite, negative weights or none above zero.
@@ -63,7 +64,7 @@ class ImageLoss {
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;
 
-  struct Impl;
+  struct DPR_LOCAL Impl;
   Impl& impl() const { return *impl_; }
 
  private:

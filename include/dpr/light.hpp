@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <glm/glm.hpp>
 #include <vector>
+
+#include "dpr/export.h"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -13,28 +15,28 @@ enum class Shading { flat, phong, gouraud, blinn };
 
 /// A point light in world space, without attenuation.
 struct PointLight {
-  glm::vec3 position{0.0F};
-  glm::vec3 diffuse{0.3F};
-  glm::vec3 specular{0.2F};
+  vec3 position{0.0F};
+  vec3 diffuse{0.3F};
+  vec3 specular{0.2F};
 };
 
 /// A light infinitely far away.
 struct DirectionalLight {
-  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
-  glm::vec3 diffuse{0.3F};
-  glm::vec3 specular{0.2F};
+  vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
+  vec3 diffuse{0.3F};
+  vec3 specular{0.2F};
 };
 
 /// A point light within a cone: times smoothstep((c - c_outer) / (c_inner - c_outer)), smoothstep(t) = t^2 (3
 /// - 2 t) for t clamped to [0, 1]; c is the cosine of the angle between the direction and the way to the
 /// point, c_inner and c_outer those of the angles.
 struct SpotLight {
-  glm::vec3 position{0.0F};
-  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
-  float angle_degrees = 30.0F;             ///< from the axis to where the light ends; at most 180
-  float inner_angle_degrees = 0.0F;        ///< to where it begins to fade; at least 0.1 less
-  glm::vec3 diffuse{0.3F};
-  glm::vec3 specular{0.2F};
+  vec3 position{0.0F};
+  vec3 direction{0.0F, -1.0F, 0.0F};  ///< world space, away from the light; its length does not matter
+  float angle_degrees = 30.0F;        ///< from the axis to where the light ends; at most 180
+  float inner_angle_degrees = 0.0F;   ///< to where it begins to fade; at least 0.1 less
+  vec3 diffuse{0.3F};
+  vec3 specular{0.2F};
 };
 
 /// Coefficients of an environment's spherical harmonics, up to the second order.
@@ -51,31 +53,31 @@ inline constexpr std::size_t k_harmonics = 9;
 /// sqrt(1/pi); Y_1m = sqrt(3/(4 pi)) (y, z, x); Y_2m = 1/2 sqrt(15/pi) (x y, y z, (2 z^2 - x^2 - y^2) /
 /// sqrt(12), x z, (x^2 - y^2) / 2), m from -l to l. Light of radiance 1 from everywhere is L_00 = sqrt(4 pi).
 struct Lights {
-  glm::vec3 ambient{0.5F};
+  vec3 ambient{0.5F};
   std::vector<PointLight> point;
   float shininess = 64.0F;  ///< >= 1
   Shading shading = Shading::phong;
   std::vector<DirectionalLight> directional{};
   std::vector<SpotLight> spot{};
-  std::vector<glm::vec3> harmonics{};  ///< [k_harmonics] RGB of L_lm by l, then m from -l to l; or empty
+  std::vector<vec3> harmonics{};  ///< [k_harmonics] RGB of L_lm by l, then m from -l to l; or empty
 };
 
 struct PointLightGradient {
-  glm::dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
+  dvec3 position{0.0}, diffuse{0.0}, specular{0.0};
 };
 
 struct DirectionalLightGradient {
-  glm::dvec3 direction{0.0}, diffuse{0.0}, specular{0.0};
+  dvec3 direction{0.0}, diffuse{0.0}, specular{0.0};
 };
 
 struct SpotLightGradient {
-  glm::dvec3 position{0.0}, direction{0.0};
+  dvec3 position{0.0}, direction{0.0};
   double angle_degrees = 0, inner_angle_degrees = 0;
-  glm::dvec3 diffuse{0.0}, specular{0.0};
+  dvec3 diffuse{0.0}, specular{0.0};
 };
 
 /// Throws InvalidArgument where a value is not finite, a direction has no length, a cone no edge, or
 /// shininess is below 1.
-void validate(const Lights& lights);
+DPR_API void validate(const Lights& lights);
 
 }  // namespace dpr

@@ -4,12 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <glm/glm.hpp>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/texture.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -20,13 +21,13 @@ inline constexpr std::uint32_t k_no_texture = std::numeric_limits<std::uint32_t>
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the
 /// mesh is white. A texture is multiplied by the colours.
 struct Mesh {
-  std::vector<glm::vec3> positions;        ///< [vertex] object space
-  std::vector<glm::uvec3> faces;           ///< [face] indices into positions
-  std::vector<glm::vec3> vertex_colors;    ///< [vertex] linear RGB, or empty
-  std::vector<glm::vec3> face_colors;      ///< [face] linear RGB, or empty
-  std::vector<glm::vec2> texcoords;        ///< texture coordinates that corners refer to, or empty
-  std::vector<glm::uvec3> face_texcoords;  ///< [face] indices into texcoords, or empty
-  std::vector<Texture> textures;           ///< of the base colour, or empty; they need face_texcoords
+  std::vector<vec3> positions;        ///< [vertex] object space
+  std::vector<uvec3> faces;           ///< [face] indices into positions
+  std::vector<vec3> vertex_colors;    ///< [vertex] linear RGB, or empty
+  std::vector<vec3> face_colors;      ///< [face] linear RGB, or empty
+  std::vector<vec2> texcoords;        ///< texture coordinates that corners refer to, or empty
+  std::vector<uvec3> face_texcoords;  ///< [face] indices into texcoords, or empty
+  std::vector<Texture> textures;      ///< of the base colour, or empty; they need face_texcoords
   /// [face] index into textures, or k_no_texture; empty: all faces have the first.
   std::vector<std::uint32_t> face_textures;
 };
@@ -34,7 +35,7 @@ struct Mesh {
 /// Throws InvalidArgument unless the mesh can be rendered: at least one face, indices in range, finite
 /// positions, colours, texture coordinates and texels, arrays of matching length. `name` says in the message
 /// which mesh it is. O(vertices + faces + texels).
-void validate(const Mesh& mesh, const std::string& name = "mesh");
+DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 
 /// Reads OBJ, PLY, OFF or STL, once from front to back; the vertices are in the order of the file. Polygons
 /// become triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices,
@@ -45,29 +46,30 @@ void validate(const Mesh& mesh, const std::string& name = "mesh");
 /// where there are textures; then faces without coordinates get (0, 0) and no texture. Throws IoError where
 /// the file is missing, malformed, truncated, goes on after its end or, being a pipe or a device, does not
 /// end; and InvalidArgument where its content cannot be rendered.
-Mesh read_mesh(const std::filesystem::path& file);
+DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face
 /// colours: asking for that is an error, not a silent loss. PLY colours are bytes, as other programs expect
 /// them: clamped to [0, 1] and rounded. Texture coordinates go to OBJ only; textures are not written, see
 /// write_texture(). Throws IoError, and InvalidArgument where the mesh is not valid.
-void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
+DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that
 /// lighting sees flat sides), 12 triangles, one colour a side.
-Mesh make_cube();
+DPR_API Mesh make_cube();
 
 /// A sphere about the origin from a subdivided icosahedron: 20 * 4^subdivisions triangles,
 /// 10 * 4^subdivisions + 2 vertices; coloured smoothly by position.
-Mesh make_icosphere(unsigned subdivisions, float radius = 1.0F);
+DPR_API Mesh make_icosphere(unsigned subdivisions, float radius = 1.0F);
 
 /// A torus about the y axis: 2 * major_segments * minor_segments triangles; coloured smoothly by position.
-Mesh make_torus(float major_radius, float minor_radius, unsigned major_segments, unsigned minor_segments);
+DPR_API Mesh make_torus(float major_radius, float minor_radius, unsigned major_segments,
+                        unsigned minor_segments);
 
 /// A mailbox on a post with a flag, in [-1, 1]^3, coloured by part: the stand-in for the paper's Figure 11.
-Mesh make_mailbox();
+DPR_API Mesh make_mailbox();
 
 /// A bag with a flap and a handle, in [-1, 1]^3, coloured by part: the stand-in for the paper's Figure 11.
-Mesh make_bag();
+DPR_API Mesh make_bag();
 
 }  // namespace dpr

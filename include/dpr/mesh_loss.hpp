@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/mesh.hpp"
 
 namespace dpr {
@@ -30,7 +31,7 @@ struct MeshLossTerms {
 /// Weighted sum of the terms for a mesh whose connectivity stays; its gradient joins that of the images in
 /// Renderer::backward. Everything is gathered in a fixed order: the same bits from run to run on a device.
 /// Faces without area have no normal, and their hinges no loss.
-class MeshLoss {
+class DPR_API MeshLoss {
  public:
   /// Throws InvalidArgument for a mesh that is not valid and for weights that are negative or not finite; all
   /// may be 0. O(faces log faces).
@@ -45,7 +46,7 @@ class MeshLoss {
   double evaluate(const Renderer& renderer, std::size_t mesh = 0);
   /// The terms of the last evaluate().
   const MeshLossTerms& terms() const;
-  struct Impl;
+  struct DPR_LOCAL Impl;
   Impl& impl() const { return *impl_; }
 
  private:

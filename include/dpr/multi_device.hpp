@@ -6,14 +6,16 @@
 #include <span>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// Parts of a device with `compute_units` units each (clCreateSubDevices), each with a context and a queue of
 /// its own. Throws InvalidArgument if the device has fewer units, DeviceError if it cannot be divided.
-std::vector<Device> split_device(const Device& device, unsigned compute_units);
+DPR_API std::vector<Device> split_device(const Device& device, unsigned compute_units);
 
 /// Renders the views of one scene on a list of devices.
 ///
@@ -22,7 +24,7 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units);
 /// gradients are added in their order: the result is bitwise the same for any number of devices of one kind,
 /// and from run to run. Devices of different kinds round differently, so there the last bits depend on who
 /// was free. One thread a device, for the time of a call. Not thread-safe.
-class MultiDeviceRenderer {
+class DPR_API MultiDeviceRenderer {
  public:
   /// Throws InvalidArgument if there is no device, or the same Device twice: each needs a queue of its own.
   explicit MultiDeviceRenderer(std::vector<Device> devices);
@@ -34,10 +36,10 @@ class MultiDeviceRenderer {
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views);
   void set_smoothing(const Smoothing& smoothing);
-  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
-  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
-  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
-  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_positions(std::size_t mesh, std::span<const vec3> positions);
+  void set_colors(std::size_t mesh, std::span<const vec3> colors);
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
+  void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
   void set_lights(const std::optional<Lights>& lights);
 
   /// The image of every view. Blocks, as the calls below.
@@ -63,7 +65,7 @@ class MultiDeviceRenderer {
   std::vector<std::size_t> views_rendered() const;
 
  private:
-  struct Impl;
+  struct DPR_LOCAL Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/mesh.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/shape.hpp"
@@ -16,8 +17,8 @@ namespace dpr {
 using Notes = std::vector<std::string>;
 
 // As the functions without notes, which keep silent about them; what was found is appended to `notes`.
-Mesh read_mesh(const std::filesystem::path& file, Notes& notes);
-Scene read_scene(const std::filesystem::path& file, Notes& notes);
-ShapeViews read_views(const std::filesystem::path& file, Notes& notes);
+DPR_API Mesh read_mesh(const std::filesystem::path& file, Notes& notes);
+DPR_API Scene read_scene(const std::filesystem::path& file, Notes& notes);
+DPR_API ShapeViews read_views(const std::filesystem::path& file, Notes& notes);
 
 }  // namespace dpr

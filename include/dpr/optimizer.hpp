@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "dpr/export.h"
+
 namespace dpr {
 
 /// uniform_adam: Adam with one second moment for all parameters, the largest, so that steps keep the
@@ -25,7 +27,7 @@ struct OptimizerState {
 };
 
 /// Adam (Kingma & Ba 2015) with bias correction, or SGD with momentum, v <- beta1 v + g.
-class Optimizer {
+class DPR_API Optimizer {
  public:
   /// Throws InvalidArgument for options out of range.
   explicit Optimizer(const OptimizerOptions& options);

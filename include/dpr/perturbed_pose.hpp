@@ -4,14 +4,15 @@
 
 #include <array>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <memory>
 
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/scene.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -19,15 +20,15 @@ namespace dpr {
 /// are vectors r applied on the left of a matrix' linear part, A <- exp([r]x) A, in radians, the translation
 /// column left alone, as in PoseGradient; translations are added to that column.
 struct PoseParameters {
-  glm::dvec3 mesh_rotation{0.0}, mesh_translation{0.0};      ///< of object to world
-  glm::dvec3 camera_rotation{0.0}, camera_translation{0.0};  ///< of world to camera
+  dvec3 mesh_rotation{0.0}, mesh_translation{0.0};      ///< of object to world
+  dvec3 camera_rotation{0.0}, camera_translation{0.0};  ///< of world to camera
   double fov_y_degrees = 0;
   std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy in pixels
 };
 
 struct PerturbedPoseOptions {
   /// >= 0; what is 0 is not perturbed and has no gradient. d is the number of the others.
-  PoseParameters scale{.mesh_rotation = glm::dvec3(0.1), .mesh_translation = glm::dvec3(0.1)};
+  PoseParameters scale{.mesh_rotation = dvec3(0.1), .mesh_translation = dvec3(0.1)};
   Prior prior = Prior::gaussian;  ///< any but uniform, whose density has no score
   std::uint32_t samples = 64;     ///< M, 1 to 4096: rigid renders of a batch
   /// What is subtracted from a loss: nothing, the loss of the unperturbed pose, eq. (14), or the mean loss of
@@ -61,7 +62,7 @@ struct PerturbedPoseResult {
 ///
 /// Costs M forward passes in one batch and no backward pass; its variance grows with d, not with the number
 /// of triangles.
-class PerturbedPose {
+class DPR_API PerturbedPose {
  public:
   /// The scene's smoothing has no part in it. Throws InvalidArgument for a scene that cannot be rendered, a
   /// target of another size, scales that are negative, not finite, all 0, or of camera parameters the scene's
@@ -86,11 +87,11 @@ class PerturbedPose {
   void set_scale(const PoseParameters& scale);
 
  private:
-  struct Impl;
+  struct DPR_LOCAL Impl;
   std::unique_ptr<Impl> impl_;
 };
 
 /// The view moved by a step in its parameters, e.g. one of an optimizer.
-View moved(const View& view, std::size_t mesh, const PoseParameters& step);
+DPR_API View moved(const View& view, std::size_t mesh, const PoseParameters& step);
 
 }  // namespace dpr

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <glm/glm.hpp>
 #include <span>
 #include <variant>
 #include <vector>
@@ -10,24 +9,26 @@
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/annealed_smoothing.hpp"
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/scene.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// A rigid motion: the object-to-world rotation and translation.
 struct Pose {
-  glm::dmat3 rotation{1.0};
-  glm::dvec3 translation{0.0};
+  dmat3 rotation{1.0};
+  dvec3 translation{0.0};
 };
 
 /// exp([r]x), and its inverse with an angle in [0, pi].
-glm::dmat3 rotation_from_vector(glm::dvec3 r);
-glm::dvec3 vector_from_rotation(const glm::dmat3& rotation);
+DPR_API dmat3 rotation_from_vector(dvec3 r);
+DPR_API dvec3 vector_from_rotation(const dmat3& rotation);
 /// The angle between two rotations, degrees, in [0, 180].
-double angle_degrees(const glm::dmat3& a, const glm::dmat3& b);
+DPR_API double angle_degrees(const dmat3& a, const dmat3& b);
 
 /// What may be different about the light of the target.
 enum class PoseLight {
@@ -110,7 +111,7 @@ struct PoseHypothesis {
 };
 
 /// The scene's camera with what was found of it.
-Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& radial);
+DPR_API Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& radial);
 
 struct PoseResult : PoseHypothesis {
   Pose start;  ///< the (first) initial pose; in a search the scene's
@@ -132,7 +133,7 @@ struct PoseResult : PoseHypothesis {
 };
 
 /// Finds the pose of the scene's only mesh from one image.
-class PoseSolver {
+class DPR_API PoseSolver {
  public:
   /// Called once an iteration; false stops the solver, which then returns the best so far.
   using Callback = std::function<bool(const PoseIteration&)>;

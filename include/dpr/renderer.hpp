@@ -10,21 +10,23 @@
 #include <vector>
 
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/scene.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// One view of a batch: a camera and where every mesh stands in it.
 struct View {
   Camera camera;
-  std::vector<glm::mat4> transforms;  ///< [mesh] object to world
+  std::vector<mat4> transforms;  ///< [mesh] object to world
 };
 
 /// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r =
 /// 0 (radians, the translation column left alone), and for the translation column.
 struct PoseGradient {
-  glm::dvec3 rotation{0.0}, translation{0.0};
+  dvec3 rotation{0.0}, translation{0.0};
 };
 
 struct CameraGradient {
@@ -41,18 +43,17 @@ struct ViewGradient {
 };
 
 struct MeshGradient {
-  std::vector<glm::vec3> positions;  ///< [vertex] object space; empty if not requested
-  std::vector<glm::vec3>
-      colors;  ///< [vertex] or [face], as the mesh has them; empty if not requested or white
-  std::vector<glm::vec2> texcoords;              ///< [texcoord]; empty if not requested or without textures
-  std::vector<std::vector<glm::vec3>> textures;  ///< [texture][height * width]; empty if not requested
+  std::vector<vec3> positions;  ///< [vertex] object space; empty if not requested
+  std::vector<vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
+  std::vector<vec2> texcoords;  ///< [texcoord]; empty if not requested or without textures
+  std::vector<std::vector<vec3>> textures;  ///< [texture][height * width]; empty if not requested
 };
 
 /// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the
 /// scene's or none is requested.
 struct ShapesGradient {
-  std::vector<glm::vec3> positions;  ///< [view][vertex]
-  std::vector<glm::vec3> colors;     ///< [view][color]
+  std::vector<vec3> positions;  ///< [view][vertex]
+  std::vector<vec3> colors;     ///< [view][color]
 };
 
 /// What GradientRequest asked for; the rest is zero or empty. Bitwise the same from run to run on one device.
@@ -60,14 +61,14 @@ struct SceneGradient {
   std::vector<MeshGradient> meshes;  ///< summed over the views; empty arrays where these have their own
   ShapesGradient shapes;
   std::vector<ViewGradient> views;
-  glm::dvec3 ambient{0.0};
+  dvec3 ambient{0.0};
   // Of lights, summed over the views.
   std::vector<PointLightGradient> lights;
   std::vector<DirectionalLightGradient> directional;
   std::vector<SpotLightGradient> spot;
-  std::vector<glm::vec3> harmonics;  ///< [k_harmonics], or empty without any
+  std::vector<vec3> harmonics;  ///< [k_harmonics], or empty without any
   double sigma = 0, gamma = 0, alpha = 0;
-  glm::dvec3 background{0.0};
+  dvec3 background{0.0};
 };
 
 struct RenderStatistics {
@@ -84,7 +85,7 @@ class ImageLoss;
 class MeshLoss;
 
 /// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
-class Renderer {
+class DPR_API Renderer {
  public:
   explicit Renderer(Device device);
   ~Renderer();
@@ -99,24 +100,24 @@ class Renderer {
   void set_views(std::span<const View> views, std::size_t first_view = 0);
   void set_smoothing(const Smoothing& smoothing);
   /// New positions, object space, for a mesh of the scene: [vertex], as many as it has.
-  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
+  void set_positions(std::size_t mesh, std::span<const vec3> positions);
   /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
-  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+  void set_colors(std::size_t mesh, std::span<const vec3> colors);
   /// New texels, linear RGB, for a texture of a mesh of the scene: [height * width].
-  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
   /// New texture coordinates for a mesh of the scene that has textures: [texcoord], as many as it has.
-  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
 
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other. Empty: the scene's own for all views, to which set_views() returns as well.
-  void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
+  void set_shapes(std::span<const vec3> positions, std::span<const vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);
   /// Other faces to leave out.
   void set_cull(Cull cull);
   /// A new background colour, linear RGB.
-  void set_background(const glm::vec3& background);
+  void set_background(const vec3& background);
   /// Replaces what the next backward() computes.
   void set_gradients(const GradientRequest& gradients);
 
@@ -132,14 +133,14 @@ class Renderer {
   /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
   Image image(std::size_t view = 0) const;
   /// All images at once, [view][height][width], RGBA. Blocks.
-  void read_pixels(std::span<glm::vec4> pixels) const;
+  void read_pixels(std::span<vec4> pixels) const;
 
   /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the
   /// background). One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise
   /// again.
   SceneGradient backward(std::span<const Image> grad_images);
   /// The same from [view][height][width], RGBA.
-  SceneGradient backward_pixels(std::span<const glm::vec4> grad_pixels);
+  SceneGradient backward_pixels(std::span<const vec4> grad_pixels);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   SceneGradient backward(const ImageLoss& loss);
   /// The same, with the gradient of a mesh's own loss added to that of its positions, on the device. Both
@@ -149,7 +150,7 @@ class Renderer {
   RenderStatistics statistics() const;
   const Device& device() const;
 
-  struct Impl;
+  struct DPR_LOCAL Impl;
   Impl& impl() const { return *impl_; }
 
  private:

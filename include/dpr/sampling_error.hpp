@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
@@ -15,7 +16,7 @@ namespace dpr {
 /// Standard errors of a single frame at the renderer's number of samples: standard deviations over
 /// independent replicates, which hold for whatever draws and control variates there are. All 0 for exact
 /// estimators. Estimates themselves, each known to a part 1 / sqrt(2 (replicates - 1)).
-struct SamplingError {
+struct DPR_API SamplingError {
   unsigned replicates = 0;
   std::uint32_t samples = 0;  ///< of the estimator they were measured at
   std::vector<Image> images;  ///< [view] RGBA, each channel's own
@@ -35,15 +36,15 @@ struct SamplingError {
 /// last forward() is then that of the renderer's own seed. The gradients are those of <grad_images, image>.
 /// Costs as many forward and backward passes. Throws InvalidArgument for fewer replicates, and what
 /// Renderer::backward throws.
-SamplingError estimate_sampling_error(Renderer& renderer, std::span<const Image> grad_images,
-                                      unsigned replicates = 16);
+DPR_API SamplingError estimate_sampling_error(Renderer& renderer, std::span<const Image> grad_images,
+                                              unsigned replicates = 16);
 /// The same for the gradients of a loss, evaluated on every replicate: what a descent on it meets.
-SamplingError estimate_sampling_error(Renderer& renderer, ImageLoss& loss, unsigned replicates = 16);
+DPR_API SamplingError estimate_sampling_error(Renderer& renderer, ImageLoss& loss, unsigned replicates = 16);
 
 /// The samples that bring a standard error down to the wanted one: errors fall as 1 / sqrt(samples), so
 /// samples (error / wanted)^2, rounded up, 1 to 2^20. Stratified draws fall at least as fast; the logarithm
 /// of a sampled occupancy has a bias beside it that no replicate shows. Throws InvalidArgument for an error
 /// below 0, a wanted one that is not above 0, and 0 samples.
-std::uint32_t suggest_samples(double error, std::uint32_t samples, double wanted);
+DPR_API std::uint32_t suggest_samples(double error, std::uint32_t samples, double wanted);
 
 }  // namespace dpr

@@ -2,23 +2,24 @@
 #pragma once
 
 #include <filesystem>
-#include <glm/glm.hpp>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "dpr/camera.hpp"
+#include "dpr/export.h"
 #include "dpr/light.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/smoothing.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// A mesh and where it stands.
 struct Instance {
   Mesh mesh;
-  glm::mat4 transform{1.0F};  ///< object to world; affine, may hold a scale
+  mat4 transform{1.0F};  ///< object to world; affine, may hold a scale
 };
 
 /// Which faces are left out: none; those that wind clockwise in the image, as the outside of a mesh does seen
@@ -42,7 +43,7 @@ struct GradientRequest {
 struct Scene {
   int width = 128, height = 128;
   Camera camera;
-  glm::vec3 background{0.0F};
+  vec3 background{0.0F};
   std::vector<Instance> meshes;
   std::optional<Lights> lights;  ///< none: colours as they are
   Smoothing smoothing;
@@ -53,11 +54,11 @@ struct Scene {
 
 /// Throws InvalidArgument where the scene cannot be rendered: size, camera, meshes, transforms, lights,
 /// smoothing.
-void validate(const Scene& scene);
+DPR_API void validate(const Scene& scene);
 
 /// Reads the scene format of lib/cli/README.md. Mesh files are relative to the scene file. An unknown key is
 /// an error that names it. Throws IoError where the file cannot be read or is not JSON (with the line),
 /// InvalidArgument else.
-Scene read_scene(const std::filesystem::path& file);
+DPR_API Scene read_scene(const std::filesystem::path& file);
 
 }  // namespace dpr

@@ -3,17 +3,18 @@
 
 #include <filesystem>
 #include <functional>
-#include <glm/glm.hpp>
 #include <optional>
 #include <vector>
 
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
+#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/mesh_loss.hpp"
 #include "dpr/smoothing.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -28,7 +29,7 @@ struct ShapeView {
 /// What a shape is found from.
 struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
-  glm::vec3 background{0.0F};
+  vec3 background{0.0F};
   std::vector<ShapeView> views;
   std::optional<Mesh> initial;         ///< grey without vertex colours; none: an icosphere in the common view
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
@@ -37,7 +38,7 @@ struct ShapeViews {
 /// Reads the views format of lib/cli/README.md; images and the initial mesh are relative to the file. Throws
 /// IoError where a file cannot be read, InvalidArgument for an unknown key, no views, or an image of another
 /// size.
-ShapeViews read_views(const std::filesystem::path& file);
+DPR_API ShapeViews read_views(const std::filesystem::path& file);
 
 /// How the mesh moves. large_steps: in the variables u = (I + lambda L) v, L the Laplacian of the mesh's
 /// edges, by Adam with one step size for all (Nicolet, Jacobson & Jakob 2021). direct: Adam on the positions.
@@ -73,7 +74,7 @@ struct ShapeOptions {
 /// The smoothing at the finest level's end: that of the views, or else Gaussian noise of the pixel's position
 /// by `blur_end`, and of depths by the same length in the world. A level with half the pixels has twice the
 /// blur. Throws InvalidArgument where cameras see no common point.
-Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options);
+DPR_API Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options);
 
 /// One iteration: what it evaluated, and how.
 struct ShapeIteration {
@@ -94,7 +95,7 @@ struct ShapeResult {
 };
 
 /// Finds a mesh with vertex colours that explains several images.
-class ShapeSolver {
+class DPR_API ShapeSolver {
  public:
   /// Called after every iteration with the mesh as it is then; false stops the solver.
   using Callback = std::function<bool(const ShapeIteration&, const Mesh&)>;

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "dpr/export.h"
+
 namespace dpr {
 
 /// Distribution of the noise. What the library knows of each is a row of lib/smoothing/priors.cpp.
@@ -88,25 +90,25 @@ struct Smoothing {
 ///   exact estimators, a fixed width and no blur_radius: no triangle is blurred. Its scale is sigma with
 ///   Euclidean distances, else the root of sigma, NDC; the occupancy_threshold has no part in it.
 ///   `supersampling` is of the pixel's noise alone.
-void validate(const Smoothing& smoothing);
+DPR_API void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to
 /// `occupancy_threshold`: sigma times the prior's quantile at 1 - threshold. The Cauchy prior's tail is so
 /// heavy that its radius is capped at 100 sigma, where p = 1/2 - atan(100)/pi = 3.18e-3: a threshold below
 /// that has no effect there.
 /// With noise of the pixel it is 0.
-float blur_radius(const Smoothing& smoothing);
+DPR_API float blur_radius(const Smoothing& smoothing);
 
 /// Sets sigma; a blur radius, where there is one, stays the same number of sigmas. With a variable width it
 /// stays as it is: there sigma is no width, but what keeps the derivative at an edge finite.
-void set_sigma(Smoothing& smoothing, float sigma);
+DPR_API void set_sigma(Smoothing& smoothing, float sigma);
 
 /// Whether either stage draws samples.
-bool is_sampled(const Smoothing& smoothing);
+DPR_API bool is_sampled(const Smoothing& smoothing);
 
 /// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins, and of
 /// triangles that share an edge exactly one covers a sample on it.
-Smoothing rigid_smoothing();
+DPR_API Smoothing rigid_smoothing();
 
 /// A named member of the family; throws InvalidArgument for another name and for a size below 1x1. What is
 /// not said of a member of the triangles' noise is that of "gaussian". Equations in brackets are the paper's;
@@ -131,10 +133,10 @@ Smoothing rigid_smoothing();
 /// - "pixel": the default above, Gaussian noise of the pixel's position, joint composition, exact; gamma is
 ///   1e-4, so that what lies a thousandth of the depth range behind is not seen
 /// - "rigid": rigid_smoothing()
-Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
+DPR_API Smoothing smoothing_preset(std::string_view name, int width = 128, int height = 128);
 
 /// The presets' names, in the order above.
-std::vector<std::string_view> smoothing_preset_names();
+DPR_API std::vector<std::string_view> smoothing_preset_names();
 
 /// The enumerations whose values have names in files, on the command line and in messages.
 template <typename Type>
@@ -144,14 +146,14 @@ concept SmoothingChoice = std::same_as<Type, Prior> || std::same_as<Type, Compos
 
 /// "gaussian", "leave_one_out" and so on; empty for what is no value of the enumeration.
 template <SmoothingChoice Choice>
-std::string_view to_string(Choice value);
+DPR_API std::string_view to_string(Choice value);
 
 /// The inverse; `where` names the argument in the InvalidArgument thrown for an unknown word.
 template <SmoothingChoice Choice>
-Choice parse_choice(std::string_view word, std::string_view where);
+DPR_API Choice parse_choice(std::string_view word, std::string_view where);
 
 /// All values, in the order of their declaration.
 template <SmoothingChoice Choice>
-std::vector<Choice> choices();
+DPR_API std::vector<Choice> choices();
 
 }  // namespace dpr

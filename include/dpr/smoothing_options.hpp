@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "dpr/export.h"
 #include "dpr/smoothing.hpp"
 
 namespace dpr {
@@ -41,15 +42,15 @@ struct SmoothingOptions {
 ///    has it: 9.21 of them in "softras", "paper_gaussian" and "paper_cauchy", none in "rigid". A variable
 ///    width keeps the radius of step 1 in NDC: 0.5 in "nmr"; noise of the pixel has none. The other presets
 ///    have no radius of their own, so that theirs follows from sigma, prior and threshold.
-Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
-                            const std::optional<Smoothing>& otherwise = {});
+DPR_API Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
+                                    const std::optional<Smoothing>& otherwise = {});
 
 /// Whether no member of the family is described: nothing is given but, perhaps, the seed and the
 /// supersampling.
-bool says_nothing(const SmoothingOptions& given);
+DPR_API bool says_nothing(const SmoothingOptions& given);
 
 /// What `over`, such as a command line, leaves of `under`, such as a file, and adds to it: each option given
 /// replaces its like. A preset replaces all but the seed, an estimator those of both stages.
-SmoothingOptions overlay(const SmoothingOptions& under, const SmoothingOptions& over);
+DPR_API SmoothingOptions overlay(const SmoothingOptions& under, const SmoothingOptions& over);
 
 }  // namespace dpr

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <glm/glm.hpp>
 #include <string>
 #include <vector>
+
+#include "dpr/export.h"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
@@ -22,22 +24,22 @@ enum class Filter { nearest, bilinear, trilinear };
 /// and v = 1 - (r + 1/2) / H.
 struct Texture {
   int width = 0, height = 0;
-  std::vector<glm::vec3> texels;  ///< [height * width] linear RGB, row-major, row 0 on top
+  std::vector<vec3> texels;  ///< [height * width] linear RGB, row-major, row 0 on top
   Wrap wrap = Wrap::repeat;
   Filter filter = Filter::bilinear;
 };
 
 /// Throws InvalidArgument unless the texture has 1 to 16384 texels a side, as many texels as its sides say,
 /// and all of them finite. `name` says in the message which texture it is.
-void validate(const Texture& texture, const std::string& name = "texture");
+DPR_API void validate(const Texture& texture, const std::string& name = "texture");
 
 /// Reads any format of read_image(). 8- and 16-bit files hold sRGB (IEC 61966-2-1) and are decoded to linear
 /// RGB; files of floats, EXR and the like, are taken as they are. Alpha is left out. Throws as read_image()
 /// does.
-Texture read_texture(const std::filesystem::path& file);
+DPR_API Texture read_texture(const std::filesystem::path& file);
 
 /// Writes by the extension, as write_image(): .exr keeps the linear floats, 8-bit formats are encoded to
 /// sRGB. Throws as write_image() does.
-void write_texture(const std::filesystem::path& file, const Texture& texture);
+DPR_API void write_texture(const std::filesystem::path& file, const Texture& texture);
 
 }  // namespace dpr

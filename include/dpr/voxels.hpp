@@ -3,16 +3,17 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <vector>
 
+#include "dpr/export.h"
 #include "dpr/mesh.hpp"
+#include "dpr/vectors.hpp"
 
 namespace dpr {
 
 /// An axis-aligned box, object space.
 struct Bounds {
-  glm::vec3 low{-1.0F}, high{1.0F};
+  vec3 low{-1.0F}, high{1.0F};
 };
 
 /// Which points a surface encloses. nonzero: its winding number is not 0, so that overlapping parts are one
@@ -21,7 +22,7 @@ struct Bounds {
 enum class FillRule { nonzero, even_odd };
 
 /// resolution^3 equal cells of a box; a cell is occupied if its centre is inside.
-struct VoxelGrid {
+struct DPR_API VoxelGrid {
   unsigned resolution = 0;
   Bounds bounds;
   std::vector<std::uint8_t> cells;  ///< [z][y][x], 1 inside, 0 outside
@@ -39,11 +40,11 @@ struct VoxelGrid {
 /// displaced symbolically, Edelsbrunner & Muecke 1990). Parts outside the box count as they should. Throws
 /// InvalidArgument for a mesh that is not valid, a resolution outside 1 to 512, bounds that are not finite
 /// or empty. O(faces + cells + columns of cells under each face), on the host; serial and deterministic.
-VoxelGrid voxelize(const Mesh& mesh, unsigned resolution, const Bounds& bounds,
-                   FillRule rule = FillRule::nonzero);
+DPR_API VoxelGrid voxelize(const Mesh& mesh, unsigned resolution, const Bounds& bounds,
+                           FillRule rule = FillRule::nonzero);
 
 /// Occupied cells of both over those of either; 1 where both are empty. Throws InvalidArgument if the grids
 /// differ in resolution or bounds.
-double iou(const VoxelGrid& a, const VoxelGrid& b);
+DPR_API double iou(const VoxelGrid& a, const VoxelGrid& b);
 
 }  // namespace dpr

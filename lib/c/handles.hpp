@@ -95,6 +95,8 @@ std::span<Number> numbers(Number* pointer, std::size_t count, std::size_t width,
 
 /// Vectors of three numbers.
 std::vector<glm::vec3> to_vectors(std::span<const float> values);
+/// Vectors of two.
+std::vector<glm::vec2> to_pairs(std::span<const float> values);
 /// Row-major.
 glm::mat4 to_matrix(const float* values);
 Camera to_camera(const dpr_camera* camera, const char* argument);

@@ -119,6 +119,22 @@ dpr_status dpr_renderer_set_colors(dpr_renderer* renderer, std::size_t mesh, con
   });
 }
 
+dpr_status dpr_renderer_set_texels(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
+                                   const float* texels, std::size_t count) {
+  return guarded([&] {
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    r.set_texels(mesh, texture, dpr::c::to_vectors(numbers(texels, count, 3, "texels")));
+  });
+}
+
+dpr_status dpr_renderer_set_texcoords(dpr_renderer* renderer, std::size_t mesh, const float* texcoords,
+                                      std::size_t count) {
+  return guarded([&] {
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    r.set_texcoords(mesh, dpr::c::to_pairs(numbers(texcoords, count, 2, "texcoords")));
+  });
+}
+
 dpr_status dpr_renderer_forward(dpr_renderer* renderer) {
   return guarded([&] { deref(renderer, "renderer").renderer.forward(); });
 }

@@ -24,6 +24,13 @@ std::vector<glm::vec3> to_vectors(std::span<const float> values) {
   return vectors;
 }
 
+std::vector<glm::vec2> to_pairs(std::span<const float> values) {
+  std::vector<glm::vec2> pairs;
+  pairs.reserve(values.size() / 2);
+  for (std::size_t i = 0; i + 1 < values.size(); i += 2) pairs.emplace_back(values[i], values[i + 1]);
+  return pairs;
+}
+
 glm::mat4 to_matrix(const float* values) {
   glm::mat4 matrix;
   for (int row = 0; row < 4; ++row) {
@@ -63,6 +70,54 @@ void require_count(std::size_t count, const char* argument) {
   throw InvalidArgument(argument, std::to_string(count), "1 to " + std::to_string(k_most));
 }
 
+/// The lights of a kind, or the textures of a mesh; few of either.
+template <class Item>
+std::span<const Item> span_of(const Item* items, std::size_t count, const std::string& argument) {
+  if (count > 0) deref(items, argument.c_str());
+  constexpr std::size_t k_most = 1U << 16U;
+  if (count > k_most)
+    throw InvalidArgument("count (" + argument + ")", std::to_string(count),
+                          "at most " + std::to_string(k_most));
+  return {items, count};
+}
+
+/// Indices of a face's three corners.
+std::vector<glm::uvec3> to_indices(const std::uint32_t* values, std::size_t count) {
+  std::vector<glm::uvec3> indices;
+  indices.reserve(count);
+  for (std::size_t i = 0; i < 3 * count; i += 3)
+    indices.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return indices;
+}
+
+Texture to_texture(const dpr_texture& given, const std::string& argument) {
+  deref(given.texels, (argument + ".texels").c_str());
+  Texture texture{.width = given.width,
+                  .height = given.height,
+                  .texels = {},
+                  .wrap = static_cast<Wrap>(given.wrap),
+                  .filter = static_cast<Filter>(given.filter)};
+  const auto can_be_side = [](int side) { return side >= 1 && side <= checks::k_largest_side; };
+  if (can_be_side(given.width) && can_be_side(given.height)) {  // validate() tells of others
+    const auto rows = static_cast<std::size_t>(given.height), columns = static_cast<std::size_t>(given.width);
+    texture.texels = triples(given.texels, rows * columns);
+  }
+  return texture;
+}
+
+/// What the mesh has of textures; validate() checks how its parts fit.
+void copy_textures(const dpr_mesh& given, Mesh& mesh) {
+  if (given.texcoords) {
+    require_count(given.texcoord_count, "mesh.texcoord_count");
+    mesh.texcoords = to_pairs({given.texcoords, 2 * given.texcoord_count});
+  }
+  if (given.face_texcoords) mesh.face_texcoords = to_indices(given.face_texcoords, given.face_count);
+  for (const dpr_texture& texture : span_of(given.textures, given.texture_count, "mesh.textures"))
+    mesh.textures.push_back(to_texture(texture, checks::element("mesh.textures", mesh.textures.size())));
+  if (given.face_textures)
+    mesh.face_textures.assign(given.face_textures, given.face_textures + given.face_count);
+}
+
 Instance to_instance(const dpr_mesh* given) {
   const dpr_mesh mesh = versioned<dpr_mesh>(given, DPR_MESH_INIT, "mesh");
   deref(mesh.positions, "mesh.positions");
@@ -72,29 +127,16 @@ Instance to_instance(const dpr_mesh* given) {
   Instance instance;
   Mesh& m = instance.mesh;
   m.positions = triples(mesh.positions, mesh.vertices);
-  m.faces.reserve(mesh.face_count);
-  for (std::size_t i = 0; i < 3 * mesh.face_count; i += 3)
-    m.faces.emplace_back(mesh.faces[i], mesh.faces[i + 1], mesh.faces[i + 2]);
+  m.faces = to_indices(mesh.faces, mesh.face_count);
   m.vertex_colors = triples(mesh.vertex_colors, mesh.vertices);
   m.face_colors = triples(mesh.face_colors, mesh.face_count);
+  copy_textures(mesh, m);
   validate(m);
   if (mesh.transform) {
     instance.transform = to_matrix(mesh.transform);
     checks::require_affine(instance.transform, "mesh.transform");
   }
   return instance;
-}
-
-/// The lights of a kind.
-template <class Light>
-std::span<const Light> span_of(const Light* lights, std::size_t count, const std::string& argument) {
-  if (count > 0) deref(lights, argument.c_str());
-  constexpr std::size_t k_most_lights = 1U << 16U;
-  if (count > k_most_lights) {
-    throw InvalidArgument(argument + "_count", std::to_string(count),
-                          "at most " + std::to_string(k_most_lights));
-  }
-  return {lights, count};
 }
 
 Lights to_lights(const dpr_lights* given) {

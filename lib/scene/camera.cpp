@@ -125,7 +125,7 @@ Camera orbit_camera(float distance, float elevation_degrees, float azimuth_degre
   const glm::dvec3 centre(target);
   Camera camera;
   camera.view = glm::mat4(
-      glm::lookAt(centre + static_cast<double>(distance) * direction, centre, glm::dvec3(0.0, 1.0, 0.0)));
+      glm::lookAtRH(centre + static_cast<double>(distance) * direction, centre, glm::dvec3(0.0, 1.0, 0.0)));
   return camera;
 }
 

@@ -149,6 +149,163 @@ static void test_views(const dpr_device* device, const dpr_scene* scene) {
   dpr_renderer_destroy(renderer);
 }
 
+static const float texcoords[] = {0, 0, 1, 0, 0.5f, 1};
+static const float texels[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; /* red, green; blue, white */
+
+static dpr_texture four_texels(void) {
+  dpr_texture texture = {2, 2, NULL, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR};
+  texture.texels = texels;
+  return texture;
+}
+
+static dpr_mesh textured_triangle(const dpr_texture* texture) {
+  dpr_mesh mesh = triangle();
+  mesh.face_colors = NULL;
+  mesh.texcoords = texcoords, mesh.texcoord_count = 3;
+  mesh.face_texcoords = faces;
+  mesh.textures = texture, mesh.texture_count = 1;
+  return mesh;
+}
+
+/* The sum over pixels of a fixed weight times the image. */
+static double weighted(const dpr_renderer* renderer, const float* weights) {
+  float pixels[FLOATS];
+  double sum = 0;
+  size_t i;
+  OK(dpr_renderer_read_image(renderer, pixels, FLOATS));
+  for (i = 0; i < FLOATS; ++i) sum += (double)weights[i] * pixels[i];
+  return sum;
+}
+
+/* Gradients of every texel and coordinate against central differences. */
+static void test_textures(const dpr_device* device) {
+  const char* const wanted[] = {"texture", "texcoords"};
+  const dpr_texture texture = four_texels();
+  const dpr_mesh mesh = textured_triangle(&texture);
+  const dpr_camera camera = three_units_away();
+  const float step = 1.0f / 256;
+  float weights[FLOATS], moved[12];
+  double of_texels[12], of_texcoords[6], numeric;
+  size_t i, count = 0;
+  dpr_scene* scene = NULL;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  for (i = 0; i < FLOATS; ++i) weights[i] = (float)(i % 7) - (float)(i / 64 % 5);
+  OK(dpr_scene_create(SIDE, SIDE, &scene));
+  OK(dpr_scene_add_mesh(scene, &mesh));
+  OK(dpr_scene_set_camera(scene, &camera));
+  OK(dpr_scene_set_gradients(scene, wanted, 2));
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_backward_pixels(renderer, weights, FLOATS, &gradient));
+  OK(dpr_gradient_size(gradient, "meshes[0].textures", &count));
+  EXPECT(count == 12);
+  OK(dpr_gradient_read(gradient, "meshes[0].textures", of_texels, 12));
+  OK(dpr_gradient_read(gradient, "meshes[0].texcoords", of_texcoords, 6));
+  for (i = 0; i < 12; ++i) {
+    memcpy(moved, texels, sizeof texels);
+    moved[i] += step;
+    OK(dpr_renderer_set_texels(renderer, 0, 0, moved, 12));
+    OK(dpr_renderer_forward(renderer));
+    numeric = weighted(renderer, weights);
+    moved[i] -= 2 * step;
+    OK(dpr_renderer_set_texels(renderer, 0, 0, moved, 12));
+    OK(dpr_renderer_forward(renderer));
+    numeric = (numeric - weighted(renderer, weights)) / (2 * step);
+    EXPECT(fabs(numeric - of_texels[i]) < 2e-2 * (1 + fabs(numeric)));
+  }
+  OK(dpr_renderer_set_texels(renderer, 0, 0, texels, 12));
+  for (i = 0; i < 6; ++i) {
+    memcpy(moved, texcoords, sizeof texcoords);
+    moved[i] += step;
+    OK(dpr_renderer_set_texcoords(renderer, 0, moved, 6));
+    OK(dpr_renderer_forward(renderer));
+    numeric = weighted(renderer, weights);
+    moved[i] -= 2 * step;
+    OK(dpr_renderer_set_texcoords(renderer, 0, moved, 6));
+    OK(dpr_renderer_forward(renderer));
+    numeric = (numeric - weighted(renderer, weights)) / (2 * step);
+    EXPECT(fabs(numeric - of_texcoords[i]) < 2e-2 * (1 + fabs(numeric)));
+  }
+  REFUSED(dpr_renderer_set_texels(renderer, 0, 1, texels, 12), "texture");
+  REFUSED(dpr_renderer_set_texels(renderer, 0, 0, texels, 9), "expected 4");
+  REFUSED(dpr_renderer_set_texels(renderer, 0, 0, NULL, 12), "texels");
+  REFUSED(dpr_renderer_set_texcoords(renderer, 0, texcoords, 5), "multiple of 2");
+  REFUSED(dpr_renderer_set_texcoords(renderer, 0, texcoords, 4), "expected 3");
+  dpr_gradient_destroy(gradient);
+  dpr_renderer_destroy(renderer);
+  dpr_scene_destroy(scene);
+}
+
+/* Wrapping and filters are the texture's: what a corner beyond the image shows. */
+static void test_wrap_and_filter(const dpr_device* device) {
+  const float beyond[] = {1.25f, 0.75f, 1.25f, 0.75f, 1.25f, 0.75f}; /* every pixel shows this point */
+  const float quarter[] = {0.5f, 0.75f, 0.5f, 0.75f, 0.5f, 0.75f};   /* between red and green */
+  const int wraps[] = {DPR_WRAP_REPEAT, DPR_WRAP_MIRROR, DPR_WRAP_CLAMP};
+  const float red[] = {1, 0, 0};
+  const dpr_camera camera = three_units_away();
+  const size_t middle = 4 * (SIDE * SIDE / 2 + SIDE / 2);
+  float pixels[FLOATS];
+  size_t i;
+  for (i = 0; i < 4; ++i) {
+    dpr_texture texture = four_texels();
+    dpr_mesh mesh = textured_triangle(&texture);
+    dpr_scene* scene = NULL;
+    dpr_renderer* renderer = NULL;
+    mesh.texcoords = i < 3 ? beyond : quarter;
+    if (i < 3) texture.wrap = wraps[i], texture.filter = DPR_FILTER_NEAREST;
+    OK(dpr_scene_create(SIDE, SIDE, &scene));
+    OK(dpr_scene_add_mesh(scene, &mesh));
+    OK(dpr_scene_set_camera(scene, &camera));
+    OK(dpr_renderer_create(device, &renderer));
+    OK(dpr_renderer_set_scene(renderer, scene));
+    OK(dpr_renderer_forward(renderer));
+    OK(dpr_renderer_read_image(renderer, pixels, FLOATS));
+    EXPECT(fabsf(pixels[middle] - (i < 3 ? red[i] : 0.5f)) < 1e-3f);
+    dpr_renderer_destroy(renderer);
+    dpr_scene_destroy(scene);
+  }
+}
+
+static void test_wrong_textures(dpr_scene* scene) {
+  const float not_finite[] = {0, 0, 1, NAN, 0.5f, 1};
+  const uint32_t beyond[] = {0, 1, 3}, second[] = {1}, none[] = {DPR_TEXTURE_NONE};
+  dpr_texture texture = four_texels();
+  dpr_mesh mesh = textured_triangle(&texture);
+  mesh.face_textures = second;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "face_textures[0]");
+  mesh.face_textures = none;
+  OK(dpr_scene_add_mesh(scene, &mesh));
+  mesh.face_texcoords = beyond;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "texture coordinate 3");
+  mesh.face_texcoords = NULL;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "face_texcoords");
+  mesh = textured_triangle(&texture);
+  mesh.texcoords = not_finite;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "texcoords[1]");
+  mesh = textured_triangle(&texture);
+  mesh.texcoord_count = (size_t)-1;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.texcoord_count");
+  mesh = textured_triangle(&texture);
+  mesh.texture_count = (size_t)-1;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.textures");
+  mesh.texture_count = 1, mesh.textures = NULL;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.textures");
+  mesh.textures = &texture;
+  texture.width = 1 << 30;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "texels a side");
+  texture = four_texels();
+  texture.wrap = 3;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "repeat, mirror or clamp");
+  texture = four_texels();
+  texture.filter = -1;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "trilinear");
+  texture = four_texels();
+  texture.texels = NULL;
+  REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.textures[0].texels");
+}
+
 /* In the caller's context, on the caller's queue: images and gradients as buffers. */
 static void test_own_opencl(const dpr_scene* scene) {
   cl_platform_id platform;
@@ -223,6 +380,9 @@ static void test_wrong_meshes(dpr_scene* scene) {
   REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.size");
   mesh.size = sizeof mesh + 8; /* of a later version, with more than this library knows */
   REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.size");
+  mesh.size = offsetof(dpr_mesh, texcoords); /* a program compiled before there were textures */
+  mesh.textures = NULL, mesh.texture_count = 1;
+  OK(dpr_scene_add_mesh(scene, &mesh));
 }
 
 /* The lens' own gradients, and an orthographic camera's. */
@@ -291,7 +451,7 @@ static void test_wrong_scenes(void) {
   lights.point = &light;
   REFUSED(dpr_scene_set_lights(scene, &lights), "finite");
   lights.point_count = (size_t)-1;
-  REFUSED(dpr_scene_set_lights(scene, &lights), "lights.point_count");
+  REFUSED(dpr_scene_set_lights(scene, &lights), "count (lights.point)");
   lights.point_count = 0;
   lights.directional_count = 1;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.directional");
@@ -323,6 +483,7 @@ static void test_wrong_scenes(void) {
   REFUSED(dpr_scene_set_gradients(scene, names, 1000), "count");
   REFUSED(dpr_scene_set_gradients(scene, NULL, 1), "names");
   test_wrong_meshes(scene);
+  test_wrong_textures(scene);
   dpr_scene_destroy(scene);
 }
 
@@ -390,6 +551,8 @@ int main(void) {
   scene = make_scene();
   test_descent(device, scene);
   test_views(device, scene);
+  test_textures(device);
+  test_wrap_and_filter(device);
   test_own_opencl(scene);
   test_cameras(device);
   test_wrong_scenes();

@@ -10,7 +10,13 @@ SIDE = 16
 class Mesh(ctypes.Structure):
     _fields_ = [("size", c_size_t), ("positions", c_void_p), ("vertices", c_size_t), ("faces", c_void_p),
                 ("face_count", c_size_t), ("vertex_colors", c_void_p), ("face_colors", c_void_p),
-                ("transform", c_void_p)]
+                ("transform", c_void_p), ("texcoords", c_void_p), ("texcoord_count", c_size_t),
+                ("face_texcoords", c_void_p), ("textures", c_void_p), ("texture_count", c_size_t),
+                ("face_textures", c_void_p)]
+
+
+class Texture(ctypes.Structure):
+    _fields_ = [("width", c_int), ("height", c_int), ("texels", c_void_p), ("wrap", c_int), ("filter", c_int)]
 
 
 class Camera(ctypes.Structure):
@@ -45,6 +51,39 @@ def refusal(call, *arguments):
     except RuntimeError as error:
         return str(error)
     return ""
+
+
+def check_textures(dpr, device, camera, positions, faces):
+    """A texture is found again from its image: every texel that is seen."""
+    texels, texcoords = (c_float * 6)(1, 0, 0, 0, 1, 0), (c_float * 6)(0, 0, 1, 0, 0.5, 1)
+    texture = Texture(2, 1, ctypes.addressof(texels), 2, 1)  # DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR
+    mesh = Mesh(ctypes.sizeof(Mesh), ctypes.addressof(positions), 3, ctypes.addressof(faces), 1, None, None, None,
+                ctypes.addressof(texcoords), 3, ctypes.addressof(faces), ctypes.addressof(texture), 1, None)
+    scene, renderer, gradient = c_void_p(), c_void_p(), c_void_p()
+    count = SIDE * SIDE * 4
+    target, image, residual = (c_float * count)(), (c_float * count)(), (c_float * count)()
+    dpr.scene_create(c_int(SIDE), c_int(SIDE), byref(scene))
+    dpr.scene_add_mesh(scene, byref(mesh))
+    dpr.scene_set_camera(scene, byref(camera))
+    dpr.scene_set_gradients(scene, (c_char_p * 1)(b"texture"), c_size_t(1))
+    dpr.renderer_create(device, byref(renderer))
+    dpr.renderer_set_scene(renderer, scene)
+    dpr.renderer_forward(renderer)
+    dpr.renderer_read_image(renderer, target, c_size_t(count))
+    found = (c_float * 6)(*[0.5] * 6)
+    for _ in range(60):
+        dpr.renderer_set_texels(renderer, c_size_t(0), c_size_t(0), found, c_size_t(6))
+        dpr.renderer_forward(renderer)
+        dpr.renderer_read_image(renderer, image, c_size_t(count))
+        residual[:] = [i - t for i, t in zip(image, target)]
+        grad = (c_double * 6)()
+        dpr.backward_pixels(renderer, residual, c_size_t(count), byref(gradient))
+        dpr.gradient_read(gradient, b"meshes[0].textures", grad, c_size_t(6))
+        dpr.library.dpr_gradient_destroy(gradient)
+        found[:] = [x - 0.03 * g for x, g in zip(found, grad)]
+    assert max(abs(a - b) for a, b in zip(found, texels)) < 0.02, list(found)
+    dpr.library.dpr_renderer_destroy(renderer)
+    dpr.library.dpr_scene_destroy(scene)
 
 
 def main():
@@ -88,6 +127,7 @@ def main():
     print("loss", losses[0], "to", losses[-1])
     assert losses[-1] < 0.1 * losses[0], losses
 
+    check_textures(dpr, device, camera, positions, faces)
     assert "NULL" in refusal(dpr.scene_add_mesh, scene, None)
     assert "multiple of 3" in refusal(dpr.renderer_set_positions, renderer, c_size_t(0), moved, c_size_t(8))
     for kind, handle in (("loss", loss), ("renderer", renderer), ("scene", scene), ("device", device)):
