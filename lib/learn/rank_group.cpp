@@ -16,8 +16,6 @@
 namespace dpr::learn {
 namespace {
 
-std::string endpoint(const Ranks& ranks) { return ranks.address + ":" + std::to_string(ranks.port); }
-
 /// The error of an exchange, without the place in Gloo's sources that it begins with.
 Error lost_contact(const Ranks& ranks, const std::string& reason) {
   const std::size_t place = reason.starts_with("[") ? reason.find("] ") : std::string::npos;
@@ -29,6 +27,8 @@ Error lost_contact(const Ranks& ranks, const std::string& reason) {
 }
 
 #ifdef USE_C10D_GLOO
+
+std::string endpoint(const Ranks& ranks) { return ranks.address + ":" + std::to_string(ranks.port); }
 
 /// This machine's address on the way to rank 0, in digits: names of machines often stand for their loopback.
 std::string own_address(const Ranks& ranks) {
@@ -189,11 +189,8 @@ void GradientAverage::add_bucket(const std::vector<at::Tensor>& parameters) {
 
 void GradientAverage::backward(const at::Tensor& loss) {
   for (const auto& bucket : buckets_) bucket->missing = bucket->accumulators.size();
-  loss.backward();
-  for (const auto& bucket : buckets_) {
-    ranks_->finish(*bucket->sum);
-    bucket->values.div_(ranks_->ranks().count);
-  }
+  (loss / ranks_->ranks().count).backward();
+  for (const auto& bucket : buckets_) ranks_->finish(*bucket->sum);
 }
 
 }  // namespace dpr::learn

@@ -41,7 +41,7 @@ class RankGroup : public torch::CustomClassHolder {
 
 using RankGroupPtr = c10::intrusive_ptr<RankGroup>;
 
-/// Means over the ranks of the parameters' gradients. They are exchanged in buckets, each as soon as the
+/// Gradients of the mean of the ranks' losses. They are exchanged in buckets, each as soon as the
 /// backward pass has the last gradient of it, while that pass goes on.
 ///
 /// What c10d::Reducer does. Debian's libtorch 1.13 has that class without the headers that its own includes.
@@ -53,7 +53,7 @@ class GradientAverage {
   GradientAverage(const GradientAverage&) = delete;
   GradientAverage& operator=(const GradientAverage&) = delete;
 
-  /// loss.backward(), and the exchange. The gradients are zero before.
+  /// The backward pass of the mean of the ranks' losses, and the exchange. The gradients are zero before.
   void backward(const at::Tensor& loss);
 
  private:

@@ -11,6 +11,7 @@ import pathlib
 import random
 import signal
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -94,38 +95,38 @@ def counted_bytes():
 
 
 def train(dpr, folder, ranks, steps, batch):
-    """Wall-clock seconds of a run; the parts that are no steps are the same in runs of other numbers of steps."""
+    """Trains, and returns when rank 0 told that a step is done: with ten of them it does so for each."""
     with socket.socket() as free:
         free.bind(("", 0))
         port = free.getsockname()[1]
     subprocess.run(["rm", "-rf", "run"], cwd=folder, check=True)
-    start = time.time()
     processes = []
     for rank in range(ranks):
-        words = ["taskset", "-c", str(rank), *command(dpr, "run", steps, batch, "--checkpoint-every", "100000", "--quiet")]
+        words = ["taskset", "-c", str(rank), *command(dpr, "run", steps, batch, "--checkpoint-every", "100000")]
         variables = dict(os.environ, **ONE_THREAD)
         if ranks > 1:
             words = ["ip", "netns", "exec", NAMESPACES[rank], *words]
             variables.update(RANK=str(rank), WORLD_SIZE=str(ranks), MASTER_ADDR="10.213.8.1", MASTER_PORT=str(port))
-        processes.append(subprocess.Popen(words, cwd=folder, env=variables))
+        processes.append(subprocess.Popen(words, cwd=folder, env=variables, stdout=subprocess.PIPE, text=True))
+    times = [time.time() for line in processes[0].stdout if f"/{steps} " in line]
     for process in processes:
         if process.wait() != 0:
             sys.exit("a rank failed")
-    return time.time() - start
+    return times
 
 
-def seconds_a_step(dpr, folder, ranks, batch, repetitions=3, few=2, many=8):
-    """The shortest of some differences: other work on the machine makes a run longer, never shorter."""
-    short = min(train(dpr, folder, ranks, few, batch) for _ in range(repetitions))
-    long = min(train(dpr, folder, ranks, many, batch) for _ in range(repetitions))
-    return (long - short) / (many - few)
+def seconds_a_step(dpr, folder, ranks, batch):
+    """Median and minimum of nine: other work on the machine makes a step longer, never shorter."""
+    times = train(dpr, folder, ranks, 10, batch)
+    steps = [after - before for before, after in zip(times, times[1:])]
+    return statistics.median(steps), min(steps)
 
 
 def measure_throughput(dpr, folder, batch):
     print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    one = seconds_a_step(dpr, folder, 1, batch)
-    two = seconds_a_step(dpr, folder, 2, batch)
-    print(f"batch {batch}: one rank {one:.3f} s a step, two ranks {two:.3f} s, {one / two:.2f} times the throughput")
+    one, two = (seconds_a_step(dpr, folder, ranks, batch) for ranks in (1, 2))
+    for what, a, b in zip(("median", "minimum"), one, two):
+        print(f"batch {batch}, {what} of nine steps: one rank {a:.3f} s, two ranks {b:.3f} s, {a / b:.2f} times the throughput")
     print(f"load after: {os.getloadavg()[0]:.1f}")
 
 
