@@ -60,10 +60,12 @@ void add_learn_command(CLI::App& application) {
                     "a build without libtorch",
                     "one with it: libtorch-dev, and cmake --preset release, which builds dpr-learn",
                     // OpenBLAS' threads sleep at once instead of waiting busily while the renderer works, and
-                    // freed memory is kept: a step's tensors take the pages of the last one's.
+                    // freed memory is kept: a step's tensors take the pages of the last one's. Libtorch's
+                    // log would tell of every attempt to connect.
                     {{"OPENBLAS_THREAD_TIMEOUT", "4"},
                      {"MALLOC_MMAP_THRESHOLD_", "8589934592"},
-                     {"MALLOC_TRIM_THRESHOLD_", "8589934592"}}});
+                     {"MALLOC_TRIM_THRESHOLD_", "8589934592"},
+                     {"GLOG_minloglevel", "3"}}});
 }
 
 void add_bench_command(CLI::App& application) {

@@ -91,6 +91,19 @@ LoadedCheckpoint read_checkpoint(const std::filesystem::path& file, torch::seria
   return loaded;
 }
 
+template <typename Open>
+LoadedCheckpoint load(const std::filesystem::path& file, double learning_rate, Open open) {
+  try {
+    torch::serialize::InputArchive archive;
+    open(archive);
+    return read_checkpoint(file, archive, learning_rate);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {  // torch has several kinds for an archive that it does not understand
+    throw IoError(file, "is damaged, or no checkpoint of dpr learn");
+  }
+}
+
 }  // namespace
 
 void save_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint, const Network& network,
@@ -135,15 +148,15 @@ LoadedCheckpoint load_checkpoint(const std::filesystem::path& file, double learn
   if (!std::filesystem::is_regular_file(file, error)) {  // torch reads it back and forth
     throw IoError(file, "is a pipe or a device, expected a regular file");
   }
-  try {
-    torch::serialize::InputArchive archive;
-    archive.load_from(file.string());
-    return read_checkpoint(file, archive, learning_rate);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception&) {  // torch has several kinds for an archive that it does not understand
-    throw IoError(file, "is damaged, or no checkpoint of dpr learn");
-  }
+  return load(file, learning_rate,
+              [&](torch::serialize::InputArchive& archive) { archive.load_from(file.string()); });
+}
+
+LoadedCheckpoint load_checkpoint(const std::filesystem::path& file, const std::string& bytes,
+                                 double learning_rate) {
+  return load(file, learning_rate, [&](torch::serialize::InputArchive& archive) {
+    archive.load_from(bytes.data(), bytes.size());
+  });
 }
 
 }  // namespace dpr::learn

@@ -47,5 +47,8 @@ LoadedCheckpoint start(const NetworkOptions& architecture, const std::string& me
 
 /// Throws IoError for a file that is missing, no checkpoint, or of another architecture.
 LoadedCheckpoint load_checkpoint(const std::filesystem::path& file, double learning_rate);
+/// The same of a file's bytes, where this process need not have it. The name is for errors.
+LoadedCheckpoint load_checkpoint(const std::filesystem::path& file, const std::string& bytes,
+                                 double learning_rate);
 
 }  // namespace dpr::learn

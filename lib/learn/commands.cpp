@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <sstream>
 
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
@@ -13,8 +15,10 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/provenance.hpp"
+#include "dpr/error.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
+#include "learn/ranks.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -118,6 +122,8 @@ void add_data_command(CLI::App& application, CommonOptions& common) {
 struct TrainCommand {
   DataOptions data;
   std::string output;
+  std::optional<int> ranks;
+  unsigned timeout = static_cast<unsigned>(learn::Ranks().timeout.count());
   learn::TrainingOptions training;
 };
 
@@ -137,11 +143,18 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
          {{"Training loss, means of consecutive steps", "loss", true, {{"mean", means}}}});
 }
 
-void run_train(const TrainCommand& command, const CommonOptions& common) {
+void print_result(const std::string& folder, const learn::TrainingResult& result) {
+  std::printf("%s: %zu steps, validation IoU %.3f; %.0f s in this run, %.0f%% of them in the renderer\n",
+              folder.c_str(), result.losses.size(), result.last.validation_iou, result.last.seconds,
+              100 * result.last.render_share);
+}
+
+/// Trains as one rank, or alone.
+void train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
   learn::training_smoothing(command.training);  // a wrong method leaves no folder behind
-  make_folder(command.output);
   const learn::TrainingOptions& o = command.training;
+  if (o.ranks.rank == 0) make_folder(command.output);
   learn::TrainingResult result;
   {
     Progress bar(static_cast<unsigned>(o.steps), common.quiet);
@@ -154,17 +167,39 @@ void run_train(const TrainCommand& command, const CommonOptions& common) {
           bar.update(static_cast<unsigned>(p.step), std::max(steps, time), text);
         });
   }
+  if (o.ranks.rank != 0) return;
   const std::filesystem::path folder(command.output);
   plot_losses(folder / "losses.png", result.losses);
   if (result.validation_steps.size() > 1) {
     plot(folder / "validation.png", "step", result.validation_steps,
          {{"Validation on unseen shapes", "mean IoU", false, {{"validation", result.validation_iou}}}});
   }
-  if (!common.quiet) {
-    std::printf("%s: %zu steps, validation IoU %.3f; %.0f s in this run, %.0f%% of them in the renderer\n",
-                command.output.c_str(), result.losses.size(), result.last.validation_iou, result.last.seconds,
-                100 * result.last.render_share);
+  if (!common.quiet) print_result(command.output, result);
+}
+
+/// The selector of a rank's device: of a list, one after the other by turns.
+std::string device_of(const std::string& selectors, int local_rank) {
+  std::vector<std::string> list;
+  std::istringstream text(selectors);
+  for (std::string selector; std::getline(text, selector, ',');) list.push_back(selector);
+  return list.empty() ? "" : list[static_cast<std::size_t>(local_rank) % list.size()];
+}
+
+void run_train(TrainCommand command, CommonOptions common) {
+  learn::Ranks& ranks = command.training.ranks;
+  ranks = learn::ranks_of([](const char* variable) { return std::getenv(variable); });
+  ranks.timeout = std::chrono::seconds(command.timeout);
+  if (ranks.count == 1 && command.ranks.value_or(1) > 1) {
+    if (const int status = learn::run_ranks(*command.ranks); status != 0) std::exit(status);
+    return;
   }
+  if (command.ranks.value_or(ranks.count) != ranks.count) {
+    throw InvalidArgument("ranks (dpr learn)", std::to_string(*command.ranks),
+                          std::to_string(ranks.count) + ", as WORLD_SIZE says, or no --ranks");
+  }
+  if (ranks.count > 1) common.device = device_of(common.device, ranks.local_rank);
+  common.quiet = common.quiet || ranks.rank != 0;
+  train(command, common);
 }
 
 void add_train_command(CLI::App& application, CommonOptions& common) {
@@ -190,7 +225,9 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
   add_seed_option(
       *command, [&o](std::uint64_t seed) { o.seed = seed; }, "Seed of the weights, the batches and the noise")
       ->default_str(std::to_string(o.seed));
-  command->add_option("--batch", o.batch, "Images a step")->capture_default_str()->type_name("N");
+  command->add_option("--batch", o.batch, "Images a step, of all ranks")
+      ->capture_default_str()
+      ->type_name("N");
   command->add_option("--learning-rate", o.learning_rate, "Of Adam")
       ->capture_default_str()
       ->type_name("FLOAT");
@@ -214,6 +251,13 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
   command
       ->add_option("--checkpoint-every", o.checkpoint_every, "Steps between checkpoints, which are validated")
       ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--ranks", options->ranks, "Processes on this machine that train together (default: 1)")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
+  command->add_option("--timeout", options->timeout, "Seconds for another rank to answer")
+      ->check(CLI::Range(1, 86400))
       ->capture_default_str()
       ->type_name("N");
   add_output_options(*command, common);

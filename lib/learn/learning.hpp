@@ -12,6 +12,7 @@
 #include "dpr/device.hpp"
 #include "dpr/smoothing.hpp"
 #include "learn/dataset.hpp"
+#include "learn/ranks.hpp"
 
 namespace dpr::learn {
 
@@ -26,14 +27,15 @@ struct TrainingOptions {
   /// Unless given, SoftRas' published 1e-4 each, and what makes another prior's noise as wide
   /// (Gaussian: 1.79e-4 and 1.24e-4); of opendr and nmr the preset's.
   std::optional<float> sigma, gamma;
-  std::uint64_t seed = 1;       ///< of the first weights, the batches, and sampled noise
-  std::int64_t palette = 16;    ///< colours of a palette
-  int batch = 16;               ///< images a step; each mesh is compared with two views of its object
+  std::uint64_t seed = 1;     ///< of the first weights, the batches, and sampled noise
+  std::int64_t palette = 16;  ///< colours of a palette
+  int batch = 16;  ///< images a step, of all ranks; each mesh is compared with two views of its object
   double learning_rate = 3e-4;  ///< of Adam (0.9, 0.999); the paper's is 1e-4
   LearningWeights weights;
   std::size_t steps = 20000;           ///< in all, with those before a resumption
   double minutes = 0;                  ///< of this run; 0: no limit
   std::size_t checkpoint_every = 250;  ///< steps; validated each time
+  Ranks ranks;                         ///< of which this process is one
 };
 
 /// What is said of a run as it goes.
@@ -60,7 +62,12 @@ Smoothing training_smoothing(const TrainingOptions& options);
 /// leaves checkpoint.pt and losses.csv in that folder, which exists. Step n depends on the options, the data
 /// and n only, and all but the learning rate are those of the checkpoint: interrupted
 /// and resumed training gives the same losses, bit by bit on one device with the same number of threads.
-/// Throws InvalidArgument, IoError, DeviceError; and Error if a loss is not finite.
+///
+/// Ranks divide every batch, and the validation, into equal parts, and all return the losses of the whole,
+/// for their number the same bit by bit. They follow a process that is alone to rounding; sampled noise is of
+/// its own on each. Rank 0 reads and writes the folder, which the others need not have, and is told the
+/// progress. Throws InvalidArgument, IoError, DeviceError; and Error if a loss is not finite, or another rank
+/// ended or does not answer (learn/ranks.hpp).
 TrainingResult train(const Device& device, const Dataset& training, const Dataset& validation,
                      const TrainingOptions& options, const std::filesystem::path& folder,
                      const std::function<void(const TrainingProgress&)>& progress);

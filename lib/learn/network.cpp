@@ -1,5 +1,7 @@
 #include "learn/network.hpp"
 
+#include "learn/batch_norm.hpp"
+
 namespace dpr::learn {
 namespace {
 
@@ -21,13 +23,18 @@ nn::Conv2d convolution(std::int64_t in, std::int64_t out) {
 Mesh template_mesh() { return make_icosphere(3); }
 
 EncoderImpl::EncoderImpl()
-    : convolutions_(convolution(4, 64), nn::BatchNorm2d(64), nn::ReLU(), convolution(64, 128),
-                    nn::BatchNorm2d(128), nn::ReLU(), convolution(128, 256), nn::BatchNorm2d(256),
-                    nn::ReLU()),
+    : convolutions_(convolution(4, 64), BatchNorm(64), nn::ReLU(), convolution(64, 128), BatchNorm(128),
+                    nn::ReLU(), convolution(128, 256), BatchNorm(256), nn::ReLU()),
       linear_(nn::Linear(256 * 8 * 8, k_hidden), nn::ReLU(), nn::Linear(k_hidden, k_hidden), nn::ReLU(),
               nn::Linear(k_hidden, k_features), nn::ReLU()) {
   register_module("convolutions", convolutions_);
   register_module("linear", linear_);
+}
+
+void EncoderImpl::share_batches(const RankGroupPtr& ranks) {
+  for (const auto& layer : convolutions_->children()) {
+    if (auto* const normalisation = layer->as<BatchNormImpl>()) normalisation->share_batches(ranks);
+  }
 }
 
 at::Tensor EncoderImpl::forward(at::Tensor images) {

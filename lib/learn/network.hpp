@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "dpr/mesh.hpp"
+#include "learn/rank_group.hpp"
 
 namespace dpr::learn {
 
@@ -28,6 +29,7 @@ Mesh template_mesh();
 class EncoderImpl : public torch::nn::Module {
  public:
   EncoderImpl();
+  void share_batches(const RankGroupPtr& ranks);
   /// [image, 4, 64, 64] to [image, 512].
   at::Tensor forward(at::Tensor images);
 
@@ -65,6 +67,8 @@ TORCH_MODULE(ColorDecoder);
 class NetworkImpl : public torch::nn::Module {
  public:
   explicit NetworkImpl(const NetworkOptions& options);
+  /// From now on it is trained with batches of which each rank has a part: learn/batch_norm.hpp.
+  void share_batches(const RankGroupPtr& ranks) { encoder_->share_batches(ranks); }
   /// [image, 4, 64, 64], RGBA over black in [0, 1].
   Reconstruction forward(const at::Tensor& images);
 

@@ -9,12 +9,14 @@
 #include <sstream>
 
 #include "base/checks.hpp"
+#include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/smoothing_options.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
+#include "learn/rank_group.hpp"
 #include "mesh/adjacency.hpp"
 #include "smoothing/priors.hpp"
 #include "torch/errors.hpp"
@@ -54,6 +56,13 @@ Batch draw_batch(const Dataset& dataset, std::uint64_t seed, std::size_t step, i
     batch.others.emplace_back(object, other);
   }
   return batch;
+}
+
+/// The part of a list that is a rank's.
+template <typename Value>
+std::vector<Value> part_of(const std::vector<Value>& all, const Ranks& ranks) {
+  const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
+  return {at(ranks.first(all.size())), at(ranks.last(all.size()))};
 }
 
 /// World to camera of every view: [24, 4, 4].
@@ -97,15 +106,20 @@ struct Losses {
 
 class Trainer {
  public:
-  Trainer(const Device& device, const Dataset& dataset, const TrainingOptions& options)
+  Trainer(const Device& device, const Dataset& dataset, const TrainingOptions& options,
+          const RankGroupPtr& ranks, Network& network)
       : dataset_(dataset),
         options_(options),
+        ranks_(ranks),
+        gradients_(ranks, network->parameters()),
         smoothing_(training_smoothing(options)),
         renderer_(c10::make_intrusive<torch_op::BatchRenderer>(template_mesh().faces, k_image_size,
                                                                k_image_size, smoothing_, device)),
         views_(view_matrices()),
-        intrinsics_(intrinsics().expand({2 * options.batch, 4})),
-        laplacian_(umbrella_operator(template_mesh())) {}
+        intrinsics_(intrinsics().expand({2 * options.batch / ranks->ranks().count, 4})),
+        laplacian_(umbrella_operator(template_mesh())) {
+    network->share_batches(ranks);
+  }
 
   double render_seconds() const { return renderer_->seconds(); }
 
@@ -126,22 +140,35 @@ class Trainer {
     const LearningWeights& w = options_.weights;
     const at::Tensor loss =
         w.silhouette * losses.silhouette + w.color * losses.color + w.laplacian * losses.laplacian;
-    const StepRecord record{loss.item<float>(), losses.silhouette.item<float>(), losses.color.item<float>(),
-                            losses.laplacian.item<float>()};
+    const StepRecord record =
+        record_of(torch::stack({loss, losses.silhouette, losses.color, losses.laplacian}));
     if (!std::isfinite(record.loss)) {
       throw Error("loss (dpr learn): got " + checks::text(record.loss) + " in step " +
                   std::to_string(number) + ", expected a finite number; the last checkpoint stands");
     }
     run.optimizer->zero_grad();
-    loss.backward();
+    gradients_.backward(loss);
     run.optimizer->step();
     return record;
   }
 
+  /// Of all ranks, whose batches are of the same size.
+  StepRecord record_of(const at::Tensor& losses) const {
+    const at::Tensor means = losses.detach().to(torch::kDouble);
+    ranks_->sum(means);
+    means.div_(ranks_->ranks().count);
+    const auto value = [&](std::int64_t i) { return means[i].item<double>(); };
+    return {value(0), value(1), value(2), value(3)};
+  }
+
   Losses evaluate_step(Network& network, std::size_t number) {
-    const Batch batch = draw_batch(dataset_, options_.seed, number, options_.batch);
+    constexpr unsigned k_step_bits = 40;
+    const Batch whole = draw_batch(dataset_, options_.seed, number, options_.batch);
+    const Ranks& ranks = ranks_->ranks();
+    const Batch batch{part_of(whole.inputs, ranks), part_of(whole.others, ranks)};
     Smoothing smoothing = smoothing_;
-    smoothing.seed = options_.seed + number;  // sampled noise of its own in every step
+    // Sampled noise of its own in every step, and on every rank.
+    smoothing.seed = options_.seed + number + (static_cast<std::uint64_t>(ranks.rank) << k_step_bits);
     renderer_->set_smoothing(smoothing);
     const at::Tensor inputs = load_images(dataset_, batch.inputs);
     const at::Tensor targets =
@@ -173,6 +200,8 @@ class Trainer {
 
   const Dataset& dataset_;
   const TrainingOptions& options_;
+  RankGroupPtr ranks_;
+  GradientAverage gradients_;
   Smoothing smoothing_;
   c10::intrusive_ptr<torch_op::BatchRenderer> renderer_;
   at::Tensor views_, intrinsics_, laplacian_;
@@ -196,6 +225,8 @@ void check(const TrainingOptions& options) {
     if (!good) throw InvalidArgument(std::string(name) + " (dpr learn)", checks::text(got), expected);
   };
   require(options.batch >= 2 && options.batch <= 1024, "batch", options.batch, "2 to 1024");
+  require(options.batch % options.ranks.count == 0, "batch", options.batch,
+          ("a multiple of the " + std::to_string(options.ranks.count) + " ranks").c_str());
   require(options.palette >= 1 && options.palette <= 256, "palette", static_cast<double>(options.palette),
           "1 to 256");
   require(options.learning_rate > 0 && std::isfinite(options.learning_rate), "learning rate",
@@ -229,31 +260,63 @@ std::vector<std::string> parts_of(const std::string& settings) {
   return parts;
 }
 
-/// Throws InvalidArgument unless the settings are the same, with those parts that are not.
-void require_same(const std::filesystem::path& file, const std::string& found, const std::string& asked) {
-  if (found == asked) return;
-  const std::vector<std::string> there = parts_of(found), here = parts_of(asked);
-  std::string got, expected;
+/// Those parts of two settings that are not the same.
+std::pair<std::string, std::string> differences(const std::string& first, const std::string& second) {
+  const std::vector<std::string> there = parts_of(first), here = parts_of(second);
+  std::pair<std::string, std::string> result;
   for (std::size_t i = 0; i < std::max(there.size(), here.size()); ++i) {
     const std::string a = i < there.size() ? there[i] : "", b = i < here.size() ? here[i] : "";
     if (a == b) continue;
-    got += (got.empty() ? "" : ", ") + a;
-    expected += (expected.empty() ? "" : ", ") + b;
+    result.first += (result.first.empty() ? "" : ", ") + a;
+    result.second += (result.second.empty() ? "" : ", ") + b;
   }
+  return result;
+}
+
+/// Throws InvalidArgument unless the settings are the same, with those parts that are not.
+void require_same(const std::filesystem::path& file, const std::string& found, const std::string& asked) {
+  if (found == asked) return;
+  const auto [got, expected] = differences(found, asked);
   throw InvalidArgument("checkpoint (" + file.string() + ")", got,
                         expected + " as asked for, or another folder");
 }
 
+/// Throws InvalidArgument on every rank that is to train otherwise than rank 0.
+void require_same(const RankGroup& ranks, const TrainingOptions& options, const std::string& settings) {
+  std::ostringstream text;
+  text << settings << ", palette " << options.palette << ", learning rate "
+       << checks::text(options.learning_rate) << ", " << options.steps << " steps, "
+       << checks::text(options.minutes) << " minutes, a checkpoint every " << options.checkpoint_every;
+  const std::string expected = ranks.share(text.str());
+  if (text.str() == expected) return;
+  const auto [got, wanted] = differences(text.str(), expected);
+  throw InvalidArgument("rank " + std::to_string(ranks.ranks().rank) + " (dpr learn)", got,
+                        wanted + " as rank 0");
+}
+
+/// What rank 0 has in its folder, if anything.
+LoadedCheckpoint load_of_rank_0(const std::filesystem::path& file, double learning_rate,
+                                const RankGroup& ranks) {
+  if (ranks.ranks().rank != 0) {
+    const std::string bytes = ranks.share({});
+    return bytes.empty() ? LoadedCheckpoint{} : load_checkpoint(file, bytes, learning_rate);
+  }
+  LoadedCheckpoint loaded;
+  if (std::filesystem::exists(file)) loaded = load_checkpoint(file, learning_rate);
+  if (!ranks.is_alone()) ranks.share(loaded.network ? read_file(file) : "");
+  return loaded;
+}
+
 /// The checkpoint to go on from, or a fresh start. Throws InvalidArgument if it belongs to another training.
 LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions& options,
-                        const std::string& settings) {
+                        const std::string& settings, const RankGroup& ranks) {
   const NetworkOptions wanted{options.palette};
-  if (!std::filesystem::exists(file)) {
-    LoadedCheckpoint fresh = start(wanted, options.method, options.seed, options.learning_rate);
-    fresh.checkpoint.settings = settings;
-    return fresh;
+  LoadedCheckpoint loaded = load_of_rank_0(file, options.learning_rate, ranks);
+  if (!loaded.network) {
+    loaded = start(wanted, options.method, options.seed, options.learning_rate);
+    loaded.checkpoint.settings = settings;
+    return loaded;
   }
-  LoadedCheckpoint loaded = load_checkpoint(file, options.learning_rate);
   const Checkpoint& c = loaded.checkpoint;
   if (!(c.architecture == wanted)) {
     throw InvalidArgument("checkpoint (" + file.string() + ")",
@@ -262,6 +325,19 @@ LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions
   }
   require_same(file, c.settings, settings);
   return loaded;
+}
+
+/// Mean IoU of the listed images, of which every rank takes a part.
+double validate(Network& network, const Dataset& dataset, const std::vector<ViewOfObject>& which,
+                const RankGroup& ranks) {
+  const std::vector<double> own =
+      reconstruction_iou(network, dataset, part_of(which, ranks.ranks()), [](std::size_t) {});
+  const auto first = static_cast<std::int64_t>(ranks.ranks().first(which.size()));
+  const at::Tensor all = torch::zeros({static_cast<std::int64_t>(which.size())}, torch::kDouble);
+  std::ranges::copy(own, all.data_ptr<double>() + first);
+  ranks.sum(all);
+  const double* const values = all.data_ptr<double>();
+  return std::accumulate(values, values + which.size(), 0.0) / static_cast<double>(which.size());
 }
 
 TrainingResult result_of(const LoadedCheckpoint& run, const TrainingProgress& last) {
@@ -308,29 +384,30 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
                      const std::function<void(const TrainingProgress&)>& progress) {
   check(options);
   const std::filesystem::path file = folder / "checkpoint.pt";
-  LoadedCheckpoint run = resume(file, options, settings_of(options, training));
-  Trainer trainer(device, training, options);
+  const std::string settings = settings_of(options, training);
+  const auto ranks = c10::make_intrusive<RankGroup>(options.ranks);
+  const bool is_first = options.ranks.rank == 0;
+  require_same(*ranks, options, settings);
+  LoadedCheckpoint run = resume(file, options, settings, *ranks);
+  Trainer trainer(device, training, options, ranks, run.network);
   constexpr std::size_t k_validation_views = 2;
   const std::vector<ViewOfObject> held_out = spread_views(validation, k_validation_views);
   TrainingProgress state;
   if (!run.checkpoint.validations.empty()) state.validation_iou = run.checkpoint.validations.back().iou;
 
   const auto save = [&] {
-    const std::vector<double> found =
-        reconstruction_iou(run.network, validation, held_out, [](std::size_t) {});
-    state.validation_iou =
-        std::accumulate(found.begin(), found.end(), 0.0) / static_cast<double>(found.size());
+    state.validation_iou = validate(run.network, validation, held_out, *ranks);
     run.checkpoint.validations.push_back(
         {static_cast<double>(run.checkpoint.steps.size()), state.validation_iou});
+    if (!is_first) return;
     // In this order: interrupted between the two, a training that is complete would not write its losses.
     write_losses(folder / "losses.csv", run.checkpoint.steps);
     save_checkpoint(file, run.checkpoint, run.network, *run.optimizer);
   };
 
   const Clock::time_point begin = Clock::now();
-  bool saved = true;
-  while (run.checkpoint.steps.size() < options.steps &&
-         (options.minutes <= 0 || seconds_since(begin) < 60 * options.minutes)) {
+  bool saved = true, is_over = false;
+  while (run.checkpoint.steps.size() < options.steps && !is_over) {
     const Clock::time_point start_of_step = Clock::now();
     run.checkpoint.steps.push_back(trainer.step(run));
     state.seconds += seconds_since(start_of_step);
@@ -339,7 +416,8 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
     state.render_share = trainer.render_seconds() / state.seconds;
     saved = state.step % options.checkpoint_every == 0;
     if (saved) save();
-    progress(state);
+    if (is_first) progress(state);
+    is_over = options.minutes > 0 && ranks->any(seconds_since(begin) >= 60 * options.minutes);
   }
   if (!saved) save();
   return result_of(run, state);

@@ -63,6 +63,8 @@ class Process {
            info.si_pid == id_;
   }
 
+  pid_t id() const { return id_; }
+
   void kill(int signal) const { ::kill(id_, signal); }
 
   /// How it ended: its exit status, or minus the signal that ended it.
