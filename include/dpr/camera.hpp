@@ -85,18 +85,18 @@ DPR_API Intrinsics from_opencv_intrinsics(const Intrinsics& intrinsics);
 
 /// What PyTorch3D's PerspectiveCameras and OrthographicCameras are made with, in its NDC (in_ndc=True).
 struct PyTorch3dProjection {
-  glm::vec2 focal_length, principal_point;
+  vec2 focal_length, principal_point;
 };
-PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height);
+DPR_API PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height);
 /// Of PerspectiveCameras.
 DPR_API Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height);
 
 /// OpenGL's projection matrix: clip coordinates from camera space, for a viewport of that many pixels.
 /// Without the lens' distortion, which no matrix has.
-DPR_API glm::mat4 to_opengl_projection(const Camera& camera, int width, int height);
+DPR_API mat4 to_opengl_projection(const Camera& camera, int width, int height);
 /// The camera of OpenGL's view and projection matrices: with intrinsics, or orthographic. Throws
 /// InvalidArgument for a matrix that is of neither kind, or skewed; orthographic also if its pixels are not
 /// square or the axis does not pass the image's centre.
-DPR_API Camera from_opengl(const glm::mat4& view, const glm::mat4& projection, int width, int height);
+DPR_API Camera from_opengl(const mat4& view, const mat4& projection, int width, int height);
 
 }  // namespace dpr

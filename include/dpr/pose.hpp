@@ -99,7 +99,7 @@ struct PoseIteration {
   unsigned hypotheses = 1;    ///< that were turned together
   Pose pose;                  ///< of the best
   double focal_scale = 1;     ///< of the best
-  glm::dvec2 radial{0.0};     ///< of the best
+  dvec2 radial{0.0};          ///< of the best
 };
 
 /// A pose that was found, and how well it explains the target.
@@ -107,11 +107,11 @@ struct PoseHypothesis {
   Pose pose;
   double focal_scale = 1;  ///< factor on the scene's focal length
   double loss = 0;         ///< at the finest level
-  glm::dvec2 radial{0.0};  ///< what is added to k1 and k2 of the scene's lens
+  dvec2 radial{0.0};       ///< what is added to k1 and k2 of the scene's lens
 };
 
 /// The scene's camera with what was found of it.
-DPR_API Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& radial);
+DPR_API Camera calibrated(const Camera& camera, double focal_scale, const dvec2& radial);
 
 struct PoseResult : PoseHypothesis {
   Pose start;  ///< the (first) initial pose; in a search the scene's

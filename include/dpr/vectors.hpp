@@ -15,6 +15,7 @@ static_assert(std::is_same_v<glm::length_t, int>,
 using vec2 = glm::vec<2, float, glm::packed_highp>;
 using vec3 = glm::vec<3, float, glm::packed_highp>;
 using vec4 = glm::vec<4, float, glm::packed_highp>;
+using dvec2 = glm::vec<2, double, glm::packed_highp>;
 using dvec3 = glm::vec<3, double, glm::packed_highp>;
 using uvec3 = glm::vec<3, std::uint32_t, glm::packed_highp>;
 using mat3 = glm::mat<3, 3, float, glm::packed_highp>;
