@@ -93,15 +93,31 @@ PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rota
   return solver.solve(initial, callback);
 }
 
-void print(const std::string& file, const PoseResult& result, bool is_light_fixed) {
-  std::printf("%s: loss %.6g after %u iterations, %.1f s\n", file.c_str(), result.loss, result.iterations,
-              result.seconds);
+/// What may help where the target is not explained: what was not asked for.
+std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
+  std::string text;
+  const auto add = [&](const char* option, const char* why) {
+    if (command.count(option) == 0) text += std::string(text.empty() ? "" : "; ") + option + " " + why;
+  };
+  add("--search", "forgets the start");
+  add("--translation", "finds a displaced object");
+  add("--focal", "an unknown focal length");
+  add("--distortion", "a lens");
+  add("--robust", "is for clutter and occlusion");
+  if (options.light == name_of(PoseLight::fixed))
+    text += (text.empty() ? "" : "; ") + std::string("--light harmonics for another light");
+  return text.empty() ? "" : ": " + text;
+}
+
+void print(const CLI::App& command, const PoseCommandOptions& options, const PoseResult& result) {
+  std::printf("%s: loss %.6g after %u iterations, %.1f s\n", options.output.c_str(), result.loss,
+              result.iterations, result.seconds);
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
-        "be wrong: --search tries all rotations, --translation, --focal and --distortion find what else is "
-        "not known. Or colours, clutter or occlusion differ from the scene's: --robust is for these%s.\n",
-        is_light_fixed ? ", --light harmonics for another light" : "");
+        "be "
+        "wrong%s.\n",
+        advice(command, options).c_str());
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }
@@ -130,7 +146,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
     write_pose_report(options.report, page_source(title, common, device), device, scene, target, result,
                       common.quiet);
   }
-  if (!common.quiet) print(options.output, result, options.light == name_of(PoseLight::fixed));
+  if (!common.quiet) print(command, options, result);
 }
 
 void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {

@@ -95,10 +95,10 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   scene.meshes.push_back({read_mesh(options.mesh, notes), glm::mat4(1.0F)});
   const std::string note = noise_note({}, common.smoothing);
   if (!note.empty()) notes.push_back(note);
-  print_notes(notes, common);
   const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
   scene.smoothing = picture_smoothing(common.smoothing, size);
   apply(common, scene);
+  print_notes(notes, common);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
   scene.camera = fit_camera(sphere, options, scene.width, scene.height);
   scene.lights = fit_lights(scene.camera, sphere);

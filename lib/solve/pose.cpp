@@ -60,6 +60,10 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
     if (scene_.camera.orthographic_height)
       throw InvalidArgument("distortion (pose)", "an orthographic camera", "a perspective one, with a lens");
   }
+  if (options_.solve_translation && scene_.camera.orthographic_height) {
+    throw InvalidArgument("translation (pose)", "an orthographic camera, which shows nothing of the depth",
+                          "a perspective one, or a rotation to look for alone");
+  }
   std::visit([&](const auto& method) { validate(method, scene_); }, options_.method);
   const double determinant = glm::determinant(glm::dmat3(scene_.meshes.front().transform));
   require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,

@@ -372,6 +372,7 @@ TEST_SUITE("robustness") {
     dpr::Scene orthographic = good;
     orthographic.camera.orthographic_height = 4.0F;
     refuses(orthographic, target, {.method = least_squares(), .solve_distortion = true});
+    refuses(orthographic, target, {.method = least_squares(), .solve_translation = true});
 
     refuses_descent([](dpr::Descent& d) { d.iterations = 0; });
     refuses_descent([](dpr::Descent& d) { d.optimizer.learning_rate = -1; });
