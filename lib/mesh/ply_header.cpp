@@ -213,25 +213,38 @@ class PlyHeaderReader {
                   "the file is truncated: its header promises " + std::to_string(least) + " bytes or more");
   }
 
-  // No list of a face in a text may claim more than its line holds.
+  // No list of a face in a text may claim more than its line holds, nor may a line hold more: OpenMesh, which
+  // reads number after number, would take the rest for the next element's.
   void check_lists(const Element& face) {
-    std::uint64_t before = 0;
     for (const Element* element = elements_.data(); element != &face; ++element) {
-      before += element->properties.empty() ? 0 : element->count;
-    }
-    for (std::uint64_t i = 0; i < before + face.count && lines_.next();) {
-      scan::split(lines_.line(), words_);
-      if (words_.empty()) continue;
-      if (i++ < before) continue;
-      std::size_t word = 0;
-      for (const Property& property : face.properties) {
-        if (word >= words_.size()) fail("too few numbers for a face");
-        const auto length = scan::parse<std::uint32_t>(words_[word++]);
-        if (property.list_count_type.empty()) continue;
-        if (!length || *length > words_.size() - word) fail("too few numbers for a face");
-        word += *length;
+      for (std::uint64_t i = 0; i < element->count && !element->properties.empty() && next_numbers(); ++i) {
+        if (words_.size() != element->properties.size())
+          fail("expected " + std::to_string(element->properties.size()) + " numbers, of one " +
+               element->name);
       }
     }
+    for (std::uint64_t i = 0; i < face.count && next_numbers(); ++i) check_lists_of_line(face);
+  }
+
+  void check_lists_of_line(const Element& face) {
+    std::size_t word = 0;
+    for (const Property& property : face.properties) {
+      if (word >= words_.size()) fail("too few numbers for a face");
+      const auto length = scan::parse<std::uint32_t>(words_[word++]);
+      if (property.list_count_type.empty()) continue;
+      if (!length || *length > words_.size() - word) fail("too few numbers for a face");
+      word += *length;
+    }
+    if (word < words_.size()) fail("too many numbers for a face");
+  }
+
+  // The words of the next line that has some; false at the end.
+  bool next_numbers() {
+    while (lines_.next()) {
+      scan::split(lines_.line(), words_);
+      if (!words_.empty()) return true;
+    }
+    return false;
   }
 
   // Only all three together are colours.
