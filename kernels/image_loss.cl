@@ -62,9 +62,11 @@ kernel void image_loss_backward(const uint views, const uint pixels_per_view, co
 }
 
 /// A level of a pyramid from the one before: means of blocks of 2x2 pixels, at the border of those that are
-/// there. One work-item per pixel of it. in   width, height  of the level before in   pixels         of all
-/// views, of this level in   large          float4[view][height][width]  RGBA out  small float4[view][(height
-/// + 1) / 2][(width + 1) / 2]
+/// there. One work-item per pixel of it.
+/// in   width, height  of the level before
+/// in   pixels         of all views, of this level
+/// in   large          float4[view][height][width]  RGBA
+/// out  small          float4[view][(height + 1) / 2][(width + 1) / 2]
 kernel void image_loss_shrink(const uint width, const uint height, const uint pixels,
                               global const float4* restrict large, global float4* restrict small) {
   const uint i = (uint)get_global_id(0);

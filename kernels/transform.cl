@@ -33,11 +33,10 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
 /// no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, vertex).
 /// in      views, models, vertex_mesh, world  as transform_forward
 /// in      grad_ndc    float4[view][vertex]  d loss / d (x, y, depth)
-/// in      grad_clip   float4[view][vertex]  what clipped faces add, of homogeneous coordinates: x times
-/// depth,
-///                     y times depth, depth, with x and y in NDC; orthographic: x, y, depth. Where the lens
-///                     distorts, without its distortion: what it does to cuts is left out of its own
-///                     gradients. Read where p.clips is set
+/// in      grad_clip   float4[view][vertex]  what clipped faces add, of homogeneous coordinates: x and y in
+///                     NDC, times depth, and depth; orthographic: x, y, depth. Where the lens distorts,
+///                     without its distortion: what it does to cuts is left out of its own gradients. Read
+///                     where p.clips is set
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in out  grad_world  float4[view][vertex]  in: what shading adds; out: the whole d loss / d world position
 /// out     channels    float[DPR_POSE_CHANNELS][view][vertex]; float[DPR_LENS_CHANNELS][view][vertex] where

@@ -11,6 +11,7 @@
 #include "experiment.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
+#include "views.hpp"
 
 namespace dpr::experiments {
 namespace {
@@ -189,11 +190,9 @@ const std::vector<Kind>& kinds() {
 /// As a camera's file has it: noise, and 255 steps.
 void spoil(Image& image, Random& random) {
   for (glm::vec4& pixel : image.pixels) {
-    for (int c = 0; c < 3; ++c) {
-      const float noisy = pixel[c] + k_noise * random.gaussian();
-      pixel[c] = std::round(255 * std::clamp(noisy, 0.0F, 1.0F)) / 255;
-    }
+    for (int c = 0; c < 3; ++c) pixel[c] += k_noise * random.gaussian();
   }
+  round_to_8_bits(image);
 }
 
 /// Light takes nothing away, and a cone stays one that can be rendered with.

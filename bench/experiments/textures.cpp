@@ -49,13 +49,6 @@ std::vector<View> views_of(const std::vector<Camera>& cameras) {
   return views;
 }
 
-/// As a file has it.
-void round_to_8_bits(Image& image) {
-  for (glm::vec4& pixel : image.pixels) {
-    for (int c = 0; c < 3; ++c) pixel[c] = std::round(255 * std::clamp(pixel[c], 0.0F, 1.0F)) / 255;
-  }
-}
-
 std::vector<Image> render(const Device& device, const Scene& scene, const std::vector<Camera>& cameras) {
   Renderer renderer(device);
   renderer.set_scene(scene);

@@ -1,5 +1,6 @@
 #include "views.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dpr::experiments {
@@ -19,6 +20,12 @@ std::vector<Camera> cameras_around(std::size_t count, double turn_degrees) {
     cameras.push_back(camera);
   }
   return cameras;
+}
+
+void round_to_8_bits(Image& image) {
+  for (glm::vec4& pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) pixel[c] = std::round(255 * std::clamp(pixel[c], 0.0F, 1.0F)) / 255;
+  }
 }
 
 double psnr(const std::vector<Image>& images, const std::vector<Image>& targets, float least_alpha) {

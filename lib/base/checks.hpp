@@ -61,6 +61,18 @@ inline void require_positive(float value, const std::string& argument) {
   throw InvalidArgument(argument, text(value), "a finite number > 0");
 }
 
+/// Throws unless the first channel of a mask can say how much pixels count: from 0 to `most`, not all 0.
+inline void require_weights(const Image& mask, const std::string& name, float most,
+                            const std::string& expected) {
+  double sum = 0;
+  for (const glm::vec4& pixel : mask.pixels) {
+    if (!(pixel.x >= 0 && pixel.x <= most))
+      throw InvalidArgument("pixel of the " + name, text(pixel.x), expected);
+    sum += static_cast<double>(pixel.x);
+  }
+  if (!(sum > 0)) throw InvalidArgument("sum of the " + name, text(sum), "a pixel above 0");
+}
+
 /// Throws unless the matrix is finite, affine and far enough from singular that its inverse means something.
 inline void require_affine(const glm::mat4& matrix, const std::string& argument) {
   constexpr float k_last_row_tolerance = 1e-5F;  // a product of single-precision inverses leaves that much

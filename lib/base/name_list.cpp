@@ -4,6 +4,8 @@
 #include <numeric>
 #include <vector>
 
+#include "dpr/error.hpp"
+
 namespace dpr {
 namespace {
 
@@ -38,6 +40,13 @@ std::string joined(std::span<const std::string_view> names) {
   std::string list;
   for (const std::string_view name : names) list += (list.empty() ? "" : "|") + std::string(name);
   return list;
+}
+
+std::size_t position_of(std::string_view word, std::span<const std::string_view> names,
+                        const std::string& argument) {
+  const auto found = std::ranges::find(names, word);
+  if (found == names.end()) throw InvalidArgument(argument, "\"" + std::string(word) + "\"", one_of(names));
+  return static_cast<std::size_t>(found - names.begin());
 }
 
 std::optional<std::string_view> nearest_name(std::string_view word, std::span<const std::string_view> names) {

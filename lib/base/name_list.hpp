@@ -1,6 +1,7 @@
 // Lists of names as messages and --help have them.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,6 +13,11 @@ namespace dpr {
 std::string one_of(std::span<const std::string_view> names);
 /// "a|b|c", as --help has it.
 std::string joined(std::span<const std::string_view> names);
+
+/// Where a name stands in the list. Throws InvalidArgument, which calls what the word is for `argument`, for
+/// a word that is none of them.
+std::size_t position_of(std::string_view word, std::span<const std::string_view> names,
+                        const std::string& argument);
 
 /// The name that is mistyped as `word`: the one of the fewest changed letters, at most a third of the word's.
 std::optional<std::string_view> nearest_name(std::string_view word, std::span<const std::string_view> names);

@@ -115,8 +115,7 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above a tenth of what wrong poses leave. The pose may "
-        "be "
-        "wrong%s.\n",
+        "be wrong%s.\n",
         advice(command, options).c_str());
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
@@ -163,8 +162,8 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
   add("--robust", method.robust_scale,
       "For clutter and occlusion: pixels of other colours hardly count; a number is the colour difference "
-      "from which "
-      "on, else the residuals tell",
+      "from which on, "
+      "else the residuals tell",
       "[FLOAT]")
       ->expected(0, 1);
   command

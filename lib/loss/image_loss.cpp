@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "base/checks.hpp"
@@ -91,13 +92,7 @@ void require_mask(const Image& mask, const Image& image, const std::string& name
     throw InvalidArgument("size of the " + name, checks::size(mask.width, mask.height),
                           checks::size(image.width, image.height) + ", the image's");
   }
-  double sum = 0;
-  for (const glm::vec4& p : mask.pixels) {
-    if (!(p.x >= 0) || !std::isfinite(p.x))
-      throw InvalidArgument("pixel of the " + name, std::to_string(p.x), "a finite number, at least 0");
-    sum += static_cast<double>(p.x);
-  }
-  if (!(sum > 0)) throw InvalidArgument("sum of the " + name, std::to_string(sum), "a pixel above 0");
+  checks::require_weights(mask, name, std::numeric_limits<float>::max(), "a finite number, at least 0");
 }
 
 std::span<const ImageLossRow> image_losses() { return k_losses; }

@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "base/name_list.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
@@ -31,10 +32,7 @@ std::vector<std::array<glm::vec2, 3>> corner_texcoords(const Scene& scene) {
 std::string_view to_string(Aov aov) { return k_names[static_cast<std::size_t>(aov)]; }
 
 Aov parse_aov(std::string_view word, std::string_view where) {
-  const auto* const found = std::ranges::find(k_names, word);
-  if (found != k_names.end()) return static_cast<Aov>(found - k_names.begin());
-  throw InvalidArgument(std::string(where), "\"" + std::string(word) + "\"",
-                        "depth, normal, face_id, barycentrics, uv or effective_faces");
+  return static_cast<Aov>(position_of(word, k_names, std::string(where)));
 }
 
 void Renderer::Impl::render_aov() {

@@ -67,9 +67,7 @@ double LightKind<SpotLight>::cosine_slope(float degrees) {
 }
 
 Shading parse_shading(const std::string& word, const std::string& argument) {
-  const auto found = std::ranges::find(k_shadings, word);
-  if (found == k_shadings.end()) throw InvalidArgument(argument, "\"" + word + "\"", one_of(k_shadings));
-  return static_cast<Shading>(found - k_shadings.begin());
+  return static_cast<Shading>(position_of(word, k_shadings, argument));
 }
 
 cl_uint needs_of(const Lights& lights) {

@@ -2,6 +2,7 @@
 #include "scene/scene_json.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <string>
 
@@ -86,12 +87,8 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
 template <typename Word>
 void take_word(const JsonNode& node, std::string_view key, Word& value,
                std::span<const std::string_view> names) {
-  take(node, key, value, [names](const JsonNode& n) {
-    const std::string word = n.string();
-    const auto found = std::ranges::find(names, word);
-    if (found == names.end()) n.fail("\"" + word + "\"", one_of(names));
-    return static_cast<Word>(found - names.begin());
-  });
+  take(node, key, value,
+       [names](const JsonNode& n) { return static_cast<Word>(position_of(n.string(), names, n.name())); });
 }
 
 // A texture beside a file takes the place of all of the file's.
@@ -240,14 +237,10 @@ Distortion parse_distortion(const JsonNode& node) {
 
 /// "orthographic" or "perspective", and what belongs to it.
 void take_projection(const JsonNode& node, Camera& camera) {
-  bool is_orthographic = false;
-  if (const auto projection = node.find("projection")) {
-    const std::string word = projection->string();
-    is_orthographic = word == "orthographic";
-    if (!is_orthographic && word != "perspective")
-      projection->fail("\"" + word + "\"", "perspective or orthographic");
-  }
-  if (!is_orthographic) {
+  enum class Kind { perspective, orthographic } kind{};
+  constexpr std::array<std::string_view, 2> k_kinds{"perspective", "orthographic"};
+  take_word(node, "projection", kind, k_kinds);
+  if (kind == Kind::perspective) {
     if (node.find("orthographic_height"))
       node.fail("orthographic_height without orthographic projection", "\"projection\": \"orthographic\"");
     return;

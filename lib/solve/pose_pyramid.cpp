@@ -26,12 +26,7 @@ void validate(const LeastSquares& options, const Scene& scene) {
     throw InvalidArgument("size of the mask (pose)", checks::size(mask.width, mask.height),
                           checks::size(scene.width, scene.height) + ", the scene's");
   }
-  double sum = 0;
-  for (const glm::vec4& pixel : mask.pixels) {
-    require(pixel.x >= 0 && pixel.x <= 1, "pixel of the mask (pose)", pixel.x, "a number in [0, 1]");
-    sum += static_cast<double>(pixel.x);
-  }
-  require(sum > 0, "sum of the mask (pose)", sum, "a pixel above 0");
+  checks::require_weights(mask, "mask (pose)", 1, "a number in [0, 1]");
 }
 
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {

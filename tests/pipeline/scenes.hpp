@@ -55,24 +55,26 @@ inline Scene scene_of(Mesh mesh, int width, int height) {
 
 inline Scene cube_scene(int width, int height) { return scene_of(make_cube(), width, height); }
 
-/// From within: faces at the camera's sides reach behind it.
-inline Scene scene_within(Mesh mesh, int width, int height) {
+/// Faces reach nearer than the near plane.
+inline Scene scene_from_near(Mesh mesh, int width, int height, const Camera& from, float znear) {
   Scene scene = scene_of(std::move(mesh), width, height);
-  scene.camera = orbit_camera(0.55F, 21.0F, 37.0F, {0.1F, -0.07F, 0.05F});
+  scene.camera = from;
   scene.camera.fov_y_degrees = 80.0F;
-  scene.camera.znear = 0.2F;
+  scene.camera.znear = znear;
   scene.camera.zfar = 8.0F;
   return scene;
 }
 
+/// From within: faces at the camera's sides reach behind it.
+inline Scene scene_within(Mesh mesh, int width, int height) {
+  return scene_from_near(std::move(mesh), width, height,
+                         orbit_camera(0.55F, 21.0F, 37.0F, {0.1F, -0.07F, 0.05F}), 0.2F);
+}
+
 /// From outside, with the near plane through the mesh, so that the cut is in sight.
 inline Scene scene_cut_open(Mesh mesh, int width, int height) {
-  Scene scene = scene_of(std::move(mesh), width, height);
-  scene.camera = orbit_camera(2.2F, 24.0F, 37.0F, {0.03F, -0.02F, 0.01F});
-  scene.camera.fov_y_degrees = 80.0F;
-  scene.camera.znear = 1.4F;
-  scene.camera.zfar = 8.0F;
-  return scene;
+  return scene_from_near(std::move(mesh), width, height,
+                         orbit_camera(2.2F, 24.0F, 37.0F, {0.03F, -0.02F, 0.01F}), 1.4F);
 }
 
 /// A plane below the camera, from behind it to the horizon, of quads with a row of corners in the camera's
