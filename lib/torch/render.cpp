@@ -12,30 +12,15 @@
 #include <string>
 #include <utility>
 
-#include "base/name_list.hpp"
 #include "scene/light_table.hpp"
 #include "torch/errors.hpp"
+#include "torch/light_tensors.hpp"
 
 namespace dpr::torch_op {
 namespace {
 
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
-
-/// The tensor itself, if it is contiguous. -1 stands for any size.
-at::Tensor checked(const at::Tensor& tensor, const std::string& name,
-                   std::initializer_list<std::int64_t> shape, const char* expected) {
-  if (tensor.scalar_type() != at::kFloat || !tensor.device().is_cpu()) {
-    throw InvalidArgument(name + " (dpr::render)", tensor.toString(), "a float32 tensor on the CPU");
-  }
-  bool fits = tensor.dim() == static_cast<std::int64_t>(shape.size());
-  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
-    const std::int64_t wanted = shape.begin()[i];
-    fits = wanted < 0 || tensor.size(static_cast<std::int64_t>(i)) == wanted;
-  }
-  if (!fits) throw InvalidArgument(name + " (dpr::render)", shape_text(tensor), expected);
-  return tensor.contiguous();
-}
 
 /// The memory of a contiguous tensor whose rows are vectors.
 template <typename Vector>
@@ -54,67 +39,6 @@ at::Tensor adopt(std::vector<glm::vec3>& own, std::vector<glm::vec3>& shared, st
   return at::from_blob(
       vectors->data(), {batch, count / batch, 3}, [vectors](void*) { delete vectors; },
       at::TensorOptions(at::kFloat));
-}
-
-/// Lights whose numbers are yet to come, and a tensor of these, in their order.
-struct PackedLights {
-  Lights lights;
-  at::Tensor numbers;
-};
-
-/// The numbers of a kind's light, one after the other.
-template <typename Kind>
-std::int64_t count_numbers(Kind) {
-  std::int64_t count = 0;
-  typename Kind::Light light;
-  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
-    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
-  });
-  return count;
-}
-
-void require_known(const LightTensors& given) {
-  std::vector<std::string_view> keys{"ambient", "harmonics"};
-  for_each_light_kind([&](auto kind) { keys.push_back(kind.key); });
-  for (const auto& entry : given) {
-    if (std::ranges::find(keys, entry.key()) == keys.end())
-      throw InvalidArgument("lights (dpr::render_lit)", "\"" + entry.key() + "\"", one_of(keys));
-  }
-}
-
-/// By torch's own operations, which differentiate the packing.
-PackedLights pack(const LightTensors& given, const Lights& model) {
-  require_known(given);
-  PackedLights packed{model, {}};
-  std::vector<at::Tensor> parts;
-  const auto take = [&](std::string_view key, std::initializer_list<std::int64_t> shape,
-                        const std::string& expected) {
-    const std::string name(key);
-    if (!given.contains(name)) return std::int64_t{0};
-    const at::Tensor tensor = given.at(name);
-    parts.push_back(checked(tensor, "lights." + name, shape, expected.c_str()).flatten());
-    return tensor.size(0);
-  };
-  if (take("ambient", {3}, "[3]") == 0) {
-    const glm::vec3& ambient = model.ambient;
-    parts.push_back(at::tensor({ambient.x, ambient.y, ambient.z}, at::kFloat));
-  }
-  packed.lights.harmonics.resize(
-      static_cast<std::size_t>(take("harmonics", {static_cast<std::int64_t>(k_harmonics), 3}, "[9, 3]")));
-  for_each_light_kind([&](auto kind) {
-    const std::int64_t count = count_numbers(kind);
-    (packed.lights.*kind.lights)
-        .resize(
-            static_cast<std::size_t>(take(kind.key, {-1, count}, "[light, " + std::to_string(count) + "]")));
-  });
-  packed.numbers = at::cat(parts);
-  return packed;
-}
-
-Lights unpack(Lights lights, const at::Tensor& numbers) {
-  const float* next = numbers.data_ptr<float>();
-  for_each_light_number(lights, [&](std::string_view, float& number) { number = *next++; });
-  return lights;
 }
 
 struct Inputs {
