@@ -8,6 +8,7 @@
 #include "cli/folder.hpp"
 #include "cli/page.hpp"
 #include "cli/plot.hpp"
+#include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "stages.hpp"
 

@@ -307,9 +307,9 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
   if (!run.checkpoint.validations.empty()) state.validation_iou = run.checkpoint.validations.back().iou;
 
   const auto save = [&] {
-    state.validation_iou = validate(run.network, validation, held_out, *ranks);
-    run.checkpoint.validations.push_back(
-        {static_cast<double>(run.checkpoint.steps.size()), state.validation_iou});
+    const double iou = validate(run.network, validation, held_out, *ranks);
+    state.validation_iou = iou;
+    run.checkpoint.validations.push_back({static_cast<double>(run.checkpoint.steps.size()), iou});
     if (!is_first) return;
     // In this order: interrupted between the two, a training that is complete would not write its losses.
     write_losses(folder / "losses.csv", run.checkpoint.steps);
