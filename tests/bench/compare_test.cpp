@@ -109,7 +109,7 @@ TEST_SUITE("bench-smoke") {
     failed.erase("forward_ms");
     const std::string csv = dpr::bench::to_csv(results(Json::array({failed})));
     CHECK(dpr::test::contains(csv, ",ok,\"too large, for \"\"this\"\"\"\r\n"));
-    CHECK(dpr::test::contains(csv, ",,,,,,,1,1,1,,,15,"));
+    CHECK(dpr::test::contains(csv, ",,,,,,,1.0,1.0,1.0,,,15,"));
   }
 
   TEST_CASE("rows of a sweep differ by what it varies") {
