@@ -9,7 +9,7 @@ dpr_packages_demo=(
   gnuplot-nox
 )
 # The tests, and the reference manual.
-dpr_packages_tests=(doctest-dev clang doxygen git pkg-config libzip-dev python3)
+dpr_packages_tests=(doctest-dev clang clang-19 libclc-19 doxygen git pkg-config libzip-dev python3)
 # The operator of libtorch and dpr learn.
 dpr_packages_learning=(libgloo-dev libtorch-dev libopenblas0-pthread python3-torch)
 # The tests under a simulator of the kernels.
