@@ -9,7 +9,7 @@
 namespace dpr::cli {
 namespace {
 
-Json to_json(const DeviceInfo& info) {
+Json device_to_json(const DeviceInfo& info) {
   return {{"index", info.index},
           {"platform", info.platform},
           {"name", info.name},
@@ -42,7 +42,7 @@ void run(bool as_json) {
   const std::vector<DeviceInfo> devices = list_devices();
   if (as_json) {
     Json list = Json::array();
-    for (const DeviceInfo& info : devices) list.push_back(to_json(info));
+    for (const DeviceInfo& info : devices) list.push_back(device_to_json(info));
     std::printf("%s", to_text(list).c_str());
     return;
   }

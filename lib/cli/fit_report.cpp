@@ -70,7 +70,7 @@ bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIter
                {"Vertices of the mesh", "vertices", false, {vertices}}});
 }
 
-Json to_json(const ShapeResult& result) {
+Json shape_to_json(const ShapeResult& result) {
   Json history = Json::array();
   for (const ShapeIteration& step : result.history) {
     history.push_back({{"iteration", step.iteration},
@@ -214,7 +214,7 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
       write_strip(folder_ / "turntable.png", render(result.mesh, around), sides);
   const bool is_plotted = !result.history.empty() && plot_history(folder_ / "plot.png", result.history);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
-  write_json(folder_ / "fit.json", to_json(result));
+  write_json(folder_ / "fit.json", shape_to_json(result));
 
   Page page(source);
   page.add_heading("Images, and the shape from there");

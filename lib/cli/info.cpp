@@ -20,14 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Json to_json(const std::vector<MeshMaterial>& materials) {
+Json materials_to_json(const std::vector<MeshMaterial>& materials) {
   Json list = Json::array();
   for (const auto& [name, texture] : materials)
     list.push_back({{"name", name}, {"texture", texture.empty() ? Json() : Json(texture)}});
   return list;
 }
 
-Json to_json(const std::vector<Texture>& textures) {
+Json textures_to_json(const std::vector<Texture>& textures) {
   Json list = Json::array();
   for (const Texture& t : textures) {
     list.push_back({{"width", t.width},
@@ -82,8 +82,8 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
           {"bounds", {{"low", vector_to_json(box.low)}, {"high", vector_to_json(box.high)}}},
           {"colors", colors_of(mesh)},
           {"texture_coordinates", mesh.texcoords.size()},
-          {"textures", to_json(mesh.textures)},
-          {"materials", to_json(materials)},
+          {"textures", textures_to_json(mesh.textures)},
+          {"materials", materials_to_json(materials)},
           {"notes", mesh_notes(mesh, facts)}};
 }
 

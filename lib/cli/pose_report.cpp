@@ -116,12 +116,12 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
                {"Smoothing", "scale", true, {sigma, gamma}}});
 }
 
-Json to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
+Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
   const Pose& pose = hypothesis.pose;
   Json json{
       {"rotation_matrix", rows_to_json(pose.rotation)},
-      {"rotation", cli::to_json(vector_from_rotation(pose.rotation))},
-      {"translation", cli::to_json(pose.translation)},
+      {"rotation", to_json(vector_from_rotation(pose.rotation))},
+      {"translation", to_json(pose.translation)},
       {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch_of(scene), pose.translation)))},
       {"focal_scale", hypothesis.focal_scale},
       {"loss", hypothesis.loss}};
@@ -130,7 +130,7 @@ Json to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
   return json;
 }
 
-Json to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
+Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
   const Smoothing& smoothing = step.smoothing;
   Json entry{{"iteration", step.iteration},
              {"descent", step.descent},
@@ -178,7 +178,7 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
 }
 
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
-  Json json = to_json(result, scene);
+  Json json = hypothesis_to_json(result, scene);
   json["explained"] = result.explained;
   json["light"] = name_of(result.light);
   json["iterations"] = result.iterations;
@@ -189,9 +189,10 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   }
   json["covariance"] = covariance_to_json(result.covariance);
   Json& equals = json["hypotheses"] = Json::array();
-  for (const PoseHypothesis& hypothesis : result.equals) equals.push_back(to_json(hypothesis, scene));
+  for (const PoseHypothesis& hypothesis : result.equals)
+    equals.push_back(hypothesis_to_json(hypothesis, scene));
   Json& history = json["history"] = Json::array();
-  for (const PoseIteration& step : result.history) history.push_back(to_json(step, truth));
+  for (const PoseIteration& step : result.history) history.push_back(iteration_to_json(step, truth));
   return json;
 }
 

@@ -278,7 +278,7 @@ struct EvalCommand {
   std::size_t views = learn::k_views;
 };
 
-Json to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
+Json evaluation_to_json(const learn::Evaluation& evaluation, const EvalCommand& command) {
   Json classes = Json::array();
   for (const learn::ClassIou& row : evaluation.classes) {
     const learn::ObjectClass& c = learn::object_classes()[row.object_class];
@@ -307,7 +307,7 @@ void run_eval(const EvalCommand& command, const CommonOptions& common) {
           bar->update(static_cast<unsigned>(done), "images");
         });
   }
-  if (!command.output.empty()) write_json(command.output, to_json(evaluation, command));
+  if (!command.output.empty()) write_json(command.output, evaluation_to_json(evaluation, command));
   if (common.quiet) return;
   const auto print = [](std::string_view name, double iou, double sphere) {
     std::printf("%-10s %5.1f%%  (the sphere %4.1f%%)\n", std::string(name).c_str(), 100 * iou, 100 * sphere);

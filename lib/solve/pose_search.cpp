@@ -200,9 +200,10 @@ void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) 
   } else {
     // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
     // residuals of wrong hypotheses have it, clutter would count.
-    constexpr float k_least_scale = 0.1F, k_most_scale = 0.12F;
+    constexpr float k_least_robust_scale = 0.1F, k_most_robust_scale = 0.12F;
     level.estimate_scale(hypotheses);
-    if (level.scale() > 0) level.set_scale(std::clamp(level.scale(), k_least_scale, k_most_scale));
+    if (level.scale() > 0)
+      level.set_scale(std::clamp(level.scale(), k_least_robust_scale, k_most_robust_scale));
   }
 }
 
