@@ -81,20 +81,22 @@ DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, co
 /// How much room frames have.
 struct FrameRoom {
   std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them
-  std::size_t contours = 0;              ///< with noise on the pixel: (8x8 tile, contour) pairs
+  /// With noise on the pixel: (8x8 tile, contour) pairs. An edge becomes a contour where colours that are
+  /// optimized part on its two sides.
+  std::size_t contours = 0;
 };
 
 /// Makes frames of forward_on_device() certain that need no more than this; until the next set_scene().
 DPR_API void reserve(Renderer& renderer, const FrameRoom& room);
 
 /// Renderer::forward() for a program that keeps everything on the device: enqueues the frame, and neither
-/// waits nor reads. What the host cannot count, it makes room for: as much as reserve() asks for, and a quarter
-/// more than the last frame took of which it knows the counts. A frame that exceeds its room is emptied: it has
-/// the image and the gradients of one in which nothing is seen.
+/// waits nor reads. What the host cannot count, it makes room for: as much as reserve() asks for, and a
+/// quarter more than the last frame took of which it knows the counts. A frame that exceeds its room is
+/// emptied: it has the image and the gradients of one in which nothing is seen.
 ///
-/// The host learns the counts from the first frame of a scene, and of another number of views, unless there is
-/// reserve(); and from whatever needs a whole frame: Renderer::image(), statistics(), frame_history(), ... That
-/// waits for the device, as do a frame in several bands and the first with noise on the pixel.
+/// The host learns the counts from the first frame of a scene, and of another number of views, unless there
+/// is reserve(); and from whatever needs a whole frame: Renderer::image(), statistics(), frame_history(), ...
+/// That waits for the device, as do a frame in several bands and the first with noise on the pixel.
 DPR_API void forward_on_device(Renderer& renderer, const Events& events = {});
 
 /// What frames of forward_on_device() took since the last call.
