@@ -78,6 +78,11 @@ DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const B
 /// by row. A stride of 64 skips the last row. Until the next Renderer::set_views().
 DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events = {});
 
+/// World to camera, [view] of twelve floats as set_transforms() has them; the rest of the cameras stays what
+/// it is, until the next Renderer::set_views(). Backward passes throw InvalidArgument for the gradient of
+/// cameras in lit scenes then.
+DPR_API void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events = {});
+
 /// How much room frames have.
 struct FrameRoom {
   std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them

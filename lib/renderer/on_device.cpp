@@ -9,7 +9,8 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_vector = 3, k_pair = 2, k_pixel = 4;
+constexpr std::size_t k_vector = 3, k_pair = 2, k_pixel = 4;  // floats
+constexpr std::size_t k_rows = 3, k_columns = 4;              // of an affine matrix
 
 /// Runs `work` after what it waits for, and before its event.
 template <class Work>
@@ -87,10 +88,16 @@ void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpa
 void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events) {
   Renderer::Impl& m = renderer.impl();
   m.require_scene("set_transforms");
-  constexpr std::size_t k_rows = 3, k_columns = 4;
   const VectorShape shape{m.views.size() * m.scene.meshes.size(), k_columns, k_rows};
   const FloatVectors from = source(m, transforms, shape, "transforms");
   enqueue(m, events, [&] { m.take_transforms(from); });
+}
+
+void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_view_matrices");
+  const FloatVectors from = source(m, matrices, {m.views.size(), k_columns, k_rows}, "matrices");
+  enqueue(m, events, [&] { m.take_view_matrices(from); });
 }
 
 void reserve(Renderer& renderer, const FrameRoom& room) {

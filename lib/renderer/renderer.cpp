@@ -97,7 +97,7 @@ void Renderer::Impl::find_edges() {
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
   const bool may_hide =
-      pixel_noise && frame.position_stride == 0 && !has_device_transforms && scene.cull == Cull::none;
+      pixel_noise && frame.position_stride == 0 && !has_device_poses && scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
     return;
@@ -110,7 +110,7 @@ void Renderer::Impl::hide_back_faces() {
 }
 
 void Renderer::Impl::set_up() {
-  frame.clips = has_device_transforms || near_plane.may_be_crossed(scene, views) ? 1 : 0;
+  frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
@@ -253,6 +253,11 @@ void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images)
 void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
                                       const AddToGradient& add_to_positions) {
   const GradientRequest& wanted = scene.gradients;
+  if (has_device_cameras && wanted.camera && shade.lit()) {
+    throw InvalidArgument("gradient of the camera (backward)",
+                          "a lit scene, with view matrices from a buffer",
+                          "Renderer::set_views(): the eye's part of it needs their inverses");
+  }
   if (pixel_noise) {
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
   }

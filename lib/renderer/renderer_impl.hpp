@@ -39,7 +39,7 @@ struct ViewSet {
   DeviceViews device_views;
   Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
   shared::FrameParams frame{};
-  bool has_device_transforms = false;  // which the host does not know
+  bool has_device_poses = false, has_device_cameras = false;  // which the host does not know
 
   std::size_t bytes() const;
 };
@@ -85,6 +85,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
+  void take_view_matrices(const FloatVectors& from);
   /// For images of the scene's size, and so many views.
   SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {

@@ -184,7 +184,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
     }
   }
   prepared.frame = frame_params(of, its, its_views, first_view, raster);
-  prepared.has_device_transforms = false;
+  prepared.has_device_poses = prepared.has_device_cameras = false;
   prepared.views.assign(its_views.begin(), its_views.end());
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);
@@ -341,17 +341,27 @@ void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
     if (from) made_exchange().take(*from, count, values, 0);
     return static_cast<cl_uint>(from ? of_view : 0);
   };
-  frame.position_stride = take(positions, geometry->vertices, geometry->view_positions);
-  frame.color_stride = take(colors, geometry->colors, geometry->view_colors);
+  const cl_uint position_stride = take(positions, geometry->vertices, spare_view_positions_);
+  const cl_uint color_stride = take(colors, geometry->colors, spare_view_colors_);
+
+  std::swap(geometry->view_positions, spare_view_positions_);
+  std::swap(geometry->view_colors, spare_view_colors_);
+  frame.position_stride = position_stride;
+  frame.color_stride = color_stride;
   near_plane.set_boxes_of_views({});
   if (positions) near_plane.forget_views();
   rendered = false;
 }
 
 void Renderer::Impl::take_transforms(const FloatVectors& from) {
-  constexpr std::size_t k_rows = 3;
-  made_exchange().take(from, views.size() * scene.meshes.size() * k_rows, device_views.models, 0);
-  has_device_transforms = true;
+  made_exchange().take(from, views.size() * scene.meshes.size() * from.rows, device_views.models, 0);
+  has_device_poses = true;
+  rendered = false;
+}
+
+void Renderer::Impl::take_view_matrices(const FloatVectors& from) {
+  made_exchange().take_cameras(from, views.size(), frame.orthographic != 0, device_views.cameras);
+  has_device_poses = has_device_cameras = true;
   rendered = false;
 }
 

@@ -22,6 +22,12 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<cl_float
   copy(from, count, vectors_of(to, first, 4), true);
 }
 
+void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
+                            Buffer<shared::ViewParams>& cameras) {
+  cameras_(count, static_cast<cl_uint>(count), layout(from), orthographic ? 1 : 0,
+           BufferRef<float>(from.buffer), cameras);
+}
+
 void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
   copy(from, count, to, false);
 }

@@ -28,11 +28,15 @@ class Exchange {
   explicit Exchange(Device::Impl& device)
       : device_(device),
         vectors_(device, "exchange.cl", "exchange_vectors"),
+        cameras_(device, "exchange.cl", "exchange_cameras"),
         map_(device, "exchange.cl", "exchange_map") {}
 
   /// From the caller's `count` vectors to elements of `to` from `first` on, 0 behind their components.
   /// Numbers that are not finite become 0: kernels index by what they compute of them.
   void take(const FloatVectors& from, std::size_t count, Buffer<cl_float4>& to, std::size_t first);
+  /// From `count` world-to-camera matrices, of three rows each, to what cameras have of them.
+  void take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
+                    Buffer<shared::ViewParams>& cameras);
   /// `count` vectors to the caller.
   void give(const FloatVectors& from, std::size_t count, const FloatVectors& to);
   void map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers);
@@ -42,6 +46,7 @@ class Exchange {
 
   Device::Impl& device_;
   Kernel<cl_uint, cl_uint4, cl_uint4, cl_uint, In<float>, Out<float>> vectors_;
+  Kernel<cl_uint, cl_uint4, cl_uint, In<float>, Out<shared::ViewParams>> cameras_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<float>> map_;
 };
 

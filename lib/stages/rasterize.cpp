@@ -228,8 +228,9 @@ FrameCounts Rasterize::read_counts() {
 
 const Buffer<cl_uint4>& Rasterize::history() {
   if (history_.size() == 0) {
-    history_.resize(device_, 1);
-    forget_history();
+    Buffer<cl_uint4> zero(device_, 1);
+    zero.fill(cl_uint4{});
+    history_ = std::move(zero);
   }
   return history_;
 }

@@ -63,6 +63,34 @@ TEST_SUITE("unit") {
     CHECK(std::isnan(given.download()[2]));
   }
 
+  TEST_CASE("exchange: cameras of matrices have the eye that the inverse gives") {
+    const Device device = open_device();
+    Exchange exchange(device.impl());
+    const std::vector<float> matrices = random_floats(3 * 16, 9);
+    const Buffer<float> source(device.impl(), matrices);
+    for (const bool orthographic : {false, true}) {
+      Buffer<shared::ViewParams> cameras(device.impl(), std::vector<shared::ViewParams>(3, {.znear = 7.0F}));
+      exchange.take_cameras({source.cl_buffer()(), 0, 16, 4, 3}, 3, orthographic, cameras);
+      const std::vector<shared::ViewParams> found = cameras.download();
+      for (std::size_t v = 0; v < 3; ++v) {
+        CAPTURE(v);
+        glm::dmat4 view(1);
+        for (int row = 0; row < 3; ++row) {
+          for (int column = 0; column < 4; ++column) {
+            const float value = matrices[16 * v + static_cast<std::size_t>(4 * row + column)];
+            view[column][row] = static_cast<double>(value);
+            CHECK(found[v].row[row].s[column] == value);
+          }
+        }
+        const glm::dvec4 eye = glm::inverse(view)[orthographic ? 2 : 3];
+        for (int axis = 0; axis < 3; ++axis)
+          CHECK(static_cast<double>(found[v].eye.s[axis]) == doctest::Approx(eye[axis]).epsilon(1e-4));
+        CHECK(found[v].eye.s[3] == (orthographic ? 0.0F : 1.0F));
+        CHECK(found[v].znear == 7.0F);
+      }
+    }
+  }
+
   TEST_CASE("exchange: numbers of sums are rounded once") {
     const Device device = open_device();
     Exchange exchange(device.impl());
