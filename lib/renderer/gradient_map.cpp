@@ -45,10 +45,10 @@ GradientMap upload(Device::Impl& device, const Terms& terms) {
   std::vector<float> factors;
   for (const std::vector<Term>& of_number : terms) {
     for (const Term& term : of_number) {
-      indices.push_back(static_cast<cl_uint>(term.sum));
+      indices.push_back(to_uint(term.sum));
       factors.push_back(static_cast<float>(term.factor));
     }
-    starts.push_back(static_cast<cl_uint>(indices.size()));
+    starts.push_back(to_uint(indices.size()));
   }
   if (indices.empty()) {  // never read, but arguments all the same
     indices.push_back(0);

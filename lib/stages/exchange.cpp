@@ -4,8 +4,7 @@ namespace dpr {
 namespace {
 
 cl_uint4 layout(const FloatVectors& v) {
-  const auto number = [](std::size_t n) { return static_cast<cl_uint>(n); };
-  return {{number(v.first), number(v.stride), number(v.rows), number(v.components)}};
+  return {{to_uint(v.first), to_uint(v.stride), to_uint(v.rows), to_uint(v.components)}};
 }
 
 }  // namespace
@@ -24,8 +23,7 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<cl_float
 
 void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                             Buffer<shared::ViewParams>& cameras) {
-  cameras_(count, static_cast<cl_uint>(count), layout(from), orthographic ? 1 : 0,
-           BufferRef<float>(from.buffer), cameras);
+  cameras_(count, to_uint(count), layout(from), orthographic ? 1 : 0, BufferRef<float>(from.buffer), cameras);
 }
 
 void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
@@ -33,13 +31,13 @@ void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVect
 }
 
 void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
-  vectors_(count, static_cast<cl_uint>(count), layout(from), layout(to), clean ? 1 : 0,
-           BufferRef<float>(from.buffer), BufferRef<float>(to.buffer));
+  vectors_(count, to_uint(count), layout(from), layout(to), clean ? 1 : 0, BufferRef<float>(from.buffer),
+           BufferRef<float>(to.buffer));
 }
 
 void Exchange::map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers) {
   numbers.resize(device_, map.numbers);
-  map_(map.numbers, static_cast<cl_uint>(map.numbers), map.starts, map.terms, map.factors, sums, numbers);
+  map_(map.numbers, to_uint(map.numbers), map.starts, map.terms, map.factors, sums, numbers);
 }
 
 }  // namespace dpr

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "device/kernel.hpp"
+#include "stages/geometry.hpp"
 
 namespace dpr {
 

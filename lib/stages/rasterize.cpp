@@ -77,7 +77,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
-  rows_(rows + 1, p, static_cast<cl_uint>(contours.last), bin.tile_starts, bin.pair_starts, fragment_starts,
+  rows_(rows + 1, p, to_uint(contours.last), bin.tile_starts, bin.pair_starts, fragment_starts,
         contours.starts, device_rows_);
   in_bands_ = false;
 }
@@ -201,17 +201,16 @@ void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameP
                                const Buffer<shared::Triangle>& triangles, Bin& bin,
                                const std::optional<ContourCount>& contours, bool reads) {
   const ContourCount contour_count = contours ? *contours : no_contours(bin);
-  const auto number = [](std::size_t count) { return static_cast<cl_uint>(count); };
   counted_ = false;
   count(p, triangles, bin, contour_count);
   const std::size_t last_row = device_rows_.size() - 1;
-  const cl_uint4 limits{{number(bin.pairs), number(capacity.fragments), number(capacity.contours), 0}};
+  const cl_uint4 limits{{to_uint(bin.pairs), to_uint(capacity.fragments), to_uint(capacity.contours), 0}};
   const cl_uint4 sizes{
-      {number(pixels_of(p)), p.views * p.faces, number(contour_count.last), number(last_row)}};
+      {to_uint(pixels_of(p)), p.views * p.faces, to_uint(contour_count.last), to_uint(last_row)}};
   if (reads) {
     last_row_.start(device_rows_, last_row);
   } else {
-    note_(1, limits, number(last_row), device_rows_, history());
+    note_(1, limits, to_uint(last_row), device_rows_, history());
   }
   fit_(device_.local_size() * device_.info.compute_units, limits, sizes, device_rows_, masks, fragment_starts,
        pixel_starts, bin.pair_starts, contour_count.starts);

@@ -69,7 +69,9 @@ TEST_SUITE("unit") {
     const std::vector<float> matrices = random_floats(3 * 16, 9);
     const Buffer<float> source(device.impl(), matrices);
     for (const bool orthographic : {false, true}) {
-      Buffer<shared::ViewParams> cameras(device.impl(), std::vector<shared::ViewParams>(3, {.znear = 7.0F}));
+      shared::ViewParams before{};
+      before.znear = 7.0F;
+      Buffer<shared::ViewParams> cameras(device.impl(), std::vector<shared::ViewParams>(3, before));
       exchange.take_cameras({source.cl_buffer()(), 0, 16, 4, 3}, 3, orthographic, cameras);
       const std::vector<shared::ViewParams> found = cameras.download();
       for (std::size_t v = 0; v < 3; ++v) {
