@@ -217,13 +217,15 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps
 /// that it won. One work-item per pair. Deterministic.
 /// in   edges, faces, facing, ndc, clipped, winner, cut  as antialias_cross
-/// in   pair_contour   uint[pair]       of so many `pairs`
+/// in   pairs          uint[1]          how many there are
+/// in   pair_contour   uint[pair]
 /// in   pair_tile      uint[pair]       view * tiles + tile
 /// in   grad_cut       float[2][pixel]
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
-kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams a, const uint pairs,
-                                     global const uint4* restrict edges, global const uint4* restrict faces,
-                                     global const uint* restrict facing, global const float4* restrict ndc,
+kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams a,
+                                     global const uint* restrict pairs, global const uint4* restrict edges,
+                                     global const uint4* restrict faces, global const uint* restrict facing,
+                                     global const float4* restrict ndc,
                                      global const ClippedFace* restrict clipped,
                                      global const uint* restrict pair_contour,
                                      global const uint* restrict pair_tile,
@@ -231,7 +233,7 @@ kernel void antialias_cross_backward(const FrameParams p, const AntialiasParams 
                                      global const float* restrict grad_cut,
                                      global float4* restrict grad_ends) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= pairs[0]) return;
   const uint contour = pair_contour[pair];
   const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
   const TileSamples s = tile_samples(p, pair_tile[pair]);

@@ -65,29 +65,53 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
 /// in   tile_starts      uint[view * tile + 1]  runs of pairs
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
-/// out  rows  uint4[view * tiles_y + 1]   the first pair and fragment; z = the number of pairs
-kernel void rasterize_rows(const FrameParams p, global const uint* restrict tile_starts,
-                           global const uint* restrict pair_starts,
-                           global const uint* restrict fragment_starts, global uint4* restrict rows) {
+/// in   contour_starts   uint[last_contour + 1]  whose last is the number of contours' pairs, fitting or not
+/// out  rows  uint4[view * tiles_y + 1]   the first pair and fragment; z = the number of pairs, w = that of
+///                                        contours' pairs
+kernel void rasterize_rows(const FrameParams p, const uint last_contour,
+                           global const uint* restrict tile_starts, global const uint* restrict pair_starts,
+                           global const uint* restrict fragment_starts,
+                           global const uint* restrict contour_starts, global uint4* restrict rows) {
   const uint row = (uint)get_global_id(0);
   if (row > p.views * p.tiles_y) return;
   const uint pair = tile_starts[row * p.tiles_x];
-  rows[row] = (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], 0);
+  rows[row] =
+      (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], contour_starts[last_contour]);
 }
 
-/// Empties a frame of so many `pairs` and `pixels` whose fragments exceed the capacity of the buffers, so
-/// that no later kernel writes behind a buffer's end. A work-item takes every N-th element, where N is the
-/// size of the launch.
-/// in   rows  uint4[last_row + 1]  whose last has the totals
-/// out  masks, fragment_starts, pixel_starts  all 0, or left as they are
-kernel void rasterize_fit(const uint pairs, const uint pixels, const uint capacity, const uint last_row,
-                          global const uint4* restrict rows, global uint2* restrict masks,
-                          global uint* restrict fragment_starts, global uint* restrict pixel_starts) {
-  if (rows[last_row].y <= capacity) return;
+/// Whether the totals of a frame, pairs, fragments and contours' pairs, exceed the capacity of its buffers.
+static inline int exceeds(uint4 last, uint4 capacity) {
+  return last.z > capacity.x || last.y > capacity.y || last.w > capacity.z;
+}
+
+/// Empties a frame that exceeds the capacity of the buffers, so that no later kernel goes behind a buffer's
+/// end, forward or backward. A work-item takes every N-th element, where N is the size of the launch.
+/// in   capacity  pairs, fragments, contours' pairs; w unused
+/// in   sizes     pixels, faces of all views, edges of all views, the last row
+/// in   rows  uint4[last row + 1]  whose last has the totals
+/// out  masks, fragment_starts, pixel_starts, pair_starts, contour_starts  all 0, or left as they are
+kernel void rasterize_fit(const uint4 capacity, const uint4 sizes, global const uint4* restrict rows,
+                          global uint2* restrict masks, global uint* restrict fragment_starts,
+                          global uint* restrict pixel_starts, global uint* pair_starts,
+                          global uint* contour_starts) {
+  if (!exceeds(rows[sizes.w], capacity)) return;
   const uint first = (uint)get_global_id(0), step = (uint)get_global_size(0);
-  for (uint i = first; i < pairs; i += step) masks[i] = 0;
-  for (uint i = first; i <= pairs; i += step) fragment_starts[i] = 0;
-  for (uint i = first; i <= pixels; i += step) pixel_starts[i] = 0;
+  for (uint i = first; i < capacity.x; i += step) masks[i] = 0;
+  for (uint i = first; i <= capacity.x; i += step) fragment_starts[i] = 0;
+  for (uint i = first; i <= sizes.x; i += step) pixel_starts[i] = 0;
+  for (uint i = first; i <= sizes.y; i += step) pair_starts[i] = 0;
+  for (uint i = first; i <= sizes.z; i += step) contour_starts[i] = 0;
+}
+
+/// Keeps what a frame was like for a host that asks later. One work-item.
+/// in   capacity, rows  as rasterize_fit
+/// in   last_row
+/// in out  history  uint4[1]  the most pairs, fragments and contours' pairs so far; w = frames emptied
+kernel void rasterize_note(const uint4 capacity, const uint last_row, global const uint4* restrict rows,
+                           global uint4* restrict history) {
+  if (get_global_id(0) != 0) return;
+  const uint4 last = rows[last_row], before = history[0];
+  history[0] = (uint4)(max(before.xyz, last.zyw), before.w + (exceeds(last, capacity) ? 1u : 0u));
 }
 
 /// Counts runs from a band's first element. The runs are `columns` from `first` on and as many from every

@@ -227,6 +227,7 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
 /// pair, up to `last_pair`. Inputs as surface_backward, and
 /// in   no_cell     what stands for the cell of a fragment without texture; no texel has that number
 /// in   levels      how many of a pyramid a fragment sees at most, 1 or 2
+/// out  places      uint[1]                   how many there are: fragments times levels
 /// out  cells       uint[fragment][levels]    the first of the cell's texels
 /// out  numbers     uint[fragment][levels]    the place's own: what sorting permutes
 /// out  parts       float2[fragment][levels]  of the neighbours to the right and below
@@ -239,10 +240,12 @@ kernel void surface_list(const FrameParams p, const uint last_pair, const uint n
                          global const ClippedFace* restrict clipped, global const float* restrict bary1,
                          global const float* restrict bary2, global const float* restrict grad_red,
                          global const float* restrict grad_green, global const float* restrict grad_blue,
-                         global uint* restrict cells, global uint* restrict numbers,
-                         global float2* restrict parts, global float4* restrict grad_seen) {
+                         global uint* restrict places, global uint* restrict cells,
+                         global uint* restrict numbers, global float2* restrict parts,
+                         global float4* restrict grad_seen) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
+  if (pair + 1 == last_pair) places[0] = levels * fragment_starts[last_pair];
   const SurfaceScene scene =
       make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);

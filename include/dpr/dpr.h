@@ -41,6 +41,7 @@ DPR_API const char* dpr_version(void);
 struct _cl_context;
 struct _cl_command_queue;
 struct _cl_mem;
+struct _cl_event;
 
 typedef struct dpr_device dpr_device;
 typedef struct dpr_scene dpr_scene;
@@ -54,7 +55,8 @@ typedef struct dpr_gradient dpr_gradient;
  * them, or a part of its name. */
 DPR_API dpr_status dpr_device_open(const char* selector, dpr_device** device);
 
-/* Uses the caller's cl_context and in-order cl_command_queue, which are retained. */
+/* Uses the caller's cl_context and in-order cl_command_queue, which are retained. Of an out-of-order queue it
+ * takes the device alone, and makes an in-order queue beside it. */
 DPR_API dpr_status dpr_device_adopt(struct _cl_context* context, struct _cl_command_queue* queue,
                                     dpr_device** device);
 
@@ -265,6 +267,77 @@ DPR_API dpr_status dpr_gradient_size(const dpr_gradient* gradient, const char* n
 DPR_API dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, double* values,
                                      size_t count);
 DPR_API void dpr_gradient_destroy(dpr_gradient* gradient);
+
+/* ---- Everything on the device ---- */
+
+/* What changes in a scene comes from the caller's buffers, images and gradients stay in buffers, and no call
+ * waits for the device or moves a byte to or from it: dpr/opencl_handles.hpp says all of it. */
+
+/* Vectors of floats in a cl_mem of the device's context. One that a call fills is the library's, not
+ * retained. */
+typedef struct dpr_buffer {
+  size_t size;
+  struct _cl_mem* buffer;
+  size_t byte_offset; /* before the first vector */
+  size_t byte_stride; /* from one vector to the next; 0: they are packed */
+  size_t count;       /* filled in by the library: vectors, and floats of each */
+  size_t components;
+} dpr_buffer;
+
+#define DPR_BUFFER_INIT \
+  { sizeof(dpr_buffer), NULL, 0, 0, 0, 0 }
+
+/* What the work of a call waits for, and its own event, which the caller releases. NULL for neither. */
+typedef struct dpr_events {
+  size_t size;
+  struct _cl_event* const* wait; /* [wait_count]; NULL if that is 0 */
+  size_t wait_count;
+  struct _cl_event** done; /* or NULL */
+} dpr_events;
+
+#define DPR_EVENTS_INIT \
+  { sizeof(dpr_events), NULL, 0, NULL }
+
+/* How much room frames have; with noise on the pixel, contours need some too. */
+typedef struct dpr_frame_room {
+  size_t size;
+  size_t pairs, fragments, contours;
+} dpr_frame_room;
+
+#define DPR_FRAME_ROOM_INIT \
+  { sizeof(dpr_frame_room), 0, 0, 0 }
+
+/* Vectors of three floats, as those of the calls without "_from"; texture coordinates are two. */
+DPR_API dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, size_t mesh,
+                                                   const dpr_buffer* positions, const dpr_events* events);
+DPR_API dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, size_t mesh, const dpr_buffer* colors,
+                                                const dpr_events* events);
+DPR_API dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, size_t mesh, size_t texture,
+                                                const dpr_buffer* texels, const dpr_events* events);
+DPR_API dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, size_t mesh,
+                                                   const dpr_buffer* texcoords, const dpr_events* events);
+/* Object to world, [view][mesh] of twelve floats: the upper three rows of a matrix. */
+DPR_API dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
+                                                    const dpr_events* events);
+/* Frames that need no more than this are whole; until the next scene. */
+DPR_API dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room);
+/* A frame that exceeds its room is emptied. */
+DPR_API dpr_status dpr_renderer_forward_on_device(dpr_renderer* renderer, const dpr_events* events);
+/* Frames that were emptied since the last call, and what the largest needed. Waits for the device. */
+DPR_API dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, size_t* emptied,
+                                              dpr_frame_room* largest);
+/* From d loss / d image, [view][height][width] of four floats. */
+DPR_API dpr_status dpr_renderer_backward_on_device(dpr_renderer* renderer, const dpr_buffer* grad,
+                                                   const dpr_events* events);
+/* The images, [view][height][width] of four floats; or a gradient of the last backward pass on the device, by
+ * its name. Fills a struct that holds its size; valid as dpr/opencl_handles.hpp says. */
+DPR_API dpr_status dpr_renderer_image_view(dpr_renderer* renderer, dpr_buffer* view);
+DPR_API dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view);
+/* Copies of them, to the caller's buffers. */
+DPR_API dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_buffer* images,
+                                            const dpr_events* events);
+DPR_API dpr_status dpr_renderer_copy_gradient(dpr_renderer* renderer, const char* name,
+                                              const dpr_buffer* gradient, const dpr_events* events);
 
 #ifdef __cplusplus
 }

@@ -2,14 +2,31 @@
 #pragma once
 
 #include <CL/opencl.hpp>
+#include <vector>
 
 #include "dpr/opencl_handles.hpp"
 
 namespace dpr {
 
-/// adopt_device(), image_handle() and backward() of dpr/opencl_handles.hpp with the bindings' types.
+/// What dpr/opencl_handles.hpp has, with the bindings' types.
 inline Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
   return adopt_device(context(), queue());
+}
+
+/// Vectors in the caller's buffer; offset and stride in bytes, 0 for packed ones.
+inline BufferSpan span_of(const cl::Buffer& buffer, std::size_t offset = 0, std::size_t stride = 0) {
+  return {buffer(), offset, stride};
+}
+
+/// The buffer of a view, retained: it outlives the renderer's own use of it.
+inline cl::Buffer buffer_of(const BufferView& view) { return cl::Buffer(view.buffer, true); }
+
+/// Both live at least as long as the call that takes them. `done` lets go of what it held.
+inline Events events_of(const std::vector<cl::Event>& wait, cl::Event* done = nullptr) {
+  static_assert(sizeof(cl::Event) == sizeof(cl_event));
+  if (done != nullptr) *done = cl::Event();
+  return {{reinterpret_cast<const cl_event*>(wait.data()), wait.size()},
+          done != nullptr ? &(*done)() : nullptr};
 }
 
 /// Retained: outlives the renderer's own use of it.

@@ -1,7 +1,13 @@
-// For embedding by OpenCL's C handles. dpr/opencl.hpp does the same with the C++ bindings.
+// For programs with OpenCL objects of their own, by OpenCL's C handles: everything that changes in a scene
+// comes from buffers on the device, images and gradients stay in buffers there, and no call waits.
+// dpr/opencl.hpp does the same with the C++ bindings.
 #pragma once
 
 #include <CL/cl.h>
+
+#include <cstddef>
+#include <span>
+#include <string>
 
 #include "dpr/device.hpp"
 #include "dpr/export.h"
@@ -9,18 +15,142 @@
 
 namespace dpr {
 
-/// Uses the caller's context and in-order queue instead of making its own. Both are retained. Throws
-/// InvalidArgument for an out-of-order queue and for a queue of another context, DeviceError for what is no
-/// queue.
+/// Uses the caller's context and in-order queue instead of making its own. Both are retained. Given an
+/// out-of-order queue, it makes an in-order queue of its own for the queue's device and context: what the
+/// caller enqueues is ordered with the library's work by events alone, in both directions. Throws
+/// InvalidArgument for a queue of another context, DeviceError for what is no queue.
 DPR_API Device adopt_device(cl_context context, cl_command_queue queue);
+
+/// Vectors of floats in a buffer of the caller's: a whole one or a sub-buffer, of the device's context. What
+/// takes one throws InvalidArgument for a null handle, an image, a buffer of another context, one that
+/// kernels may not read or write, one that is too small, and for an offset or stride that is no multiple of
+/// 4, is smaller than a vector or is 2^34 or more.
+struct BufferSpan {
+  cl_mem buffer = nullptr;
+  std::size_t offset = 0;  ///< bytes before the first vector
+  std::size_t stride =
+      0;  ///< bytes from one vector to the next; 0: they are packed, 12 bytes for three floats
+};
+
+/// Vectors of floats in a buffer of the library's. The handle is not retained for the caller; the buffer is
+/// replaced where the function that gives the view says so.
+struct BufferView {
+  cl_mem buffer = nullptr;
+  std::size_t offset = 0, stride = 0;  ///< bytes
+  std::size_t count = 0;               ///< vectors
+  std::size_t components = 0;          ///< floats of each; what lies between a vector and the next is unused
+
+  BufferSpan span() const { return {buffer, offset, stride}; }
+};
+
+/// What the work of a call waits for, and where its event goes. On an in-order queue of the caller's own
+/// neither is needed for what is enqueued there before and after the call. Events of other queues have to be
+/// flushed there, as OpenCL asks for. Throws InvalidArgument for an event of another context.
+struct Events {
+  std::span<const cl_event> wait = {};
+  cl_event* done = nullptr;  ///< receives one that the caller releases: the call's work has run
+};
+
+// The setters of Renderer, from buffers. They enqueue a copy into the renderer, which no later change of the
+// buffer reaches before the next call. Numbers that are not finite count as 0. Renderer::scene() and views()
+// keep the values that the host has given. The host does not know where vertices are then: every frame is
+// prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
+// closed mesh.
+
+/// Of a mesh of the scene: [vertex] of three floats, object space.
+DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
+                           const Events& events = {});
+/// [vertex] or [face], as the mesh has them, of three floats.
+DPR_API void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors,
+                        const Events& events = {});
+/// [height * width] of three floats, linear RGB.
+DPR_API void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
+                        const Events& events = {});
+/// [texcoord] of two floats. Noise on the pixel goes on with the seams of the last coordinates that the host
+/// has given.
+DPR_API void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords,
+                           const Events& events = {});
+/// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
+/// scene's.
+DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
+                        const Events& events = {});
+/// Object to world, [view][mesh] of twelve floats: the upper three rows of a matrix that acts on columns, row
+/// by row. A stride of 64 skips the last row. Until the next Renderer::set_views().
+DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events = {});
+
+/// World to camera, [view] of twelve floats as set_transforms() has them; the rest of the cameras stays what
+/// it is, until the next Renderer::set_views(). Backward passes throw InvalidArgument for the gradient of
+/// cameras in lit scenes then.
+DPR_API void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events = {});
+
+/// How much room frames have.
+struct FrameRoom {
+  std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them
+  /// With noise on the pixel: (8x8 tile, contour) pairs. An edge becomes a contour where colours that are
+  /// optimized part on its two sides.
+  std::size_t contours = 0;
+};
+
+/// Makes frames of forward_on_device() certain that need no more than this; until the next set_scene().
+DPR_API void reserve(Renderer& renderer, const FrameRoom& room);
+
+/// Renderer::forward() for a program that keeps everything on the device: enqueues the frame, and neither
+/// waits nor reads. What the host cannot count, it makes room for: as much as reserve() asks for, and a
+/// quarter more than the last frame took of which it knows the counts. A frame that exceeds its room is
+/// emptied: it has the image and the gradients of one in which nothing is seen.
+///
+/// The host learns the counts from the first frame of a scene, and of another number of views, unless there
+/// is reserve(); and from whatever needs a whole frame: Renderer::image(), statistics(), frame_history(), ...
+/// That waits for the device, as do a frame in several bands and the first with noise on the pixel.
+DPR_API void forward_on_device(Renderer& renderer, const Events& events = {});
+
+/// What frames of forward_on_device() took since the last call.
+struct FrameHistory {
+  std::size_t emptied = 0;  ///< frames that exceeded the room
+  FrameRoom largest;        ///< exceeding or not; fragments of frames whose pairs fitted
+};
+
+/// Waits for the device. Later frames have room for the largest, and a quarter more.
+DPR_API FrameHistory frame_history(Renderer& renderer);
+/// The same for kernels: four unsigned numbers, pairs, fragments, contours and frames emptied. Valid as long
+/// as the renderer.
+DPR_API BufferView frame_history_view(Renderer& renderer);
+
+/// Enqueues the backward pass of the last frame as it is, emptied or not, for gradients that stay on the
+/// device: what GradientRequest asks for, to single precision, not checked for being finite. Neither waits
+/// nor reads, but for the first after a change of the views, lights, smoothing or request by the host.
+/// @param grad_images  d loss / d image, [view][height][width] of four floats; packed and at offset 0 it is
+/// not copied, but with noise on the pixel that is wider than eight samples
+DPR_API void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events = {});
+
+/// The images, float4 RGBA [view][height][width]. Those of a frame that was emptied included. Valid until the
+/// next set_scene(), set_views() or set_smoothing(); written by forward() and forward_on_device().
+DPR_API BufferView image_view(Renderer& renderer);
+/// Copies them, four floats each.
+DPR_API void copy_images(Renderer& renderer, const BufferSpan& images, const Events& events = {});
+
+/// A gradient of the last backward_on_device() by the name that gradient files and messages have for it:
+/// "meshes[0].positions", "meshes[0].colors", "meshes[0].texcoords", "meshes[0].textures[0]",
+/// "shapes.positions", "views[0].meshes[0].rotation", "views[0].camera.translation",
+/// "lights.point[0].diffuse", "sigma", "background", ... Arrays are [vertex] and so on as SceneGradient has
+/// them. Numbers are packed, and those of one name lie side by side in the order of views, then meshes or
+/// lights. Valid until the next set_scene(), set_views(), set_shapes(), set_lights(), set_smoothing() or
+/// set_gradients(); written by backward_on_device(). Throws InvalidArgument for a name that the scene has
+/// not, or does not ask for, and before the first.
+DPR_API BufferView gradient_view(Renderer& renderer, const std::string& name);
+/// Copies one.
+DPR_API void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,
+                           const Events& events = {});
 
 /// The rendered images, float4 RGBA [view][height][width], as forward() leaves them on the device. Not
 /// retained: valid until the next forward() that needs a larger buffer. Work enqueued on the device's queue
-/// after forward() sees the finished image. Throws InvalidArgument where there is no image.
+/// after forward() sees the finished image. Blocks where it is not known that the frame fitted its room.
+/// Throws InvalidArgument where there is no image.
 DPR_API cl_mem image_handle(const Renderer& renderer);
 
 /// Runs the backward pass from a buffer of d loss / d image, float4 RGBA [view][height][width], on the
-/// device's context. Throws InvalidArgument for a buffer of another context, or one that is too small.
+/// device's context, and waits for it. Throws InvalidArgument for a buffer of another context, or one that is
+/// too small.
 DPR_API SceneGradient backward(Renderer& renderer, cl_mem grad_images);
 
 }  // namespace dpr

@@ -81,6 +81,14 @@ Struct versioned(const Struct* given, Struct defaults, const char* argument) {
   return defaults;
 }
 
+/// Fills a versioned struct of the caller's, as much as it knows of it.
+template <class Struct>
+void fill(Struct* given, Struct values, const char* argument) {
+  const std::size_t size = versioned(given, Struct(), argument).size;
+  values.size = size;
+  std::memcpy(given, &values, size);
+}
+
 /// `count` numbers behind a pointer, of which there are [n][width]. Throws for NULL, and where n would not be
 /// whole.
 template <class Number>

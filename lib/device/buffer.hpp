@@ -147,6 +147,20 @@ class Buffer {
   Length length_ = 0;
 };
 
+/// A buffer as the argument of a kernel: one of ours, or a caller's that holds as many elements. Valid as
+/// long as that.
+template <class T>
+class BufferRef {
+ public:
+  BufferRef(const Buffer<T>& buffer) : handle_(buffer.cl_buffer()()) {}
+  explicit BufferRef(cl_mem handle) : handle_(handle) {}
+
+  cl_mem handle() const { return handle_; }
+
+ private:
+  cl_mem handle_;
+};
+
 /// One element of a buffer on its way to the host.
 template <class T>
 class PendingRead {
@@ -158,6 +172,8 @@ class PendingRead {
   }
   PendingRead(const PendingRead&) = delete;
   PendingRead& operator=(const PendingRead&) = delete;
+
+  bool is_started() const { return device_ != nullptr; }
 
   /// Does not block. What an earlier start() was to read is lost.
   void start(const Buffer<T>& buffer, std::size_t index) {

@@ -141,13 +141,19 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
 
 namespace {
 
+/// In order.
+cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device) {
+  int error = CL_SUCCESS;
+  cl::CommandQueue queue(context, device, cl_command_queue_properties{0}, &error);
+  check_cl(error, "clCreateCommandQueue");
+  return queue;
+}
+
 Device open_found(const FoundDevice& found) {
   int error = CL_SUCCESS;
   const cl::Context context(found.device, nullptr, nullptr, nullptr, &error);
   check_cl(error, "clCreateContext");
-  const cl::CommandQueue queue(context, found.device, cl_command_queue_properties{0}, &error);
-  check_cl(error, "clCreateCommandQueue");
-  Device device = make_device(found.device, context, queue);
+  Device device = make_device(found.device, context, make_queue(context, found.device));
   device.impl().info = found.info;
   return device;
 }
@@ -197,10 +203,8 @@ Device adopt_device(cl_context context_handle, cl_command_queue queue_handle) {
     throw InvalidArgument("queue (adopt_device)", "a queue of another context", "one of the context");
   }
   const auto properties = cl_info<CL_QUEUE_PROPERTIES>(queue, "clGetCommandQueueInfo");
-  if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) != 0) {
-    throw InvalidArgument("queue (adopt_device)", "an out-of-order queue", "an in-order one");
-  }
-  return make_device(device, context, queue);
+  if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) == 0) return make_device(device, context, queue);
+  return make_device(device, context, make_queue(context, device));
 }
 
 const DeviceInfo& Device::info() const { return impl_->info; }

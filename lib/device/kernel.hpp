@@ -57,9 +57,10 @@ struct Argument {
 
 template <class T>
 struct BufferArgument {
-  using Value = Buffer<T>;
-  static int set(cl::Kernel& kernel, unsigned index, const Buffer<T>& buffer) {
-    return kernel.setArg(index, buffer.cl_buffer());
+  using Value = BufferRef<T>;
+  static int set(cl::Kernel& kernel, unsigned index, const BufferRef<T>& buffer) {
+    const cl_mem handle = buffer.handle();
+    return kernel.setArg(index, sizeof(handle), &handle);
   }
 };
 

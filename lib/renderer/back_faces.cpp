@@ -14,6 +14,12 @@ void BackFaces::move(std::size_t mesh) noexcept {
   states_[mesh].is_measured = false;
 }
 
+void BackFaces::forget(std::size_t mesh) noexcept {
+  move(mesh);
+  states_[mesh].is_measured = true;
+  states_[mesh].winding = 0;
+}
+
 void BackFaces::measure(State& state, const Mesh& mesh) {
   state.is_measured = true;
   const bool is_closed =

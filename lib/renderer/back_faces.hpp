@@ -18,6 +18,8 @@ class BackFaces {
 
   /// The mesh's positions are others than before.
   void move(std::size_t mesh) noexcept;
+  /// Only the device knows them: all faces may be seen.
+  void forget(std::size_t mesh) noexcept;
 
   /// [view][mesh] the orientation in NDC, +1 or -1, of faces that cannot be seen; 0: all may be. They may not
   /// where the mesh bounds a solid that lies wholly behind the near plane, thicker by far than the depth

@@ -1,5 +1,7 @@
 #include "renderer/near_plane.hpp"
 
+#include <algorithm>
+
 namespace dpr {
 
 std::vector<BoxCorners> NearPlane::boxes_of(std::span<const glm::vec3> positions,
@@ -21,6 +23,8 @@ const BoxCorners& NearPlane::box_of(const Scene& scene, std::size_t view, std::s
 }
 
 bool NearPlane::may_be_crossed(const Scene& scene, std::span<const View> views) {
+  if (!are_views_known_) return true;
+  if (boxes_of_views_.empty() && std::ranges::find(is_known_, false) != is_known_.end()) return true;
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (std::size_t m = 0; m < boxes_.size(); ++m) {
       const DepthRange range = depth_range(box_of(scene, v, m), views[v].camera, views[v].transforms[m]);

@@ -14,17 +14,28 @@ namespace dpr {
 class NearPlane {
  public:
   NearPlane() = default;
-  explicit NearPlane(std::size_t meshes) : boxes_(meshes) {}
+  explicit NearPlane(std::size_t meshes) : boxes_(meshes), is_known_(meshes, true) {}
 
   /// The mesh's positions are others than before.
-  void move(std::size_t mesh) noexcept { boxes_[mesh].reset(); }
+  void move(std::size_t mesh) noexcept {
+    boxes_[mesh].reset();
+    is_known_[mesh] = true;
+  }
+  /// Only the device knows the mesh's positions; those of views with shapes of their own.
+  void forget(std::size_t mesh) noexcept { is_known_[mesh] = false; }
+  void forget_views() noexcept { are_views_known_ = false; }
+  bool knows(std::size_t mesh) const noexcept { return is_known_[mesh]; }
   /// What set_boxes_of_views() takes: of views with shapes of their own, [view][vertex]. O(positions).
   static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions,
                                           std::span<const MeshRange> meshes);
   /// [view][mesh]; empty: the views share the scene's meshes.
-  void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept { boxes_of_views_ = std::move(boxes); }
+  void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept {
+    boxes_of_views_ = std::move(boxes);
+    are_views_known_ = true;
+  }
 
-  /// False only if every vertex lies beyond the near plane. O(vertices of meshes moved + views * meshes).
+  /// False only if every vertex is known to lie beyond the near plane. O(vertices of meshes moved + views *
+  /// meshes).
   bool may_be_crossed(const Scene& scene, std::span<const View> views);
 
  private:
@@ -32,6 +43,8 @@ class NearPlane {
 
   std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured
   std::vector<BoxCorners> boxes_of_views_;
+  std::vector<bool> is_known_;  // [mesh]
+  bool are_views_known_ = true;
 };
 
 }  // namespace dpr

@@ -39,7 +39,7 @@ void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& sample
 }
 
 void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
-                          const Buffer<cl_float4>& grad_image, bool by_scale) {
+                          const BufferRef<cl_float4>& grad_image, bool by_scale) {
   blur.backward(size, grad_image, grad_blended_);
   if (by_scale) {
     if (!blur_holds_image_) blur.forward(size, blended_, image);

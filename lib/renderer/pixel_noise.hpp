@@ -33,15 +33,14 @@ class PixelNoise {
   Contour contour;
   Antialias antialias;
   Blur blur;
-  std::optional<Edges> edges;                // of the scene; made for its first frame
-  BackFaces back_faces;                      // of the edges' meshes
-  std::optional<std::size_t> last_contours;  // pairs of a frame like the next one
+  std::optional<Edges> edges;  // of the scene; made for its first frame
+  BackFaces back_faces;        // of the edges' meshes
 
   /// From samples to the image, after the antialiasing's find_front() of all bands.
   void forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale.
   void backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
-                const Buffer<cl_float4>& grad_image, bool by_scale);
+                const BufferRef<cl_float4>& grad_image, bool by_scale);
 
   /// Samples other than those of forward() the same way, to [view][height][width].
   void smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,

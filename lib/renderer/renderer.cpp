@@ -23,6 +23,10 @@ std::size_t fragment_bytes(const Geometry& geometry) {
   return k_always + (geometry.textures.empty() ? 0 : Shade::k_textured_fragment_bytes);
 }
 
+FrameCounts larger(const FrameCounts& a, const FrameCounts& b) {
+  return {std::max(a.pairs, b.pairs), std::max(a.fragments, b.fragments), std::max(a.contours, b.contours)};
+}
+
 /// Frames of all renderers, so that a loss knows which one it was evaluated on.
 std::atomic<std::uint64_t> frames_rendered = 0;
 
@@ -45,13 +49,17 @@ void Renderer::Impl::require_scene(const char* caller) const {
   if (!geometry) throw InvalidArgument(std::string(caller), "no scene", "set_scene() first");
 }
 
-void Renderer::Impl::require_forward(const char* caller) {
+void Renderer::Impl::require_rendered(const char* caller) const {
   if (!rendered)
     throw InvalidArgument(std::string(caller), "no image of the current scene", "forward() first");
+}
+
+void Renderer::Impl::require_forward(const char* caller) {
+  require_rendered(caller);
   settle();
 }
 
-void Renderer::Impl::forward() {
+void Renderer::Impl::forward(FrameSizes sizes) {
   require_scene("Renderer::forward");
   rendered = false;
   build_pyramids();
@@ -62,7 +70,7 @@ void Renderer::Impl::forward() {
   capacity.reset();
   capacity = expected_capacity();
   if (capacity) {
-    forward_within(*capacity);
+    forward_within(*capacity, sizes);
   } else {
     forward_measured();
   }
@@ -80,12 +88,16 @@ void Renderer::Impl::find_edges() {
   if (!pixel_noise || pixel_noise->edges) return;
   pixel_noise->edges.emplace(device.impl(), scene, shape_of_first_view());
   pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids), frame.position_stride == 0);
+  for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
+    if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
+  }
 }
 
 /// Of views with shapes of their own none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
-  const bool may_hide = pixel_noise && frame.position_stride == 0 && scene.cull == Cull::none;
+  const bool may_hide =
+      pixel_noise && frame.position_stride == 0 && !has_device_poses && scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
     return;
@@ -98,7 +110,7 @@ void Renderer::Impl::hide_back_faces() {
 }
 
 void Renderer::Impl::set_up() {
-  frame.clips = near_plane.may_be_crossed(scene, views) ? 1 : 0;
+  frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
@@ -115,8 +127,10 @@ std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
 
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
-  if (!last_counts || (pixel_noise && !pixel_noise->last_contours)) return std::nullopt;
-  const FrameCounts expected = rasterize.capacity_for(*last_counts, bin);
+  if (!last_counts && !reserved) return std::nullopt;
+  const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
+  FrameCounts expected = rasterize.capacity_for(counts, bin);
+  if (pixel_noise) expected.contours = pixel_noise->contour.capacity_for(counts.contours);
   if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= device.memory_budget())
     return std::nullopt;
   return expected;
@@ -137,14 +151,13 @@ Blur::Size Renderer::Impl::image_size() const {
 }
 
 /// Of noise on the pixel. Within the capacity for what is expected, or blocks to count.
-void Renderer::Impl::find_contours(std::optional<std::size_t> expected) {
+void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
   if (!pixel_noise) return;
   Contour& contour = pixel_noise->contour;
   if (expected) {
-    contour.forward_within(contour_inputs(), contour.capacity_for(*expected));
+    contour.forward_within(contour_inputs(), expected->contours);
   } else {
     contour.forward(contour_inputs());
-    pixel_noise->last_contours = contour.pairs;
   }
 }
 
@@ -154,10 +167,16 @@ void Renderer::Impl::finish_image() {
   pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), depth_reach(scene.smoothing));
 }
 
-void Renderer::Impl::forward_within(const FrameCounts& expected) {
-  if (pixel_noise) find_contours(pixel_noise->last_contours);
+void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {
+  find_contours(expected);
   bin.forward(frame, setup, expected.pairs);
-  rasterize.forward_within(expected, frame, setup.triangles, bin);
+  std::optional<ContourCount> contours;
+  if (pixel_noise) {
+    const Contour& contour = pixel_noise->contour;
+    contours.emplace(contour.pair_starts.size() - 1, contour.pair_starts);
+  }
+  rasterize.forward_within(expected, frame, setup.triangles, bin, contours, sizes == FrameSizes::read);
+  bands = {*rasterize.band};
   shade_and_aggregate();
   finish_image();
 }
@@ -170,15 +189,24 @@ void Renderer::Impl::forward_measured() {
   bands = rasterize.cut(frame, bin, device.memory_budget(), fragment_bytes(*geometry));
   for (const Band& band : bands) render(band);
   finish_image();
-  if (bands.size() == 1) last_counts = rasterize.counted();
+  if (bands.size() > 1) return;
+  last_counts = rasterize.counted();
+  if (pixel_noise) last_counts->contours = pixel_noise->contour.pairs;
+}
+
+void Renderer::Impl::reserve(const FrameCounts& counts) {
+  reserved = larger(reserved.value_or(FrameCounts()), counts);
+}
+
+void Renderer::Impl::expect(const FrameCounts& counts) {
+  if (last_counts || reserved) last_counts = larger(last_counts.value_or(FrameCounts()), counts);
 }
 
 /// Learns whether the frame has exceeded the capacity of its buffers, and renders it again if so.
 void Renderer::Impl::settle() {
   if (!capacity) return;
   const FrameCounts found = rasterize.read_counts();
-  const std::size_t contours = pixel_noise ? pixel_noise->contour.read_count() : 0;
-  const bool fits = found.fit(*capacity) && (!pixel_noise || contours <= pixel_noise->contour.pairs);
+  const bool fits = found.fit(*capacity);
   capacity.reset();
   if (fits) {
     bin.settle(found.pairs);
@@ -186,10 +214,7 @@ void Renderer::Impl::settle() {
     shade.settle(found.fragments);
     occupancy.settle(found.fragments);
     last_counts = found;
-    if (pixel_noise) {
-      pixel_noise->contour.settle(contours);
-      pixel_noise->last_contours = contours;
-    }
+    if (pixel_noise) pixel_noise->contour.settle(found.contours);
     return;
   }
   rendered = false;
@@ -209,17 +234,39 @@ void Renderer::Impl::shade_and_aggregate() {
   if (pixel_noise) pixel_noise->antialias.find_front(frame, rasterize);
 }
 
-SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
+SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,
                                        const AddToGradient& add_to_positions) {
+  enqueue_backward(grad_images, add_to_positions);
+  SceneGradient gradient = finish_summed_gradients(gradient_sums_.download());
+  read_mesh_gradients(gradient);
+  require_finite(gradient);
+  return gradient;
+}
+
+void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images) {
+  enqueue_backward(grad_images, {});
+  if (!gradient_map) gradient_map = make_gradient_map();
+  made_exchange().map(*gradient_map, gradient_sums_, grad_numbers);
+  device_gradient_frame = frame_number;
+}
+
+void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
+                                      const AddToGradient& add_to_positions) {
   const GradientRequest& wanted = scene.gradients;
+  if (has_device_cameras && wanted.camera && shade.lit()) {
+    throw InvalidArgument("gradient of the camera (backward)",
+                          "a lit scene, with view matrices from a buffer",
+                          "Renderer::set_views(): the eye's part of it needs their inverses");
+  }
   if (pixel_noise) {
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
   }
   const bool textured = !geometry->textures.empty();
   if (wanted.texture && textured) texels->start(geometry->textures);
+  const BufferRef<cl_float4> grad_raster = pixel_noise ? pixel_noise->grad_raster : grad_images;
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
-    differentiate(pixel_noise ? pixel_noise->grad_raster : grad_images);
+    differentiate(grad_raster);
   }
   if (is_geometric(wanted)) {
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
@@ -233,17 +280,11 @@ SceneGradient Renderer::Impl::backward(const Buffer<cl_float4>& grad_images,
     transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, clip.grad, grad_world);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
-  SceneGradient gradient;
-  gradient.meshes.resize(scene.meshes.size());
-  gradient.views.resize(views.size());
-  for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
-  read_summed_gradients(gradient);
-  read_mesh_gradients(gradient, add_to_positions);
-  require_finite(gradient);
-  return gradient;
+  gather_mesh_gradients(add_to_positions);
+  sum_gradients();
 }
 
-void Renderer::Impl::differentiate(const Buffer<cl_float4>& grad_images) {
+void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
@@ -284,7 +325,9 @@ std::size_t Renderer::Impl::bytes() const {
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
-         grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes();
+         grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() +
+         grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
+         (gradient_map ? gradient_map->bytes() : 0);
 }
 
 }  // namespace dpr

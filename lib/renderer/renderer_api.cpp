@@ -4,8 +4,6 @@
 #include <algorithm>
 
 #include "base/checks.hpp"
-#include "device/info.hpp"
-#include "dpr/opencl_handles.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "renderer/finite.hpp"
@@ -93,6 +91,7 @@ void Renderer::set_background(const glm::vec3& background) {
 void Renderer::set_gradients(const GradientRequest& gradients) {
   impl_->require_scene("Renderer::set_gradients");
   impl_->scene.gradients = gradients;
+  impl_->gradient_map.reset();
 }
 
 const Scene& Renderer::scene() const { return impl_->scene; }
@@ -213,31 +212,6 @@ RenderStatistics Renderer::statistics() const {
   s.bands = m.bands.size();
   s.device_bytes = m.bytes();
   return s;
-}
-
-cl_mem image_handle(const Renderer& renderer) {
-  renderer.impl().require_forward("image_handle");
-  return renderer.impl().image().cl_buffer()();
-}
-
-SceneGradient backward(Renderer& renderer, cl_mem grad_handle) {
-  const cl::Buffer grad_images(grad_handle, true);
-  Renderer::Impl& m = renderer.impl();
-  m.require_forward("backward");
-  const std::size_t count = m.image().size();
-  if (cl_info<CL_MEM_CONTEXT>(grad_images, "clGetMemObjectInfo")() != m.device.impl().context()) {
-    throw InvalidArgument("grad_images", "a buffer of another context", "one of the device's own");
-  }
-  const std::size_t bytes = cl_info<CL_MEM_SIZE>(grad_images, "clGetMemObjectInfo");
-  if (bytes < count * sizeof(cl_float4)) {
-    throw InvalidArgument("grad_images", std::to_string(bytes) + " bytes",
-                          std::to_string(count * sizeof(cl_float4)));
-  }
-  m.host_grad_images.resize(m.device.impl(), count);
-  check_cl(m.device.impl().queue.enqueueCopyBuffer(grad_images, m.host_grad_images.cl_buffer(), 0, 0,
-                                                   count * sizeof(cl_float4)),
-           "clEnqueueCopyBuffer");
-  return m.backward(m.host_grad_images);
 }
 
 }  // namespace dpr

@@ -27,28 +27,37 @@ bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.
 
 }  // namespace
 
-void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, const AddToGradient& add_to_positions) {
+bool Renderer::Impl::wants_colors() const {
+  return scene.gradients.colors &&
+         std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
+}
+
+bool Renderer::Impl::wants_texcoords() const {
+  return scene.gradients.texcoords && !geometry->textures.empty();
+}
+
+void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
-  const bool colors = scene.gradients.colors &&
-                      std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
-  if (colors && frame.color_stride != 0) {
+  if (wants_colors() && frame.color_stride != 0) {
     gather.per_view(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
                     grad_colors);
-  } else if (colors) {
+  } else if (wants_colors()) {
     gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
                       grad_colors);
   }
+  if (wants_texcoords()) {
+    gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
+                      shade.surface->grad_corner_texcoords, grad_texcoords);
+  }
+}
+
+void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
   const bool own_positions = frame.position_stride != 0, own_colors = frame.color_stride != 0;
   if (scene.gradients.positions && own_positions) {
     gradient.shapes.positions = read_range(transform.grad_positions, 0, transform.grad_positions.size());
   }
-  if (colors && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
-  const bool texcoords = scene.gradients.texcoords && !geometry->textures.empty();
-  if (texcoords) {
-    gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
-                      shade.surface->grad_corner_texcoords, grad_texcoords);
-  }
+  if (wants_colors() && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const MeshRange& range = geometry->meshes[m];
     const Mesh& mesh = scene.meshes[m].mesh;
@@ -58,7 +67,7 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, const AddToGra
     if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
       gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
     }
-    if (texcoords) {
+    if (wants_texcoords()) {
       for (const glm::vec3& uv : read_range(grad_texcoords, range.first_texcoord, range.texcoords))
         gradient.meshes[m].texcoords.emplace_back(uv);
     }
@@ -93,7 +102,7 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
 }
 
 /// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh].
-void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std::span<const View> views,
+void add_pose_gradients(std::span<const float> sums, const Scene& scene, std::span<const View> views,
                         SceneGradient& gradient) {
   const std::size_t meshes = scene.meshes.size(), segments = views.size() * meshes;
   const auto sum = [&](std::size_t channel, std::size_t segment) {
@@ -127,7 +136,7 @@ void add_pose_gradients(const std::vector<float>& sums, const Scene& scene, std:
 /// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
 /// translation. One infinitely far away lies in the direction A^-1 z, which is as if t were -z and fixed.
 /// From sums by [3][view].
-void add_eye_gradients(const std::vector<float>& sums, std::span<const View> views, SceneGradient& gradient) {
+void add_eye_gradients(std::span<const float> sums, std::span<const View> views, SceneGradient& gradient) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const dvec3 grad_eye(sums[v], sums[views.size() + v], sums[2 * views.size() + v]);
     const glm::dmat4 view(views[v].camera.view);
@@ -141,59 +150,93 @@ void add_eye_gradients(const std::vector<float>& sums, std::span<const View> vie
 
 }  // namespace
 
-/// One segment of all pixels, uploaded anew where they have become more or less.
-const Buffer<cl_uint>& Renderer::Impl::one_segment(std::size_t pixels) {
-  if (all_pixels_count_ != pixels) {
-    all_pixels_count_ = 0;
-    all_pixels_.upload(device.impl(), std::array<cl_uint, 2>{0, static_cast<cl_uint>(pixels)});
-    all_pixels_count_ = pixels;
+/// One segment of so many, uploaded anew where they have become more or less.
+const Buffer<cl_uint>& Renderer::Impl::Segment::of(Device::Impl& device, std::size_t wanted) {
+  if (count != wanted) {
+    count = 0;
+    starts.upload(device, std::array<cl_uint, 2>{0, static_cast<cl_uint>(wanted)});
+    count = wanted;
   }
-  return all_pixels_;
+  return starts;
 }
 
-double Renderer::Impl::read_sigma_gradient() {
-  double sum = 0;
-  for (const float by_scale : pixel_noise->blur.grad_scale.download()) sum += static_cast<double>(by_scale);
-  return sum * pixel_scale(scene.smoothing, std::min(scene.width, scene.height)).by_sigma;
-}
-
-void Renderer::Impl::read_summed_gradients(SceneGradient& gradient) {
+void Renderer::Impl::sum_gradients() {
   const GradientRequest& wanted = scene.gradients;
   const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
   const std::size_t faces = std::size_t{frame.views} * frame.faces;
-  const bool poses = wanted.transform || wanted.camera || wanted.distortion,
-             eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
+  // Every kept face has a tile, and every tile some face: so many pairs, whatever room there is for them.
+  const std::size_t pairs = faces + std::size_t{frame.views} * frame.tiles_x * frame.tiles_y;
+  const bool poses = wanted.transform || wanted.camera || wanted.distortion;
+  const bool eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
-  const std::size_t sigmas = channels(wanted.smoothing && !pixel_noise, 1);
-  const Buffer<cl_uint>& all_pixels = one_segment(pixels);
-  const Summation sigma = aggregate.perturbs_distances()
-                              ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
-                              : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma};
-  // One wait for all of them.
-  const std::vector<std::vector<float>> sums =
-      reduce.read({{pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1,
-                    all_pixels, aggregate.channels},
-                   sigma,
-                   {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
-                    views.size() * scene.meshes.size(), 1, view_vertex_starts, transform.channels},
-                   {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye},
-                   {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
-                    shade.light_channels}});
-  const std::vector<float>& pixel_sums = sums[0];
+  const bool scale = wanted.smoothing && pixel_noise != nullptr;
+  const std::size_t sigmas = channels(wanted.smoothing && !scale, 1);
+  const Buffer<cl_uint>& all_pixels = all_pixels_.of(device.impl(), pixels);
+  const Summation sigma =
+      aggregate.perturbs_distances()
+          ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
+          : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma, pairs};
+  std::vector<Summation> all{
+      {pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1, all_pixels,
+       aggregate.channels},
+      sigma,
+      {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
+       views.size() * scene.meshes.size(), 1, view_vertex_starts, transform.channels},
+      {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs},
+      {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
+       shade.light_channels, pairs}};
+  if (scale)
+    all.push_back(
+        {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->blur.grad_scale});
+  add_sums(all);
+}
+
+/// Sums what `summed_` lists.
+void Renderer::Impl::add_sums(std::span<const Summation> all) {
+  summed_ = {};
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    *summed_.all()[i] = {first, all[i].channels, all[i].segments};
+    first += summed_.all()[i]->count();
+  }
+  gradient_sums_.resize(device.impl(), first);
+  for (std::size_t i = 0; i < all.size(); ++i) reduce.add(all[i], gradient_sums_, summed_.all()[i]->first);
+}
+
+SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sums) const {
+  const GradientRequest& wanted = scene.gradients;
+  const auto list = [&](const SumList& of) { return sums.subspan(of.first, of.count()); };
+  SceneGradient gradient;
+  gradient.meshes.resize(scene.meshes.size());
+  gradient.views.resize(views.size());
+  for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
+  const std::span<const float> pixel_sums = list(summed_.pixels);
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
     gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
-    gradient.sigma = pixel_noise ? read_sigma_gradient() : static_cast<double>(sums[1][0]);
+    const double by_scale =
+        pixel_noise ? pixel_scale(scene.smoothing, std::min(scene.width, scene.height)).by_sigma : 1.0;
+    gradient.sigma = by_scale * static_cast<double>(list(pixel_noise ? summed_.scale : summed_.sigma)[0]);
   }
   if (wanted.background) {
     gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],
                                 pixel_sums[DPR_CHANNEL_BACKGROUND + 2]);
   }
-  if (poses) add_pose_gradients(sums[2], scene, views, gradient);
-  if (eye) add_eye_gradients(sums[3], views, gradient);
-  if (lights) read_light_gradients(*scene.lights, sums[4], gradient);
+  if (summed_.poses.channels > 0) add_pose_gradients(list(summed_.poses), scene, views, gradient);
+  if (summed_.eye.channels > 0) add_eye_gradients(list(summed_.eye), views, gradient);
+  if (summed_.lights.channels > 0) read_light_gradients(*scene.lights, list(summed_.lights), gradient);
+  return gradient;
+}
+
+GradientMap Renderer::Impl::make_gradient_map() const {
+  return make_map(device.impl(), summed_, scene.meshes.size(),
+                  [this](std::span<const float> sums) { return finish_summed_gradients(sums); });
+}
+
+SceneGradient Renderer::Impl::empty_gradient() const {
+  return finish_summed_gradients(std::vector<float>(summed_.count()));
 }
 
 }  // namespace dpr

@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
+#include "renderer/gradient_map.hpp"
 #include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
 #include "stages/clip.hpp"
+#include "stages/exchange.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
 #include "stages/occupancy.hpp"
@@ -37,6 +39,7 @@ struct ViewSet {
   DeviceViews device_views;
   Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
   shared::FrameParams frame{};
+  bool has_device_poses = false, has_device_cameras = false;  // which the host does not know
 
   std::size_t bytes() const;
 };
@@ -55,6 +58,10 @@ struct SmoothingSetting {
 /// Adds a gradient of the positions ([vertex], object space) to the one that is there.
 using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad)>;
 
+/// Where the counts of a frame go whose sizes are not measured first: to the host, which will want them soon;
+/// or nowhere, until it asks.
+enum class FrameSizes { read, kept };
+
 /// Setters come in two halves: the first prepares everything that can fail beside what is in force, the
 /// second swaps it in and cannot fail. What it replaced is freed or kept for the next.
 struct Renderer::Impl : OnDevice, ViewSet {
@@ -70,6 +77,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
   void set_lights(const std::optional<Lights>& lights);
+  /// The same from the device, in place, for whom the host's copies stay what they were.
+  void take_positions(std::size_t mesh, const FloatVectors& from);
+  void take_colors(std::size_t mesh, const FloatVectors& from);
+  void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
+  void take_texcoords(std::size_t mesh, const FloatVectors& from);
+  /// Either may be left out, and then is the scene's.
+  void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
+  void take_transforms(const FloatVectors& from);
+  void take_view_matrices(const FloatVectors& from);
   /// For images of the scene's size, and so many views.
   SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {
@@ -78,8 +94,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set(SmoothingSetting&& prepared) noexcept;
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
   /// blocks to read the sizes to allocate.
-  void forward();
-  SceneGradient backward(const Buffer<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
+  void forward(FrameSizes sizes = FrameSizes::read);
+  SceneGradient backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
+  /// Leaves the gradients on the device: `transform.grad_positions`, `grad_colors`, `grad_texcoords`,
+  /// `texels->grad`, and `grad_numbers`. Works on the last frame as it is, even if that has been emptied.
+  void backward_on_device(const BufferRef<cl_float4>& grad_images);
+  /// Room for at least so much in all frames of the scene.
+  void reserve(const FrameCounts& counts);
+  /// Frames like the next one have been found to take so much.
+  void expect(const FrameCounts& counts);
   /// Fills `aov` for the last frame, if it does not hold that already.
   void render_aov();
 
@@ -87,6 +110,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// known to be complete after that: where the last frame's buffers were too small, the frame is rendered
   /// again, and what forward() throws is thrown here.
   void require_scene(const char* caller) const;
+  void require_rendered(const char* caller) const;
   void require_forward(const char* caller);
   /// Of the last frame: [view][height][width] RGBA.
   const Buffer<cl_float4>& image() const { return pixel_noise ? pixel_noise->image : aggregate.image; }
@@ -97,6 +121,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   bool rendered = false;                // the stages hold the frame of the current scene, or it is on the way
   std::optional<FrameCounts> capacity;  // of the last frame, until it is known to fit
   std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
+  std::optional<FrameCounts> reserved;     // by the caller
   std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
 
   std::optional<Geometry> geometry;
@@ -114,6 +139,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
   Reduce reduce;
+  std::optional<Exchange> exchange;             // made when first asked for
   Raster raster;                                // around the frame
   std::shared_ptr<PixelNoise> pixel_noise;      // made when first asked for; none: the triangles' noise
   std::optional<Auxiliary> aov;                 // made when first asked for
@@ -123,6 +149,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
   Buffer<cl_float4> grad_texcoords;                     // [texcoord]
+  Buffer<float> grad_numbers;                           // as GradientMap has them
+  std::uint64_t device_gradient_frame = 0;              // the frame of backward_on_device()
+  std::optional<GradientMap> gradient_map;              // of the scene and views as they are
+
+  Exchange& made_exchange();
+  /// The gradient of zero sums: all arrays of the last backward pass but those of vertices, colours, texels.
+  SceneGradient empty_gradient() const;
+  bool wants_colors() const;
+  bool wants_texcoords() const;
 
  private:
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
@@ -143,27 +178,39 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_up();
   std::vector<glm::vec3> shape_of_first_view() const;
   std::optional<FrameCounts> expected_capacity() const;
-  void forward_within(const FrameCounts& expected);
+  void forward_within(const FrameCounts& expected, FrameSizes sizes);
   void forward_measured();
   void settle();
 
   /// The stages from the fragments on: of a band, and backward of the one rendered last.
   void render(const Band& band);
-  void find_contours(std::optional<std::size_t> expected);
+  void find_contours(const std::optional<FrameCounts>& expected);
   void finish_image();
   void shade_and_aggregate();
-  void differentiate(const Buffer<cl_float4>& grad_images);
+  void differentiate(const BufferRef<cl_float4>& grad_images);
 
-  void read_mesh_gradients(SceneGradient& gradient, const AddToGradient& add_to_positions);
-  void read_summed_gradients(SceneGradient& gradient);
-  double read_sigma_gradient();
-  const Buffer<cl_uint>& one_segment(std::size_t pixels);
+  void enqueue_backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions);
+  void gather_mesh_gradients(const AddToGradient& add_to_positions);
+  void sum_gradients();
+  void add_sums(std::span<const Summation> all);
+  void read_mesh_gradients(SceneGradient& gradient);
+  SceneGradient finish_summed_gradients(std::span<const float> sums) const;
+  GradientMap make_gradient_map() const;
 
   Buffer<float> hidden_;  // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;
 
-  Buffer<cl_uint> all_pixels_;  // [2]: one segment
-  std::size_t all_pixels_count_ = 0;
+  Buffer<float> gradient_sums_;  // of sum_gradients()
+  GradientSums summed_;          // what they are
+
+  /// All of `count` elements as a segment of a sum.
+  struct Segment {
+    const Buffer<cl_uint>& of(Device::Impl& device, std::size_t wanted);
+
+    Buffer<cl_uint> starts;  // [2]
+    std::size_t count = 0;
+  };
+  Segment all_pixels_, all_views_;
 
   // Where the next setter prepares what it sets.
   ViewSet spare_views_;

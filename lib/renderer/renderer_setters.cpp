@@ -160,10 +160,8 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   set(std::move(smoothing));
   std::swap(near_plane, new_near_plane);
   last_counts.reset();
-  if (pixel_noise) {
-    pixel_noise->edges.reset();
-    pixel_noise->last_contours.reset();
-  }
+  reserved.reset();
+  if (pixel_noise) pixel_noise->edges.reset();
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
@@ -186,6 +184,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
     }
   }
   prepared.frame = frame_params(of, its, its_views, first_view, raster);
+  prepared.has_device_poses = prepared.has_device_cameras = false;
   prepared.views.assign(its_views.begin(), its_views.end());
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);
@@ -193,10 +192,8 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
 }
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {
-  if (prepared.frame.views != frame.views) {
-    last_counts.reset();
-    if (pixel_noise) pixel_noise->last_contours.reset();
-  }
+  if (prepared.frame.views != frame.views) last_counts.reset();
+  gradient_map.reset();
   std::swap(static_cast<ViewSet&>(*this), prepared);
   near_plane.set_boxes_of_views({});
   rendered = false;
@@ -233,6 +230,8 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
   frame.sharp = is_sharp(scene.smoothing) ? 1 : 0;
   raster = prepared.raster;
   set_raster(frame, scene, raster);
+  gradient_map.reset();
+  if ((pixel_noise != nullptr) != (prepared.pixel_noise != nullptr)) last_counts.reset();
   std::swap(pixel_noise, prepared.pixel_noise);
   if (pixel_noise) pixel_noise->blur.set(std::move(prepared.blur));
   occupancy.set(std::move(prepared.occupancy));
@@ -259,6 +258,7 @@ void Renderer::Impl::set_lights(const std::optional<Lights>& lights) {
   std::optional<Lights> new_lights = lights;
   shade.set(shade.prepare(lights, is_textured(scene)));
   std::swap(scene.lights, new_lights);
+  gradient_map.reset();
   rendered = false;
 }
 
@@ -296,6 +296,72 @@ void Renderer::Impl::set_texcoords(std::size_t mesh, std::span<const glm::vec2> 
   replace(geometry->textures.texcoord_values, geometry->meshes[mesh].first_texcoord, values);
   std::ranges::copy(texcoords, scene.meshes[mesh].mesh.texcoords.begin());
   if (pixel_noise) pixel_noise->edges.reset();  // which know the seams
+  rendered = false;
+}
+
+Exchange& Renderer::Impl::made_exchange() {
+  if (!exchange) exchange.emplace(device.impl());
+  return *exchange;
+}
+
+void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) {
+  const MeshRange& range = geometry->meshes[mesh];
+  made_exchange().take(from, range.vertices, geometry->positions, range.first_vertex);
+  near_plane.forget(mesh);
+  if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
+  rendered = false;
+}
+
+void Renderer::Impl::take_colors(std::size_t mesh, const FloatVectors& from) {
+  const MeshRange& range = geometry->meshes[mesh];
+  made_exchange().take(from, range.colors, geometry->color_values, range.first_color);
+  rendered = false;
+}
+
+void Renderer::Impl::take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from) {
+  const shared::Texture& t = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
+  made_exchange().take(from, std::size_t{t.width} * t.height, geometry->textures.texel_values, t.first);
+  geometry->textures.has_levels = false;
+  rendered = false;
+}
+
+/// The edges keep the seams that the host knows.
+void Renderer::Impl::take_texcoords(std::size_t mesh, const FloatVectors& from) {
+  const MeshRange& range = geometry->meshes[mesh];
+  made_exchange().take(from, range.texcoords, geometry->textures.texcoord_values, range.first_texcoord);
+  rendered = false;
+}
+
+void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
+                                 const std::optional<FloatVectors>& colors) {
+  const auto take = [&](const std::optional<FloatVectors>& from, std::size_t of_view,
+                        Buffer<cl_float4>& values) {
+    const std::size_t count = from ? views.size() * of_view : 0;
+    values.resize(device.impl(), count);
+    if (from) made_exchange().take(*from, count, values, 0);
+    return static_cast<cl_uint>(from ? of_view : 0);
+  };
+  const cl_uint position_stride = take(positions, geometry->vertices, spare_view_positions_);
+  const cl_uint color_stride = take(colors, geometry->colors, spare_view_colors_);
+
+  std::swap(geometry->view_positions, spare_view_positions_);
+  std::swap(geometry->view_colors, spare_view_colors_);
+  frame.position_stride = position_stride;
+  frame.color_stride = color_stride;
+  near_plane.set_boxes_of_views({});
+  if (positions) near_plane.forget_views();
+  rendered = false;
+}
+
+void Renderer::Impl::take_transforms(const FloatVectors& from) {
+  made_exchange().take(from, views.size() * scene.meshes.size() * from.rows, device_views.models, 0);
+  has_device_poses = true;
+  rendered = false;
+}
+
+void Renderer::Impl::take_view_matrices(const FloatVectors& from) {
+  made_exchange().take_cameras(from, views.size(), frame.orthographic != 0, device_views.cameras);
+  has_device_poses = has_device_cameras = true;
   rendered = false;
 }
 

@@ -49,14 +49,23 @@ void check_values(const char* name, std::span<const glm::vec3> values, std::size
   }
 }
 
-namespace {
-
 void check_mesh(const Scene& scene, std::size_t mesh) {
   if (mesh < scene.meshes.size()) return;
   throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));
 }
 
-}  // namespace
+void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture) {
+  check_mesh(scene, mesh);
+  const std::size_t textures = scene.meshes[mesh].mesh.textures.size();
+  if (texture >= textures)
+    throw InvalidArgument("texture", std::to_string(texture), "below " + std::to_string(textures));
+}
+
+void check_has_texcoords(const Scene& scene, std::size_t mesh) {
+  check_mesh(scene, mesh);
+  if (scene.meshes[mesh].mesh.textures.empty())
+    throw InvalidArgument("mesh (set_texcoords)", "a mesh without textures", "one that has some");
+}
 
 void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions) {
   check_mesh(scene, mesh);
@@ -70,19 +79,12 @@ void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec
 
 void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
                   std::span<const glm::vec3> texels) {
-  check_mesh(scene, mesh);
-  const std::vector<Texture>& textures = scene.meshes[mesh].mesh.textures;
-  if (texture >= textures.size()) {
-    throw InvalidArgument("texture", std::to_string(texture), "below " + std::to_string(textures.size()));
-  }
-  check_values("texels", texels, textures[texture].texels.size());
+  check_texture(scene, mesh, texture);
+  check_values("texels", texels, scene.meshes[mesh].mesh.textures[texture].texels.size());
 }
 
 void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  check_mesh(scene, mesh);
-  if (scene.meshes[mesh].mesh.textures.empty()) {
-    throw InvalidArgument("mesh (set_texcoords)", "a mesh without textures", "one that has some");
-  }
+  check_has_texcoords(scene, mesh);
   std::vector<glm::vec3> values;
   for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
   check_values("texcoords", values, scene.meshes[mesh].mesh.texcoords.size());

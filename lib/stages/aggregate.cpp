@@ -93,7 +93,7 @@ void Aggregate::forward(const AggregateInputs& in, const shared::AggregateParams
 }
 
 void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
-                         const Buffer<cl_float4>& grad_image) {
+                         const BufferRef<cl_float4>& grad_image) {
   shared::AggregateParams a = params(in.p, background);
   for (Buffer<float>* buffer :
        {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
@@ -111,7 +111,7 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
 }
 
 void Aggregate::backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
-                         const Buffer<cl_float4>& grad_image) {
+                         const BufferRef<cl_float4>& grad_image) {
   const Rasterize& r = in.rasterize;
   if (now_.kernels->exact) {
     now_.kernels->exact->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,

@@ -79,7 +79,8 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
   void forward(const AggregateInputs& in, const glm::vec3& background);
   /// `grad_image` is [view][height][width].
-  void backward(const AggregateInputs& in, const glm::vec3& background, const Buffer<cl_float4>& grad_image);
+  void backward(const AggregateInputs& in, const glm::vec3& background,
+                const BufferRef<cl_float4>& grad_image);
 
   /// Of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
@@ -101,7 +102,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   /// Of a run of pixels.
   void forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels);
   void backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
-                const Buffer<cl_float4>& grad_image);
+                const BufferRef<cl_float4>& grad_image);
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
 
   Buffer<shared::Slot> slots_;   // [fragment + pixel]

@@ -54,7 +54,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   grad_ends.resize(device_, contour.pairs);
   backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
             grad_cut_, grad_raster);
-  cross_backward_(contour.pairs, in.p, params(in, 0.0F), static_cast<cl_uint>(contour.pairs), in.edges.edges,
+  cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, contour.facing, in.transform.ndc, in.clipped,
                   contour.pair_contour, contour.pair_tile, winner, cut, grad_cut_, grad_ends);
 }

@@ -42,7 +42,7 @@ class Antialias {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
          Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, cl_uint, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
+  Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
          Out<cl_float4>>
       cross_backward_;

@@ -105,14 +105,14 @@ std::size_t Blur::row_items(const Pass& pass) const {
 }
 
 void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
-                   const Buffer<cl_float4>& in, Buffer<cl_float4>& out) {
+                   const BufferRef<cl_float4>& in, Buffer<cl_float4>& out) {
   pass.lines = static_cast<cl_uint>(views);
   pass.width = static_cast<cl_uint>(width);
   out.resize(device_, views * pass.out_length * width);
   columns_(views * column_items(pass, width), pass, weights, in, out);
 }
 
-void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
+void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
                 Buffer<cl_float4>& out) {
   pass.lines = static_cast<cl_uint>(lines);
   out.resize(device_, lines * pass.out_length);
@@ -133,7 +133,8 @@ void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_
   }
 }
 
-void Blur::backward(const Size& size, const Buffer<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster) {
+void Blur::backward(const Size& size, const BufferRef<cl_float4>& grad_image,
+                    Buffer<cl_float4>& grad_raster) {
   const Axis x = axis(size.width), y = axis(size.height);
   if (is_coarse()) {
     columns(transposed(expansion(y)), size.views, x.pixels, now_.expand, grad_image, scratch_);
@@ -160,7 +161,7 @@ void Blur::upload_starts(std::size_t views, std::size_t stride) {
 }
 
 void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
-                          const Buffer<cl_float4>& grad_image) {
+                          const BufferRef<cl_float4>& grad_image) {
   const Axis x = axis(size.width), y = axis(size.height);
   Pass along_columns = convolution(y), along_rows = convolution(x);
   const std::size_t of_columns = column_items(along_columns, x.in), of_rows = y.out * row_items(along_rows);

@@ -31,10 +31,14 @@ class Blur {
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
   /// The transpose of forward().
-  void backward(const Size& size, const Buffer<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster);
+  void backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster);
   /// The derivative by the scale of sum grad_image . image, in `grad_scale`. After forward() and backward()
   /// of the same raster and gradient.
-  void backward_scale(const Size& size, const Buffer<cl_float4>& raster, const Buffer<cl_float4>& grad_image);
+  void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
+                      const BufferRef<cl_float4>& grad_image);
+
+  /// Whether backward() loads whole vectors where the image ends: memory behind it must be there.
+  bool loads_behind_images() const { return is_coarse(); }
 
   Buffer<float> grad_scale;  ///< [view], by the scale in pixels
 
@@ -54,8 +58,8 @@ class Blur {
   Pass convolution(const Axis& axis) const;
   Pass expansion(const Axis& axis) const;
   void columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
-               const Buffer<cl_float4>& in, Buffer<cl_float4>& out);
-  void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const Buffer<cl_float4>& in,
+               const BufferRef<cl_float4>& in, Buffer<cl_float4>& out);
+  void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
             Buffer<cl_float4>& out);
   void upload_starts(std::size_t views, std::size_t stride);
   /// Work-items of a pass of one image's columns, and of one row.

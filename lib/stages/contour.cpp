@@ -127,22 +127,17 @@ constexpr const char* k_pairs = "pairs of tiles and contours (frame)";
 
 void Contour::forward(const ContourInputs& in) {
   count(in);
-  const std::size_t found = read_total(pair_starts_, view_edges(in), k_pairs);
+  const std::size_t found = read_total(pair_starts, view_edges(in), k_pairs);
   list(in, found);
   settle(found);
 }
 
 void Contour::forward_within(const ContourInputs& in, std::size_t capacity) {
   count(in);
-  total_.start(pair_starts_, view_edges(in));
   list(in, capacity);
 }
 
-std::size_t Contour::read_count() {
-  const std::size_t total = total_.take();
-  check_total(total, k_pairs);
-  return total;
-}
+std::size_t Contour::read_count() const { return read_total(pair_starts, pair_starts.size() - 1, k_pairs); }
 
 void Contour::settle(std::size_t known_pairs) {
   pairs = known_pairs;
@@ -166,40 +161,39 @@ void Contour::count(const ContourInputs& in) {
   count_(view_edges(in), in.p, params(in), in.edges.edges, facing, in.transform.ndc, in.transform.world,
          in.geometry.face_vertices, in.clipped, in.geometry.face_colors, in.geometry.colors_of(in.p),
          counts_);
-  scan_(view_edges(in), counts_, pair_starts_);
+  scan_(view_edges(in), counts_, pair_starts);
 }
 
 void Contour::list(const ContourInputs& in, std::size_t capacity) {
   pairs = capacity;
-  pair_count_.resize(device_, 1);
+  pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
   fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.end_starts,
         in.edges.ends, facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
-        in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_,
+        in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
         pair_tile, places_);
-  sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
+  sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
-  link_(pairs, to_uint(capacity), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
+  link_(pairs, to_uint(capacity), pair_count, places_, place_contour_, pair_contour, edge_pairs_);
 }
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
                      Buffer<cl_float4>& grad_clip) {
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
-  gather_(vertices, in.p, params(in), pair_starts_, edge_pairs_, in.edges.end_starts, in.edges.ends,
-          grad_ends, grad_ndc);
+  gather_(vertices, in.p, params(in), pair_starts, edge_pairs_, in.edges.end_starts, in.edges.ends, grad_ends,
+          grad_ndc);
   if (in.p.clips == 0) return;
   const Incidence& corners = in.geometry.vertex_corners;
   gather_cuts_(vertices, in.p, params(in), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
-               in.transform.ndc, in.clipped, corners.starts, corners.corners, pair_starts_, edge_pairs_,
+               in.transform.ndc, in.clipped, corners.starts, corners.corners, pair_starts, edge_pairs_,
                in.edges.end_starts, in.edges.ends, grad_ends, grad_ndc, grad_clip);
 }
 
 std::size_t Contour::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
-  for (const Buffer<cl_uint>* buffer :
-       {&facing, &pair_contour, &pair_tile, &tile_starts, &counts_, &pair_count_, &pair_starts_, &edge_pairs_,
-        &place_contour_, &places_}) {
+  for (const Buffer<cl_uint>* buffer : {&facing, &pair_contour, &pair_tile, &tile_starts, &counts_,
+                                        &pair_count, &pair_starts, &edge_pairs_, &place_contour_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

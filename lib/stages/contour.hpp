@@ -50,9 +50,8 @@ class Contour {
   void forward(const ContourInputs& in);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
   void forward_within(const ContourInputs& in, std::size_t capacity);
-  /// How many there are, after forward_within(). Blocks until the device has counted, not until it has
-  /// rendered.
-  std::size_t read_count();
+  /// How many there are, after forward_within(). Blocks.
+  std::size_t read_count() const;
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
   /// Room for so many and a few more, in the buffers that are there.
@@ -63,6 +62,8 @@ class Contour {
               Buffer<cl_float4>& grad_clip);
 
   std::size_t pairs = 0;         ///< or the capacity, until the number is known
+  Buffer<cl_uint> pair_count;    ///< [1] how many there are, 0 where they do not fit
+  Buffer<cl_uint> pair_starts;   ///< [view * edge + 1] runs of the edges' pairs
   Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
   Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
   Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
@@ -95,10 +96,7 @@ class Contour {
       gather_cuts_;
   Scan scan_;
   Sort sort_;
-  PendingRead<cl_uint> total_;
   Buffer<cl_uint> counts_;                  // [view * edge]
-  Buffer<cl_uint> pair_count_;              // [1] 0 where they do not fit
-  Buffer<cl_uint> pair_starts_;             // [view * edge + 1] runs of `edge_pairs_`
   Buffer<cl_uint> edge_pairs_;              // the pairs of every edge
   Buffer<cl_uint> place_contour_, places_;  // [pair] before sorting
 };

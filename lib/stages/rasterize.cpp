@@ -10,6 +10,7 @@ Rasterize::Rasterize(Device::Impl& device)
       count_(device, "rasterize.cl", "rasterize_count"),
       rows_(device, "rasterize.cl", "rasterize_rows"),
       fit_(device, "rasterize.cl", "rasterize_fit"),
+      note_(device, "rasterize.cl", "rasterize_note"),
       rebase_(device, "rasterize.cl", "rasterize_rebase"),
       list_(device, "rasterize.cl", "rasterize_list"),
       forward_(device, "rasterize.cl", "rasterize_forward"),
@@ -43,6 +44,9 @@ PixelBlock pixel_block(const shared::FrameParams& p, const Range& tiles) {
           std::min<std::size_t>(DPR_TILE, p.height - row % p.tiles_y * DPR_TILE), p.width};
 }
 
+/// The first of the starts of any list is 0.
+ContourCount no_contours(const Bin& bin) { return {0, bin.pair_starts}; }
+
 template <class Start>
 Band make_band(const shared::FrameParams& p, const Start& first, const Start& last) {
   const auto between = [](std::size_t begin, std::size_t end) { return Range(begin, end - begin); };
@@ -59,8 +63,8 @@ PairGroups::PairGroups(const Device::Impl& device, const Range& of)
   count = (of.count + size - 1) / size;
 }
 
-void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                      const Bin& bin) {
+void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+                      const ContourCount& contours) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = pixels_of(p);
   masks.resize(device_, length(pairs));
@@ -73,14 +77,15 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
-  rows_(rows + 1, p, bin.tile_starts, bin.pair_starts, fragment_starts, device_rows_);
+  rows_(rows + 1, p, to_uint(contours.last), bin.tile_starts, bin.pair_starts, fragment_starts,
+        contours.starts, device_rows_);
   in_bands_ = false;
 }
 
 void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                       const Bin& bin) {
   counted_ = true;
-  count(p, triangles, bin);
+  count(p, triangles, bin, no_contours(bin));
   row_starts_.clear();
   for (const cl_uint4& row : device_rows_.download()) {
     row_starts_.push_back({row_starts_.size() * p.tiles_x, row.s[0], row.s[1]});
@@ -193,22 +198,43 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
 }
 
 void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
-                               const Buffer<shared::Triangle>& triangles, const Bin& bin) {
+                               const Buffer<shared::Triangle>& triangles, Bin& bin,
+                               const std::optional<ContourCount>& contours, bool reads) {
+  const ContourCount contour_count = contours ? *contours : no_contours(bin);
   counted_ = false;
-  count(p, triangles, bin);
+  count(p, triangles, bin, contour_count);
   const std::size_t last_row = device_rows_.size() - 1;
-  last_row_.start(device_rows_, last_row);
-  fit_(device_.local_size() * device_.info.compute_units, static_cast<cl_uint>(bin.pairs),
-       static_cast<cl_uint>(pixels_of(p)), static_cast<cl_uint>(capacity.fragments),
-       static_cast<cl_uint>(last_row), device_rows_, masks, fragment_starts, pixel_starts);
+  const cl_uint4 limits{{to_uint(bin.pairs), to_uint(capacity.fragments), to_uint(capacity.contours), 0}};
+  const cl_uint4 sizes{
+      {to_uint(pixels_of(p)), p.views * p.faces, to_uint(contour_count.last), to_uint(last_row)}};
+  if (reads) {
+    last_row_.start(device_rows_, last_row);
+  } else {
+    note_(1, limits, to_uint(last_row), device_rows_, history());
+  }
+  fit_(device_.local_size() * device_.info.compute_units, limits, sizes, device_rows_, masks, fragment_starts,
+       pixel_starts, bin.pair_starts, contour_count.starts);
   frame_fragments = capacity.fragments;
   forward(p, triangles, bin, whole_frame(p, capacity));
 }
 
 FrameCounts Rasterize::read_counts() {
+  if (!last_row_.is_started()) last_row_.start(device_rows_, device_rows_.size() - 1);
   const cl_uint4 last = last_row_.take();
-  return {last.s[2], last.s[1]};
+  check_total(last.s[3], "pairs of tiles and contours (frame)");
+  return {last.s[2], last.s[1], last.s[3]};
 }
+
+const Buffer<cl_uint4>& Rasterize::history() {
+  if (history_.size() == 0) {
+    Buffer<cl_uint4> zero(device_, 1);
+    zero.fill(cl_uint4{});
+    history_ = std::move(zero);
+  }
+  return history_;
+}
+
+void Rasterize::forget_history() { history_.fill(cl_uint4{}); }
 
 Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) {
   band = whole_frame(p, counts);
@@ -225,7 +251,8 @@ FrameCounts Rasterize::capacity_for(const FrameCounts& counts, const Bin& bin) c
   const auto capacity = [](std::size_t count, std::size_t made_for) {
     return std::min(with_headroom(count), std::max(count, made_for));
   };
-  return {capacity(counts.pairs, bin.pair_face.capacity()), capacity(counts.fragments, distance.capacity())};
+  return {capacity(counts.pairs, bin.pair_face.capacity()), capacity(counts.fragments, distance.capacity()),
+          counts.contours};
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
@@ -240,7 +267,8 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
 }
 
 std::size_t Rasterize::bytes() const {
-  std::size_t bytes = scan_.bytes() + masks.capacity_bytes() + device_rows_.capacity_bytes();
+  std::size_t bytes =
+      scan_.bytes() + masks.capacity_bytes() + device_rows_.capacity_bytes() + history_.capacity_bytes();
   for (const Buffer<cl_uint>* buffer :
        {&fragment_starts, &pixel_starts, &list, &fragment_pair, &fragment_pixel, &counts_,
         &frame_fragment_starts_, &frame_pixel_starts_}) {

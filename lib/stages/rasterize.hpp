@@ -12,13 +12,20 @@
 
 namespace dpr {
 
-/// How many pairs and fragments a frame holds, or its buffers can hold.
+/// How many pairs and fragments a frame holds, or its buffers can hold; and, with noise on the pixel, pairs
+/// of tiles and contours.
 struct FrameCounts {
-  std::size_t pairs = 0, fragments = 0;
+  std::size_t pairs = 0, fragments = 0, contours = 0;
 
   bool fit(const FrameCounts& capacity) const {
-    return pairs <= capacity.pairs && fragments <= capacity.fragments;
+    return pairs <= capacity.pairs && fragments <= capacity.fragments && contours <= capacity.contours;
   }
+};
+
+/// Contours' pairs of a frame, as far as they have to fit: starts[last] is how many there are.
+struct ContourCount {
+  std::size_t last;
+  const Buffer<cl_uint>& starts;
 };
 
 /// Rows of as many pixels of the frame.
@@ -51,12 +58,18 @@ class Rasterize {
   /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
   void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
   /// The same and forward() of the whole frame without waiting to learn how many fragments there are. If
-  /// this exceeds the capacity the frame is emptied; read_counts() returns the true counts, so that the
-  /// caller can retry.
+  /// anything exceeds the capacity the frame is emptied, with the lists of faces' and contours' pairs;
+  /// read_counts() returns the true counts, so that the caller can retry. `reads`: they are on their way to
+  /// the host at once; else only history() takes part.
   void forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
-                      const Buffer<shared::Triangle>& triangles, const Bin& bin);
-  /// What forward_within() found. Blocks until the device has counted, not until it has rendered.
+                      const Buffer<shared::Triangle>& triangles, Bin& bin,
+                      const std::optional<ContourCount>& contours, bool reads);
+  /// What forward_within() found. Blocks until the device has counted and, where it did not read, rendered.
   FrameCounts read_counts();
+  /// [1] of the frames that forward_within() did not read: the most pairs, fragments and contours' pairs, and
+  /// how many were emptied. All 0 at first, and after forget_history().
+  const Buffer<cl_uint4>& history();
+  void forget_history();
   /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
   /// the band whose fragments these are.
   Band settle(const shared::FrameParams& p, const FrameCounts& counts);
@@ -115,15 +128,20 @@ class Rasterize {
   std::vector<TileStart> tile_starts(const shared::FrameParams& p, const Bin& bin, std::size_t row) const;
   void rebase(const Band& next);
   Length length(std::size_t count) const { return counted_ ? Length(count) : Length::at_most(count); }
-  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+             const ContourCount& contours);
 
   Device::Impl& device_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::Triangle>, In<cl_uint>, In<cl_uint>,
          Out<cl_uint2>, Out<cl_uint>>
       cover_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>> rows_;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>> fit_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>>
+      rows_;
+  Kernel<cl_uint4, cl_uint4, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>,
+         Out<cl_uint>>
+      fit_;
+  Kernel<cl_uint4, cl_uint, In<cl_uint4>, Out<cl_uint4>> note_;
   Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
       list_;
@@ -135,7 +153,7 @@ class Rasterize {
       backward_;
   Scan scan_;
   Buffer<cl_uint> counts_;
-  Buffer<cl_uint4> device_rows_;
+  Buffer<cl_uint4> device_rows_, history_;
   PendingRead<cl_uint4> last_row_;
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
   bool counted_ = true;                // the counts are the frame's, not the capacity

@@ -19,10 +19,10 @@ Reduce::Reduce(Device::Impl& device)
       partial_sums_(device, "reduce.cl", "reduce_partial"),
       final_sums_(device, "reduce.cl", "reduce_final") {}
 
-void Reduce::enqueue(const Summation& what, Buffer<float>& sums, std::size_t first_sum) {
+void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_sum) {
   const std::size_t count = what.channels * what.segments;
   if (count == 0) return;
-  const auto slots = static_cast<cl_uint>(slots_of(what.count / what.segments));
+  const auto slots = static_cast<cl_uint>(slots_of(what.expected / what.segments));
   partial_.resize(device_, 2 * count * slots);
   const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
   partial_sums_(count * slots / width, static_cast<cl_uint>(what.count), static_cast<cl_uint>(what.channels),
@@ -33,7 +33,7 @@ void Reduce::enqueue(const Summation& what, Buffer<float>& sums, std::size_t fir
 
 void Reduce::operator()(const Summation& what, Buffer<float>& sums) {
   sums.resize(device_, what.channels * what.segments);
-  enqueue(what, sums, 0);
+  add(what, sums, 0);
 }
 
 std::vector<std::vector<float>> Reduce::read(std::initializer_list<Summation> all) {
@@ -42,7 +42,7 @@ std::vector<std::vector<float>> Reduce::read(std::initializer_list<Summation> al
   sums_.resize(device_, total);
   std::size_t first = 0;
   for (const Summation& what : all) {
-    enqueue(what, sums_, first);
+    add(what, sums_, first);
     first += what.channels * what.segments;
   }
   const std::vector<float> values = sums_.download();

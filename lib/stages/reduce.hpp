@@ -9,11 +9,13 @@
 namespace dpr {
 
 /// What to sum: values[channel][starts[s * stride] .. starts[(s + 1) * stride]) for every channel and segment
-/// s, of `count` values a channel. The sums are [channel][segment].
+/// s, of `count` values a channel. The sums are [channel][segment]. How they are rounded depends on
+/// `expected`, roughly how many values of a channel there are.
 struct Summation {
   std::size_t count, channels, segments, stride;
   const Buffer<cl_uint>& starts;
   const Buffer<float>& values;
+  std::size_t expected = count;
 };
 
 class Reduce {
@@ -21,14 +23,14 @@ class Reduce {
   explicit Reduce(Device::Impl& device);
 
   void operator()(const Summation& what, Buffer<float>& sums);
-  /// The sums of each, read back at once. Nothing is done where there are no channels.
+  /// Writes them from `first_sum` on. Nothing is done where there are no channels.
+  void add(const Summation& what, Buffer<float>& sums, std::size_t first_sum);
+  /// The sums of each, read back at once.
   std::vector<std::vector<float>> read(std::initializer_list<Summation> all);
 
   std::size_t bytes() const { return partial_.capacity_bytes() + sums_.capacity_bytes(); }
 
  private:
-  void enqueue(const Summation& what, Buffer<float>& sums, std::size_t first_sum);
-
   Device::Impl& device_;
   Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<float>, Out<float>> partial_sums_;
   Kernel<cl_uint, cl_uint, cl_uint, In<float>, Out<float>> final_sums_;

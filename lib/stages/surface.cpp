@@ -57,18 +57,21 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
   const Textures& t = in.geometry.textures;
   const Range pairs = in.rasterize.pairs(in.bin);
   const std::size_t levels = t.has_pyramids() ? 2 : 1, places = levels * in.rasterize.fragments;
+  place_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&cells, &numbers}) buffer->resize(device_, places);
   parts.resize(device_, places);
   grad_seen.resize(device_, places);
   list_(pairs, in.p, pairs.last(), static_cast<cl_uint>(t.texels), static_cast<cl_uint>(levels),
         in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors, in.geometry.colors_of(in.p),
         t.face_texcoords, t.texcoord_values, t.textures, in.triangles, in.clipped, in.rasterize.bary1,
-        in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, cells, numbers, parts, grad_seen);
+        in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, place_count, cells, numbers,
+        parts, grad_seen);
 }
 
 std::size_t Surface::bytes() const {
-  return grad_corner_texcoords.capacity_bytes() + grad_steps_.capacity_bytes() + cells.capacity_bytes() +
-         numbers.capacity_bytes() + parts.capacity_bytes() + grad_seen.capacity_bytes();
+  return grad_corner_texcoords.capacity_bytes() + grad_steps_.capacity_bytes() +
+         place_count.capacity_bytes() + cells.capacity_bytes() + numbers.capacity_bytes() +
+         parts.capacity_bytes() + grad_seen.capacity_bytes();
 }
 
 }  // namespace dpr

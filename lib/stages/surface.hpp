@@ -48,6 +48,7 @@ class Surface {
       2 * (4 * sizeof(cl_uint) + sizeof(cl_float2) + sizeof(cl_float4));
 
   Buffer<float> grad_corner_texcoords;  ///< [pair][9] u, v and 0
+  Buffer<cl_uint> place_count;          ///< [1] of those below
   Buffer<cl_uint> cells, numbers;  ///< [fragment][level] the first texel that is seen; the place's number
   Buffer<cl_float2> parts;         ///< [fragment][level] of its neighbours
   Buffer<cl_float4> grad_seen;     ///< [fragment][level] RGB of what is seen of the level
@@ -72,7 +73,7 @@ class Surface {
   Kernel<shared::FrameParams, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>,
          In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>,
          In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<cl_uint>,
-         Out<cl_uint>, Out<cl_float2>, Out<cl_float4>>
+         Out<cl_uint>, Out<cl_uint>, Out<cl_float2>, Out<cl_float4>>
       list_;
 };
 

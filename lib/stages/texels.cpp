@@ -37,9 +37,7 @@ void Texels::start(const Textures& textures) {
 void Texels::add(const Textures& textures, Surface& surface) {
   const std::size_t places = surface.cells.size();
   if (places == 0) return;
-  count_.resize(device_, 1);
-  count_.fill(static_cast<cl_uint>(places));
-  sort_(places, count_, textures.texels + 1, surface.cells, surface.numbers, starts_);
+  sort_(places, surface.place_count, textures.texels + 1, surface.cells, surface.numbers, starts_);
   sum_(textures.texels, static_cast<cl_uint>(textures.texels), starts_, surface.numbers, surface.parts,
        surface.grad_seen, sums_);
 }
@@ -58,8 +56,7 @@ void Texels::finish(const Textures& textures) {
 }
 
 std::size_t Texels::bytes() const {
-  return grad.capacity_bytes() + sort_.bytes() + count_.capacity_bytes() + starts_.capacity_bytes() +
-         sums_.capacity_bytes();
+  return grad.capacity_bytes() + sort_.bytes() + starts_.capacity_bytes() + sums_.capacity_bytes();
 }
 
 }  // namespace dpr

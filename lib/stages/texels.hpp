@@ -31,7 +31,6 @@ class Texels {
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>> sum_;
   Kernel<cl_uint, cl_uint, cl_uint, In<shared::Texture>, In<cl_float4>, Out<cl_float4>> gather_;
   Kernel<cl_uint, cl_uint, In<shared::Texture>, Out<cl_float4>> shrink_, shrink_backward_;
-  Buffer<cl_uint> count_;   // [1]
   Buffer<cl_uint> starts_;  // [texel + 2] runs of fragments by cell; the last cell is that of no texture
   Buffer<cl_float4> sums_;  // [4][texel]
 };

@@ -306,6 +306,59 @@ static void test_wrong_textures(dpr_scene* scene) {
   REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.textures[0].texels");
 }
 
+/* The same image and gradient without the host: positions from a buffer, the gradient into one. */
+static void test_on_device(cl_context context, cl_command_queue queue, dpr_renderer* renderer,
+                           const float* image, const double* expected) {
+  dpr_buffer from = DPR_BUFFER_INIT, view = DPR_BUFFER_INIT, to = DPR_BUFFER_INIT;
+  dpr_events first = DPR_EVENTS_INIT, second = DPR_EVENTS_INIT;
+  dpr_frame_room room = DPR_FRAME_ROOM_INIT;
+  float read[FLOATS], gradient[9];
+  cl_event set = NULL, copied = NULL;
+  size_t emptied = 1;
+  int i;
+  cl_mem vertices = clCreateBuffer(context, CL_MEM_READ_ONLY, sizeof positions, NULL, NULL);
+  cl_mem gradients = clCreateBuffer(context, CL_MEM_WRITE_ONLY, sizeof gradient, NULL, NULL);
+  clEnqueueWriteBuffer(queue, vertices, CL_TRUE, 0, sizeof positions, positions, 0, NULL, NULL);
+  from.buffer = vertices;
+  first.done = &set;
+  OK(dpr_renderer_set_positions_from(renderer, 0, &from, &first));
+  second.wait = &set;
+  second.wait_count = 1;
+  OK(dpr_renderer_forward_on_device(renderer, &second));
+  OK(dpr_renderer_image_view(renderer, &view));
+  EXPECT(view.count == SIDE * SIDE && view.components == 4 && view.byte_stride == 16);
+  OK(dpr_renderer_backward_on_device(renderer, &view, NULL));
+  to.buffer = gradients;
+  first.done = &copied;
+  OK(dpr_renderer_copy_gradient(renderer, "meshes[0].positions", &to, &first));
+  EXPECT(clEnqueueReadBuffer(queue, gradients, CL_TRUE, 0, sizeof gradient, gradient, 1, &copied, NULL) ==
+         CL_SUCCESS);
+  for (i = 0; i < 9; ++i) EXPECT((double)gradient[i] == expected[i]);
+  EXPECT(clEnqueueReadBuffer(queue, view.buffer, CL_TRUE, 0, sizeof read, read, 0, NULL, NULL) == CL_SUCCESS);
+  EXPECT(memcmp(read, image, sizeof read) == 0);
+  OK(dpr_renderer_gradient_view(renderer, "sigma", &view));
+  EXPECT(view.count == 1 && view.components == 1);
+  OK(dpr_renderer_reserve(renderer, &room));
+  OK(dpr_renderer_frame_history(renderer, &emptied, &room));
+  EXPECT(emptied == 0 && room.pairs > 0 && room.fragments > 0);
+  REFUSED(dpr_renderer_set_positions_from(renderer, 0, &to, NULL), "only write");
+  REFUSED(dpr_renderer_set_positions_from(renderer, 0, NULL, NULL), "positions");
+  REFUSED(dpr_renderer_set_colors_from(renderer, 1, &from, NULL), "mesh");
+  REFUSED(dpr_renderer_set_texels_from(renderer, 0, 0, &from, NULL), "texture");
+  REFUSED(dpr_renderer_set_texcoords_from(renderer, 0, &from, NULL), "textures");
+  REFUSED(dpr_renderer_set_transforms_from(renderer, &from, NULL), "transforms");
+  REFUSED(dpr_renderer_copy_images(renderer, &to, NULL), "images");
+  REFUSED(dpr_renderer_gradient_view(renderer, "color", &view), "color");
+  second.wait = NULL;
+  REFUSED(dpr_renderer_forward_on_device(renderer, &second), "events.wait");
+  to.size = sizeof to + 1;
+  REFUSED(dpr_renderer_copy_images(renderer, &to, NULL), "size");
+  clReleaseEvent(set);
+  clReleaseEvent(copied);
+  clReleaseMemObject(vertices);
+  clReleaseMemObject(gradients);
+}
+
 /* In the caller's context, on the caller's queue: images and gradients as buffers. */
 static void test_own_opencl(const dpr_scene* scene) {
   cl_platform_id platform;
@@ -337,6 +390,7 @@ static void test_own_opencl(const dpr_scene* scene) {
   OK(dpr_gradient_read(second, "meshes[0].positions", of_pixels, 9));
   EXPECT(memcmp(of_buffer, of_pixels, sizeof of_buffer) == 0);
   REFUSED(dpr_backward_buffer(renderer, NULL, &first), "grad");
+  test_on_device(context, queue, renderer, read, of_pixels);
   REFUSED(dpr_device_adopt(NULL, queue, &device), "context");
   REFUSED(dpr_device_adopt(context, NULL, &device), "queue");
   dpr_gradient_destroy(first);

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "device/context.hpp"
 #include "dpr/dpr.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "faults/sweep.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
@@ -102,7 +104,18 @@ struct Operation {
 std::vector<Operation> operations(const Device& device) {
   const Scene scene = old_scene();
   const Mesh& mesh = scene.meshes[0].mesh;
+  std::vector<glm::vec3> values = moved(mesh.positions, 0.6F);
+  const cl::Buffer positions(device.impl().context, CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR,
+                             values.size() * sizeof(glm::vec3), values.data());
   return {
+      {"set_positions from a buffer", [positions](Renderer& r) { set_positions(r, 0, {positions()}); }},
+      {"set_shapes from buffers", [positions](Renderer& r) { set_shapes(r, {positions()}, {}); }},
+      {"on device",
+       [](Renderer& r) {
+         forward_on_device(r);
+         backward_on_device(r, image_view(r).span());
+         gradient_view(r, "meshes[0].positions");
+       }},
       {"set_scene", [](Renderer& r) { r.set_scene(new_scene()); }},
       {"set_views", [scene](Renderer& r) { r.set_views(three_views(scene)); }},
       {"set_smoothing", [](Renderer& r) { r.set_smoothing(new_smoothing()); }},

@@ -1,0 +1,69 @@
+// Vectors to and from buffers whose layout is the caller's, and the numbers of a gradient from the sums of
+// its channels: what lets a program keep everything on the device.
+#include "shared_types.h"
+
+/// Copies vectors of floats from one layout to another. A layout is the first float, the floats from one
+/// group to the next, the vectors of a group, which follow one another, and the floats of a vector. One
+/// work-item per vector. What the source has not is 0. in   vectors   how many there are in   from, to  uint4
+/// the layouts in   clean     1: numbers that are not finite become 0 in   source    float[...] out  target
+/// float[...]
+kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 to, const uint clean,
+                             global const float* restrict source, global float* restrict target) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= vectors) return;
+  global const float* in = source + from.x + (size_t)(i / from.z) * from.y + i % from.z * from.w;
+  global float* out = target + to.x + (size_t)(i / to.z) * to.y + i % to.z * to.w;
+  for (uint k = 0; k < to.w; ++k) {
+    const float value = k < from.w ? in[k] : 0.0f;
+    out[k] = clean && !isfinite(value) ? 0.0f : value;
+  }
+}
+
+static inline float4 finite_row(global const float* row) {
+  return (float4)(isfinite(row[0]) ? row[0] : 0.0f, isfinite(row[1]) ? row[1] : 0.0f,
+                  isfinite(row[2]) ? row[2] : 0.0f, isfinite(row[3]) ? row[3] : 0.0f);
+}
+
+/// Cameras' places and directions from world-to-camera matrices. One work-item per view.
+/// in   count         views
+/// in   from          uint4         the layout, as exchange_vectors has it, of rows of four floats
+/// in   orthographic  whether the views are
+/// in   source        float[...]    numbers that are not finite count as 0
+/// out  views         ViewParams[view]  of which row and eye are written
+kernel void exchange_cameras(const uint count, const uint4 from, const uint orthographic,
+                             global const float* restrict source, global ViewParams* restrict views) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= count) return;
+  global const float* in = source + from.x + (size_t)i * from.y;
+  const float4 x = finite_row(in), y = finite_row(in + 4), z = finite_row(in + 8);
+  // Columns of the inverse, times the determinant.
+  const float3 first = cross(y.xyz, z.xyz), second = cross(z.xyz, x.xyz), third = cross(x.xyz, y.xyz);
+  const float inverse = 1.0f / dot(x.xyz, first);
+  const float3 eye = orthographic ? third : -(x.w * first + y.w * second + z.w * third);
+  views[i].row[0] = x;
+  views[i].row[1] = y;
+  views[i].row[2] = z;
+  views[i].eye = (float4)(eye * inverse, orthographic ? 0.0f : 1.0f);
+}
+
+/// Numbers that are sums of factors times sums. One work-item per number of `numbers`. Products and additions
+/// carry their errors along (Dekker 1971, Knuth 1969), so that the result is rounded once.
+/// in   starts   uint[number + 1]  runs of `terms`
+/// in   terms    uint[...]         indices of `sums`
+/// in   factors  float[...]        of the terms
+/// in   sums     float[...]
+/// out  values   float[number]
+kernel void exchange_map(const uint numbers, global const uint* restrict starts,
+                         global const uint* restrict terms, global const float* restrict factors,
+                         global const float* restrict sums, global float* restrict values) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= numbers) return;
+  float sum = 0.0f, error = 0.0f;
+  for (uint k = starts[i]; k < starts[i + 1]; ++k) {
+    const float a = factors[k], b = sums[terms[k]], product = a * b;
+    const float total = sum + product, part = total - sum;
+    error += fma(a, b, -product) + ((sum - (total - part)) + (product - part));
+    sum = total;
+  }
+  values[i] = sum + error;
+}

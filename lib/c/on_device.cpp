@@ -1,0 +1,115 @@
+// What stays on the device, in the C interface.
+#include "c/handles.hpp"
+#include "dpr/opencl_handles.hpp"
+
+using dpr::c::deref;
+using dpr::c::guarded;
+using dpr::c::versioned;
+
+namespace {
+
+dpr::BufferSpan to_span(const dpr_buffer* given, const char* argument) {
+  const auto buffer = versioned<dpr_buffer>(given, DPR_BUFFER_INIT, argument);
+  return {buffer.buffer, buffer.byte_offset, buffer.byte_stride};
+}
+
+dpr::Events to_events(const dpr_events* given) {
+  if (!given) return {};
+  const auto events = versioned<dpr_events>(given, DPR_EVENTS_INIT, "events");
+  if (events.wait_count > 0) deref(events.wait, "events.wait");
+  return {{events.wait, events.wait_count}, events.done};
+}
+
+void fill(dpr_buffer* given, const dpr::BufferView& view) {
+  dpr::c::fill(given,
+               {sizeof(dpr_buffer), view.buffer, view.offset, view.stride, view.count, view.components},
+               "view");
+}
+
+dpr::Renderer& renderer_of(dpr_renderer* renderer) { return deref(renderer, "renderer").renderer; }
+
+}  // namespace
+
+dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* positions, const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_positions(renderer_of(renderer), mesh, to_span(positions, "positions"), to_events(events));
+  });
+}
+
+dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* colors,
+                                        const dpr_events* events) {
+  return guarded(
+      [&] { dpr::set_colors(renderer_of(renderer), mesh, to_span(colors, "colors"), to_events(events)); });
+}
+
+dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
+                                        const dpr_buffer* texels, const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_texels(renderer_of(renderer), mesh, texture, to_span(texels, "texels"), to_events(events));
+  });
+}
+
+dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* texcoords, const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_texcoords(renderer_of(renderer), mesh, to_span(texcoords, "texcoords"), to_events(events));
+  });
+}
+
+dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
+                                            const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_transforms(renderer_of(renderer), to_span(transforms, "transforms"), to_events(events));
+  });
+}
+
+dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room) {
+  return guarded([&] {
+    const auto wanted = versioned<dpr_frame_room>(room, DPR_FRAME_ROOM_INIT, "room");
+    dpr::reserve(renderer_of(renderer), {wanted.pairs, wanted.fragments, wanted.contours});
+  });
+}
+
+dpr_status dpr_renderer_forward_on_device(dpr_renderer* renderer, const dpr_events* events) {
+  return guarded([&] { dpr::forward_on_device(renderer_of(renderer), to_events(events)); });
+}
+
+dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, std::size_t* emptied, dpr_frame_room* largest) {
+  return guarded([&] {
+    deref(emptied, "emptied");
+    versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
+    const dpr::FrameHistory history = dpr::frame_history(renderer_of(renderer));
+    *emptied = history.emptied;
+    const dpr::FrameRoom& room = history.largest;
+    dpr::c::fill(largest, {sizeof(dpr_frame_room), room.pairs, room.fragments, room.contours}, "largest");
+  });
+}
+
+dpr_status dpr_renderer_backward_on_device(dpr_renderer* renderer, const dpr_buffer* grad,
+                                           const dpr_events* events) {
+  return guarded(
+      [&] { dpr::backward_on_device(renderer_of(renderer), to_span(grad, "grad"), to_events(events)); });
+}
+
+dpr_status dpr_renderer_image_view(dpr_renderer* renderer, dpr_buffer* view) {
+  return guarded([&] { fill(view, dpr::image_view(renderer_of(renderer))); });
+}
+
+dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view) {
+  return guarded([&] { fill(view, dpr::gradient_view(renderer_of(renderer), &deref(name, "name"))); });
+}
+
+dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_buffer* images,
+                                    const dpr_events* events) {
+  return guarded(
+      [&] { dpr::copy_images(renderer_of(renderer), to_span(images, "images"), to_events(events)); });
+}
+
+dpr_status dpr_renderer_copy_gradient(dpr_renderer* renderer, const char* name, const dpr_buffer* gradient,
+                                      const dpr_events* events) {
+  return guarded([&] {
+    dpr::copy_gradient(renderer_of(renderer), &deref(name, "name"), to_span(gradient, "gradient"),
+                       to_events(events));
+  });
+}

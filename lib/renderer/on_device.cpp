@@ -1,0 +1,265 @@
+// The renderer for programs that keep everything on the device: dpr/opencl_handles.hpp.
+#include <algorithm>
+#include <optional>
+
+#include "renderer/buffer_span.hpp"
+#include "renderer/renderer_impl.hpp"
+#include "renderer/setter_checks.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_vector = 3, k_pair = 2, k_pixel = 4;  // floats
+constexpr std::size_t k_rows = 3, k_columns = 4;              // of an affine matrix
+
+/// Runs `work` after what it waits for, and before its event.
+template <class Work>
+void enqueue(Renderer::Impl& m, const Events& events, const Work& work) {
+  const Device::Impl& device = m.device.impl();
+  require_events(device, events);
+  begin(device, events);
+  work();
+  end(device, events);
+}
+
+FloatVectors source(const Renderer::Impl& m, const BufferSpan& span, const VectorShape& shape,
+                    const char* name) {
+  return require_vectors(m.device.impl(), span, shape, Access::read, name);
+}
+
+FloatVectors target(const Renderer::Impl& m, const BufferSpan& span, const VectorShape& shape,
+                    const char* name) {
+  return require_vectors(m.device.impl(), span, shape, Access::write, name);
+}
+
+}  // namespace
+
+void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_positions");
+  check_mesh(m.scene, mesh);
+  const FloatVectors from = source(m, positions, {m.geometry->meshes[mesh].vertices, k_vector}, "positions");
+  enqueue(m, events, [&] { m.take_positions(mesh, from); });
+}
+
+void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_colors");
+  check_mesh(m.scene, mesh);
+  if (colors_of(m.scene.meshes[mesh].mesh).empty())
+    throw InvalidArgument("mesh (set_colors)", "a mesh without colours",
+                          "one of which vertices or faces have some");
+  const FloatVectors from = source(m, colors, {m.geometry->meshes[mesh].colors, k_vector}, "colors");
+  enqueue(m, events, [&] { m.take_colors(mesh, from); });
+}
+
+void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
+                const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_texels");
+  check_texture(m.scene, mesh, texture);
+  const std::size_t count = m.scene.meshes[mesh].mesh.textures[texture].texels.size();
+  const FloatVectors from = source(m, texels, {count, k_vector}, "texels");
+  enqueue(m, events, [&] { m.take_texels(mesh, texture, from); });
+}
+
+void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_texcoords");
+  check_has_texcoords(m.scene, mesh);
+  const FloatVectors from = source(m, texcoords, {m.geometry->meshes[mesh].texcoords, k_pair}, "texcoords");
+  enqueue(m, events, [&] { m.take_texcoords(mesh, from); });
+}
+
+void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
+                const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_shapes");
+  const auto optional_source = [&](const BufferSpan& span, std::size_t of_view, const char* name) {
+    std::optional<FloatVectors> from;
+    if (span.buffer != nullptr) from = source(m, span, {m.views.size() * of_view, k_vector}, name);
+    return from;
+  };
+  const auto from_positions = optional_source(positions, m.geometry->vertices, "positions");
+  const auto from_colors = optional_source(colors, m.geometry->colors, "colors");
+  enqueue(m, events, [&] { m.take_shapes(from_positions, from_colors); });
+}
+
+void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_transforms");
+  const VectorShape shape{m.views.size() * m.scene.meshes.size(), k_columns, k_rows};
+  const FloatVectors from = source(m, transforms, shape, "transforms");
+  enqueue(m, events, [&] { m.take_transforms(from); });
+}
+
+void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_view_matrices");
+  const FloatVectors from = source(m, matrices, {m.views.size(), k_columns, k_rows}, "matrices");
+  enqueue(m, events, [&] { m.take_view_matrices(from); });
+}
+
+void reserve(Renderer& renderer, const FrameRoom& room) {
+  renderer.impl().require_scene("reserve");
+  renderer.impl().reserve({room.pairs, room.fragments, room.contours});
+}
+
+void forward_on_device(Renderer& renderer, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("forward_on_device");
+  enqueue(m, events, [&] { m.forward(FrameSizes::kept); });
+}
+
+FrameHistory frame_history(Renderer& renderer) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("frame_history");
+  const cl_uint4 found = m.rasterize.history().download().front();
+  m.rasterize.forget_history();
+  const FrameCounts largest{found.s[0], found.s[1], found.s[2]};
+  m.expect(largest);
+  return {found.s[3], {largest.pairs, largest.fragments, largest.contours}};
+}
+
+BufferView frame_history_view(Renderer& renderer) {
+  return {renderer.impl().rasterize.history().cl_buffer()(), 0, sizeof(cl_uint4), 1, 4};
+}
+
+namespace {
+
+/// The gradient where the kernels can read it as it is, or in a copy of ours.
+BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& from, std::size_t count) {
+  const bool is_packed = from.first == 0 && from.stride == k_pixel;
+  if (is_packed && !(m.pixel_noise && m.pixel_noise->blur.loads_behind_images()))
+    return BufferRef<cl_float4>(from.buffer);
+  m.host_grad_images.resize(m.device.impl(), count);
+  m.made_exchange().give(from, count, vectors_of(m.host_grad_images, 0, k_pixel));
+  return m.host_grad_images;
+}
+
+}  // namespace
+
+void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_rendered("backward_on_device");
+  const std::size_t count = m.image().size();
+  const FloatVectors from = source(m, grad_images, {count, k_pixel}, "grad_images");
+  enqueue(m, events, [&] { m.backward_on_device(gradient_of_images(m, from, count)); });
+}
+
+BufferView image_view(Renderer& renderer) {
+  const Renderer::Impl& m = renderer.impl();
+  m.require_rendered("image_view");
+  return {m.image().cl_buffer()(), 0, sizeof(cl_float4), m.image().size(), k_pixel};
+}
+
+namespace {
+
+void copy(Renderer::Impl& m, const BufferView& view, const BufferSpan& span, const Events& events,
+          const char* name) {
+  const FloatVectors to = target(m, span, {view.count, view.components}, name);
+  const FloatVectors from{view.buffer, view.offset / sizeof(float), view.stride / sizeof(float),
+                          view.components};
+  enqueue(m, events, [&] { m.made_exchange().give(from, view.count, to); });
+}
+
+BufferView view_of(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count,
+                   std::size_t components) {
+  return {buffer.cl_buffer()(), first * sizeof(cl_float4), sizeof(cl_float4), count, components};
+}
+
+/// The texture that "[k]" behind an array's name names.
+std::optional<std::size_t> texture_of(const std::string& name, const std::string& array,
+                                      std::size_t textures) {
+  for (std::size_t k = 0; k < textures; ++k) {
+    if (name == array + "[" + std::to_string(k) + "]") return k;
+  }
+  return std::nullopt;
+}
+
+/// The array of a mesh, or of all views' shapes, if the name is its.
+std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientRow& row, std::size_t mesh,
+                                        const std::string& name) {
+  const std::string array = name_of(row, {0, mesh});
+  const MeshRange& range = m.geometry->meshes[mesh];
+  const bool of_views = row.of == GradientOf::all_views;
+  if (row.wanted == &GradientRequest::texture) {
+    const auto texture = texture_of(name, array, m.scene.meshes[mesh].mesh.textures.size());
+    if (!texture) return std::nullopt;
+    const shared::Texture& t = m.geometry->textures.list[range.first_texture + *texture];
+    return view_of(m.texels->grad, t.first, std::size_t{t.width} * t.height, k_vector);
+  }
+  if (name != array) return std::nullopt;
+  if (row.wanted == &GradientRequest::positions && of_views == (m.frame.position_stride != 0)) {
+    const Buffer<cl_float4>& grad = m.transform.grad_positions;
+    return of_views ? view_of(grad, 0, grad.size(), k_vector)
+                    : view_of(grad, range.first_vertex, range.vertices, k_vector);
+  }
+  if (row.wanted == &GradientRequest::colors && m.wants_colors() && of_views == (m.frame.color_stride != 0)) {
+    if (of_views) return view_of(m.grad_colors, 0, m.grad_colors.size(), k_vector);
+    if (!colors_of(m.scene.meshes[mesh].mesh).empty())
+      return view_of(m.grad_colors, range.first_color, range.colors, k_vector);
+  }
+  if (row.wanted == &GradientRequest::texcoords && range.texcoords > 0)
+    return view_of(m.grad_texcoords, range.first_texcoord, range.texcoords, k_pair);
+  return std::nullopt;
+}
+
+/// A number, a vector or a list of vectors among the numbers, from `first` on.
+BufferView numbers_view(const Renderer::Impl& m, const GradientArray& array, std::size_t first,
+                        std::size_t numbers) {
+  const std::size_t components = std::holds_alternative<double*>(array) ? 1 : k_vector;
+  return {m.grad_numbers.cl_buffer()(), first * sizeof(float), components * sizeof(float),
+          numbers / components, components};
+}
+
+}  // namespace
+
+void copy_images(Renderer& renderer, const BufferSpan& images, const Events& events) {
+  copy(renderer.impl(), image_view(renderer), images, events, "images");
+}
+
+BufferView gradient_view(Renderer& renderer, const std::string& name) {
+  const Renderer::Impl& m = renderer.impl();
+  m.require_rendered("gradient_view");
+  if (m.device_gradient_frame != m.frame_number)
+    throw InvalidArgument("gradient_view", "no gradient of the last frame", "backward_on_device() first");
+  SceneGradient arrays = m.empty_gradient();
+  std::optional<BufferView> found;
+  std::size_t first = 0;
+  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    const bool is_there = m.scene.gradients.*row.wanted && (!row.exists || row.exists(m.scene));
+    if (!is_summed(row)) {
+      if (is_there && !found) found = mesh_gradient(m, row, index.item, name);
+      return;
+    }
+    std::size_t numbers = 0;
+    transform_numbers(array, [&](double value) { return ++numbers, value; });
+    if (is_there && name_of(row, index) == name) found = numbers_view(m, array, first, numbers);
+    first += numbers;
+  });
+  if (found) return *found;
+  throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",
+                        "a gradient that the scene has and GradientRequest asks for, such as "
+                        "\"meshes[0].positions\", \"views[0].camera.rotation\" or \"sigma\"");
+}
+
+void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,
+                   const Events& events) {
+  copy(renderer.impl(), gradient_view(renderer, name), gradient, events, "gradient");
+}
+
+cl_mem image_handle(const Renderer& renderer) {
+  renderer.impl().require_forward("image_handle");
+  return renderer.impl().image().cl_buffer()();
+}
+
+SceneGradient backward(Renderer& renderer, cl_mem grad_images) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_forward("backward");
+  const std::size_t count = m.image().size();
+  const FloatVectors from = source(m, {grad_images}, {count, k_pixel}, "grad_images");
+  return m.backward(gradient_of_images(m, from, count));
+}
+
+}  // namespace dpr

@@ -1,0 +1,43 @@
+#include "stages/exchange.hpp"
+
+namespace dpr {
+namespace {
+
+cl_uint4 layout(const FloatVectors& v) {
+  return {{to_uint(v.first), to_uint(v.stride), to_uint(v.rows), to_uint(v.components)}};
+}
+
+}  // namespace
+
+FloatVectors vectors_of(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t components) {
+  return {buffer.cl_buffer()(), 4 * first, 4, components};
+}
+
+FloatVectors vectors_of(const Buffer<float>& buffer, std::size_t first, std::size_t components) {
+  return {buffer.cl_buffer()(), first, components, components};
+}
+
+void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<cl_float4>& to, std::size_t first) {
+  copy(from, count, vectors_of(to, first, 4), true);
+}
+
+void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
+                            Buffer<shared::ViewParams>& cameras) {
+  cameras_(count, to_uint(count), layout(from), orthographic ? 1 : 0, BufferRef<float>(from.buffer), cameras);
+}
+
+void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
+  copy(from, count, to, false);
+}
+
+void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
+  vectors_(count, to_uint(count), layout(from), layout(to), clean ? 1 : 0, BufferRef<float>(from.buffer),
+           BufferRef<float>(to.buffer));
+}
+
+void Exchange::map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers) {
+  numbers.resize(device_, map.numbers);
+  map_(map.numbers, to_uint(map.numbers), map.starts, map.terms, map.factors, sums, numbers);
+}
+
+}  // namespace dpr

@@ -1,0 +1,138 @@
+// A step that stays on the device: the caller's kernels are its loss and its optimizer. Counted by the
+// library that stands before OpenCL, no call moves a byte between host and device, and none waits.
+#include <doctest/doctest.h>
+
+#include <string>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "dpr/opencl_handles.hpp"
+#include "faults/opencl_faults.hpp"
+#include "pipeline/scenes.hpp"
+#include "support/caller.hpp"
+
+using namespace dpr;
+using namespace dpr::test;
+using namespace dpr::test::pipeline;
+
+namespace {
+
+constexpr int k_size = 16;
+
+constexpr const char* k_source = R"(
+kernel void loss(global const float4* image, global const float4* target, global float4* grad) {
+  const size_t i = get_global_id(0);
+  grad[i] = image[i] - target[i];
+}
+kernel void descend(global const float* grad, const float rate, global float* values) {
+  const size_t i = get_global_id(0), k = i / 3 * 4 + i % 3;  // a gradient has four floats of room
+  values[i] -= rate * grad[k];
+})";
+
+/// Calls that move bytes or wait, since the last arming.
+std::size_t calls_to_the_host() {
+  std::size_t calls = 0;
+  for (const char* name : {"clEnqueueRead*", "clEnqueueWrite*", "clEnqueueMap*", "clWaitForEvents",
+                           "clFinish", "clCreateBuffer", "clBuildProgram"})
+    calls += dpr_opencl_calls(name);
+  return calls;
+}
+
+class Program {
+ public:
+  explicit Program(const Scene& scene)
+      : renderer_(adopt_device(caller_.context(), caller_.queue())),
+        loss_(caller_.kernel(k_source, "loss")),
+        step_(caller_.kernel(k_source, "descend")) {
+    renderer_.set_scene(scene);
+    const Mesh& mesh = scene.meshes[0].mesh;
+    positions_ = caller_.buffer(mesh.positions);
+    colors_ = caller_.buffer(mesh.vertex_colors);
+    numbers_ = 3 * mesh.positions.size();
+    pixels_ = static_cast<std::size_t>(scene.width * scene.height);
+    target_ = caller_.buffer(std::vector<glm::vec4>(pixels_, glm::vec4(0.4F)));
+    grad_ = caller_.buffer(std::vector<glm::vec4>(pixels_));
+  }
+
+  void step() {
+    set_positions(renderer_, 0, {positions_()});
+    set_colors(renderer_, 0, {colors_()});
+    cl_event rendered = nullptr;
+    forward_on_device(renderer_, {.done = &rendered});
+    run(loss_, pixels_, cl::Buffer(image_view(renderer_).buffer, true), target_, grad_);
+    backward_on_device(renderer_, {grad_()}, {.wait = {&rendered, 1}});
+    run(step_, numbers_, gradient_of("meshes[0].positions"), 1e-7F, positions_);
+    run(step_, numbers_, gradient_of("meshes[0].colors"), 1e-2F, colors_);
+    clReleaseEvent(rendered);
+  }
+
+  std::vector<float> colors() const { return caller_.read(colors_); }
+  FrameHistory history() { return frame_history(renderer_); }
+
+ private:
+  cl::Buffer gradient_of(const char* name) { return cl::Buffer(gradient_view(renderer_, name).buffer, true); }
+
+  template <class... Args>
+  void run(cl::Kernel& kernel, std::size_t count, const Args&... args) {
+    cl_uint index = 0;
+    (kernel.setArg(index++, args), ...);
+    caller_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(count));
+  }
+
+  Caller caller_;
+  Renderer renderer_;
+  cl::Kernel loss_, step_;
+  cl::Buffer positions_, colors_, target_, grad_;
+  std::size_t numbers_ = 0, pixels_ = 0;
+};
+
+/// Counts in steps after the second: the first measures, and both make buffers and kernels.
+void check_step(const Scene& scene) {
+  Program program(scene);
+  program.step();
+  program.step();
+  const std::vector<float> before = program.colors();
+  dpr_arm_opencl_fault("", 0);
+  for (int i = 0; i < 5; ++i) program.step();
+  CHECK(calls_to_the_host() == 0);
+  CHECK(dpr_opencl_calls("clEnqueueNDRangeKernel") > 100);
+  CHECK(program.colors() != before);
+  CHECK(program.history().emptied == 0);
+  CHECK(calls_to_the_host() > 0);  // which shows that they are counted
+}
+
+Scene scene_with_gradients(const char* preset) {
+  Scene scene = scene_of(random_soup(8, 3), k_size, k_size);
+  scene.smoothing = smoothing_preset(preset);
+  return scene;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("transfers: a step on the device has none, and waits for nothing") {
+    for (const char* preset : {"gaussian", "joint_gaussian", "softras", "pixel", "paper_gaussian"}) {
+      CAPTURE(std::string(preset));
+      check_step(scene_with_gradients(preset));
+    }
+    Scene lit = scene_with_gradients("pixel");
+    lit.lights = every_light(Shading::phong);
+    lit.gradients.lights = lit.gradients.distortion = true;
+    check_step(lit);
+    Scene texture = scene_with_gradients("gaussian");
+    texture.meshes[0].mesh =
+        textured(texture.meshes[0].mesh, random_texture(5, 3, Wrap::mirror, Filter::trilinear));
+    texture.gradients.texture = texture.gradients.texcoords = true;
+    check_step(texture);
+  }
+
+  TEST_CASE("transfers: the ordinary path has some") {
+    Renderer renderer(open_device());
+    renderer.set_scene(scene_with_gradients("gaussian"));
+    renderer.forward();
+    dpr_arm_opencl_fault("", 0);
+    renderer.forward();
+    renderer.image();
+    CHECK(calls_to_the_host() > 0);
+  }
+}

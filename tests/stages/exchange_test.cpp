@@ -1,0 +1,120 @@
+// Vectors from one layout to another, and numbers from sums, against plain loops in double precision.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "dpr/dpr.hpp"
+#include "pipeline/scenes.hpp"
+#include "stages/exchange.hpp"
+
+using namespace dpr;
+using dpr::test::pipeline::Random;
+
+namespace {
+
+std::vector<float> random_floats(std::size_t count, unsigned seed) {
+  Random random(seed);
+  std::vector<float> values;
+  for (std::size_t i = 0; i < count; ++i) values.push_back(random(-1.0F, 1.0F));
+  return values;
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("exchange: vectors come out of a caller's layout, in order, with zeros behind") {
+    const Device device = open_device();
+    Exchange exchange(device.impl());
+    // Groups of two vectors of three floats, eight floats apart, from the fifth float on.
+    const std::vector<float> floats = random_floats(40, 3);
+    const Buffer<float> source(device.impl(), floats);
+    constexpr std::size_t k_count = 7, k_first = 2;
+    const std::vector<cl_float4> poison(k_first + k_count + 1, cl_float4{{-9, -9, -9, -9}});
+    Buffer<cl_float4> target(device.impl(), poison);
+    exchange.take({source.cl_buffer()(), 5, 8, 3, 2}, k_count, target, k_first);
+    const std::vector<cl_float4> found = target.download();
+    for (std::size_t i = 0; i < k_count; ++i) {
+      CAPTURE(i);
+      for (std::size_t k = 0; k < 3; ++k)
+        CHECK(found[k_first + i].s[k] == floats[5 + i / 2 * 8 + i % 2 * 3 + k]);
+      CHECK(found[k_first + i].s[3] == 0.0F);
+    }
+    CHECK(found[k_first - 1].s[0] == -9.0F);
+    CHECK(found[k_first + k_count].s[0] == -9.0F);
+  }
+
+  TEST_CASE("exchange: what comes in is finite, what goes out is as it is") {
+    const Device device = open_device();
+    Exchange exchange(device.impl());
+    const float infinite = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+    const std::vector<float> floats{1, infinite, nan, -infinite, 2, 3};
+    const Buffer<float> source(device.impl(), floats);
+    Buffer<cl_float4> taken(device.impl(), 2);
+    exchange.take({source.cl_buffer()(), 0, 3, 3}, 2, taken, 0);
+    CHECK(taken.download()[0].s[0] == 1.0F);
+    CHECK(taken.download()[0].s[1] == 0.0F);
+    CHECK(taken.download()[0].s[2] == 0.0F);
+    CHECK(taken.download()[1].s[0] == 0.0F);
+    Buffer<float> given(device.impl(), 6);
+    exchange.give(vectors_of(source, 0, 3), 2, vectors_of(given, 0, 3));
+    CHECK(given.download()[1] == infinite);
+    CHECK(std::isnan(given.download()[2]));
+  }
+
+  TEST_CASE("exchange: cameras of matrices have the eye that the inverse gives") {
+    const Device device = open_device();
+    Exchange exchange(device.impl());
+    const std::vector<float> matrices = random_floats(3 * 16, 9);
+    const Buffer<float> source(device.impl(), matrices);
+    for (const bool orthographic : {false, true}) {
+      shared::ViewParams before{};
+      before.znear = 7.0F;
+      Buffer<shared::ViewParams> cameras(device.impl(), std::vector<shared::ViewParams>(3, before));
+      exchange.take_cameras({source.cl_buffer()(), 0, 16, 4, 3}, 3, orthographic, cameras);
+      const std::vector<shared::ViewParams> found = cameras.download();
+      for (std::size_t v = 0; v < 3; ++v) {
+        CAPTURE(v);
+        glm::dmat4 view(1);
+        for (int row = 0; row < 3; ++row) {
+          for (int column = 0; column < 4; ++column) {
+            const float value = matrices[16 * v + static_cast<std::size_t>(4 * row + column)];
+            view[column][row] = static_cast<double>(value);
+            CHECK(found[v].row[row].s[column] == value);
+          }
+        }
+        const glm::dvec4 eye = glm::inverse(view)[orthographic ? 2 : 3];
+        for (int axis = 0; axis < 3; ++axis)
+          CHECK(static_cast<double>(found[v].eye.s[axis]) == doctest::Approx(eye[axis]).epsilon(1e-4));
+        CHECK(found[v].eye.s[3] == (orthographic ? 0.0F : 1.0F));
+        CHECK(found[v].znear == 7.0F);
+      }
+    }
+  }
+
+  TEST_CASE("exchange: numbers of sums are rounded once") {
+    const Device device = open_device();
+    Exchange exchange(device.impl());
+    const std::vector<float> sums = random_floats(50, 5), factors = random_floats(60, 6);
+    SparseMap map;
+    std::vector<cl_uint> starts{0}, terms;
+    for (cl_uint k = 0; k < factors.size(); ++k) terms.push_back(k * 7 % 50);
+    for (const cl_uint length : {0U, 1U, 2U, 17U, 40U}) starts.push_back(starts.back() + length);
+    map.numbers = starts.size() - 1;
+    map.starts.upload(device.impl(), starts);
+    map.terms.upload(device.impl(), terms);
+    map.factors.upload(device.impl(), factors);
+    Buffer<float> numbers;
+    exchange.map(map, Buffer<float>(device.impl(), sums), numbers);
+    const std::vector<float> found = numbers.download();
+    REQUIRE(found.size() == map.numbers);
+    for (std::size_t i = 0; i < map.numbers; ++i) {
+      CAPTURE(i);
+      double exact = 0;
+      for (cl_uint k = starts[i]; k < starts[i + 1]; ++k)
+        exact += static_cast<double>(factors[k]) * static_cast<double>(sums[terms[k]]);
+      CHECK(std::abs(static_cast<double>(found[i]) - exact) <= std::abs(exact) * 6e-8);
+    }
+  }
+}
