@@ -5,9 +5,9 @@
 //   DPR_FAULT_LOG=FILE at its end the process writes "NAME CALLS" of every function there, and of the one
 //   that
 //                      failed " failed"
-//   DPR_LOST_QUEUE=Q:N  the N-th call on the Q-th command queue that is made (from 0) fails, and all after it,
-//                       as if its device had vanished
-//   DPR_SLOW_QUEUE=Q:T  every call on the Q-th that waits takes T microseconds longer, as over a network
+//   DPR_LOST_QUEUE=Q:N the N-th call on the Q-th command queue that is made (from 0) fails, and all after
+//                      it, as if its device had vanished
+//   DPR_SLOW_QUEUE=Q:T every call on the Q-th that waits takes T microseconds longer, as over a network
 #pragma once
 
 #include <cstddef>
