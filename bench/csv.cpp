@@ -15,7 +15,8 @@ std::vector<std::string> columns() {
       paths.push_back(std::string(timing) + "/" + part);
   }
   for (const char* const key :
-       {"fragments", "bands", "peak_device_bytes", "peak_rss_bytes", "status", "reason"})
+       {"fragments", "bands", "peak_device_bytes", "peak_rss_bytes", "transfers/bytes_to_device",
+        "transfers/bytes_from_device", "transfers/host_waits", "status", "reason"})
     paths.emplace_back(key);
   return paths;
 }

@@ -100,6 +100,23 @@ void measure_passes(Row& row, const MeasureOptions& options, Json& result) {
   result["backward_ms"] = timing_of(backward);
 }
 
+Json to_json(const TransferCounts& before, const TransferCounts& after) {
+  return {{"bytes_to_device", after.bytes_to_device - before.bytes_to_device},
+          {"bytes_from_device", after.bytes_from_device - before.bytes_from_device},
+          {"host_waits", after.host_waits - before.host_waits}};
+}
+
+/// Of a frame as a descent has it: the vertices have moved. No image goes to the host.
+void count_transfers(Row& row, const Workload& workload, Json& result) {
+  const Device::Impl& device = row.renderer.device().impl();
+  const TransferCounts before = device.transfers();
+  for (std::size_t m = 0; m < workload.scene.meshes.size(); ++m)
+    row.renderer.set_positions(m, workload.scene.meshes[m].mesh.positions);
+  row.renderer.forward();
+  row.backward();
+  result["transfers"] = to_json(before, device.transfers());
+}
+
 using StageRuns = std::map<std::string, std::vector<double>>;
 
 void append(const std::map<std::string, double>& run, std::size_t index, StageRuns& all) {
@@ -177,6 +194,7 @@ void measure_into(Json& result, const Device& device, const Peaks& peaks, const 
   row.forward();  // kernels are compiled, buffers grow
   row.backward();
   measure_passes(row, options, result);
+  count_transfers(row, workload, result);
   const std::size_t device_bytes = device.peak_allocated_bytes(), resident_bytes = peak_resident_bytes();
   measure_stages(row, device, peaks, options, result);
   const RenderStatistics statistics = row.renderer.statistics();

@@ -31,7 +31,8 @@ kernel void image_loss_forward(const uint pixels, const float inverse_scale_squa
 }
 
 /// d loss / d image of the mean over the views and levels. One work-item per pixel.
-/// in   views, pixels_per_view, levels
+/// in   views, pixels_per_view
+/// in   images         that the mean is over: levels times views, which may be more than these
 /// in   inverse_scale_squared  of the robust loss
 /// in   image, target  float4[view][pixel]  RGBA
 /// in   mask           float[view][pixel]   how much a pixel counts
@@ -39,7 +40,7 @@ kernel void image_loss_forward(const uint pixels, const float inverse_scale_squa
 /// in   weights        float[view][DPR_LOSS_COUNT]
 /// in   channels       float[view]  the sum of the mask times the colour channels
 /// out  grad_image     float4[view][pixel]
-kernel void image_loss_backward(const uint views, const uint pixels_per_view, const uint levels,
+kernel void image_loss_backward(const uint views, const uint pixels_per_view, const uint images,
                                 const float inverse_scale_squared, global const float4* restrict image,
                                 global const float4* restrict target, global const float* restrict mask,
                                 global const float* restrict sums, global const float* restrict weights,
@@ -58,7 +59,7 @@ kernel void image_loss_backward(const uint views, const uint pixels_per_view, co
     grad += name##_gradient(weight[name##_number], pixel, of_view + name##_first);
   DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
   const float mean = 1.0f / channels[view];
-  grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)(views * levels) * mask[i];
+  grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)images * mask[i];
 }
 
 /// A level of a pyramid from the one before: means of blocks of 2x2 pixels, at the border of those that are

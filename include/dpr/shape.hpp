@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "dpr/camera.hpp"
@@ -53,7 +54,10 @@ struct ShapeOptions {
   unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
   unsigned iterations = 400;  ///< > 0: of a level
   unsigned batch = 8;         ///< > 0: views that an iteration renders, in turn
-  float edge_pixels = 2.0F;   ///< > 0: length of edges to which a level begins to remesh, in its pixels
+  /// How many of them a device renders together, as MultiDeviceRenderer::set_chunk(). 0: all on one device, a
+  /// twelfth on several.
+  unsigned chunk = 0;
+  float edge_pixels = 2.0F;  ///< > 0: length of edges to which a level begins to remesh, in its pixels
   /// Iterations between two remeshings, in the first half of a level; 0: the mesh keeps its faces.
   unsigned remesh_interval = 50;
   /// > 0: of the edges, in pixels of the level, at its beginning and at its end. Where the views have a
@@ -85,6 +89,7 @@ struct ShapeIteration {
   Smoothing smoothing;
   int width = 0, height = 0;  ///< of the images compared
   std::size_t vertices = 0, faces = 0;
+  std::vector<std::string> notes = {};  ///< a sentence for every device that was lost in it
 };
 
 struct ShapeResult {
@@ -94,15 +99,19 @@ struct ShapeResult {
   std::vector<ShapeIteration> history;  ///< also of the runs that it goes on from
 };
 
-/// Finds a mesh with vertex colours that explains several images.
+/// Finds a mesh with vertex colours that explains several images, on one device or on several, each with a
+/// part of every batch. The result is the same to the bit on any devices of one kind, one or several, that
+/// have the same ShapeOptions::chunk, or 0 on several; and if some of them are lost, as MultiDeviceRenderer
+/// has it, down to the last.
 class DPR_API ShapeSolver {
  public:
   /// Called after every iteration with the mesh as it is then; false stops the solver.
   using Callback = std::function<bool(const ShapeIteration&, const Mesh&)>;
 
   /// Throws InvalidArgument if there are no views, sizes differ, cameras see no common point, or an option is
-  /// out of its range.
+  /// out of its range, or for what MultiDeviceRenderer refuses of a list of devices.
   ShapeSolver(Device device, ShapeViews views, ShapeOptions options = {});
+  ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOptions options = {});
 
   /// The mesh that solve() begins with: the initial one with vertex colours, or the icosphere.
   const Mesh& start() const { return start_; }
@@ -110,13 +119,13 @@ class DPR_API ShapeSolver {
   unsigned most_iterations() const;
 
   /// From the start, or from the checkpoint if there is one in the file; leaves checkpoints there, the last
-  /// when it ends. An interrupted run gives the same bits as one that was not, on one device. An empty path:
-  /// no checkpoints. Throws IoError where the file cannot be read or written, InvalidArgument where it
-  /// belongs to other views or options.
+  /// when it ends. An interrupted run gives the same bits as one that was not, on devices as above; it may go
+  /// on on others. An empty path: no checkpoints. Throws IoError where the file cannot be read or written,
+  /// InvalidArgument where it belongs to other views or options.
   ShapeResult solve(const Callback& callback = {}, const std::filesystem::path& checkpoint = {}) const;
 
  private:
-  Device device_;
+  std::vector<Device> devices_;
   ShapeViews views_;
   ShapeOptions options_;
   Mesh start_;

@@ -7,6 +7,7 @@
 #include "base/input_file.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "dpr/multi_device.hpp"
 #include "scene/scene_json.hpp"
 #include "smoothing/option_fields.hpp"
 #include "smoothing/presets.hpp"
@@ -86,6 +87,14 @@ void add_device_options(CLI::App& command, CommonOptions& options) {
       ->type_name("MiB");
 }
 
+void allow_several_devices(CLI::App& command) {
+  command.get_option("--device")
+      ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST")
+      ->description(
+          "Which OpenCL devices, a list: each takes a part of every batch. DEVICE/N: N equal parts of it "
+          "(default: DPR_DEVICE, else one GPU, else an accelerator, else a CPU)");
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   add_output_options(command, options);
   add_device_options(command, options);
@@ -96,17 +105,32 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
   add_smoothing_options(command, options.smoothing);
 }
 
-Device open_device(const CommonOptions& options) {
+namespace {
+
+/// What the options say of a device that was opened.
+void set_up(Device& device, const CommonOptions& options) {
   constexpr std::size_t k_mebibyte = 1024 * 1024;
-  Device device = dpr::open_device(options.device);
   print_notes(device.info().passed_over, options);
   if (options.memory_budget) device.set_memory_budget(*options.memory_budget * k_mebibyte);
   if (options.verbose) {
     const DeviceInfo& info = device.info();
-    std::printf("device %zu: %s, %s, %u lanes\n", info.index, info.platform.c_str(), info.name.c_str(),
-                info.lanes);
+    std::printf("device %zu: %s, %s, %u compute units, %u lanes\n", info.index, info.platform.c_str(),
+                info.name.c_str(), info.compute_units, info.lanes);
   }
+}
+
+}  // namespace
+
+Device open_device(const CommonOptions& options) {
+  Device device = dpr::open_device(options.device);
+  set_up(device, options);
   return device;
+}
+
+std::vector<Device> open_devices(const CommonOptions& options) {
+  std::vector<Device> devices = dpr::open_devices(options.device);
+  for (Device& device : devices) set_up(device, options);
+  return devices;
 }
 
 SmoothingOptions smoothing_options(const CommonOptions& options) {

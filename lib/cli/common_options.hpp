@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dpr/device.hpp"
 #include "dpr/image.hpp"
@@ -39,6 +40,8 @@ CLI::Option* add_seed_option(CLI::App& command, const std::function<void(std::ui
                              const std::string& description);
 /// --device and --memory-budget.
 void add_device_options(CLI::App& command, CommonOptions& options);
+/// Says in the command's help that --device may be a list.
+void allow_several_devices(CLI::App& command);
 /// --verbose and --quiet.
 void add_output_options(CLI::App& command, CommonOptions& options);
 /// Those, and all that a command that renders understands.
@@ -46,6 +49,8 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// The device of --device. Says which one it is if asked to be verbose.
 Device open_device(const CommonOptions& options);
+/// The same where --device may be a list.
+std::vector<Device> open_devices(const CommonOptions& options);
 /// The smoothing flags and --seed.
 SmoothingOptions smoothing_options(const CommonOptions& options);
 /// Puts --size, --seed and the smoothing flags into a scene that no file describes: what they leave open is

@@ -82,21 +82,25 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   const ShapeViews views = read_views(command, options, common);
-  const Device device = open_device(common);
+  const std::vector<Device> devices = open_devices(common);
   const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},
-                                               [&] { return ShapeSolver(device, views, options.solver); });
+                                               [&] { return ShapeSolver(devices, views, options.solver); });
   std::optional<FitReport> report;
-  if (!options.report.empty()) report.emplace(options.report, device, views);
+  if (!options.report.empty()) report.emplace(options.report, devices, views);
   const auto keep = [&](const ShapeIteration& step, const Mesh& mesh) {
     if (report) report->keep(step.iteration, mesh);
     return true;
   };
   FitObserver observer(solver.most_iterations(), common.quiet, keep);
-  const ShapeResult result = solver.solve(observer.callback(), options.checkpoint);
+  const auto watch = [&, show = observer.callback()](const ShapeIteration& step, const Mesh& mesh) {
+    print_notes(step.notes, common);
+    return show(step, mesh);
+  };
+  const ShapeResult result = solver.solve(watch, options.checkpoint);
   write_mesh(options.output, result.mesh);
   if (report) {
     const std::string views_file = std::filesystem::path(options.views).filename().string();
-    report->write(page_source("The shape in " + views_file, common, device), result, common.quiet);
+    report->write(page_source("The shape in " + views_file, common, devices), result, common.quiet);
   }
   if (!common.quiet) {
     std::printf("%s: %zu vertices, %zu triangles, loss %.4g after %zu iterations, %.1f s\n",
@@ -117,6 +121,10 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
       "N");
   add("--iterations", solver.iterations, "How many steps a level", "N");
   add("--batch", solver.batch, "Views that a step looks at, in turn", "N");
+  add("--chunk", solver.chunk,
+      "Views that a device renders together; 0: all of a step on one device, a twelfth on several. The last "
+      "bits depend on it",
+      "N");
   add("--edge", solver.edge_pixels, "Length of the mesh's edges, in pixels of the level", "FLOAT");
   add("--remesh-interval", solver.remesh_interval,
       "Steps between two remeshings, in the first half of a level; 0: the faces stay", "N");
@@ -178,6 +186,7 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
   add_solver_options(*command, *options);
   add_loss_options(*command, options->solver);
   add_common_options(*command, common);
+  allow_several_devices(*command);
   command->footer(
       "Example: dpr fit --views views.json -o mesh.obj --report report --checkpoint fit.checkpoint");
   command->callback([command, options, &common] { run(*command, *options, common); });

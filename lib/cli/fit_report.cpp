@@ -11,6 +11,7 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/text.hpp"
+#include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
 
@@ -148,8 +149,8 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
   return images;
 }
 
-FitReport::FitReport(std::filesystem::path folder, Device device, const ShapeViews& views)
-    : folder_(std::move(folder)), device_(std::move(device)), views_(views) {
+FitReport::FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views)
+    : folder_(std::move(folder)), devices_(std::move(devices)), views_(views) {
   make_folder(folder_ / "iterations");
 }
 
@@ -159,7 +160,16 @@ void FitReport::keep(unsigned iteration, const Mesh& mesh) const {
 }
 
 std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>& cameras) const {
-  return render_rigidly(device_, mesh, cameras, views_.width, views_.height, views_.background);
+  const auto on = [&](const Device& device) {
+    return render_rigidly(device, mesh, cameras, views_.width, views_.height, views_.background);
+  };
+  for (std::size_t d = 0; d + 1 < devices_.size(); ++d) {
+    try {
+      return on(devices_[d]);
+    } catch (const DeviceError&) {  // lost: the next may not be
+    }
+  }
+  return on(devices_.back());
 }
 
 /// The start, and the iterations of which there are pictures.

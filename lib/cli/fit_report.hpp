@@ -33,8 +33,9 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
 /// leaves them, and a run that goes on from its checkpoint shows them too.
 class FitReport {
  public:
-  /// Makes the folder if need be. Throws IoError.
-  FitReport(std::filesystem::path folder, Device device, const ShapeViews& views);
+  /// Makes the folder if need be. Throws IoError. The first of the devices renders, or where it is lost the
+  /// next; where all are, what is called throws DeviceError.
+  FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views);
 
   /// Writes iterations/N.png: the mesh as the first camera sees it. Throws IoError.
   void keep(unsigned iteration, const Mesh& mesh) const;
@@ -48,7 +49,7 @@ class FitReport {
   std::vector<std::vector<Picture>> compare_views(const Mesh& mesh) const;
 
   std::filesystem::path folder_;
-  Device device_;
+  std::vector<Device> devices_;
   const ShapeViews& views_;
 };
 

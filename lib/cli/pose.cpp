@@ -121,6 +121,15 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   }
 }
 
+/// A pose of one image gains nothing from several devices.
+Device open_only_device(const CommonOptions& common) {
+  const std::vector<Device> devices = open_devices(common);
+  if (devices.size() == 1) return devices.front();
+  throw InvalidArgument("--device (command line)", "a list of " + std::to_string(devices.size()) + " devices",
+                        "one: the host compares the images of all hypotheses, and several devices would wait "
+                        "for it");
+}
+
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // What can be wrong about the output is found out before the work, not after it.
   require_writable(options.output);
@@ -132,7 +141,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
   const Image target = read_target(options.target, options.descent.loss, common.encoding());
-  const Device device = open_device(common);
+  const Device device = open_only_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
   });
@@ -141,7 +150,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   write_json(options.output, pose_to_json(scene, result));
   if (!options.report.empty()) {
     const std::string title = "The pose of " + std::filesystem::path(options.scene).filename().string();
-    write_pose_report(options.report, page_source(title, common, device), device, scene, target, result,
+    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, target, result,
                       common.quiet);
   }
   if (!common.quiet) print(command, options, result);

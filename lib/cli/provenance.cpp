@@ -20,9 +20,14 @@ Json provenance(const Device& device) {
           {"build_options", build_options(device.impl())}};
 }
 
-PageSource page_source(const std::string& title, const CommonOptions& common, const Device& device) {
-  const DeviceInfo& info = device.info();
-  return {title, common.command_line, info.name + " (" + info.platform + ", " + info.version + ")"};
+PageSource page_source(const std::string& title, const CommonOptions& common,
+                       std::span<const Device> devices) {
+  std::string names;
+  for (const Device& device : devices) {
+    const DeviceInfo& info = device.info();
+    names += (names.empty() ? "" : "; ") + info.name + " (" + info.platform + ", " + info.version + ")";
+  }
+  return {title, common.command_line, names};
 }
 
 }  // namespace dpr::cli

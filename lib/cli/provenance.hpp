@@ -1,6 +1,9 @@
 // What a file of results, or a page, says about where they come from.
 #pragma once
 
+#include <span>
+#include <string>
+
 #include "cli/common_options.hpp"
 #include "cli/json.hpp"
 #include "cli/page.hpp"
@@ -13,7 +16,8 @@ const char* commit();
 
 /// {"commit", "device": {...}, "build_options"}.
 Json provenance(const Device& device);
-/// The command as it was typed, and the device it ran on.
-PageSource page_source(const std::string& title, const CommonOptions& common, const Device& device);
+/// The command as it was typed, and the devices it ran on.
+PageSource page_source(const std::string& title, const CommonOptions& common,
+                       std::span<const Device> devices);
 
 }  // namespace dpr::cli

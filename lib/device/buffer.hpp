@@ -61,8 +61,7 @@ class Buffer {
   void upload(Device::Impl& device, std::span<const T> values) {
     resize(device, values.size());
     if (values.empty()) return;
-    check_cl(device.queue.enqueueWriteBuffer(buffer_, CL_TRUE, 0, values.size_bytes(), values.data()),
-             "clEnqueueWriteBuffer");
+    device.write(buffer_, 0, std::as_bytes(values));
   }
 
   /// Blocks until everything enqueued before has run. Throws std::logic_error for elements that are not
@@ -71,10 +70,7 @@ class Buffer {
     if (first > size() || values.size() > size() - first)
       throw std::logic_error("more is read of a buffer than it holds");
     if (values.empty()) return;
-    ++device_->host_waits;
-    check_cl(device_->queue.enqueueReadBuffer(buffer_, CL_TRUE, first * sizeof(T), values.size_bytes(),
-                                              values.data()),
-             "clEnqueueReadBuffer");
+    device_->read(buffer_, first * sizeof(T), std::as_writable_bytes(values));
   }
   std::vector<T> download() const {
     std::vector<T> values(size());
@@ -182,6 +178,7 @@ class PendingRead {
                                              &value_, nullptr, &arrived_),
              "clEnqueueReadBuffer");
     device_ = device;
+    device->bytes_from_device += sizeof(T);
     check_cl(device->queue.flush(), "clFlush");
   }
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <limits>
 #include <numeric>
 #include <optional>
+#include <sstream>
 
 #include "device/context.hpp"
 
@@ -26,6 +28,31 @@ std::optional<std::size_t> parse_index(const std::string& text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return index;
+}
+
+/// "DEVICE/N" taken apart.
+struct Parts {
+  std::string device;
+  unsigned count;
+};
+
+std::optional<Parts> parse_parts(const std::string& text) {
+  const std::size_t slash = text.rfind('/');
+  if (slash == std::string::npos) return std::nullopt;
+  const auto count = parse_index(text.substr(slash + 1));
+  if (!count || *count < 1 || *count > std::numeric_limits<unsigned>::max()) return std::nullopt;
+  return Parts{text.substr(0, slash), static_cast<unsigned>(*count)};
+}
+
+bool names_one(std::span<const DeviceInfo> devices, const std::string& text) {
+  return std::ranges::any_of(devices, [&](const DeviceInfo& info) { return matches(info, text); });
+}
+
+std::vector<std::string> items_of(const std::string& selectors) {
+  std::vector<std::string> items;
+  std::istringstream text(selectors);
+  for (std::string item; std::getline(text, item, ',');) items.push_back(item);
+  return items;
 }
 
 }  // namespace
@@ -56,6 +83,47 @@ bool matches(const DeviceInfo& info, const std::string& selector) {
   if (const auto index = parse_index(selector)) return info.index == *index;
   return lower(info.platform + " " + info.name + " " + info.version).find(lower(selector)) !=
          std::string::npos;
+}
+
+bool names_several(std::span<const DeviceInfo> devices, const std::string& selectors) {
+  if (names_one(devices, selectors)) return false;
+  return selectors.find(',') != std::string::npos || parse_parts(selectors).has_value();
+}
+
+std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, const std::string& selectors,
+                                         const std::string& where) {
+  std::vector<DeviceChoice> choices;
+  const auto is_taken = [&](std::size_t position) {
+    return std::ranges::any_of(choices, [&](const DeviceChoice& c) { return c.position == position; });
+  };
+  for (const std::string& item : items_of(selectors)) {
+    const auto parts = names_one(devices, item) ? std::nullopt : parse_parts(item);
+    const std::string& wanted = parts ? parts->device : item;
+    std::size_t position = 0;
+    while (position < devices.size() && (is_taken(position) || !matches(devices[position], wanted)))
+      ++position;
+    if (position == devices.size()) {
+      throw InvalidArgument(where, "'" + item + "' in '" + selectors + "'",
+                            "one more device, of " + device_names(devices));
+    }
+    const unsigned units = devices[position].compute_units;
+    if (parts && parts->count > units) {
+      throw InvalidArgument(
+          where, "'" + item + "'",
+          "at most " + std::to_string(units) + " parts, the compute units of " + devices[position].name);
+    }
+    choices.push_back({position, parts ? parts->count : 1});
+  }
+  return choices;
+}
+
+std::string device_names(std::span<const DeviceInfo> devices) {
+  std::string list;
+  for (const DeviceInfo& info : devices) {
+    list +=
+        (list.empty() ? "" : ", ") + std::to_string(info.index) + " (" + info.type + ", " + info.name + ")";
+  }
+  return list;
 }
 
 Device open_best(std::span<const DeviceInfo> devices, const std::function<Device(std::size_t, bool)>& open) {

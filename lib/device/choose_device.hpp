@@ -22,6 +22,24 @@ std::string reason_of_preference(const DeviceInfo& info);
 /// its platform, name or version, ignoring case. Empty: whether it is the default.
 bool matches(const DeviceInfo& info, const std::string& selector);
 
+/// A device of a list, or equal parts of it.
+struct DeviceChoice {
+  std::size_t position;
+  unsigned parts = 1;
+};
+
+/// Whether the text is a list or asks for parts, rather than naming one of the devices as it stands.
+bool names_several(std::span<const DeviceInfo> devices, const std::string& selectors);
+
+/// The devices that such a text names. Each item takes the first that matches and is not taken yet. Throws
+/// InvalidArgument, which calls the text `where`, for an item that finds none, and for more parts than
+/// compute units.
+std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, const std::string& selectors,
+                                         const std::string& where);
+
+/// "0 (cpu, NAME), 1 (gpu, NAME)", as messages have it.
+std::string device_names(std::span<const DeviceInfo> devices);
+
 /// Opens the best device that can be used. Those that cannot, because `open` throws a DeviceError or a
 /// BuildError, are named with the reason in the `passed_over` of the one that is opened. What the last one
 /// throws is thrown.

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <list>
 #include <map>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +25,20 @@ inline void check_cl(int code, std::string_view where) {
   if (code != CL_SUCCESS) throw DeviceError(code, std::string(where));
 }
 
+/// What goes between host and device, and how often the host waits for it.
+struct TransferCounts {
+  std::size_t bytes_to_device = 0, bytes_from_device = 0;
+  std::size_t host_waits = 0;  ///< blocking calls
+};
+
 /// May be used from several threads, except for `profile`.
 struct Device::Impl {
+  Impl() = default;
+  /// Waits for the writes that are still under way.
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
   cl::Device device;
   cl::Context context;
   cl::CommandQueue queue;
@@ -43,6 +58,14 @@ struct Device::Impl {
     if (info.platform == "Oclgrind") clRetainMemObject(buffer());
   }
 
+  /// Enqueues a write to a buffer, from a byte on. The bytes are copied, so that the host need not wait: over
+  /// a network a wait costs more than the copy. Of more than a mebibyte it does wait, and nothing is copied.
+  void write(const cl::Buffer& buffer, std::size_t first, std::span<const std::byte> bytes);
+  /// Blocks until everything enqueued before has run, and the bytes are here.
+  void read(const cl::Buffer& buffer, std::size_t first, std::span<std::byte> bytes);
+  /// Since the device was opened.
+  TransferCounts transfers() const { return {bytes_to_device, bytes_from_device, host_waits}; }
+
   void count_allocated(std::size_t bytes) noexcept {
     const std::size_t now = allocated_bytes += bytes;
     std::size_t peak = peak_allocated_bytes;
@@ -51,12 +74,21 @@ struct Device::Impl {
   }
 
   std::atomic<std::size_t> allocated_bytes = 0, peak_allocated_bytes = 0;
-  std::atomic<std::size_t> host_waits = 0;  ///< how often the host has waited to read from the device
+  std::atomic<std::size_t> bytes_to_device = 0, bytes_from_device = 0, host_waits = 0;  ///< TransferCounts
   std::atomic<std::size_t> memory_budget = 0;
 
  private:
+  /// What a write reads until it has run.
+  struct PendingWrite {
+    std::vector<std::byte> bytes;
+    cl::Event finished;
+    bool has_run() const;
+  };
+
   std::mutex mutex_;
   std::map<std::string, cl::Program> programs_;
+  std::mutex writes_mutex_;
+  std::list<PendingWrite> writes_;
 };
 
 /// Describes a device of a platform; index, default and lanes are filled in by list_devices().

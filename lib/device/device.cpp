@@ -11,6 +11,7 @@
 #include "device/context.hpp"
 #include "device/info.hpp"
 #include "device/kernel.hpp"
+#include "dpr/multi_device.hpp"
 #include "dpr/opencl_handles.hpp"
 
 namespace dpr {
@@ -96,14 +97,17 @@ FoundDevices find_devices() {
   return found;
 }
 
-std::string names(const std::vector<FoundDevice>& found) {
-  std::string list;
-  for (const FoundDevice& entry : found) {
-    list += (list.empty() ? "" : ", ") + std::to_string(entry.info.index) + " (" + entry.info.type + ", " +
-            entry.info.name + ")";
+/// The caller's word, or else the environment's, and what messages call it.
+struct Wanted {
+  explicit Wanted(const std::string& selector) : text(selector) {
+    const char* const environment = std::getenv("DPR_DEVICE");
+    if (!selector.empty() || environment == nullptr) return;
+    text = environment;
+    where = "DPR_DEVICE (environment)";
   }
-  return list;
-}
+
+  std::string text, where = "device";
+};
 
 }  // namespace
 
@@ -172,8 +176,7 @@ void try_out(const Device& device) {
 }  // namespace
 
 Device open_device(const std::string& selector) {
-  const char* environment = std::getenv("DPR_DEVICE");
-  const std::string wanted = selector.empty() && environment != nullptr ? environment : selector;
+  const auto [wanted, where] = Wanted(selector);
   const auto [found, failure] = find_devices();
   if (wanted.empty() && !found.empty()) {
     Device device = open_best(infos_of(found), [&entries = found](std::size_t position, bool is_tried) {
@@ -191,8 +194,36 @@ Device open_device(const std::string& selector) {
   if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
   if (found.empty())
     throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
-  throw InvalidArgument(selector.empty() ? "DPR_DEVICE (environment)" : "device", "'" + wanted + "'",
-                        "one of " + names(found));
+  const std::vector<DeviceInfo> infos = infos_of(found);
+  const bool is_list = names_several(infos, wanted);
+  throw InvalidArgument(
+      where, "'" + wanted + "'",
+      (is_list ? "one device, not a list of them or parts: " : "one of ") + device_names(infos));
+}
+
+std::vector<Device> open_devices(const std::string& selectors) {
+  const auto [wanted, where] = Wanted(selectors);
+  const auto [found, failure] = find_devices();
+  const std::vector<DeviceInfo> infos = infos_of(found);
+  if (infos.empty() || !names_several(infos, wanted)) return {open_device(selectors)};
+  std::vector<DeviceChoice> choices;
+  try {
+    choices = choose_devices(infos, wanted, where);
+  } catch (const InvalidArgument&) {
+    if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
+    throw;
+  }
+  std::vector<Device> devices;
+  for (const auto& [position, parts] : choices) {
+    const Device whole = open_found(found[position]);
+    if (parts == 1) {
+      devices.push_back(whole);
+      continue;
+    }
+    const std::vector<Device> equal = split_device(whole, whole.info().compute_units / parts);
+    devices.insert(devices.end(), equal.begin(), equal.begin() + parts);
+  }
+  return devices;
 }
 
 Device adopt_device(cl_context context_handle, cl_command_queue queue_handle) {

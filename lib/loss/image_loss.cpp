@@ -123,6 +123,7 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
       width(targets[0].width),
       height(targets[0].height),
       views(targets.size()),
+      views_of_mean(targets.size()),
       per_view(targets.size()),
       inverse_scale_squared(1 / (options.weights.robust_scale * options.weights.robust_scale)),
       forward(device.impl(), "image_loss.cl", "image_loss_forward"),
@@ -222,8 +223,8 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
             level.per_pixel);
     reduce({pixels, shared::DPR_LOSS_SUMS, views, 1, level.view_starts, level.per_pixel}, level.sums);
     backward(pixels, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
-             static_cast<cl_uint>(levels.size()), inverse_scale_squared, image, level.target, level.mask,
-             level.sums, device_weights, level.device_channels, level.grad_image);
+             static_cast<cl_uint>(views_of_mean * levels.size()), inverse_scale_squared, image, level.target,
+             level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
   }
   for (std::size_t l = levels.size() - 1; l > 0; --l) {
     Level& large = levels[l - 1];

@@ -64,6 +64,8 @@ struct ImageLoss::Impl {
   Device device;
   int width, height;
   std::size_t views;
+  std::size_t
+      views_of_mean;  // that gradients are those of a mean over: `views`, or the batch these are a part of
   std::vector<double> per_view;
   std::vector<float> view_weights;  // [view][loss]
   float inverse_scale_squared;

@@ -12,20 +12,21 @@
 namespace dpr {
 namespace {
 
-void check(const MeshLossWeights& weights) {
-  for (const float value : {weights.laplacian, weights.edge_length, weights.normal_consistency,
-                            weights.flatness, weights.edge_target}) {
-    if (value >= 0 && std::isfinite(value)) continue;
-    throw InvalidArgument("weight (mesh loss)", checks::text(value), "a finite number, at least 0");
-  }
-}
-
 /// A mean's weight for a sum over `count`; a mean of nothing is 0.
 float per_item(float weight, std::size_t count) {
   return count > 0 ? weight / static_cast<float>(count) : 0.0F;
 }
 
 }  // namespace
+
+void check_mesh_loss(const MeshLossWeights& weights, const Mesh& mesh) {
+  for (const float value : {weights.laplacian, weights.edge_length, weights.normal_consistency,
+                            weights.flatness, weights.edge_target}) {
+    if (value >= 0 && std::isfinite(value)) continue;
+    throw InvalidArgument("weight (mesh loss)", checks::text(value), "a finite number, at least 0");
+  }
+  validate(mesh);
+}
 
 MeshLoss::Impl::Impl(const Device& device_, const MeshLossWeights& weights_, const Mesh& mesh)
     : device(device_),
@@ -99,8 +100,7 @@ void MeshLoss::Impl::add_gradient(const Buffer<cl_float4>& at, Buffer<cl_float4>
 }
 
 MeshLoss::MeshLoss(const Device& device, const MeshLossWeights& weights, const Mesh& mesh) {
-  check(weights);
-  validate(mesh);
+  check_mesh_loss(weights, mesh);
   impl_ = std::make_unique<Impl>(device, weights, mesh);
 }
 

@@ -9,6 +9,9 @@
 
 namespace dpr {
 
+/// Throws InvalidArgument for what a MeshLoss refuses.
+void check_mesh_loss(const MeshLossWeights& weights, const Mesh& mesh);
+
 struct MeshLoss::Impl {
   Impl(const Device& device, const MeshLossWeights& weights, const Mesh& mesh);
 

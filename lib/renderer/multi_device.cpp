@@ -1,223 +1,23 @@
-// Views dealt to devices in chunks; gradients added in the order of the chunks.
+// The setters and calls of the renderer on several devices.
 #include "dpr/multi_device.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <cstdint>
-#include <exception>
-#include <functional>
-#include <iterator>
-#include <optional>
-#include <thread>
+#include <utility>
 
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "loss/mesh_loss_impl.hpp"
+#include "renderer/gradient_sum.hpp"
+#include "renderer/multi_device_impl.hpp"
 #include "renderer/setter_checks.hpp"
-#include "scene/gradient_table.hpp"
 
 namespace dpr {
-namespace {
-
-/// Chunks a batch falls into, if it has as many views: enough for the devices to finish together, few enough
-/// for a chunk to fill a device.
-constexpr std::size_t k_chunks = 12;
-
-/// Consecutive views [first, last).
-struct Chunk {
-  std::size_t first, last;
-  std::size_t size() const { return last - first; }
-};
-
-/// The same whatever devices there are; none with more views than a frame may have.
-std::vector<Chunk> make_chunks(std::size_t views, std::size_t most) {
-  const std::size_t size = std::min((views + k_chunks - 1) / k_chunks, std::max(most, std::size_t{1}));
-  std::vector<Chunk> chunks;
-  for (std::size_t first = 0; first < views; first += size)
-    chunks.push_back({first, std::min(first + size, views)});
-  return chunks;
-}
-
-/// Adds the gradients of chunks, which come in their order, in double precision.
-class GradientSum {
- public:
-  void add_chunk(SceneGradient&& chunk, double factor) {
-    std::size_t next = 0;
-    for_each_array(chunk, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
-      if (is_per_view(row.of)) {
-        transform_numbers(array, [&](double value) { return 0.0 + factor * value; });
-      } else {
-        if (next == sums_.size()) sums_.emplace_back();
-        add(sums_[next++], array, factor);
-      }
-    });
-    std::ranges::move(chunk.views, std::back_inserter(views_));
-    last_ = std::move(chunk);
-  }
-
-  SceneGradient finish() {
-    std::size_t next = 0;
-    for_each_array(last_, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
-      if (is_per_view(row.of)) return;
-      auto value = sums_[next++].begin();
-      transform_numbers(array, [&](double) { return *value++; });
-    });
-    last_.views = std::move(views_);
-    return std::move(last_);
-  }
-
- private:
-  static void add(std::vector<double>& sum, const GradientArray& array, double factor) {
-    std::size_t i = 0;
-    transform_numbers(array, [&](double value) {
-      if (i == sum.size()) sum.push_back(0.0);
-      sum[i++] += factor * value;
-      return value;
-    });
-  }
-
-  std::vector<std::vector<double>> sums_;  // [array that is a sum over the views]
-  std::vector<ViewGradient> views_;
-  SceneGradient last_;
-};
-
-/// How often each part of the scene has been set.
-struct Versions {
-  std::uint64_t scene = 0, smoothing = 0, lights = 0;
-  std::vector<std::uint64_t> positions, colors, texcoords;  // [mesh]
-  std::vector<std::vector<std::uint64_t>> texels;           // [mesh][texture]
-
-  explicit Versions(const Scene& of = {}, std::uint64_t number = 0)
-      : scene(number), positions(of.meshes.size()), colors(of.meshes.size()), texcoords(of.meshes.size()) {
-    for (const Instance& instance : of.meshes) texels.emplace_back(instance.mesh.textures.size());
-  }
-};
-
-}  // namespace
-
-/// Setters change what is here. A device's renderer catches up before its next chunk, so that an error of one
-/// device leaves no two of them with different scenes.
-struct MultiDeviceRenderer::Impl {
-  /// A device's renderer, which version of the scene it has, and the losses of the chunks it has met.
-  struct Worker {
-    explicit Worker(const Device& device) : renderer(device) {}
-    Renderer renderer;
-    Versions has;
-    std::uint64_t losses_of = 0;
-    std::vector<std::optional<ImageLoss>> losses;  // [chunk]
-    std::size_t views_rendered = 0;
-  };
-
-  std::vector<Worker> workers;
-  Scene scene;
-  Versions now;
-  std::vector<View> views;
-  std::vector<Chunk> chunks;
-  LossWeights weights;
-  std::vector<Image> targets;
-  std::uint64_t losses = 0;  // how often chunks or targets have changed
-
-  void catch_up(Worker& worker) const {
-    Renderer& renderer = worker.renderer;
-    if (worker.has.scene != now.scene) {
-      Versions all = now;
-      renderer.set_scene(scene);
-      std::swap(worker.has, all);
-      return;
-    }
-    if (worker.has.smoothing != now.smoothing) {
-      renderer.set_smoothing(scene.smoothing);
-      worker.has.smoothing = now.smoothing;
-    }
-    if (worker.has.lights != now.lights) {
-      renderer.set_lights(scene.lights);
-      worker.has.lights = now.lights;
-    }
-    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-      if (worker.has.positions[m] != now.positions[m]) {
-        renderer.set_positions(m, scene.meshes[m].mesh.positions);
-        worker.has.positions[m] = now.positions[m];
-      }
-      if (worker.has.colors[m] != now.colors[m]) {
-        renderer.set_colors(m, colors_of(scene.meshes[m].mesh));
-        worker.has.colors[m] = now.colors[m];
-      }
-      if (worker.has.texcoords[m] != now.texcoords[m]) {
-        renderer.set_texcoords(m, scene.meshes[m].mesh.texcoords);
-        worker.has.texcoords[m] = now.texcoords[m];
-      }
-      for (std::size_t t = 0; t < now.texels[m].size(); ++t) {
-        if (worker.has.texels[m][t] == now.texels[m][t]) continue;
-        renderer.set_texels(m, t, scene.meshes[m].mesh.textures[t].texels);
-        worker.has.texels[m][t] = now.texels[m][t];
-      }
-    }
-  }
-
-  void require_views(const char* caller) const {
-    if (views.empty()) throw InvalidArgument(caller, "no scene", "set_scene() first");
-  }
-
-  std::span<const View> views_of(const Chunk& chunk) const {
-    return std::span(views).subspan(chunk.first, chunk.size());
-  }
-
-  using Work = std::function<void(Worker&, std::size_t chunk)>;
-
-  /// Renders every chunk on the device that is free first, then does `work` there. The first error, in the
-  /// order of the chunks, is thrown when all devices are done.
-  void for_each_chunk(const Work& work) {
-    std::atomic<std::size_t> next = 0;
-    std::vector<std::exception_ptr> errors(chunks.size());
-    const auto run = [&](Worker& worker) {
-      for (std::size_t c = next++; c < chunks.size(); c = next++) {
-        try {
-          catch_up(worker);
-          worker.renderer.set_views(views_of(chunks[c]), chunks[c].first);
-          worker.renderer.forward();
-          work(worker, c);
-          worker.views_rendered += chunks[c].size();
-        } catch (...) {
-          errors[c] = std::current_exception();
-        }
-      }
-    };
-    {
-      std::vector<std::jthread> threads;
-      for (std::size_t w = 1; w < workers.size(); ++w)
-        threads.emplace_back([&run, &worker = workers[w]] { run(worker); });
-      run(workers.front());
-    }
-    for (const std::exception_ptr& error : errors) {
-      if (error) std::rethrow_exception(error);
-    }
-  }
-
-  ImageLoss& loss_of(Worker& worker, std::size_t chunk) const {
-    if (worker.losses_of != losses) {
-      worker.losses.clear();
-      worker.losses.resize(chunks.size());
-      worker.losses_of = losses;
-    }
-    std::optional<ImageLoss>& loss = worker.losses[chunk];
-    if (!loss) {
-      loss.emplace(worker.renderer.device(), weights,
-                   std::span(targets).subspan(chunks[chunk].first, chunks[chunk].size()));
-    }
-    return *loss;
-  }
-};
 
 MultiDeviceRenderer::MultiDeviceRenderer(std::vector<Device> devices) : impl_(std::make_unique<Impl>()) {
-  if (devices.empty()) throw InvalidArgument("devices", "none", "at least one");
-  for (std::size_t d = 0; d < devices.size(); ++d) {
-    for (std::size_t other = 0; other < d; ++other) {
-      if (&devices[d].impl() != &devices[other].impl()) continue;
-      throw InvalidArgument("devices[" + std::to_string(d) + "]",
-                            "the same Device as devices[" + std::to_string(other) + "]",
-                            "one with a queue of its own, open_device() or split_device()");
-    }
-    impl_->workers.emplace_back(devices[d]);
-  }
+  check_devices(devices);
+  for (const Device& device : devices) impl_->workers.emplace_back(device);
+  impl_->paces.resize(devices.size());
+  impl_->lost.assign(devices.size(), false);
 }
 
 MultiDeviceRenderer::~MultiDeviceRenderer() = default;
@@ -229,13 +29,11 @@ void MultiDeviceRenderer::set_scene(const Scene& scene) {
   Impl& m = *impl_;
   Scene new_scene = scene;
   std::vector<View> only{own_view(scene)};
-  std::vector<Chunk> chunks = make_chunks(1, 1);
   Versions versions(scene, m.now.scene + 1);
   std::swap(m.scene, new_scene);
   std::swap(m.views, only);
-  std::swap(m.chunks, chunks);
   std::swap(m.now, versions);
-  ++m.losses;
+  m.mesh_loss.reset();
 }
 
 void MultiDeviceRenderer::set_views(std::span<const View> views) {
@@ -243,11 +41,10 @@ void MultiDeviceRenderer::set_views(std::span<const View> views) {
   m.require_views("MultiDeviceRenderer::set_views");
   check_views(m.scene, views);
   std::vector<View> new_views(views.begin(), views.end());
-  std::vector<Chunk> chunks = make_chunks(views.size(), most_views(m.scene));
   std::swap(m.views, new_views);
-  std::swap(m.chunks, chunks);
-  ++m.losses;
 }
+
+void MultiDeviceRenderer::set_chunk(std::size_t views) { impl_->chunk_views = views; }
 
 void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
   impl_->require_views("MultiDeviceRenderer::set_smoothing");
@@ -296,9 +93,10 @@ std::vector<Image> MultiDeviceRenderer::render() {
   Impl& m = *impl_;
   m.require_views("MultiDeviceRenderer::render");
   std::vector<Image> images(m.views.size());
-  m.for_each_chunk([&](Impl::Worker& worker, std::size_t c) {
-    for (std::size_t v = m.chunks[c].first; v < m.chunks[c].last; ++v)
-      images[v] = worker.renderer.image(v - m.chunks[c].first);
+  const Impl::Batch all = m.all_views();
+  m.for_each_chunk(all, [&](Impl::Worker& worker, std::size_t c) {
+    for (std::size_t v = all.chunks[c].first; v < all.chunks[c].last; ++v)
+      images[v] = worker.renderer.image(v - all.chunks[c].first);
   });
   return images;
 }
@@ -310,49 +108,79 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
-  std::vector<SceneGradient> parts(m.chunks.size());
-  m.for_each_chunk([&](Impl::Worker& worker, std::size_t c) {
-    parts[c] = worker.renderer.backward(grad_images.subspan(m.chunks[c].first, m.chunks[c].size()));
+  const Impl::Batch all = m.all_views();
+  std::vector<SceneGradient> parts(all.chunks.size());
+  m.for_each_chunk(all, [&](Impl::Worker& worker, std::size_t c) {
+    parts[c] = worker.renderer.backward(grad_images.subspan(all.chunks[c].first, all.chunks[c].size()));
   });
-  GradientSum sum;
-  for (SceneGradient& part : parts) sum.add_chunk(std::move(part), 1.0);
-  return sum.finish();
+  return sum_of(std::move(parts));
 }
 
-void MultiDeviceRenderer::set_loss(LossWeights weights, std::span<const Image> targets) {
+void MultiDeviceRenderer::set_loss(const LossOptions& options, std::span<const Image> targets) {
   impl_->require_views("MultiDeviceRenderer::set_loss");
-  check_loss({.weights = weights}, targets);
-  std::vector<Image> new_targets(targets.begin(), targets.end());
-  impl_->weights = weights;
-  std::swap(impl_->targets, new_targets);
+  check_loss(options, targets);
+  OwnLoss loss{options.weights,
+               {options.has_alpha.begin(), options.has_alpha.end()},
+               {options.masks.begin(), options.masks.end()},
+               {targets.begin(), targets.end()},
+               options.levels};
+  std::swap(impl_->loss, loss);
   ++impl_->losses;
 }
 
-MultiDeviceRenderer::Evaluation MultiDeviceRenderer::evaluate() {
+void MultiDeviceRenderer::set_loss(LossWeights weights, std::span<const Image> targets) {
+  set_loss(LossOptions{.weights = weights}, targets);
+}
+
+void MultiDeviceRenderer::set_mesh_loss(const MeshLossWeights& weights, std::size_t mesh) {
+  Impl& m = *impl_;
+  m.require_views("MultiDeviceRenderer::set_mesh_loss");
+  if (mesh >= m.scene.meshes.size()) {
+    throw InvalidArgument("mesh (mesh loss)", std::to_string(mesh),
+                          "below " + std::to_string(m.scene.meshes.size()));
+  }
+  if (!m.scene.gradients.positions) {
+    throw InvalidArgument("mesh loss (MultiDeviceRenderer)", "a scene without gradients of positions",
+                          "GradientRequest::positions");
+  }
+  check_mesh_loss(weights, m.scene.meshes[mesh].mesh);
+  m.mesh_loss = {weights, mesh};
+  ++m.mesh_losses;
+}
+
+MultiDeviceRenderer::Evaluation MultiDeviceRenderer::evaluate() { return evaluate(0, impl_->views.size()); }
+
+MultiDeviceRenderer::Evaluation MultiDeviceRenderer::evaluate(std::size_t first, std::size_t count) {
   Impl& m = *impl_;
   m.require_views("MultiDeviceRenderer::evaluate");
-  if (m.targets.size() != m.views.size()) {
-    throw InvalidArgument("targets (loss)", std::to_string(m.targets.size()) + " images",
+  if (m.loss.targets.size() != m.views.size()) {
+    throw InvalidArgument("targets (loss)", std::to_string(m.loss.targets.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
+  if (count == 0 || first > m.views.size() || count > m.views.size() - first) {
+    throw InvalidArgument("views (MultiDeviceRenderer::evaluate)",
+                          std::to_string(count) + " from " + std::to_string(first) + " on",
+                          "at least one of the " + std::to_string(m.views.size()));
+  }
   Evaluation result;
-  result.per_view.resize(m.views.size());
-  std::vector<SceneGradient> parts(m.chunks.size());
-  m.for_each_chunk([&](Impl::Worker& worker, std::size_t c) {
-    ImageLoss& loss = m.loss_of(worker, c);
+  result.per_view.resize(count);
+  const Impl::Batch batch = m.batch(first, count);
+  std::vector<SceneGradient> parts(batch.chunks.size());
+  m.for_each_chunk(batch, [&](Impl::Worker& worker, std::size_t c) {
+    ImageLoss& loss = m.loss_of(worker, batch, c);
     loss.evaluate(worker.renderer);
     std::ranges::copy(loss.per_view(),
-                      result.per_view.begin() + static_cast<std::ptrdiff_t>(m.chunks[c].first));
-    parts[c] = worker.renderer.backward(loss);
+                      result.per_view.begin() + static_cast<std::ptrdiff_t>(batch.chunks[c].first));
+    if (c == 0 && m.mesh_loss) {
+      MeshLoss& mesh_loss = m.mesh_loss_of(worker);
+      result.mesh_loss = mesh_loss.evaluate(worker.renderer, m.mesh_loss->mesh);
+      parts[c] = worker.renderer.backward(loss, mesh_loss);
+    } else {
+      parts[c] = worker.renderer.backward(loss);
+    }
   });
-  GradientSum sum;
-  for (std::size_t c = 0; c < parts.size(); ++c) {
-    // A chunk's loss is the mean over its own views.
-    sum.add_chunk(std::move(parts[c]),
-                  static_cast<double>(m.chunks[c].size()) / static_cast<double>(m.views.size()));
-  }
-  result.gradient = sum.finish();
-  for (const double loss : result.per_view) result.loss += loss / static_cast<double>(m.views.size());
+  result.gradient = sum_of(std::move(parts));
+  for (const double loss : result.per_view) result.loss += loss / static_cast<double>(count);
   return result;
 }
 
@@ -361,5 +189,7 @@ std::vector<std::size_t> MultiDeviceRenderer::views_rendered() const {
   for (const Impl::Worker& worker : impl_->workers) counts.push_back(worker.views_rendered);
   return counts;
 }
+
+std::vector<std::string> MultiDeviceRenderer::take_notes() { return std::exchange(impl_->notes, {}); }
 
 }  // namespace dpr

@@ -111,11 +111,7 @@ void require_pixel_count(std::size_t found, std::size_t expected) {
 /// The pixels of a frame from `first` on. Blocks.
 void read_image(const Renderer::Impl& m, std::size_t first, std::span<glm::vec4> pixels) {
   static_assert(sizeof(glm::vec4) == sizeof(cl_float4));
-  Device::Impl& device = m.device.impl();
-  ++device.host_waits;
-  check_cl(device.queue.enqueueReadBuffer(m.image().cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
-                                          pixels.size_bytes(), pixels.data()),
-           "clEnqueueReadBuffer");
+  m.device.impl().read(m.image().cl_buffer(), first * sizeof(cl_float4), std::as_writable_bytes(pixels));
 }
 
 }  // namespace
@@ -144,9 +140,7 @@ SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) 
   require_pixel_count(grad_pixels.size(), m.image().size());
   checks::require_finite(grad_pixels, "grad_pixels");
   m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
-  check_cl(m.device.impl().queue.enqueueWriteBuffer(m.host_grad_images.cl_buffer(), CL_TRUE, 0,
-                                                    grad_pixels.size_bytes(), grad_pixels.data()),
-           "clEnqueueWriteBuffer");
+  m.device.impl().write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
   return m.backward(m.host_grad_images);
 }
 

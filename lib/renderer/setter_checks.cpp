@@ -14,6 +14,18 @@ View own_view(const Scene& scene) {
   return view;
 }
 
+void check_devices(std::span<const Device> devices) {
+  if (devices.empty()) throw InvalidArgument("devices", "none", "at least one");
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    for (std::size_t other = 0; other < d; ++other) {
+      if (&devices[d].impl() != &devices[other].impl()) continue;
+      throw InvalidArgument(checks::element("devices", d),
+                            "the same Device as " + checks::element("devices", other),
+                            "one with a queue of its own, open_device() or split_device()");
+    }
+  }
+}
+
 void check_views(const Scene& scene, std::span<const View> views) {
   if (views.empty()) throw InvalidArgument("views", "none", "at least one");
   for (std::size_t v = 0; v < views.size(); ++v) {

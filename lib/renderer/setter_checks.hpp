@@ -11,6 +11,9 @@ namespace dpr {
 /// The view of a scene's own camera and transforms.
 View own_view(const Scene& scene);
 
+/// Throws InvalidArgument if there is no device, or the same Device twice: each needs a queue of its own.
+void check_devices(std::span<const Device> devices);
+
 /// These throw InvalidArgument for what does not suit the scene.
 void check_views(const Scene& scene, std::span<const View> views);
 void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions);

@@ -11,9 +11,11 @@
 
 #include "base/require.hpp"
 #include "dpr/adaptive_smoothing.hpp"
-#include "dpr/renderer.hpp"
+#include "dpr/multi_device.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "loss/mesh_loss_impl.hpp"
 #include "mesh/remesh.hpp"
+#include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/resample.hpp"
@@ -50,51 +52,61 @@ Smoothing widened(Smoothing smoothing, double factor) {
   return smoothing;
 }
 
-/// The views of a level, dealt into batches: batch b has the views b, b + batches, ...
-class Batches {
- public:
-  Batches(const Device& device, const ShapeViews& views, const ShapeOptions& options, unsigned level)
-      : width(side(views.width, options, level)), height(side(views.height, options, level)) {
-    const std::size_t count = (views.views.size() + options.batch - 1) / options.batch;
-    for (std::size_t first = 0; first < count; ++first) {
-      std::vector<Image> images, masks;
-      std::vector<unsigned char> has_alpha;
-      std::vector<View>& cameras = cameras_.emplace_back();
-      for (std::size_t i = first; i < views.views.size(); i += count) {
-        const ShapeView& view = views.views[i];
-        images.push_back(resample(view.image, width, height));
-        has_alpha.push_back(view.has_alpha ? 1 : 0);
-        masks.push_back(view.mask.pixels.empty() ? Image(width, height, glm::vec4(1))
-                                                 : resample(view.mask, width, height));
-        cameras.push_back(
-            {resample(view.camera, views.width, views.height, width, height), {glm::mat4(1.0F)}});
-      }
-      losses_.emplace_back(
-          device, LossOptions{.weights = options.loss, .has_alpha = has_alpha, .masks = masks}, images);
+/// The views of a level in batches, one after the other: batch b has the views b, b + batches, ...
+struct Level {
+  Level(const ShapeViews& all, const ShapeOptions& options, unsigned level)
+      : width(side(all.width, options, level)), height(side(all.height, options, level)) {
+    const std::size_t count = (all.views.size() + options.batch - 1) / options.batch;
+    for (std::size_t batch = 0; batch < count; ++batch) {
+      starts.push_back(order.size());
+      for (std::size_t i = batch; i < all.views.size(); i += count) order.push_back(i);
+    }
+    starts.push_back(order.size());
+    for (const std::size_t i : order) {
+      const Camera& camera = all.views[i].camera;
+      views.push_back({resample(camera, all.width, all.height, width, height), {glm::mat4(1.0F)}});
     }
   }
 
-  std::span<const View> cameras(unsigned iteration) const { return cameras_[iteration % cameras_.size()]; }
-  ImageLoss& loss(unsigned iteration) { return losses_[iteration % losses_.size()]; }
+  /// Which views an iteration looks at: the first and how many.
+  std::pair<std::size_t, std::size_t> batch(unsigned iteration) const {
+    const std::size_t b = iteration % (starts.size() - 1);
+    return {starts[b], starts[b + 1] - starts[b]};
+  }
 
-  const int width, height;
+  int width, height;
+  std::vector<std::size_t> order;   // which of all views
+  std::vector<std::size_t> starts;  // [batch + 1]
+  std::vector<View> views;
 
  private:
   static int side(int pixels, const ShapeOptions& options, unsigned level) {
     return std::max(static_cast<int>(std::lround(pixels / pixel_scale(options, level))), 1);
   }
-
-  std::vector<std::vector<View>> cameras_;
-  std::vector<ImageLoss> losses_;
 };
 
-/// What a mesh needs as long as its faces stay.
-struct Topology {
-  Topology(const Device& device, const Mesh& mesh, const MeshLossWeights& weights, double lambda)
-      : mesh_loss(device, weights, mesh), steps(mesh, lambda) {}
+/// What the views of a level are compared with.
+struct Targets {
+  Targets(const ShapeViews& all, const Level& level) {
+    const auto has_mask = [](const ShapeView& view) { return !view.mask.pixels.empty(); };
+    const bool any_mask = std::ranges::any_of(all.views, has_mask);
+    for (const std::size_t i : level.order) {
+      const ShapeView& view = all.views[i];
+      images.push_back(resample(view.image, level.width, level.height));
+      has_alpha.push_back(view.has_alpha ? 1 : 0);
+      if (!any_mask) continue;
+      masks.push_back(has_mask(view) ? resample(view.mask, level.width, level.height)
+                                     : Image(level.width, level.height, glm::vec4(1)));
+    }
+  }
 
-  MeshLoss mesh_loss;
-  LargeSteps steps;
+  /// Valid as long as this.
+  LossOptions options(const LossWeights& weights) const {
+    return {.weights = weights, .has_alpha = has_alpha, .masks = masks};
+  }
+
+  std::vector<Image> images, masks;
+  std::vector<unsigned char> has_alpha;
 };
 
 OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) {
@@ -106,30 +118,35 @@ OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) 
 /// One run of the solver.
 class Run {
  public:
-  Run(const Device& device, const ShapeViews& views, const ShapeOptions& options, ShapeState state)
-      : device_(device),
-        views_(views),
+  Run(const std::vector<Device>& devices, const ShapeViews& views, const ShapeOptions& options,
+      ShapeState state)
+      : views_(views),
         options_(options),
         common_(common_view(views)),
         finest_(finest_smoothing(views, options)),
-        renderer_(device),
+        renderer_(devices),
         position_optimizer_(position_optimizer(options, common_.radius)),
         color_optimizer_({.learning_rate = options.color_learning_rate}),
         state_(std::move(state)) {
     position_optimizer_.set_state(state_.position_steps);
     color_optimizer_.set_state(state_.color_steps);
+    renderer_.set_chunk(options.chunk > 0 || devices.size() > 1 ? options.chunk : options.batch);
   }
 
   /// One iteration; what it evaluated is the history's last.
   void iterate() {
     const unsigned level = state_.iteration / options_.iterations;
     const unsigned in_level = state_.iteration % options_.iterations;
-    const bool is_new_level = !batches_ || in_level == 0;
-    if (is_new_level) batches_.emplace(device_, views_, options_, level);
+    const bool is_new_level = !level_ || in_level == 0;
+    if (is_new_level) level_.emplace(views_, options_, level);
     const bool remeshes = options_.remesh_interval > 0 && in_level % options_.remesh_interval == 0 &&
                           2 * in_level < options_.iterations;
     if (remeshes) make_mesh_anew(level);
     if (is_new_level || remeshes) prepare();
+    if (is_new_level) {
+      const Targets targets(views_, *level_);
+      renderer_.set_loss(targets.options(options_.loss), targets.images);
+    }
     const double rate = std::pow(options_.learning_rate_end, progress(in_level));
     position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
     color_optimizer_.set_learning_rate(rate * options_.color_learning_rate);
@@ -168,15 +185,15 @@ class Run {
     return weights;
   }
 
-  /// Puts the current mesh on the device.
+  /// Makes the current mesh the scene.
   void prepare() {
     const Mesh mesh = state_.mesh();
-    topology_.emplace(device_, mesh, scaled_regularizers(), options_.lambda);
+    steps_.emplace(mesh, options_.lambda);
     Scene scene;
-    scene.width = batches_->width;
-    scene.height = batches_->height;
+    scene.width = level_->width;
+    scene.height = level_->height;
     scene.background = views_.background;
-    scene.camera = batches_->cameras(0).front().camera;
+    scene.camera = level_->views.front().camera;
     scene.meshes.push_back({mesh});
     scene.smoothing = finest_;
     scene.gradients = no_gradients();
@@ -184,6 +201,8 @@ class Run {
     scene.gradients.colors = true;
     scene.gradients.smoothing = is_adaptive();
     renderer_.set_scene(scene);
+    renderer_.set_views(level_->views);
+    renderer_.set_mesh_loss(scaled_regularizers());
   }
 
   /// Through a level, from 0 to 1.
@@ -231,7 +250,6 @@ class Run {
 
   SceneGradient evaluate(unsigned level, unsigned in_level) {
     const Mesh mesh = state_.mesh();
-    ImageLoss& loss = batches_->loss(in_level);
     ShapeIteration step;
     step.iteration = state_.iteration;
     step.level = level;
@@ -239,19 +257,20 @@ class Run {
     renderer_.set_positions(0, mesh.positions);
     renderer_.set_colors(0, mesh.vertex_colors);
     renderer_.set_smoothing(step.smoothing);
-    renderer_.set_views(batches_->cameras(in_level));
-    renderer_.forward();
-    step.image_loss = loss.evaluate(renderer_);
-    step.mesh_loss = topology_->mesh_loss.evaluate(renderer_);
+    const auto [first, count] = level_->batch(in_level);
+    MultiDeviceRenderer::Evaluation found = renderer_.evaluate(first, count);
+    step.image_loss = found.loss;
+    step.mesh_loss = found.mesh_loss;
     step.loss = step.image_loss + step.mesh_loss;
     const std::string where = "loss (shape, iteration " + std::to_string(step.iteration) + ")";
     require(std::isfinite(step.loss), where.c_str(), step.loss, "a finite number");
-    step.width = batches_->width;
-    step.height = batches_->height;
+    step.width = level_->width;
+    step.height = level_->height;
     step.vertices = mesh.positions.size();
     step.faces = mesh.faces.size();
-    state_.history.push_back(step);
-    return renderer_.backward(loss, topology_->mesh_loss);
+    step.notes = renderer_.take_notes();
+    state_.history.push_back(std::move(step));
+    return std::move(found.gradient);
   }
 
   void descend(const SceneGradient& gradient) {
@@ -259,23 +278,22 @@ class Run {
     const std::vector<double> grad_positions = flat(grad.positions);
     if (options_.steps == ShapeSteps::large_steps) {
       // v = (I + lambda L)^-1 u: the gradient for u, and what a step of u does to v.
-      const auto step = position_optimizer_.step(topology_->steps.solve(grad_positions));
-      add(state_.positions, topology_->steps.solve(step));
+      const auto step = position_optimizer_.step(steps_->solve(grad_positions));
+      add(state_.positions, steps_->solve(step));
     } else {
       add(state_.positions, position_optimizer_.step(grad_positions));
     }
     add(state_.colors, color_optimizer_.step(flat(grad.colors)));
   }
 
-  const Device& device_;
   const ShapeViews& views_;
   const ShapeOptions& options_;
   CommonView common_;
   Smoothing finest_;
-  Renderer renderer_;
+  MultiDeviceRenderer renderer_;
   Optimizer position_optimizer_, color_optimizer_;
-  std::optional<Batches> batches_;
-  std::optional<Topology> topology_;
+  std::optional<Level> level_;
+  std::optional<LargeSteps> steps_;  // of the current mesh
   ShapeState state_;
 };
 
@@ -360,13 +378,17 @@ Smoothing finest_smoothing(const ShapeViews& views, const ShapeOptions& options)
 }
 
 ShapeSolver::ShapeSolver(Device device, ShapeViews views, ShapeOptions options)
-    : device_(std::move(device)), views_(std::move(views)), options_(options) {
+    : ShapeSolver(std::vector{std::move(device)}, std::move(views), options) {}
+
+ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOptions options)
+    : devices_(std::move(devices)), views_(std::move(views)), options_(options) {
+  check_devices(devices_);
   check(views_);
   check(options_, views_);
   start_ = make_start(views_);
-  // Each throws what is wrong with its options.
-  [[maybe_unused]] const MeshLoss mesh_loss(device_, options_.regularizers, start_);
-  [[maybe_unused]] const Batches batches(device_, views_, options_, 0);
+  check_mesh_loss(options_.regularizers, start_);
+  const Targets targets(views_, Level(views_, options_, 0));
+  check_loss(targets.options(options_.loss), targets.images);
 }
 
 unsigned ShapeSolver::most_iterations() const { return options_.levels * options_.iterations; }
@@ -382,7 +404,7 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
   if (!checkpoint.empty() && (std::filesystem::exists(checkpoint, unknown) || unknown))
     state = read_checkpoint(checkpoint, mark, finest_smoothing(views_, options_));
 
-  Run run(device_, views_, options_, std::move(state));
+  Run run(devices_, views_, options_, std::move(state));
   bool goes_on = true;
   while (goes_on && run.state().iteration < most_iterations()) {
     run.iterate();

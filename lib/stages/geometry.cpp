@@ -86,9 +86,7 @@ void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::siz
   std::vector<cl_float4> rows;
   rows.reserve(values.size());
   for (const glm::vec3& v : values) rows.push_back(to_cl(v));
-  check_cl(device.queue.enqueueWriteBuffer(buffer.cl_buffer(), CL_TRUE, first * sizeof(cl_float4),
-                                           rows.size() * sizeof(cl_float4), rows.data()),
-           "clEnqueueWriteBuffer");
+  device.write(buffer.cl_buffer(), first * sizeof(cl_float4), std::as_bytes(std::span(rows)));
 }
 
 Geometry::Geometry(Device::Impl& device, const Scene& scene) {

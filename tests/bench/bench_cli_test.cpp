@@ -72,6 +72,8 @@ TEST_SUITE("bench-smoke") {
     CHECK(names.size() == results["results"].size());  // a workload that is named twice is measured once
     const std::string csv = dpr::read_file(folder / "a.csv");
     CHECK(csv.starts_with("workload,preset,"));
+    CHECK(dpr::test::contains(
+        csv, ",transfers_bytes_to_device,transfers_bytes_from_device,transfers_host_waits,"));
     CHECK(static_cast<std::size_t>(std::ranges::count(csv, '\n')) == results["results"].size() + 1);
     const Outcome compared = bench(folder, {"--compare", "a.json", "a.json", "-o", "c.json"});
     CHECK(compared.status == 0);

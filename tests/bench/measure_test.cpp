@@ -56,6 +56,13 @@ TEST_SUITE("bench-smoke") {
       CHECK(row["backward_ms"]["median"].get<double>() > 0);
       CHECK(row["fragments"].get<std::size_t>() > 0);
       CHECK(row["peak_device_bytes"].get<std::size_t>() > 0);
+      // The vertices go there, their gradients come back, and no image.
+      const Json& transfers = row["transfers"];
+      const std::size_t vertices = 16 * workload.scene.meshes[0].mesh.positions.size();
+      CHECK(transfers["bytes_to_device"].get<std::size_t>() >= vertices);
+      CHECK(transfers["bytes_to_device"].get<std::size_t>() < 2 * vertices);
+      CHECK(transfers["bytes_from_device"].get<std::size_t>() >= vertices);
+      CHECK(transfers["host_waits"].get<std::size_t>() > 0);
       CHECK(row["peak_rss_bytes"].get<std::size_t>() > 0);
       for (const char* const name : {"rasterize", "aggregate"}) {
         const Json& stage = row["stages"][name];

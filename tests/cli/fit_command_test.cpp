@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "dpr/device.hpp"
 #include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
 #include "support/command.hpp"
@@ -107,6 +108,28 @@ TEST_SUITE("pipeline") {
     CHECK(history[0]["height"] == 16);
     CHECK(history[0]["sigma"].get<double>() == doctest::Approx(25 * 3e-4));  // --blur is 5 times --blur-end
     CHECK(history[0]["gamma"].get<double>() == doctest::Approx(5 * 1e-3));   // the file's
+  }
+}
+
+TEST_SUITE("pipeline") {
+  TEST_CASE(
+      "dpr fit on parts of the CPU is that on the whole with chunks as large; a checkpoint goes on there") {
+    if (is_skipped() || dpr::open_device("cpu").info().compute_units < 2) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto fit = [&](const std::vector<std::string>& more) {
+      const auto outcome = run_command(folder, with(k_short, more));
+      CAPTURE(outcome.err);
+      REQUIRE(outcome.status == 0);
+      CHECK(outcome.err.empty());
+      return folder.read("mesh.obj");
+    };
+    const std::string parts = fit({"--device", "cpu/2"});
+    CHECK(parts == fit({"--device", "0/2"}));
+    CHECK(parts == fit({"--device", "cpu", "--chunk", "1"}));
+    fit({"--device", "cpu/2", "--checkpoint", "state"});
+    CHECK(fit({"--device", "cpu", "--checkpoint", "state"}) == parts);  // nothing is left to do
+    CHECK(run_command(folder, with(k_short, {"--device", "cpu,cpu"})).status == 1);
   }
 }
 

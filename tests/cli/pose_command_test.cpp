@@ -138,7 +138,7 @@ TEST_SUITE("robustness") {
     for (const char* options :
          {"--method least_squares --iterations 4", "--method least_squares --sigma 1e-3", "--method newton",
           "--search --schedule anneal", "--mask target.exr --iterations 4", "--mask missing.png", "--blur 0",
-          "--search --rotations 0", "--robust -1"}) {
+          "--search --rotations 0", "--robust -1", "--device cpu/2"}) {
       CAPTURE(options);
       const Outcome outcome =
           run(folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options);

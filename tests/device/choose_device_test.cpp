@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dpr/error.hpp"
+#include "dpr/multi_device.hpp"
 #include "support/messages.hpp"
 #include "support/probe.hpp"
 
@@ -84,6 +85,52 @@ TEST_SUITE("unit") {
     CHECK(opener.opened == std::vector<std::size_t>{0});
     Opener none{.unusable = {0, 1, 2, 3, 4}};
     DPR_CHECK_MESSAGE_HAS(DeviceError, open_best(k_devices, std::ref(none)), "clCreateContext");
+  }
+
+  TEST_CASE(
+      "lists of devices: each item takes the next that matches; parts; names that hold commas or slashes") {
+    std::vector<DeviceInfo> devices = k_devices;
+    devices.push_back(info_of("gpu", "Radeon (renoir, LLVM 15)", false));
+    devices[0].compute_units = 4;
+    for (std::size_t i = 0; i < devices.size(); ++i) devices[i].index = i;
+    devices[1].version = "OpenCL 1.2 PoCL-Remote 10.0.0.2:7777/0";
+    const auto positions = [&](const std::string& selectors) {
+      std::vector<std::size_t> list;
+      for (const dpr::DeviceChoice& choice : dpr::choose_devices(devices, selectors, "device")) {
+        for (unsigned part = 0; part < choice.parts; ++part) list.push_back(choice.position);
+      }
+      return list;
+    };
+    using List = std::vector<std::size_t>;
+    CHECK(positions("0,3") == List{0, 3});
+    CHECK(positions("gpu,gpu,gpu") == List{2, 3, 4});
+    CHECK(positions("another,cpu/2,7777/0") == List{4, 0, 0, 1});
+    CHECK(positions("cpu/4") == List{0, 0, 0, 0});
+    for (const char* const one : {"cpu", "renoir, LLVM", "7777/0", "2"})
+      CHECK_FALSE(dpr::names_several(devices, one));
+    for (const char* const several : {"cpu,2", "cpu/2", "gpu,gpu"})
+      CHECK(dpr::names_several(devices, several));
+    CHECK_FALSE(dpr::names_several(devices, "nothing"));
+    const auto refuses = [&](const char* selectors, const char* word) {
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, positions(selectors), word);
+    };
+    refuses("cpu,cpu", "got 'cpu' in 'cpu,cpu', expected one more device, of 0 (cpu, a CPU), 1");
+    refuses("cpu,,gpu", "got ''");
+    refuses("cpu/5", "at most 4 parts");
+    refuses("0,nothing/2", "'nothing/2'");
+    refuses("cpu/0", "'cpu/0'");
+  }
+
+  TEST_CASE("lists of devices are opened, parts of the CPU too; one device is refused in their place") {
+    CHECK(dpr::open_devices("cpu").size() == 1);
+    const unsigned units = dpr::open_device("cpu").info().compute_units;
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::open_devices("cpu/" + std::to_string(units + 1)),
+                          "compute units of");
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::open_device("cpu/2"), "one device, not a list");
+    if (units < 2 || dpr::open_device("cpu").info().platform == "Oclgrind") return;
+    const std::vector<Device> halves = dpr::open_devices("cpu/2");
+    REQUIRE(halves.size() == 2);
+    CHECK(halves[0].info().compute_units == units / 2);
   }
 
   TEST_CASE("choice of a device: by platform, name, version, type or index") {

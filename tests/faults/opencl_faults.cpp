@@ -4,11 +4,15 @@
 #include <dlfcn.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <type_traits>
 
 namespace {
@@ -68,6 +72,70 @@ std::size_t armed_calls = 0;  // of that name, until one fails
 bool has_failed = false;
 thread_local int depth = 0;  // of calls, which may call each other
 
+/// What a command queue is made to do.
+struct QueueFault {
+  std::size_t calls_left = 0;  // until it is lost; 0: it is not to be
+  bool is_lost = false;
+  unsigned delay_microseconds = 0;
+};
+std::map<void*, QueueFault> queue_faults;  // by fault_mutex
+std::size_t queues_made = 0;
+
+/// The environment's wish for the queue that has just been made: two numbers, the first that of the queue.
+std::optional<unsigned long long> wish_for_queue(const char* variable, std::size_t number) {
+  const char* const wanted = std::getenv(variable);
+  if (wanted == nullptr) return std::nullopt;
+  char* colon = nullptr;
+  if (std::strtoull(wanted, &colon, 10) != number || *colon != ':') return std::nullopt;
+  return std::strtoull(colon + 1, nullptr, 10);
+}
+
+/// The queue that a call is on: its first argument, or that of the events it waits for.
+template <class First, class... Rest>
+cl_command_queue queue_of(First first, Rest... rest) {
+  if constexpr (std::is_same_v<First, cl_command_queue>) {
+    return first;
+  } else if constexpr (std::is_same_v<First, const cl_event*>) {
+    cl_command_queue queue = nullptr;
+    clGetEventInfo(*first, CL_EVENT_COMMAND_QUEUE, sizeof queue, static_cast<void*>(&queue), nullptr);
+    return queue;
+  } else if constexpr (sizeof...(rest) > 0) {
+    return queue_of(rest...);
+  } else {
+    return nullptr;
+  }
+}
+
+/// Whether the queue's device has vanished; if not, and if the call waits, it takes its time.
+bool is_lost(cl_command_queue queue, bool waits) {
+  unsigned delay = 0;
+  {
+    const std::scoped_lock lock(fault_mutex);
+    const auto found = queue_faults.find(queue);
+    if (found == queue_faults.end()) return false;
+    QueueFault& fault = found->second;
+    if (fault.calls_left > 0 && --fault.calls_left == 0) fault.is_lost = true;
+    if (fault.is_lost) return true;
+    if (waits) delay = fault.delay_microseconds;
+  }
+  std::this_thread::sleep_for(std::chrono::microseconds(delay));
+  return false;
+}
+
+/// Whether a call returns no sooner than the device has done something.
+template <class... Args>
+bool waits(std::string_view name, Args... args) {
+  if (name == "clWaitForEvents" || name == "clFinish") return true;
+  if constexpr (sizeof...(Args) > 2) {
+    const auto is_blocking = [](auto, auto, auto third, auto...) {
+      if constexpr (std::is_same_v<decltype(third), cl_bool>) return third == CL_TRUE;
+      return false;
+    };
+    return name.ends_with("Buffer") && is_blocking(args...);
+  }
+  return false;
+}
+
 /// The environment's wishes, at both ends of the process.
 struct Environment {
   Environment() {
@@ -115,12 +183,29 @@ Result failure(int error, Args... args) {
   }
 }
 
+void arm_new_queue(cl_command_queue queue) {
+  std::size_t number = 0;
+  {
+    const std::scoped_lock lock(fault_mutex);
+    number = queues_made++;
+    queue_faults.erase(queue);  // of one before it at that address
+  }
+  if (const auto nth = wish_for_queue("DPR_LOST_QUEUE", number)) dpr::test::dpr_lose_queue(queue, *nth);
+  if (const auto time = wish_for_queue("DPR_SLOW_QUEUE", number))
+    dpr::test::dpr_slow_queue(queue, static_cast<unsigned>(*time));
+}
+
 template <class Result, class... Args>
 Result call(Function& function, Result (*real)(Args...), Args... args) {
   if (depth == 0 && fails(function)) return failure<Result>(function.error, args...);
   ++depth;
-  const Result result = real(args...);
+  const cl_command_queue queue = depth == 1 ? queue_of(args...) : nullptr;
+  const bool lost = queue != nullptr && is_lost(queue, waits(function.name, args...));
+  const Result result = lost ? failure<Result>(CL_DEVICE_NOT_AVAILABLE, args...) : real(args...);
   --depth;
+  if constexpr (std::is_same_v<Result, cl_command_queue>) {
+    if (depth == 0) arm_new_queue(result);
+  }
   return result;
 }
 
@@ -157,6 +242,17 @@ std::size_t dpr_opencl_calls(const char* name) {
   std::size_t calls = 0;
   for (const Function& f : k_functions) calls += matches(name, f.name) ? f.calls.load() : 0;
   return calls;
+}
+
+void dpr_lose_queue(void* queue, std::size_t nth) {
+  const std::scoped_lock lock(fault_mutex);
+  queue_faults[queue].calls_left = nth;
+  queue_faults[queue].is_lost = false;
+}
+
+void dpr_slow_queue(void* queue, unsigned microseconds) {
+  const std::scoped_lock lock(fault_mutex);
+  queue_faults[queue].delay_microseconds = microseconds;
 }
 
 bool dpr_is_within_opencl() { return depth > 0; }

@@ -5,6 +5,9 @@
 //   DPR_FAULT_LOG=FILE at its end the process writes "NAME CALLS" of every function there, and of the one
 //   that
 //                      failed " failed"
+//   DPR_LOST_QUEUE=Q:N the N-th call on the Q-th command queue that is made (from 0) fails, and all after
+//                      it, as if its device had vanished
+//   DPR_SLOW_QUEUE=Q:T every call on the Q-th that waits takes T microseconds longer, as over a network
 #pragma once
 
 #include <cstddef>
@@ -18,6 +21,11 @@ extern "C" void dpr_arm_opencl_fault(const char* name, std::size_t nth);
 extern "C" bool dpr_disarm_opencl_fault();
 /// Calls since the last arming of the functions that `name` matches.
 extern "C" std::size_t dpr_opencl_calls(const char* name);
+/// From now on the `nth` call (from 1) on a command queue fails, and all after it, as if its device had
+/// vanished. 0: none does. For as long as the queue lives.
+extern "C" void dpr_lose_queue(void* queue, std::size_t nth);
+/// From now on every call on a command queue that waits takes so much longer, as over a network.
+extern "C" void dpr_slow_queue(void* queue, unsigned microseconds);
 /// Whether the calling thread is within an OpenCL call.
 extern "C" bool dpr_is_within_opencl();
 

@@ -2,6 +2,7 @@
 // them.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numeric>
@@ -184,6 +185,65 @@ TEST_SUITE("pipeline") {
   }
 }
 
+TEST_SUITE("pipeline") {
+  TEST_CASE("several devices: a batch of the views with masks, a pyramid and a mesh loss is a renderer's") {
+    const std::size_t views = reduced(7, 4), first = 1, count = views - 2;
+    Scene scene = small_scene();
+    const std::vector<Image> targets = random_images(scene, views);
+    std::vector<Image> masks;
+    std::vector<unsigned char> has_alpha;
+    for (std::size_t v = 0; v < views; ++v) {
+      masks.push_back(random_image(scene.width, scene.height, 0.1F, 1.0F, 90 + static_cast<unsigned>(v)));
+      has_alpha.push_back(v % 2 == 0 ? 1 : 0);
+    }
+    const MeshLossWeights shape{.laplacian = 0.1F, .flatness = 0.2F};
+    const LossOptions options{.weights = {.mse = 1.0F, .silhouette = 0.5F, .robust = 0.3F},
+                              .has_alpha = has_alpha,
+                              .masks = masks,
+                              .levels = 2};
+    MultiDeviceRenderer several(devices(2));
+    several.set_scene(scene);
+    several.set_views(ring(scene, views));
+    several.set_loss(options, targets);
+    several.set_mesh_loss(shape);
+    const auto part = [&](const auto& all) { return std::span(all).subspan(first, count); };
+
+    const Device device = open_device();
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    const std::vector<View> batch = ring(scene, views);
+    renderer.set_views(part(batch));
+    renderer.forward();
+    ImageLoss loss(
+        device,
+        LossOptions{
+            .weights = options.weights, .has_alpha = part(has_alpha), .masks = part(masks), .levels = 2},
+        part(targets));
+    MeshLoss mesh_loss(device, shape, scene.meshes[0].mesh);
+    const double image_value = loss.evaluate(renderer), mesh_value = mesh_loss.evaluate(renderer);
+    Result expected;
+    append(renderer.backward(loss, mesh_loss), expected.values);
+
+    for (const std::size_t chunk : {count, std::size_t{0}, std::size_t{2}}) {
+      CAPTURE(chunk);
+      several.set_chunk(chunk);
+      const MultiDeviceRenderer::Evaluation found = several.evaluate(first, count);
+      CHECK(found.mesh_loss == mesh_value);
+      CHECK(found.loss == image_value);
+      CHECK(std::ranges::equal(found.per_view, loss.per_view()));
+      Result result;
+      append(found.gradient, result.values);
+      if (chunk == count) CHECK(same_bits(result, expected));
+      REQUIRE(result.values.size() == expected.values.size());
+      for (std::size_t i = 0; i < result.values.size(); ++i) result.values[i] -= expected.values[i];
+      CHECK(norm(result.values) <= 1e-5 * norm(expected.values));
+    }
+    several.set_scene(scene);  // forgets the mesh loss
+    several.set_views(ring(scene, views));
+    CHECK(several.evaluate(first, count).mesh_loss == 0);
+  }
+}
+
 TEST_SUITE("robustness") {
   TEST_CASE("several devices: a batch that is too large for a frame but not for a chunk") {
     Scene scene = small_scene();
@@ -213,6 +273,16 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "targets");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.gradient(random_images(scene, 2)), "grad_images");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views({}), "views");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_mesh_loss({}, 1), "mesh (mesh loss)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_mesh_loss({.laplacian = -1}), "weight (mesh loss)");
+    Scene fixed = scene;
+    fixed.gradients.positions = false;
+    MultiDeviceRenderer other(devices(1));
+    other.set_scene(fixed);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, other.set_mesh_loss({}), "gradients of positions");
+    renderer.set_loss(LossWeights::only(LossKind::l1), random_images(scene, 3));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(2, 2), "2 from 2 on");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(0, 0), "at least one of the 3");
     renderer.set_loss(LossWeights::only(LossKind::l1), random_images(scene, 2));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "2 images");
     // An error of one chunk, here a target of another size, is the error of the call.

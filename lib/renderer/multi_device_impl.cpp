@@ -1,0 +1,168 @@
+// The work of several devices on one batch.
+#include "renderer/multi_device_impl.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "dpr/error.hpp"
+#include "loss/image_loss_impl.hpp"
+#include "renderer/setter_checks.hpp"
+
+namespace dpr {
+namespace {
+
+/// Chunks a batch falls into unless told otherwise, if it has as many views: enough for the devices to finish
+/// together, few enough for a chunk to fill a device.
+constexpr std::size_t k_chunks = 12;
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+ImageLoss OwnLoss::make(const Device& device, const Chunk& chunk) const {
+  const auto part = [&](const auto& all) {
+    return all.empty() ? std::span(all) : std::span(all).subspan(chunk.first, chunk.size());
+  };
+  return {
+      device,
+      LossOptions{.weights = weights, .has_alpha = part(has_alpha), .masks = part(masks), .levels = levels},
+      part(targets)};
+}
+
+void MultiDeviceRenderer::Impl::catch_up(Worker& worker) const {
+  Renderer& renderer = worker.renderer;
+  if (worker.has.scene != now.scene) {
+    Versions all = now;
+    renderer.set_scene(scene);
+    std::swap(worker.has, all);
+    return;
+  }
+  if (worker.has.smoothing != now.smoothing) {
+    renderer.set_smoothing(scene.smoothing);
+    worker.has.smoothing = now.smoothing;
+  }
+  if (worker.has.lights != now.lights) {
+    renderer.set_lights(scene.lights);
+    worker.has.lights = now.lights;
+  }
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (worker.has.positions[m] != now.positions[m]) {
+      renderer.set_positions(m, scene.meshes[m].mesh.positions);
+      worker.has.positions[m] = now.positions[m];
+    }
+    if (worker.has.colors[m] != now.colors[m]) {
+      renderer.set_colors(m, colors_of(scene.meshes[m].mesh));
+      worker.has.colors[m] = now.colors[m];
+    }
+    if (worker.has.texcoords[m] != now.texcoords[m]) {
+      renderer.set_texcoords(m, scene.meshes[m].mesh.texcoords);
+      worker.has.texcoords[m] = now.texcoords[m];
+    }
+    for (std::size_t t = 0; t < now.texels[m].size(); ++t) {
+      if (worker.has.texels[m][t] == now.texels[m][t]) continue;
+      renderer.set_texels(m, t, scene.meshes[m].mesh.textures[t].texels);
+      worker.has.texels[m][t] = now.texels[m][t];
+    }
+  }
+}
+
+void MultiDeviceRenderer::Impl::require_views(const char* caller) const {
+  if (views.empty()) throw InvalidArgument(caller, "no scene", "set_scene() first");
+}
+
+std::vector<Chunk> MultiDeviceRenderer::Impl::chunks_of(std::size_t count) const {
+  const std::size_t size = chunk_views > 0 ? chunk_views : (count + k_chunks - 1) / k_chunks;
+  return make_chunks(count, std::clamp(size, std::size_t{1}, std::max(most_views(scene), std::size_t{1})));
+}
+
+void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work) {
+  ChunkDealer dealer(of.chunks, paces, lost);
+  std::vector<std::exception_ptr> errors(of.chunks.size()), losses_of_devices(workers.size());
+  const auto run = [&](std::size_t w) {
+    while (const std::optional<std::size_t> c = dealer.take(w)) {
+      const auto lose = [&] {
+        losses_of_devices[w] = std::current_exception();
+        dealer.lose(w, *c);
+      };
+      const auto start = Clock::now();
+      try {
+        render(workers[w], of, *c);
+        work(workers[w], *c);
+        dealer.finish(w, *c, seconds_since(start));
+      } catch (const DeviceError&) {
+        lose();
+      } catch (const BuildError&) {
+        lose();
+      } catch (...) {
+        errors[*c] = std::current_exception();
+        dealer.give_up(w, *c);
+      }
+    }
+  };
+  const auto start = Clock::now();
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t w = 1; w < workers.size(); ++w) threads.emplace_back(run, w);
+    run(0);
+  }
+  dealer.finish_all(seconds_since(start));
+  settle_losses(dealer, losses_of_devices);
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
+  }
+}
+
+void MultiDeviceRenderer::Impl::render(Worker& worker, const Batch& of, std::size_t chunk) const {
+  catch_up(worker);
+  const Chunk part = of.views_of(chunk);
+  worker.renderer.set_views(std::span(views).subspan(part.first, part.size()), of.chunks[chunk].first);
+  worker.renderer.forward();
+  worker.views_rendered += part.size();
+}
+
+void MultiDeviceRenderer::Impl::settle_losses(const ChunkDealer& dealer,
+                                              const std::vector<std::exception_ptr>& met) {
+  if (!dealer.is_done()) {
+    lost.assign(workers.size(), false);
+    std::rethrow_exception(*std::ranges::find_if(met, [](const auto& error) { return error != nullptr; }));
+  }
+  for (std::size_t w = 0; w < workers.size(); ++w) {
+    if (!met[w]) continue;
+    lost[w] = true;
+    try {
+      std::rethrow_exception(met[w]);
+    } catch (const Error& error) {
+      notes.push_back(workers[w].renderer.device().info().name + ", device " + std::to_string(w) +
+                      " of the list, is lost and the others do its work: " + error.what());
+    }
+  }
+}
+
+ImageLoss& MultiDeviceRenderer::Impl::loss_of(Worker& worker, const Batch& of, std::size_t chunk) const {
+  if (worker.losses_of != losses) {
+    worker.losses.clear();
+    worker.losses_of = losses;
+  }
+  const Chunk part = of.views_of(chunk);
+  const auto key = std::pair(part.first, part.last);
+  auto known = worker.losses.find(key);
+  if (known == worker.losses.end())
+    known = worker.losses.emplace(key, loss.make(worker.renderer.device(), part)).first;
+  known->second.impl().views_of_mean = of.chunks.back().last;
+  return known->second;
+}
+
+MeshLoss& MultiDeviceRenderer::Impl::mesh_loss_of(Worker& worker) const {
+  if (worker.mesh_loss_of != mesh_losses) {
+    worker.mesh_loss.emplace(worker.renderer.device(), mesh_loss->weights,
+                             scene.meshes[mesh_loss->mesh].mesh);
+    worker.mesh_loss_of = mesh_losses;
+  }
+  return *worker.mesh_loss;
+}
+}  // namespace dpr
