@@ -158,16 +158,7 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
-  std::vector<cl_float4> values;
-  for (const Image& image : grad_images) {
-    if (image.width != m.scene.width || image.height != m.scene.height) {
-      throw InvalidArgument("size (grad_images)", checks::size(image.width, image.height),
-                            checks::size(m.scene.width, m.scene.height));
-    }
-    checks::require_pixels(image, "grad_images");
-    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
-  }
-  m.host_grad_images.upload(m.device.impl(), values);
+  m.host_grad_images.upload(m.device.impl(), checked_pixels(grad_images, m.scene.width, m.scene.height));
   return m.backward(m.host_grad_images);
 }
 
