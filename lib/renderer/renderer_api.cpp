@@ -176,7 +176,9 @@ void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const c
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");
   require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
-  return impl_->backward(loss.impl().grad_image());
+  SceneGradient gradient = impl_->backward(loss.impl().grad_image());
+  loss.impl().add_attribute_gradients(gradient);
+  return gradient;
 }
 
 SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_loss) {
@@ -187,10 +189,12 @@ SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_los
     throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
                           "GradientRequest::positions");
   }
-  return impl_->backward(loss.impl().grad_image(),
-                         [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
-                           mesh_loss.impl().add_gradient(positions, grad);
-                         });
+  SceneGradient gradient = impl_->backward(loss.impl().grad_image(),
+                                           [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
+                                             mesh_loss.impl().add_gradient(positions, grad);
+                                           });
+  loss.impl().add_attribute_gradients(gradient);
+  return gradient;
 }
 
 RenderStatistics Renderer::statistics() const {
