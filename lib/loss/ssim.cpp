@@ -2,13 +2,9 @@
 
 #include "base/checks.hpp"
 #include "image_losses.h"
+#include "stages/geometry.hpp"
 
 namespace dpr {
-namespace {
-
-cl_uint index(std::size_t value) { return static_cast<cl_uint>(value); }
-
-}  // namespace
 
 void require_window(int width, int height) {
   constexpr int k_side = 2 * DPR_SSIM_RADIUS + 1;
@@ -52,15 +48,15 @@ void Ssim::forward(const Images& in, std::size_t first, Buffer<float>& similarit
   const std::size_t pixels = in.views * in.width * in.height;
   of_rows_.resize(device_, DPR_SSIM_MOMENTS * pixels);
   grad_moments_.resize(device_, DPR_SSIM_GRADIENTS * pixels);
-  rows_(pixels, index(in.width), index(in.height), index(pixels), in.image, in.target, of_rows_);
-  columns_(pixels, index(in.width), index(in.height), index(pixels), index(first), of_rows_, in.windows,
-           similarity, grad_moments_);
+  rows_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), in.image, in.target, of_rows_);
+  columns_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), to_uint(first), of_rows_,
+           in.windows, similarity, grad_moments_);
 }
 
 void Ssim::backward(const Images& in, const Buffer<float>& weights, Buffer<cl_float4>& grad_image) {
   const std::size_t pixels = in.views * in.width * in.height;
-  columns_backward_(pixels, index(in.width), index(in.height), index(pixels), grad_moments_, of_rows_);
-  rows_backward_(pixels, index(in.width), index(in.height), index(pixels), weights, in.image, in.target,
+  columns_backward_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), grad_moments_, of_rows_);
+  rows_backward_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), weights, in.image, in.target,
                  of_rows_, grad_image);
 }
 

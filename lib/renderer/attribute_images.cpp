@@ -16,7 +16,7 @@
 namespace dpr {
 namespace {
 
-constexpr std::array<std::string_view, 4> k_names{"depth", "position", "normal", "texcoords"};
+constexpr std::array<std::string_view, 4> k_attribute_names{"depth", "position", "normal", "texcoords"};
 
 std::vector<glm::vec3> at_corners(std::span<const glm::vec3> positions,
                                   const std::vector<glm::uvec3>& faces) {
@@ -57,10 +57,12 @@ GradientRequest request_of(const GradientRequest& wanted, std::optional<Attribut
 
 }  // namespace
 
-std::string_view to_string(Attribute attribute) { return k_names[static_cast<std::size_t>(attribute)]; }
+std::string_view to_string(Attribute attribute) {
+  return k_attribute_names[static_cast<std::size_t>(attribute)];
+}
 
 Attribute parse_attribute(std::string_view word, std::string_view where) {
-  return static_cast<Attribute>(position_of(word, k_names, std::string(where)));
+  return static_cast<Attribute>(position_of(word, k_attribute_names, std::string(where)));
 }
 
 void AttributeImages::Impl::require_forward(const char* caller) const {
@@ -150,7 +152,7 @@ ShownView AttributeImages::Impl::shown(std::size_t view) const {
 std::vector<glm::vec3> AttributeImages::Impl::values_of(const Scene& source, std::size_t group,
                                                         std::size_t view) const {
   if (attribute) {
-    return attribute == Attribute::texcoords ? corner_texcoords(source)
+    return attribute == Attribute::texcoords ? texcoord_values(source)
                                              : attribute_values(*attribute, shown(view));
   }
   std::vector<glm::vec3> result(values.size() / channels, glm::vec3(0));

@@ -89,7 +89,7 @@ std::vector<glm::vec3> attribute_values(Attribute attribute, const ShownView& sh
   return values;
 }
 
-std::vector<glm::vec3> corner_texcoords(const Scene& scene) {
+std::vector<glm::vec3> texcoord_values(const Scene& scene) {
   std::vector<glm::vec3> values;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;

@@ -27,7 +27,7 @@ struct ShownView {
 /// What the view shows of an attribute, [vertex] or [face] by its domain.
 std::vector<glm::vec3> attribute_values(Attribute attribute, const ShownView& shown);
 /// The texture coordinates of all meshes, [corner]. Throws InvalidArgument where one has none.
-std::vector<glm::vec3> corner_texcoords(const Scene& scene);
+std::vector<glm::vec3> texcoord_values(const Scene& scene);
 
 /// Gradients of a view's geometry.
 struct GeometryGradient {
