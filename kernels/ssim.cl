@@ -44,7 +44,9 @@ kernel void ssim_rows(const uint width, const uint height, const uint pixels,
   if (i >= pixels) return;
   if (!has_window(place_of(i, width, height).x, width)) return;
   float4 sums[DPR_SSIM_MOMENTS];
+#pragma unroll
   for (uint k = 0; k < DPR_SSIM_MOMENTS; ++k) sums[k] = 0.0f;
+#pragma unroll
   for (uint tap = 0; tap < DPR_SSIM_TAPS; ++tap) {
     const uint at = i + tap - DPR_SSIM_RADIUS;
     const float w = ssim_weights[tap];
@@ -55,6 +57,7 @@ kernel void ssim_rows(const uint width, const uint height, const uint pixels,
     sums[3] += w * y * y;
     sums[4] += w * x * y;
   }
+#pragma unroll
   for (uint k = 0; k < DPR_SSIM_MOMENTS; ++k) rows[k * pixels + i] = sums[k];
 }
 
@@ -77,8 +80,10 @@ kernel void ssim_columns(const uint width, const uint height, const uint pixels,
   float sum = 0.0f;
   if (has_window(place.x, width) && has_window(place.y, height)) {
     float4 moments[DPR_SSIM_MOMENTS];
+#pragma unroll
     for (uint k = 0; k < DPR_SSIM_MOMENTS; ++k) {
       moments[k] = 0.0f;
+#pragma unroll
       for (uint tap = 0; tap < DPR_SSIM_TAPS; ++tap)
         moments[k] += ssim_weights[tap] * rows[k * pixels + i + tap * width - DPR_SSIM_RADIUS * width];
     }
@@ -114,6 +119,7 @@ kernel void ssim_columns_backward(const uint width, const uint height, const uin
   const uint row = place_of(i, width, height).y;
   const uint first = row < DPR_SSIM_RADIUS ? DPR_SSIM_RADIUS - row : 0;
   const uint last = min(DPR_SSIM_TAPS, height + DPR_SSIM_RADIUS - row);
+#pragma unroll
   for (uint k = 0; k < DPR_SSIM_GRADIENTS; ++k) {
     float4 sum = 0.0f;
     for (uint tap = first; tap < last; ++tap)
@@ -137,6 +143,7 @@ kernel void ssim_rows_backward(const uint width, const uint height, const uint p
   const uint first = column < DPR_SSIM_RADIUS ? DPR_SSIM_RADIUS - column : 0;
   const uint last = min(DPR_SSIM_TAPS, width + DPR_SSIM_RADIUS - column);
   float4 sums[DPR_SSIM_GRADIENTS];
+#pragma unroll
   for (uint k = 0; k < DPR_SSIM_GRADIENTS; ++k) {
     sums[k] = 0.0f;
     for (uint tap = first; tap < last; ++tap)
