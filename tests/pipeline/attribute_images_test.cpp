@@ -13,6 +13,7 @@
 #include "dpr/dpr.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/welded_cube.hpp"
@@ -146,11 +147,10 @@ Image grad_off_kinks(const reference::Scene& scene) {
   return grad;
 }
 
-void check_against_reference(Attribute attribute, Composition composition) {
+void check_against_reference(Attribute attribute, const Scene& scene) {
   CAPTURE(to_string(attribute));
-  CAPTURE(to_string(composition));
+  CAPTURE(to_string(scene.smoothing.composition));
   constexpr double k_tolerance = 1e-3, k_step = 1e-5;
-  const Scene scene = soup_scene(reduced(13, 7), reduced(11, 6), composition);
   Renderer renderer(open_device());
   renderer.set_scene(scene);
   renderer.forward();
@@ -194,8 +194,25 @@ TEST_SUITE("gradient") {
       for (const Composition composition : {Composition::barrier, Composition::joint}) {
         if (test::is_reduced() && (attribute != Attribute::depth || composition == Composition::joint))
           continue;
-        check_against_reference(attribute, composition);
+        check_against_reference(attribute, soup_scene(reduced(13, 7), reduced(11, 6), composition));
       }
+    }
+  }
+
+  TEST_CASE("attribute images: through the near plane, and of a camera without perspective") {
+    if (test::is_reduced()) return;
+    for (const Attribute attribute : {Attribute::depth, Attribute::normal}) {
+      const Scene soup = soup_scene(13, 11, Composition::joint);
+      Scene cut = scene_cut_open(soup.meshes[0].mesh, 13, 11);
+      cut.smoothing = soup.smoothing;
+      Renderer renderer(open_device());
+      renderer.set_scene(cut);
+      renderer.forward();
+      CHECK(renderer.impl().frame.clips == 1);
+      check_against_reference(attribute, cut);
+      Scene orthographic = soup;
+      orthographic.camera.orthographic_height = 3.5F;
+      check_against_reference(attribute, orthographic);
     }
   }
 }
