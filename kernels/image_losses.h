@@ -37,9 +37,10 @@ typedef struct {
 #include "loss_mse.h"
 #include "loss_robust.h"
 #include "loss_silhouette.h"
+#include "loss_ssim.h"
 
 /// In the order of dpr::LossKind.
-#define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette) X(robust)
+#define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette) X(robust) X(ssim)
 
 /// Their numbers, and where the sums of each begin.
 #define DPR_LOSS_NUMBER(name) name##_number,

@@ -4,6 +4,7 @@
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/annealed_smoothing.hpp"
 #include "dpr/aov.hpp"
+#include "dpr/attribute_images.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dpr/attribute_images.hpp"
 #include "dpr/device.hpp"
 #include "dpr/export.h"
 #include "dpr/image.hpp"
@@ -16,8 +17,10 @@ class Renderer;
 
 /// mse, l1: means over pixels and the three colour channels. silhouette: 1 - IoU of the alpha channel, eq.
 /// (75). robust: mse in which pixels of quite another colour hardly count: the mean of s / (1 + s / c^2),
-/// with s a pixel's squared colour difference and c the robust_scale (Geman & McClure 1985).
-enum class LossKind { mse, l1, silhouette, robust };
+/// with s a pixel's squared colour difference and c the robust_scale (Geman & McClure 1985). ssim: 1 - the
+/// mean structural similarity (Wang et al. 2004) over colour channels, of colours from 0 to 1, and over
+/// windows of 11x11 pixels that lie in the image whole, weighed by a Gaussian of standard deviation 1.5.
+enum class LossKind { mse, l1, silhouette, robust, ssim };
 
 DPR_API std::string_view to_string(LossKind);
 /// In the order of LossKind.
@@ -26,24 +29,41 @@ DPR_API LossKind parse_loss(std::string_view word, std::string_view where);
 
 /// How much each loss counts in the total, eq. (74).
 struct DPR_API LossWeights {
-  float mse = 0, l1 = 0, silhouette = 0, robust = 0;
+  float mse = 0, l1 = 0, silhouette = 0, robust = 0, ssim = 0;
   float robust_scale = 0.1F;  ///< at least 1e-6, a colour difference
 
   static LossWeights only(LossKind kind);
 };
 
+/// What surfaces show in place of their colours, compared with what they ought to. A pixel's difference is
+/// sum_j w_j (a_j - target), of the weights w_j that blend its colour: RGB - A target of AttributeImages. It
+/// counts surfaces that are seen in part as such, and the background not at all, so that it says nothing of
+/// where a silhouette should be: a loss of the images beside it does.
+struct AttributeTarget {
+  Attribute attribute = Attribute::depth;
+  LossWeights weights = {};  ///< of those differences from 0; no silhouette, no ssim
+  /// One image a view, of the images' size: RGB as attribute images have it where a surface fills the pixel,
+  /// alpha how much the pixel counts, at least 0 and not all 0: what aov_image() makes.
+  std::span<const Image> targets = {};
+};
+
 /// What an ImageLoss compares, and how much of it.
 struct LossOptions {
-  LossWeights weights;
+  LossWeights weights = {};
   /// One value a target, or empty for all: where it is 0 a target has no silhouette, and its view no
   /// silhouette loss.
   std::span<const unsigned char> has_alpha = {};
   /// How much every pixel counts, in the first channel, at least 0: one image a target, of its size, or none.
-  /// Means are over the weights, which are not all 0 in any.
+  /// Means are over the weights, which are not all 0 in any. A window of ssim counts as the pixel at its
+  /// middle does.
   std::span<const Image> masks = {};
   /// Of a pyramid, 1 to 16: the loss is the mean over the images and ever smaller ones, each the means of
   /// blocks of 2x2 pixels of the one before. Large differences of place get gradients from the small ones.
+  /// With ssim the smallest has to hold a window.
   unsigned levels = 1;
+  /// Added to the loss of the images, whose weights may then all be 0. Each costs a forward and a backward
+  /// pass more.
+  std::span<const AttributeTarget> attributes = {};
 };
 
 /// Weighted sum of losses against fixed targets, mean over the views.

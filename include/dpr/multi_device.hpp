@@ -70,7 +70,8 @@ class DPR_API MultiDeviceRenderer {
   /// rendered again for it: no device keeps the frames of all its chunks.
   SceneGradient gradient(std::span<const Image> grad_images);
 
-  /// One target a view, as ImageLoss. They are uploaded where and when they are needed first, then kept.
+  /// One target a view, as ImageLoss, without attributes. They are uploaded where and when they are needed
+  /// first, then kept.
   void set_loss(const LossOptions& options, std::span<const Image> targets);
   void set_loss(LossWeights weights, std::span<const Image> targets);
   /// A loss of a mesh's shape alone, as MeshLoss, until the next set_scene(): its gradient joins that of the

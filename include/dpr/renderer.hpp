@@ -71,6 +71,10 @@ struct SceneGradient {
   dvec3 background{0.0};
 };
 
+/// Adds the gradient of another sum over the same scene and views. What is empty in one of them counts as 0.
+/// Throws InvalidArgument for arrays of other lengths.
+DPR_API void add(SceneGradient& to, const SceneGradient& from);
+
 struct RenderStatistics {
   std::size_t faces = 0;  ///< triangles times views
   std::size_t faces_dropped =

@@ -198,7 +198,7 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
   const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
     return command.add_option(name, value, description)->group(k_descent_group)->type_name(type);
   };
-  add("--loss", options.loss, "What is made small; mse by default", "mse|l1|silhouette|robust");
+  add("--loss", options.loss, "What is made small; mse by default", joined(loss_names()).c_str());
   add("--iterations", method.iterations, "How many steps; 200 by default, 800 with --schedule adaptive", "N");
   add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
   add("--optimizer", options.optimizer, "How steps are made; adam by default", "adam|sgd");

@@ -23,7 +23,7 @@ constexpr std::array k_losses{DPR_IMAGE_LOSSES(DPR_LOSS_ROW)};
 #define DPR_LOSS_ORDER(name) static_assert(static_cast<int>(LossKind::name) == shared::name##_number);
 DPR_IMAGE_LOSSES(DPR_LOSS_ORDER)
 
-void check_weights(const LossWeights& weights) {
+void check_weights(const LossWeights& weights, bool may_be_0) {
   float sum = 0;
   for (const ImageLossRow& loss : k_losses) {
     const float weight = weights.*loss.weight;
@@ -32,7 +32,7 @@ void check_weights(const LossWeights& weights) {
     }
     sum += weight;
   }
-  if (sum <= 0) throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
+  if (sum <= 0 && !may_be_0) throw InvalidArgument("weights (loss)", "all 0", "at least one above 0");
   constexpr float k_least_scale = 1e-6F;  // its inverse squared is still a number
   require(weights.robust_scale >= k_least_scale && std::isfinite(weights.robust_scale), "robust_scale (loss)",
           weights.robust_scale, "a finite number, at least 1e-6");
@@ -77,7 +77,7 @@ Image shrink(const Image& large) {
 
 void check_loss(const LossOptions& options, std::span<const Image> targets) {
   constexpr unsigned k_most_levels = 16;
-  check_weights(options.weights);
+  check_weights(options.weights, !options.attributes.empty());
   check_targets(targets);
   check_masks(options.masks, targets);
   require(options.levels >= 1 && options.levels <= k_most_levels, "levels (loss)", options.levels, "1 to 16");
@@ -85,6 +85,15 @@ void check_loss(const LossOptions& options, std::span<const Image> targets) {
     throw InvalidArgument("has_alpha (loss)", std::to_string(options.has_alpha.size()) + " values",
                           "one for each of the " + std::to_string(targets.size()) + " targets, or none");
   }
+  if (options.weights.ssim > 0) {
+    int width = targets[0].width, height = targets[0].height;
+    for (unsigned level = 1; level < options.levels; ++level) {
+      width = (width + 1) / 2;
+      height = (height + 1) / 2;
+    }
+    require_window(width, height);
+  }
+  for (const AttributeTarget& target : options.attributes) check_attribute_target(target, targets);
 }
 
 void require_mask(const Image& mask, const Image& image, const std::string& name) {
@@ -137,6 +146,11 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
       view_weights.push_back(loss.reads_alpha && !shows_alpha ? 0 : options.weights.*loss.weight);
   }
   device_weights.upload(device.impl(), view_weights);
+  if (options.weights.ssim > 0) {
+    ssim.emplace(device.impl());
+    ssim_weight = options.weights.ssim / static_cast<float>(options.levels);
+    set_views_of_mean(views);
+  }
   std::vector<Image> smaller(targets.begin(), targets.end()),
       masks(options.masks.begin(), options.masks.end());
   if (masks.empty()) masks.assign(views, Image(width, height, glm::vec4(1)));
@@ -148,6 +162,14 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
     levels.push_back(make_level(smaller, masks));
     if (l > 0) levels[l].image.resize(device.impl(), levels[l].pixels_per_view() * views);
   }
+  for (const AttributeTarget& target : options.attributes)
+    attributes.emplace_back(device, target, options.levels);
+}
+
+void ImageLoss::Impl::set_views_of_mean(std::size_t count) {
+  views_of_mean = count;
+  if (ssim)
+    ssim_weights.upload(device.impl(), std::vector(views, ssim_weight / static_cast<float>(views_of_mean)));
 }
 
 ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> targets,
@@ -169,6 +191,7 @@ ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> target
   Device::Impl& d = device.impl();
   level.target.upload(d, values);
   level.mask.upload(d, weights);
+  if (ssim) level.windows.upload(d, ssim_windows(masks));
   level.device_channels.upload(d, level.channels);
   level.view_starts.upload(d, starts);
   level.per_pixel.resize(d, shared::DPR_LOSS_SUMS * values.size());
@@ -203,6 +226,10 @@ double ImageLoss::evaluate(const Renderer& renderer) {
   }
   m.frame_number = 0;  // until everything of this one is there
   m.evaluate(frame.image);
+  for (AttributeLoss& attribute : m.attributes) {
+    const std::span<const double> values = attribute.evaluate(renderer);
+    for (std::size_t view = 0; view < m.views; ++view) m.per_view[view] += values[view];
+  }
   m.frame_number = frame.number;
   double total = 0;
   for (const double value : m.per_view) total += value / static_cast<double>(m.views);
@@ -221,10 +248,12 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
     const Buffer<cl_float4>& image = l == 0 ? full : level.image;
     forward(pixels, static_cast<cl_uint>(pixels), inverse_scale_squared, image, level.target, level.mask,
             level.per_pixel);
+    if (ssim) ssim->forward(windowed(level, image), shared::ssim_first * pixels, level.per_pixel);
     reduce({pixels, shared::DPR_LOSS_SUMS, views, 1, level.view_starts, level.per_pixel}, level.sums);
     backward(pixels, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
              static_cast<cl_uint>(views_of_mean * levels.size()), inverse_scale_squared, image, level.target,
              level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
+    if (ssim) ssim->backward(windowed(level, image), ssim_weights, level.grad_image);
   }
   for (std::size_t l = levels.size() - 1; l > 0; --l) {
     Level& large = levels[l - 1];
@@ -234,6 +263,10 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
   }
   std::ranges::fill(per_view, 0.0);
   for (const Level& level : levels) add_values(level);
+}
+
+void ImageLoss::Impl::add_attribute_gradients(SceneGradient& gradient) {
+  for (AttributeLoss& attribute : attributes) add(gradient, attribute.backward());
 }
 
 void ImageLoss::Impl::add_values(const Level& level) {

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "device/kernel.hpp"
 #include "dpr/image_loss.hpp"
 #include "image_losses.h"
+#include "loss/attribute_loss.hpp"
+#include "loss/ssim.hpp"
 #include "stages/reduce.hpp"
 
 namespace dpr {
@@ -38,6 +41,7 @@ struct ImageLoss::Impl {
     Buffer<float> mask;           // [view][height][width]
     std::vector<float> channels;  // [view] sums of the mask times colour channels
     Buffer<float> device_channels;
+    Buffer<float> windows;          // [view][height][width] of ssim, where it counts
     Buffer<cl_uint> view_starts;    // [view + 1] pixels
     Buffer<float> per_pixel, sums;  // [DPR_LOSS_SUMS][view][pixel], [DPR_LOSS_SUMS][view]
     Buffer<cl_float4> image;        // [view][height][width] of smaller levels than the first
@@ -54,18 +58,30 @@ struct ImageLoss::Impl {
   float weight(std::size_t view, std::size_t loss) const {
     return view_weights[view * shared::DPR_LOSS_COUNT + loss];
   }
+  /// How many views gradients are those of a mean over: `views` at first, or a batch that these are part of.
+  void set_views_of_mean(std::size_t count);
   const Buffer<cl_float4>& grad_image() const { return levels.front().grad_image; }
 
   Level make_level(std::span<const Image> targets, std::span<const Image> masks);
+  /// The images of a level as ssim reads them.
+  Ssim::Images windowed(const Level& level, const Buffer<cl_float4>& image) const {
+    return {views,
+            static_cast<std::size_t>(level.width),
+            static_cast<std::size_t>(level.height),
+            image,
+            level.target,
+            level.windows};
+  }
   /// Of the mean over the levels: value by view, and gradient.
   void evaluate(const Buffer<cl_float4>& image);
+  /// Adds the gradients of the attributes after evaluate().
+  void add_attribute_gradients(SceneGradient& gradient);
   void add_values(const Level& level);
 
   Device device;
   int width, height;
   std::size_t views;
-  std::size_t
-      views_of_mean;  // that gradients are those of a mean over: `views`, or the batch these are a part of
+  std::size_t views_of_mean;
   std::vector<double> per_view;
   std::vector<float> view_weights;  // [view][loss]
   float inverse_scale_squared;
@@ -78,7 +94,11 @@ struct ImageLoss::Impl {
   Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> shrink, shrink_backward;
   Reduce reduce;
   Buffer<float> device_weights;  // `view_weights`
+  std::optional<Ssim> ssim;      // where it counts
+  float ssim_weight = 0;         // in the mean over the levels
+  Buffer<float> ssim_weights;    // [view] in that over the views too
   std::vector<Level> levels;
+  std::vector<AttributeLoss> attributes;
 };
 
 }  // namespace dpr

@@ -119,6 +119,10 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
 void MultiDeviceRenderer::set_loss(const LossOptions& options, std::span<const Image> targets) {
   impl_->require_views("MultiDeviceRenderer::set_loss");
   check_loss(options, targets);
+  if (!options.attributes.empty()) {
+    throw InvalidArgument("attributes (MultiDeviceRenderer::set_loss)",
+                          std::to_string(options.attributes.size()), "none: they need a Renderer");
+  }
   OwnLoss loss{options.weights,
                {options.has_alpha.begin(), options.has_alpha.end()},
                {options.masks.begin(), options.masks.end()},

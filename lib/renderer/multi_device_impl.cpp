@@ -153,7 +153,7 @@ ImageLoss& MultiDeviceRenderer::Impl::loss_of(Worker& worker, const Batch& of, s
   auto known = worker.losses.find(key);
   if (known == worker.losses.end())
     known = worker.losses.emplace(key, loss.make(worker.renderer.device(), part)).first;
-  known->second.impl().views_of_mean = of.chunks.back().last;
+  known->second.impl().set_views_of_mean(of.chunks.back().last);
   return known->second;
 }
 

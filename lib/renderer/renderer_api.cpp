@@ -151,16 +151,7 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
-  std::vector<cl_float4> values;
-  for (const Image& image : grad_images) {
-    if (image.width != m.scene.width || image.height != m.scene.height) {
-      throw InvalidArgument("size (grad_images)", checks::size(image.width, image.height),
-                            checks::size(m.scene.width, m.scene.height));
-    }
-    checks::require_pixels(image, "grad_images");
-    for (const glm::vec4& p : image.pixels) values.push_back({{p.x, p.y, p.z, p.w}});
-  }
-  m.host_grad_images.upload(m.device.impl(), values);
+  m.host_grad_images.upload(m.device.impl(), checked_pixels(grad_images, m.scene.width, m.scene.height));
   return m.backward(m.host_grad_images);
 }
 
@@ -178,7 +169,9 @@ void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const c
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");
   require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
-  return impl_->backward(loss.impl().grad_image());
+  SceneGradient gradient = impl_->backward(loss.impl().grad_image());
+  loss.impl().add_attribute_gradients(gradient);
+  return gradient;
 }
 
 SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_loss) {
@@ -189,10 +182,12 @@ SceneGradient Renderer::backward(const ImageLoss& loss, const MeshLoss& mesh_los
     throw InvalidArgument("mesh_loss (Renderer::backward)", "a scene without gradients of positions",
                           "GradientRequest::positions");
   }
-  return impl_->backward(loss.impl().grad_image(),
-                         [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
-                           mesh_loss.impl().add_gradient(positions, grad);
-                         });
+  SceneGradient gradient = impl_->backward(loss.impl().grad_image(),
+                                           [&](const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad) {
+                                             mesh_loss.impl().add_gradient(positions, grad);
+                                           });
+  loss.impl().add_attribute_gradients(gradient);
+  return gradient;
 }
 
 RenderStatistics Renderer::statistics() const {

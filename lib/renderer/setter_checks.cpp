@@ -61,6 +61,19 @@ void check_values(const char* name, std::span<const glm::vec3> values, std::size
   }
 }
 
+std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int width, int height) {
+  std::vector<cl_float4> pixels;
+  for (const Image& image : grad_images) {
+    if (image.width != width || image.height != height) {
+      throw InvalidArgument("size (grad_images)", checks::size(image.width, image.height),
+                            checks::size(width, height));
+    }
+    checks::require_pixels(image, "grad_images");
+    for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  return pixels;
+}
+
 void check_mesh(const Scene& scene, std::size_t mesh) {
   if (mesh < scene.meshes.size()) return;
   throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
+#include "device/opencl_bindings.hpp"
 #include "dpr/renderer.hpp"
 
 namespace dpr {
@@ -28,6 +30,9 @@ void check_has_texcoords(const Scene& scene, std::size_t mesh);
 void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights);
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
+
+/// The pixels of the images, one after the other, whose derivative by which these are has that size.
+std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int width, int height);
 
 /// The colours that a mesh has: of its vertices, or else of its faces.
 template <class AnyMesh>

@@ -142,6 +142,39 @@ GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient
   return {};
 }
 
+void add_numbers(const GradientArray& to, const GradientArray& from) {
+  std::vector<double> sum, added;
+  const auto append_to = [](std::vector<double>& list) {
+    return [&list](double value) { return list.emplace_back(value); };
+  };
+  transform_numbers(to, append_to(sum));
+  transform_numbers(from, append_to(added));
+  if (added.empty()) return;
+  if (sum.empty()) {
+    std::visit([&](auto* list) { *list = *std::get<decltype(list)>(from); }, to);
+    return;
+  }
+  if (sum.size() != added.size()) {
+    throw InvalidArgument("gradient (add)", std::to_string(added.size()) + " numbers",
+                          std::to_string(sum.size()) + ", those of the same array");
+  }
+  auto value = added.begin();
+  transform_numbers(to, [&](double number) { return number + *value++; });
+}
+
+void add(SceneGradient& to, const SceneGradient& from) {
+  SceneGradient added = from;
+  for (const GradientRow& row : gradient_rows()) {
+    const GradientIndex has = count_arrays(row, to), more = count_arrays(row, from);
+    if ((row.lights && more.item == 0) || (has.view == more.view && has.item == more.item)) continue;
+    throw InvalidArgument("gradient (add)", std::to_string(more.view * more.item) + " of " + row.path,
+                          std::to_string(has.view * has.item) + ": the gradient of the same scene and views");
+  }
+  for_each_array(added, [&](const GradientRow& row, GradientIndex i, const GradientArray& array) {
+    add_numbers(row.array(to, i), array);
+  });
+}
+
 std::string name_of(const GradientRow& row, GradientIndex index) {
   std::string name(row.path);
   if (const std::size_t list = name.find("[]"); list != std::string::npos)

@@ -61,6 +61,10 @@ std::span<const GradientRow> gradient_rows();
 /// How many arrays of a row a gradient has.
 GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient);
 
+/// Adds the numbers of one array to those of another; one without numbers becomes the other's equal. Throws
+/// InvalidArgument where both have some, and not as many.
+void add_numbers(const GradientArray& to, const GradientArray& from);
+
 /// "views[0].camera.rotation", as messages have it.
 std::string name_of(const GradientRow& row, GradientIndex index);
 

@@ -50,7 +50,7 @@ void add(Hash& hash, const ShapeOptions& o) {
     hash.add(value);
   for (const float value :
        {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette, o.loss.robust,
-        o.loss.robust_scale, o.regularizers.laplacian, o.regularizers.edge_length,
+        o.loss.robust_scale, o.loss.ssim, o.regularizers.laplacian, o.regularizers.edge_length,
         o.regularizers.normal_consistency, o.regularizers.flatness, o.regularizers.edge_target}) {
     hash.add(value);
   }

@@ -50,7 +50,7 @@ TEST_SUITE("pipeline") {
     const auto offers = [&](const Words& words) { return candidates(folder, words); };
     CHECK(offers({"dpr", "de"}) == Words{"demo", "devices"});
     CHECK(offers({"dpr", "gradient", "--lo"}) == Words{"--loss"});
-    CHECK(offers({"dpr", "gradient", "--loss", ""}) == Words{"l1", "mse", "robust", "silhouette"});
+    CHECK(offers({"dpr", "gradient", "--loss", ""}) == Words{"l1", "mse", "robust", "silhouette", "ssim"});
     CHECK(offers({"dpr", "pose", "--search", "--method", "d"}) == Words{"descent"});
     CHECK(offers({"dpr", "render", "--device", ""}) == Words{"cpu", "gpu"});
     CHECK(offers({"dpr", "pose", "--scene", "scene"}) == Words{"scene one.json"});

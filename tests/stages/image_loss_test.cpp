@@ -75,6 +75,7 @@ TEST_SUITE("gradient") {
       double value = 0;
       std::vector<double> expected_grad(image.rgba.size());
       for (const dpr::ImageLossRow& row : dpr::image_losses()) {
+        if (row.name == "ssim") continue;  // of windows, not of pixels: ssim_test.cpp
         const auto reference = dpr::reference::evaluate_loss(row.name, image, target);
         const double weight =
             row.reads_alpha && has_alpha[view] == 0 ? 0.0 : static_cast<double>(weights.*row.weight);

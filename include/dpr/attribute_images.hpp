@@ -1,0 +1,82 @@
+// Images of other numbers than colours, with gradients: depth, position, normal, texture coordinates, and
+// whatever a caller has at the vertices.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "dpr/device.hpp"
+#include "dpr/export.h"
+#include "dpr/image.hpp"
+#include "dpr/renderer.hpp"
+
+namespace dpr {
+
+/// What a surface can show in place of its colour. depth: along the view direction, world units. position:
+/// world space. normal: the faces', world space, of length 1, on the side from which they wind
+/// counter-clockwise. texcoords: u and v.
+enum class Attribute { depth, position, normal, texcoords };
+
+DPR_API std::string_view to_string(Attribute attribute);
+/// The inverse; `where` names the argument in the InvalidArgument thrown for an unknown word.
+DPR_API Attribute parse_attribute(std::string_view word, std::string_view where);
+
+/// Images of an attribute, as a renderer's smoothing blends it, and their gradients: by way of what the
+/// surface shows, and of how much of it is seen.
+///
+/// With w_j the weights of a pixel's faces, which blend its colour, and a_j what they show there,
+///
+///     RGB = sum_j w_j a_j ,  A = sum_j w_j
+///
+/// depth in all three channels, texture coordinates in red and green. RGB / A is the expectation
+/// over what is seen, the depth of AuxiliaryOutputs; its normal is RGB made of length 1. What is here is not
+/// divided: it is linear in the weights, so that values and gradients stay smooth and finite where a surface
+/// fades out. A loss of e = RGB / A with the gradient g has g / A by RGB, and -<g, e> / A by A.
+///
+/// With noise on the pixel an edge between faces whose numbers differ is a contour, as between colours.
+///
+/// A renderer of its own shows the same faces; a forward and a backward pass cost about what those of the
+/// image do, in the barrier composition twice that, whose alpha is not the sum of the weights. Sampled
+/// estimators draw noise of their own for every view and three channels.
+class DPR_API AttributeImages {
+ public:
+  AttributeImages(const Device& device, Attribute attribute);
+  /// Of numbers at the vertices, in this many channels, as set_values() has them. Throws InvalidArgument for
+  /// no channels.
+  AttributeImages(const Device& device, std::size_t channels, std::span<const float> values);
+  ~AttributeImages();
+  AttributeImages(AttributeImages&&) noexcept;
+  AttributeImages& operator=(AttributeImages&&) noexcept;
+
+  /// New numbers for the next forward(): [vertex][channel], the vertices of all meshes one after the other.
+  /// Throws InvalidArgument for numbers that are not finite, and for attributes that the scene gives.
+  void set_values(std::span<const float> values);
+
+  /// Renders what the renderer's last forward() shows: its scene, views, shapes, smoothing and culling as
+  /// they are now. Throws InvalidArgument before that, for a renderer of another Device, for values that do
+  /// not fit its vertices, and for texcoords of a mesh without.
+  void forward(const Renderer& renderer);
+
+  std::size_t channels() const;
+  /// How many images a view has: one for every three channels.
+  std::size_t groups() const;
+  /// The image of a view: RGB, and A, as above, of the channels from 3 * group on. Blocks.
+  Image image(std::size_t view = 0, std::size_t group = 0) const;
+
+  /// Gradients of the sum over images and pixels of <grad_images, image>, RGBA, [group][view]. Those that the
+  /// renderer's scene asked for at the forward pass, of positions, transforms, cameras, distortion and
+  /// smoothing, and for texcoords of these; the rest is zero or empty. dpr::add() sums them with others.
+  SceneGradient backward(std::span<const Image> grad_images);
+  /// Of the numbers at the vertices, [vertex][channel], after backward(). Empty for other attributes.
+  std::span<const float> grad_values() const;
+
+  struct DPR_LOCAL Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dpr

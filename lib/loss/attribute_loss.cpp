@@ -1,0 +1,73 @@
+#include "loss/attribute_loss.hpp"
+
+#include <string>
+
+#include "base/checks.hpp"
+#include "loss/image_loss_impl.hpp"
+#include "renderer/attribute_images_impl.hpp"
+
+namespace dpr {
+namespace {
+
+/// A loss of differences: of pixels that count by the alpha of the targets.
+ImageLoss loss_of_differences(const Device& device, const AttributeTarget& target, unsigned levels) {
+  std::vector<Image> zeros, masks;
+  for (const Image& image : target.targets) {
+    zeros.emplace_back(image.width, image.height);
+    masks.emplace_back(image.width, image.height);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      masks.back().pixels[i] = glm::vec4(image.pixels[i].w);
+  }
+  return {device, LossOptions{.weights = target.weights, .masks = masks, .levels = levels}, zeros};
+}
+
+}  // namespace
+
+void check_attribute_target(const AttributeTarget& target, std::span<const Image> targets) {
+  const std::string name = "targets (" + std::string(to_string(target.attribute)) + ")";
+  if (target.weights.silhouette != 0 || target.weights.ssim != 0) {
+    throw InvalidArgument("weights (loss of " + std::string(to_string(target.attribute)) + ")",
+                          "a weight of silhouette or ssim", "0 for both: they say nothing of differences");
+  }
+  if (target.targets.size() != targets.size()) {
+    throw InvalidArgument(name, std::to_string(target.targets.size()) + " images",
+                          "one for each of the " + std::to_string(targets.size()) + " views");
+  }
+  for (const Image& image : target.targets) {
+    if (image.width != targets[0].width || image.height != targets[0].height) {
+      throw InvalidArgument("size of the " + name, checks::size(image.width, image.height),
+                            checks::size(targets[0].width, targets[0].height));
+    }
+    checks::require_pixels(image, name);
+  }
+}
+
+AttributeLoss::AttributeLoss(const Device& device, const AttributeTarget& target, unsigned levels)
+    : images_(device, target.attribute),
+      loss_(loss_of_differences(device, target, levels)),
+      forward_(device.impl(), "attribute.cl", "attribute_residual_forward"),
+      backward_(device.impl(), "attribute.cl", "attribute_residual_backward") {
+  std::vector<cl_float4> pixels;
+  for (const Image& image : target.targets) {
+    for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, 0}});
+  }
+  target_.upload(device.impl(), pixels);
+  residual_.resize(device.impl(), pixels.size());
+  grad_images_.resize(device.impl(), pixels.size());
+}
+
+std::span<const double> AttributeLoss::evaluate(const Renderer& renderer) {
+  images_.forward(renderer);
+  const std::size_t pixels = target_.size();
+  forward_(pixels, static_cast<cl_uint>(pixels), images_.impl().images(), target_, residual_);
+  loss_.impl().evaluate(residual_);
+  return loss_.per_view();
+}
+
+SceneGradient AttributeLoss::backward() {
+  const std::size_t pixels = target_.size();
+  backward_(pixels, static_cast<cl_uint>(pixels), target_, loss_.impl().grad_image(), grad_images_);
+  return images_.impl().backward(grad_images_);
+}
+
+}  // namespace dpr

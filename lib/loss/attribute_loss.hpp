@@ -1,0 +1,28 @@
+// The loss of what surfaces show in place of their colours.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "dpr/image_loss.hpp"
+
+namespace dpr {
+
+class AttributeLoss {
+ public:
+  AttributeLoss(const Device& device, const AttributeTarget& target, unsigned levels);
+
+  /// Of the renderer's last images, one value a view.
+  std::span<const double> evaluate(const Renderer& renderer);
+  /// Of the mean over the views, after evaluate().
+  SceneGradient backward();
+
+ private:
+  AttributeImages images_;
+  ImageLoss loss_;                                     // of the differences: its targets are 0
+  Buffer<cl_float4> target_, residual_, grad_images_;  // [view][height][width]
+  Kernel<cl_uint, In<cl_float4>, In<cl_float4>, Out<cl_float4>> forward_, backward_;
+};
+
+/// Throws InvalidArgument unless the target can stand beside those of the images, one a view.
+void check_attribute_target(const AttributeTarget& target, std::span<const Image> targets);
+
+}  // namespace dpr

@@ -1,0 +1,43 @@
+// Structural similarity of images and targets on the device.
+#pragma once
+
+#include "device/kernel.hpp"
+#include "dpr/image.hpp"
+
+namespace dpr {
+
+/// Throws InvalidArgument unless an image of that size holds a window.
+void require_window(int width, int height);
+
+/// What windows count: [view][height][width], in proportion to the mask at their middle, and over the colour
+/// channels of a view 1 in all. Throws InvalidArgument where a mask leaves none.
+std::vector<float> ssim_windows(std::span<const Image> masks);
+
+class Ssim {
+ public:
+  /// Images of a level: [view][height][width] RGBA, and the windows on the device.
+  struct Images {
+    std::size_t views, width, height;
+    const Buffer<cl_float4>&image, &target;
+    const Buffer<float>& windows;
+  };
+
+  explicit Ssim(Device::Impl& device);
+
+  /// What windows add to the similarity of their views: from `similarity[first]` on, by pixel.
+  void forward(const Images& in, std::size_t first, Buffer<float>& similarity);
+  /// After forward() of the same images: takes the gradient of `weights[view]` times the similarity from
+  /// `grad_image`.
+  void backward(const Images& in, const Buffer<float>& weights, Buffer<cl_float4>& grad_image);
+
+ private:
+  Device::Impl& device_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, In<cl_float4>, Out<cl_float4>> rows_;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_float4>, In<float>, Out<float>, Out<cl_float4>> columns_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> columns_backward_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>>
+      rows_backward_;
+  Buffer<cl_float4> of_rows_, grad_moments_;  // [DPR_SSIM_MOMENTS or DPR_SSIM_GRADIENTS][view][pixel]
+};
+
+}  // namespace dpr
