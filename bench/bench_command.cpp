@@ -16,6 +16,7 @@ struct BenchOptions {
   BenchMeasureOptions measure;
   std::vector<std::string> compared, files;
   std::string report;
+  double fail_above = 0;  ///< 0: a comparison never fails
 };
 
 void run_compare(const BenchOptions& options, const CommonOptions& common) {
@@ -23,6 +24,7 @@ void run_compare(const BenchOptions& options, const CommonOptions& common) {
       bench::compare(bench::read_results(options.compared[0]), bench::read_results(options.compared[1]));
   if (!common.quiet) std::printf("%s", bench::to_lines(comparison).c_str());
   if (!options.measure.output.empty()) write_json(options.measure.output, comparison);
+  if (options.fail_above > 0) bench::require_none_slower(comparison, options.fail_above);
 }
 
 void run_report(const BenchOptions& options, const CommonOptions& common) {
@@ -37,6 +39,8 @@ void run_report(const BenchOptions& options, const CommonOptions& common) {
 }
 
 void run(const BenchOptions& options, const CommonOptions& common) {
+  if (options.fail_above > 0 && options.compared.empty())
+    throw InvalidArgument("--fail-above (command line)", "no --compare", "--compare A.json B.json beside it");
   if (!options.compared.empty()) return run_compare(options, common);
   if (!options.report.empty()) return run_report(options, common);
   if (!options.files.empty()) {
@@ -72,6 +76,8 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
       .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")
       ->type_name("NAME");
   command.add_option("-o,--output", options.output, "Results, or the comparison, as JSON")->type_name("FILE");
+  command.add_option("--csv", options.csv, "Results as comma-separated values, a line a row")
+      ->type_name("FILE");
   command
       .add_option("--repetitions", options.each.repetitions, "Timed runs of each row, after one to warm up")
       ->check(CLI::Range(1, 1000))
@@ -90,6 +96,11 @@ void add_bench_options(CLI::App& application, CommonOptions& common) {
       application.add_option("--compare", options->compared, "Two files of results, the earlier first")
           ->expected(2)
           ->type_name("A.json B.json");
+  application
+      .add_option("--fail-above", options->fail_above,
+                  "Exit status 1 where --compare finds a row slower by more than this ratio")
+      ->check(CLI::Range(1.0, 1e6))
+      ->type_name("RATIO");
   application
       .add_option("--report", options->report,
                   "Folder for plots of the files of results that follow, and a page that shows them")

@@ -13,10 +13,14 @@ namespace dpr::bench {
 /// they overlap, or where either timing has fewer than 5 runs, whose quartiles say little.
 std::string verdict(const Json& first, const Json& second);
 
-/// {"a", "b": provenance; "rows": [{"row", "forward", "backward": {"a_ms", "b_ms", "ratio", "verdict"}}],
-/// "only_in_a", "only_in_b": row names}. A ratio is second to first. Rows that were not measured in one of
-/// the files count as not in it.
+/// {"a", "b": provenance; "warnings": what makes the files hard to compare, as text; "rows": [{"row",
+/// "forward", "backward": {"a_ms", "b_ms", "ratio", "verdict"}}], "only_in_a", "only_in_b": row names}. A
+/// ratio is second to first. Rows that were not measured in one of the files count as not in it.
 Json compare(const Json& a, const Json& b);
+
+/// Throws Error, which names the rows that the comparison calls slower by more than the ratio, if there are
+/// any.
+void require_none_slower(const Json& comparison, double ratio);
 
 /// The comparison as lines of text, with the number of rows of each verdict at the end.
 std::string to_lines(const Json& comparison);

@@ -78,6 +78,13 @@ class Budget {
   Clock::time_point start_ = Clock::now();
 };
 
+/// What they have in common, and every run in its turn.
+Json timing_of(const std::vector<double>& milliseconds) {
+  Json timing = quartiles(milliseconds);
+  for (const double run : milliseconds) timing["runs"].push_back(rounded(run));
+  return timing;
+}
+
 void measure_passes(Row& row, const MeasureOptions& options, Json& result) {
   std::vector<double> forward, backward;
   Budget budget(options.repetitions, options.max_seconds);
@@ -89,8 +96,8 @@ void measure_passes(Row& row, const MeasureOptions& options, Json& result) {
     row.backward();
     backward.push_back(milliseconds_since(middle));
   }
-  result["forward_ms"] = quartiles(forward);
-  result["backward_ms"] = quartiles(backward);
+  result["forward_ms"] = timing_of(forward);
+  result["backward_ms"] = timing_of(backward);
 }
 
 using StageRuns = std::map<std::string, std::vector<double>>;
@@ -187,6 +194,8 @@ Json quartiles(std::vector<double> values) {
   return {{"median", rounded(values[n / 2])},
           {"q1", rounded(values[n / 4])},
           {"q3", rounded(values[3 * n / 4])},
+          {"min", rounded(values.front())},
+          {"p95", rounded(values[std::min(n - 1, 95 * n / 100)])},
           {"n", n}};
 }
 

@@ -24,7 +24,7 @@ Json measure(const Device& device, const Peaks& peaks, const Workload& workload,
 /// Milliseconds to the first image of cube128 on the host, kernels built or read from the driver's cache.
 double first_image_ms(const Device& device);
 
-/// {"median", "q1", "q3", "n"}; at least one value.
+/// {"median", "q1", "q3", "min", "p95", "n"} of at least one value.
 Json quartiles(std::vector<double> values);
 
 }  // namespace dpr::bench

@@ -5,7 +5,9 @@
 
 #include "base/output_file.hpp"
 #include "cli/provenance.hpp"
+#include "csv.hpp"
 #include "dpr/error.hpp"
+#include "environment.hpp"
 #include "results_file.hpp"
 #include "stages.hpp"
 
@@ -64,19 +66,26 @@ Json results_head(const Device& device, const bench::Peaks& peaks, const bench::
   head["memory_budget_bytes"] = device.memory_budget();
   head["repetitions"] = options.repetitions;
   head["max_seconds"] = options.max_seconds;
+  head["environment"] = bench::environment();
+  head["load"] = {{"before", bench::load()}};
   head["results"] = Json::array();
   return head;
 }
 
+/// Each once.
 std::vector<std::string> chosen_workloads(const BenchMeasureOptions& options) {
-  std::vector<std::string> names = options.workloads;
+  std::vector<std::string> names;
+  const auto add = [&](std::string_view name) {
+    bench::require_workload(std::string(name));
+    if (std::ranges::find(names, name) == names.end()) names.emplace_back(name);
+  };
+  for (const std::string& name : options.workloads) add(name);
   if (names.empty()) {
-    for (const std::string_view name : bench::workload_names()) names.emplace_back(name);
+    for (const std::string_view name : bench::workload_names()) add(name);
   }
   if (options.sweeps) {
-    for (const std::string_view name : bench::sweep_names()) names.emplace_back(name);
+    for (const std::string_view name : bench::sweep_names()) add(name);
   }
-  for (const std::string& name : names) bench::require_workload(name);
   return names;
 }
 
@@ -85,7 +94,8 @@ std::vector<std::string> chosen_workloads(const BenchMeasureOptions& options) {
 void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
   const std::vector<std::string> names = chosen_workloads(options);
   for (const std::string& stage : options.stages) require_stage(stage);
-  if (!options.output.empty()) require_writable(options.output);
+  for (const std::string& output : {options.output, options.csv})
+    if (!output.empty()) require_writable(output);
   const Device device = open_device(common);
   const double first_image_ms = bench::first_image_ms(device);
   const bench::Peaks peaks = bench::measure_peaks(device);
@@ -107,7 +117,9 @@ void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
         file["results"].push_back(std::move(row));
       }
     }
+    file["load"]["after"] = bench::load();
     if (!options.output.empty()) write_json(options.output, file);
+    if (!options.csv.empty()) write_whole_file(options.csv, bench::to_csv(file));
   }
 }
 

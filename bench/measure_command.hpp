@@ -13,11 +13,11 @@ struct BenchMeasureOptions {
   std::vector<std::string> workloads;  ///< by name; none: all that are no sweeps
   bool sweeps = false;                 ///< the sweeps too
   std::vector<std::string> stages;     ///< whose figures to keep and print; none: all are kept
-  std::string output;                  ///< file of results; empty: none
+  std::string output, csv;             ///< files of results, empty: none
   bench::MeasureOptions each;
 };
 
-/// Measures, prints a line a row, and writes the file anew after every workload, so that what was measured
+/// Measures, prints a line a row, and writes the files anew after every workload, so that what was measured
 /// stays if a later one takes the process down. Throws InvalidArgument for unknown names and IoError for an
 /// output that cannot be written, both before anything is measured.
 void run_bench(BenchMeasureOptions options, const CommonOptions& common);

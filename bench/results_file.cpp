@@ -59,8 +59,8 @@ std::string row_name(const Json& row) {
 
 bool is_measured(const Json& row) { return row["status"] == "ok"; }
 
-double total_ms(const Json& row) {
-  return row["forward_ms"]["median"].get<double>() + row["backward_ms"]["median"].get<double>();
+double total_ms(const Json& row, const char* figure) {
+  return row["forward_ms"][figure].get<double>() + row["backward_ms"][figure].get<double>();
 }
 
 }  // namespace dpr::bench

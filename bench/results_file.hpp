@@ -11,8 +11,7 @@ namespace dpr::bench {
 
 using cli::Json;
 
-/// Of a results file: {"schema", "commit", "device", "build_options", "repetitions", "max_seconds",
-/// "results": [...]}.
+/// Of a results file, as bench/README.md describes it. What later versions add, a file may lack.
 inline constexpr int k_results_schema = 1;
 
 /// Reads a file that `dpr bench -o` wrote. Throws IoError where it cannot be read or is not JSON,
@@ -25,7 +24,7 @@ std::string row_name(const Json& row);
 /// Whether the row has figures.
 bool is_measured(const Json& row);
 
-/// Median forward and backward milliseconds of a measured row together.
-double total_ms(const Json& row);
+/// Forward and backward milliseconds of a measured row together: the sum of their medians, or q1 or q3.
+double total_ms(const Json& row, const char* figure = "median");
 
 }  // namespace dpr::bench

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <set>
 #include <sstream>
 
 #include "cli/folder.hpp"
 #include "cli/page.hpp"
 #include "cli/plot.hpp"
+#include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "stages.hpp"
 
@@ -68,7 +70,7 @@ Plot stage_plot(const Json& results) {
     }
     script << '\n';
   }
-  constexpr int k_row_height = 20, k_margins = 130, k_width = 1300;
+  constexpr int k_row_height = 20, k_margins = 190, k_width = 1300;  // the legend has five lines
   script << "EOD\nset yrange [" << rows.size() << ":-1]\nset xrange [0:100]\n"
          << "set xlabel 'device time by stage, forward and backward, %'\n"
          << "set style fill solid 0.9 noborder\nset key outside top center horizontal\nset lmargin 58\n"
@@ -101,25 +103,40 @@ const Axis k_axes[] = {
     {"sweep-tessellation", "tessellation", [](const Json& row) { return row["triangles"].get<double>(); }},
     {"sweep-sigma", "sigma", [](const Json& row) { return row["sigma"].get<double>(); }}};
 
+/// A figure of a row, and where its middle half begins and ends.
+struct Spread {
+  double value, low, high;
+};
+
+struct Figure {
+  const char* name;
+  Spread (*of)(const Json& row);
+};
+
 /// One curve a file and figure, over an axis; empty where no file has the sweep.
-std::string curves(std::span<const Json> files, const Axis& axis,
-                   const std::vector<std::pair<std::string, std::function<double(const Json&)>>>& figures) {
+std::string curves(std::span<const Json> files, const Axis& axis, std::span<const Figure> figures) {
   std::ostringstream data, plots;
   std::size_t index = 0;
   for (const Json& file : files) {
     const auto rows = rows_where(file, [&](const Json& row) { return row["workload"] == axis.workload; });
     if (rows.empty()) continue;
-    for (const auto& [name, figure] : figures) {
+    for (const auto& [name, of] : figures) {
       data << "$" << axis.label << index << " << EOD\n";
-      for (const Json* row : rows) data << axis.value(*row) << ' ' << figure(*row) << '\n';
+      for (const Json* row : rows) {
+        const auto [value, low, high] = of(*row);
+        data << axis.value(*row) << ' ' << value << ' ' << low << ' ' << high << '\n';
+      }
       data << "EOD\n";
-      const std::string title = files.size() > 1 ? name + ", " + label_of(file, files.size()) : name;
+      const std::string title =
+          files.size() > 1 ? std::string(name) + ", " + label_of(file, files.size()) : name;
       plots << (index > 0 ? ", " : "plot ") << "$" << axis.label << index
-            << " with linespoints lw 2 pt 7 title " << gnuplot_quote(title);
+            << " with yerrorlines lw 2 pt 7 title " << gnuplot_quote(title);
       ++index;
     }
   }
-  return index == 0 ? "" : data.str() + "set xlabel " + gnuplot_quote(axis.label) + "\n" + plots.str() + "\n";
+  if (index == 0) return "";
+  return data.str() + "set title " + gnuplot_quote(std::string("against ") + axis.label) + "\nset xlabel " +
+         gnuplot_quote(axis.label) + "\n" + plots.str() + "\n";
 }
 
 /// Above the plot: below it the labels of the axis are. Long titles stand below each other.
@@ -130,35 +147,72 @@ std::string key_place(std::span<const Json> files) {
 
 double median(const Json& timing) { return timing["median"].get<double>(); }
 
+Spread spread(const Json& timing) {
+  return {median(timing), timing["q1"].get<double>(), timing["q3"].get<double>()};
+}
+
 Plot scaling_plot(std::span<const Json> files) {
+  static constexpr Figure k_passes[] = {
+      {"forward", [](const Json& row) { return spread(row["forward_ms"]); }},
+      {"backward", [](const Json& row) { return spread(row["backward_ms"]); }}};
   std::string panels;
   int count = 0;
   for (const Axis& axis : k_axes) {
-    const std::string panel =
-        curves(files, axis,
-               {{"forward", [](const Json& row) { return median(row["forward_ms"]); }},
-                {"backward", [](const Json& row) { return median(row["backward_ms"]); }}});
+    const std::string panel = curves(files, axis, k_passes);
     panels += panel;
     count += panel.empty() ? 0 : 1;
   }
   if (count == 0) return {};
   const int lines = (count + 1) / 2;
-  return {1200, 400 * lines,
+  return {1200, 430 * lines,
           "set multiplot layout " + std::to_string(lines) + "," + (count > 1 ? "2" : "1") +
-              "\nset grid\nset logscale xy\nset key " + key_place(files) + "\nset ylabel 'milliseconds'\n" +
-              panels + "unset multiplot\n"};
+              "\nset grid\nset logscale xy\nset format '%g'\nset key " + key_place(files) +
+              "\nset ylabel 'milliseconds, median and quartiles'\n" + panels + "unset multiplot\n"};
+}
+
+Spread mebibytes(const Json& row, const char* key) {
+  const double value = row[key].get<double>() / (1024.0 * 1024.0);
+  return {value, value, value};
 }
 
 Plot memory_plot(std::span<const Json> files) {
-  constexpr double k_mebibyte = 1024.0 * 1024.0;
-  const std::string panel = curves(
-      files, k_axes[2],
-      {{"device", [](const Json& row) { return row["peak_device_bytes"].get<double>() / k_mebibyte; }},
-       {"resident", [](const Json& row) { return row["peak_rss_bytes"].get<double>() / k_mebibyte; }}});
+  static constexpr Figure k_memories[] = {
+      {"device", [](const Json& row) { return mebibytes(row, "peak_device_bytes"); }},
+      {"resident", [](const Json& row) { return mebibytes(row, "peak_rss_bytes"); }}};
+  const std::string panel = curves(files, k_axes[2], k_memories);
   if (panel.empty()) return {};
-  return {700, 450,
+  return {700, 480,
           "set grid\nset key " + key_place(files) +
               "\nset logscale x\nset yrange [0:*]\nset ylabel 'peak memory, MiB'\n" + panel};
+}
+
+/// What a stage reaches of the device's peaks: a point a row, below the roof that its operations a byte
+/// allow.
+Plot roofline_plot(const Json& results) {
+  const Json& device = results["device"];
+  if (!device.contains("peak_gflops")) return {};
+  std::map<std::string, std::string> points;
+  for (const Json* row : rows_where(results, [](const Json& r) { return r.contains("stages"); })) {
+    for (const auto& [name, stage] : (*row)["stages"].items()) {
+      if (!stage.contains("gflops")) continue;
+      const double gflops = stage["gflops"].get<double>(), gbytes = stage["gbytes_per_s"].get<double>();
+      if (gflops > 0 && gbytes > 0)
+        points[name] += std::to_string(gflops / gbytes) + " " + std::to_string(gflops) + "\n";
+    }
+  }
+  if (points.empty()) return {};
+  std::ostringstream data, plots;
+  plots << "plot min(" << device["peak_gflops"].get<double>() << ", x * "
+        << device["peak_gbytes_per_s"].get<double>() << ") lw 2 lc 'black' title 'peaks, from memory'";
+  for (const auto& [name, list] : points) {
+    data << "$" << name << " << EOD\n" << list << "EOD\n";
+    plots << ", $" << name << " with points pt 7 title " << gnuplot_quote(name);
+  }
+  return {1000, 600,
+          "min(a, b) = a < b ? a : b\nset grid\nset logscale xy\nset format '%g'\nset samples 500\n"
+          "set key outside right Left reverse\nset xrange [0.01:1000]\n"
+          "set xlabel 'operations a byte'\nset ylabel 'GFLOP/s'\n" +
+              data.str() + plots.str() + "\n"};
 }
 
 /// Time of every row that the first file has, one mark a file.
@@ -175,18 +229,22 @@ Plot device_plot(std::span<const Json> files) {
     for (const Json* row : rows_where(files[i], [](const Json&) { return true; })) {
       const auto name = std::ranges::find(names, row_name(*row));
       if (name != names.end())
-        data << total_ms(*row) << ' ' << name - names.begin() << " \"" << *name << "\"\n";
+        data << total_ms(*row) << ' ' << name - names.begin() << " \"" << *name << "\" "
+             << total_ms(*row, "q1") << ' ' << total_ms(*row, "q3") << '\n';
     }
     data << "EOD\n";
     plots << (i > 0 ? ", " : "plot ") << "$file" << i
-          << " using 1:2:yticlabels(3) with points pt 7 ps 1.2 title "
+          << " using 1:2:4:5:yticlabels(3) with xerrorbars pt 7 ps 1.2 title "
           << gnuplot_quote(label_of(files[i], files.size()));
   }
   constexpr int k_row_height = 20, k_margins = 130, k_width = 1200;
   return {k_width, k_margins + k_row_height * static_cast<int>(names.size()),
-          data.str() + "set grid\nset logscale x\nset lmargin 48\nset key outside top center\nset yrange [" +
-              std::to_string(names.size()) + ":-1]\nset xlabel 'forward and backward, milliseconds'\n" +
-              plots.str() + "\n"};
+          data.str() +
+              "set grid\nset logscale x\nset format x '%g'\nset lmargin 48\nset key outside top center\nset "
+              "yrange [" +
+              std::to_string(names.size()) +
+              ":-1]\nset xlabel 'forward and backward, milliseconds: medians and quartiles'\n" + plots.str() +
+              "\n"};
 }
 
 struct NamedPlot {
@@ -227,6 +285,7 @@ std::vector<std::string> write_report(const std::filesystem::path& folder, std::
                                       const std::string& command) {
   const NamedPlot plots[] = {
       {"stages.png", "Device time by stage, of the first file", stage_plot(results.front())},
+      {"roofline.png", "Stages below the device's peaks, of the first file", roofline_plot(results.front())},
       {"scaling.png", "Time against what grows", scaling_plot(results)},
       {"memory.png", "Peak memory against samples", memory_plot(results)},
       {"devices.png", "Time by file", device_plot(results)}};

@@ -12,6 +12,7 @@ namespace dpr::bench {
 
 /// Draws into a folder, which is made if need be, what the files have the rows for:
 /// - stages.png: the stages' share of a row's time, of the first file
+/// - roofline.png: operations a second of the stages against operations a byte, of the first file
 /// - scaling.png: time against triangles, pixels, samples and views, from the sweeps
 /// - memory.png: peak device memory against samples
 /// - devices.png: time of every row by file, where several are given

@@ -10,6 +10,7 @@
 #include "cli/folder.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
+#include "cli/text.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
 

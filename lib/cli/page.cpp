@@ -4,6 +4,7 @@
 #include <ostream>
 
 #include "base/output_file.hpp"
+#include "cli/text.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr::cli {

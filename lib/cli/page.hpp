@@ -2,7 +2,6 @@
 // without a network, on a phone too, and without its script it shows the same pictures.
 #pragma once
 
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,14 +9,6 @@
 #include "dpr/image.hpp"
 
 namespace dpr::cli {
-
-/// Text as printf writes it.
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 /// What a page says of where it comes from.
 struct PageSource {

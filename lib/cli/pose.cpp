@@ -1,8 +1,10 @@
 // dpr pose: the pose of an object from one image.
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <optional>
 
+#include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/folder.hpp"
@@ -34,16 +36,13 @@ struct PoseCommandOptions {
 };
 
 PoseLight parse_light(const std::string& word) {
-  for (const PoseLight light : {PoseLight::fixed, PoseLight::gain, PoseLight::harmonics}) {
-    if (word == name_of(light)) return light;
-  }
-  throw InvalidArgument("--light (command line)", "\"" + word + "\"", "harmonics, gain or fixed");
+  return static_cast<PoseLight>(position_of(word, light_names(), "--light (command line)"));
 }
 
 OptimizerKind parse_optimizer(const std::string& word) {
-  if (word == "adam") return OptimizerKind::adam;
-  if (word == "sgd") return OptimizerKind::sgd;
-  throw InvalidArgument("--optimizer (command line)", "\"" + word + "\"", "adam or sgd");
+  static constexpr std::array<std::string_view, 2> names{"adam", "sgd"};
+  return std::array{OptimizerKind::adam,
+                    OptimizerKind::sgd}[position_of(word, names, "--optimizer (command line)")];
 }
 
 /// The method that is asked for, by name or by an option that only one of them has.

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <string>
 
+#include "cli/pose_report.hpp"
+#include "cli/text.hpp"
+
 namespace dpr::cli {
 namespace {
 
@@ -18,8 +21,17 @@ std::string search_text(const PoseResult& result) {
 std::string light_text(const PoseResult& result) {
   if (result.light == PoseLight::fixed) return "";
   return " The target's light is not the scene's: it was found along with the pose. These pictures are in "
-         "the "
-         "scene's.";
+         "the scene's.";
+}
+
+/// Empty where the solver has none.
+std::string uncertainty_text(const PoseResult& result) {
+  const auto& c = result.covariance;
+  if (c.empty()) return "";
+  const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(c.size()))));
+  const double variance = c[0] + c[size + 1] + c[2 * size + 2];
+  return format("%.2g degrees, one standard deviation, if the scene is right",
+                glm::degrees(std::sqrt(variance)));
 }
 
 void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
@@ -36,6 +48,9 @@ void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::
   if (result.radial != glm::dvec2(0))
     rows.push_back(
         {"distortion", format("k1 %+.4g, k2 %+.4g to the scene's", result.radial.x, result.radial.y)});
+  if (const std::string text = uncertainty_text(result); !text.empty())
+    rows.push_back({"uncertainty of the rotation", text});
+  if (result.light != PoseLight::fixed) rows.push_back({"light found", name_of(result.light)});
   rows.push_back({"loss", format("%.4g", result.loss)});
   rows.push_back({"target explained", result.explained ? "yes" : "no"});
   rows.push_back({"iterations", std::to_string(result.iterations)});

@@ -2,6 +2,7 @@
 #include "cli/pose_report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
@@ -12,6 +13,7 @@
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"
+#include "cli/text.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
@@ -157,16 +159,12 @@ Json covariance_to_json(const std::vector<double>& covariance) {
 
 }  // namespace
 
-const char* name_of(PoseLight light) {
-  switch (light) {
-    case PoseLight::gain:
-      return "gain";
-    case PoseLight::harmonics:
-      return "harmonics";
-    default:
-      return "fixed";
-  }
+std::span<const std::string_view> light_names() {
+  static constexpr std::array<std::string_view, 3> names{"fixed", "gain", "harmonics"};
+  return names;
 }
+
+std::string name_of(PoseLight light) { return std::string(light_names()[static_cast<std::size_t>(light)]); }
 
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet);

@@ -3,6 +3,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 
 #include "cli/common_options.hpp"
 #include "cli/json.hpp"
@@ -11,8 +14,9 @@
 
 namespace dpr::cli {
 
-/// As --light and pose.json have it.
-const char* name_of(PoseLight light);
+/// As --light and pose.json have them, in the order of PoseLight.
+std::span<const std::string_view> light_names();
+std::string name_of(PoseLight light);
 
 /// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
 /// must not outlive the returned object's copies.

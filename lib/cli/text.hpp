@@ -1,11 +1,20 @@
-// Values that are written as text on the command line.
+// Values as text: for people, and from the command line.
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <glm/glm.hpp>
 #include <string>
 
 namespace dpr::cli {
+
+/// Text as printf writes it.
+template <typename... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
 
 /// "640x480". Throws InvalidArgument.
 glm::ivec2 parse_size(const std::string& text);

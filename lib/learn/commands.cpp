@@ -15,6 +15,7 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/provenance.hpp"
+#include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
@@ -143,9 +144,13 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
          {{"Training loss, means of consecutive steps", "loss", true, {{"mean", means}}}});
 }
 
+std::string validation_text(const learn::TrainingProgress& progress) {
+  return progress.validation_iou ? format(", validation IoU %.3f", *progress.validation_iou) : "";
+}
+
 void print_result(const std::string& folder, const learn::TrainingResult& result) {
-  std::printf("%s: %zu steps, validation IoU %.3f; %.0f s in this run, %.0f%% of them in the renderer\n",
-              folder.c_str(), result.losses.size(), result.last.validation_iou, result.last.seconds,
+  std::printf("%s: %zu steps%s; %.0f s in this run, %.0f%% of them in the renderer\n", folder.c_str(),
+              result.losses.size(), validation_text(result.last).c_str(), result.last.seconds,
               100 * result.last.render_share);
 }
 
@@ -158,14 +163,13 @@ void train(const TrainCommand& command, const CommonOptions& common) {
   learn::TrainingResult result;
   {
     Progress bar(static_cast<unsigned>(o.steps), common.quiet);
-    result = learn::train(
-        open_device(common), training, validation, o, command.output, [&](const learn::TrainingProgress& p) {
-          const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
-          const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
-          char text[128];
-          std::snprintf(text, sizeof text, "loss %.4f, validation IoU %.3f", p.loss, p.validation_iou);
-          bar.update(static_cast<unsigned>(p.step), std::max(steps, time), text);
-        });
+    result = learn::train(open_device(common), training, validation, o, command.output,
+                          [&](const learn::TrainingProgress& p) {
+                            const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
+                            const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
+                            bar.update(static_cast<unsigned>(p.step), std::max(steps, time),
+                                       format("loss %.4f", p.loss) + validation_text(p));
+                          });
   }
   if (o.ranks.rank != 0) return;
   const std::filesystem::path folder(command.output);

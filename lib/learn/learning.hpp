@@ -42,7 +42,7 @@ struct TrainingOptions {
 struct TrainingProgress {
   std::size_t step = 0;
   double loss = 0;
-  double validation_iou = 0;  ///< of the last checkpoint; 0 before the first
+  std::optional<double> validation_iou;  ///< of the last checkpoint, once there is one
   double seconds = 0;         ///< of this run, without validation
   double render_share = 0;    ///< of these seconds, in the renderer
 };

@@ -6,10 +6,8 @@
 #include <numeric>
 #include <ostream>
 #include <random>
-#include <sstream>
 
 #include "base/checks.hpp"
-#include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
@@ -17,6 +15,7 @@
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
 #include "learn/rank_group.hpp"
+#include "learn/resume.hpp"
 #include "mesh/adjacency.hpp"
 #include "smoothing/priors.hpp"
 #include "torch/errors.hpp"
@@ -239,94 +238,6 @@ void check(const TrainingOptions& options) {
   }
 }
 
-/// What a step depends on beside its number and the learning rate, which may change on the way.
-std::string settings_of(const TrainingOptions& options, const Dataset& training) {
-  const Smoothing smoothing = training_smoothing(options);
-  const LearningWeights& w = options.weights;
-  std::ostringstream text;
-  text << options.method << " with seed " << options.seed << ", batch " << options.batch << ", sigma "
-       << checks::text(smoothing.sigma) << ", gamma " << checks::text(smoothing.gamma) << ", weights "
-       << checks::text(w.silhouette) << " " << checks::text(w.color) << " " << checks::text(w.laplacian)
-       << ", " << training.size() << " objects of";
-  for (const std::size_t c : training.classes()) text << " " << object_classes()[c].name;
-  return text.str();
-}
-
-std::vector<std::string> parts_of(const std::string& settings) {
-  std::vector<std::string> parts;
-  std::istringstream text(settings);
-  for (std::string part; std::getline(text, part, ',');)
-    parts.push_back(part.substr(part.find_first_not_of(' ')));
-  return parts;
-}
-
-/// Those parts of two settings that are not the same.
-std::pair<std::string, std::string> differences(const std::string& first, const std::string& second) {
-  const std::vector<std::string> there = parts_of(first), here = parts_of(second);
-  std::pair<std::string, std::string> result;
-  for (std::size_t i = 0; i < std::max(there.size(), here.size()); ++i) {
-    const std::string a = i < there.size() ? there[i] : "", b = i < here.size() ? here[i] : "";
-    if (a == b) continue;
-    result.first += (result.first.empty() ? "" : ", ") + a;
-    result.second += (result.second.empty() ? "" : ", ") + b;
-  }
-  return result;
-}
-
-/// Throws InvalidArgument unless the settings are the same, with those parts that are not.
-void require_same(const std::filesystem::path& file, const std::string& found, const std::string& asked) {
-  if (found == asked) return;
-  const auto [got, expected] = differences(found, asked);
-  throw InvalidArgument("checkpoint (" + file.string() + ")", got,
-                        expected + " as asked for, or another folder");
-}
-
-/// Throws InvalidArgument on every rank that is to train otherwise than rank 0.
-void require_same(const RankGroup& ranks, const TrainingOptions& options, const std::string& settings) {
-  std::ostringstream text;
-  text << settings << ", palette " << options.palette << ", learning rate "
-       << checks::text(options.learning_rate) << ", " << options.steps << " steps, "
-       << checks::text(options.minutes) << " minutes, a checkpoint every " << options.checkpoint_every;
-  const std::string expected = ranks.share(text.str());
-  if (text.str() == expected) return;
-  const auto [got, wanted] = differences(text.str(), expected);
-  throw InvalidArgument("rank " + std::to_string(ranks.ranks().rank) + " (dpr learn)", got,
-                        wanted + " as rank 0");
-}
-
-/// What rank 0 has in its folder, if anything.
-LoadedCheckpoint load_of_rank_0(const std::filesystem::path& file, double learning_rate,
-                                const RankGroup& ranks) {
-  if (ranks.ranks().rank != 0) {
-    const std::string bytes = ranks.share({});
-    return bytes.empty() ? LoadedCheckpoint{} : load_checkpoint(file, bytes, learning_rate);
-  }
-  LoadedCheckpoint loaded;
-  if (std::filesystem::exists(file)) loaded = load_checkpoint(file, learning_rate);
-  if (!ranks.is_alone()) ranks.share(loaded.network ? read_file(file) : "");
-  return loaded;
-}
-
-/// The checkpoint to go on from, or a fresh start. Throws InvalidArgument if it belongs to another training.
-LoadedCheckpoint resume(const std::filesystem::path& file, const TrainingOptions& options,
-                        const std::string& settings, const RankGroup& ranks) {
-  const NetworkOptions wanted{options.palette};
-  LoadedCheckpoint loaded = load_of_rank_0(file, options.learning_rate, ranks);
-  if (!loaded.network) {
-    loaded = start(wanted, options.method, options.seed, options.learning_rate);
-    loaded.checkpoint.settings = settings;
-    return loaded;
-  }
-  const Checkpoint& c = loaded.checkpoint;
-  if (!(c.architecture == wanted)) {
-    throw InvalidArgument("checkpoint (" + file.string() + ")",
-                          "a network of " + std::to_string(c.architecture.palette) + " palette colours",
-                          std::to_string(wanted.palette) + ", as asked for");
-  }
-  require_same(file, c.settings, settings);
-  return loaded;
-}
-
 /// Mean IoU of the listed images, of which every rank takes a part.
 double validate(Network& network, const Dataset& dataset, const std::vector<ViewOfObject>& which,
                 const RankGroup& ranks) {
@@ -387,7 +298,7 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
   const std::string settings = settings_of(options, training);
   const auto ranks = c10::make_intrusive<RankGroup>(options.ranks);
   const bool is_first = options.ranks.rank == 0;
-  require_same(*ranks, options, settings);
+  require_same_options(*ranks, options, settings);
   LoadedCheckpoint run = resume(file, options, settings, *ranks);
   Trainer trainer(device, training, options, ranks, run.network);
   constexpr std::size_t k_validation_views = 2;
@@ -396,9 +307,9 @@ TrainingResult train(const Device& device, const Dataset& training, const Datase
   if (!run.checkpoint.validations.empty()) state.validation_iou = run.checkpoint.validations.back().iou;
 
   const auto save = [&] {
-    state.validation_iou = validate(run.network, validation, held_out, *ranks);
-    run.checkpoint.validations.push_back(
-        {static_cast<double>(run.checkpoint.steps.size()), state.validation_iou});
+    const double iou = validate(run.network, validation, held_out, *ranks);
+    state.validation_iou = iou;
+    run.checkpoint.validations.push_back({static_cast<double>(run.checkpoint.steps.size()), iou});
     if (!is_first) return;
     // In this order: interrupted between the two, a training that is complete would not write its losses.
     write_losses(folder / "losses.csv", run.checkpoint.steps);

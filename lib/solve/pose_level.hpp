@@ -11,6 +11,7 @@
 #include "device/opencl_bindings.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
+#include "solve/level_scene.hpp"
 #include "solve/pose_light.hpp"
 #include "solve/pose_space.hpp"
 
@@ -22,12 +23,6 @@ struct NormalEquations {
   PoseSpace::Step gradient{};   ///< of half the loss
   PoseSpace::Matrix hessian{};  ///< of half the loss
   PoseSpace::Matrix scatter{};  ///< sum over pixels of the outer products of what each adds to the gradient
-};
-
-struct LevelShape {
-  int short_side;   ///< of its images, in pixels
-  float blur;       ///< of the edges, in samples
-  int samples = 1;  ///< on a pixel's side; their mean over the pixel's area is what it shows
 };
 
 class PoseLevel {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dpr/light.hpp"
+
 namespace dpr {
 namespace {
 
@@ -18,7 +20,6 @@ constexpr int k_most_reweightings = 30;
 constexpr double k_least_fall = 1e-5;
 
 /// Real spherical harmonics, each with a mean square of 1 over the sphere.
-constexpr Eigen::Index k_harmonics = 9;
 std::array<float, k_harmonics> harmonics(const glm::vec3& n) {
   const float first = std::sqrt(3.0F), second = std::sqrt(15.0F), zonal = std::sqrt(1.25F);
   return {1,
@@ -66,7 +67,7 @@ LightFit::LightFit(const WeighedTarget& target, std::span<const std::size_t> sho
 }
 
 Eigen::MatrixXf LightFit::terms(const HypothesisImages& images, int channel) const {
-  const Eigen::Index directional = images.normals != nullptr ? k_harmonics : 1;
+  const Eigen::Index directional = images.normals != nullptr ? Eigen::Index{k_harmonics} : 1;
   Eigen::MatrixXf result(static_cast<Eigen::Index>(shown_.size()), directional + 1);
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     const std::size_t pixel = shown_[static_cast<std::size_t>(i)];
@@ -74,7 +75,7 @@ Eigen::MatrixXf LightFit::terms(const HypothesisImages& images, int channel) con
     result(i, 0) = color.s[channel];
     if (images.normals != nullptr) {
       const auto basis = harmonics(unit(images.normals[pixel]));
-      for (Eigen::Index k = 1; k < k_harmonics; ++k)
+      for (Eigen::Index k = 1; k < Eigen::Index{k_harmonics}; ++k)
         result(i, k) = color.s[channel] * basis[static_cast<std::size_t>(k)];
     }
     result(i, directional) = color.s[3];

@@ -28,7 +28,7 @@ constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
 // Samples of a pixel whose mean is compared, on its side: less than a quarter of a pixel matters little, and
 // large images show the pose without. So many, or fewer where an image has too many of them.
 constexpr int k_samples = 4;
-constexpr std::size_t k_most_samples = std::size_t{1} << 18;
+constexpr std::size_t k_most_image_samples = std::size_t{1} << 18;
 
 // Of the best hypotheses in a light of their own: so many are tried after half a turn too.
 constexpr std::size_t k_turned = 4;
@@ -185,7 +185,7 @@ LevelShape Fit::final_shape(LevelShape shape) const {
   const double loss = least_loss(sampled);
   const std::size_t pixels = target_.pixels.size();
   for (int side = k_samples; side > 1 && shape.samples == 1; --side) {
-    if (pixels * static_cast<std::size_t>(side * side) <= k_most_samples) shape.samples = side;
+    if (pixels * static_cast<std::size_t>(side * side) <= k_most_image_samples) shape.samples = side;
   }
   if (shape.samples == 1) return shape;
   PoseLevel averaged = make_level(shape, light_);

@@ -13,7 +13,7 @@
 namespace dpr {
 namespace {
 
-constexpr std::uint32_t k_most_samples = 4096;
+constexpr std::uint32_t k_most_draws = 4096;
 
 /// What a random word is for: the third word of its counter.
 enum Purpose : std::uint32_t { sampling, shuffling };
@@ -92,7 +92,7 @@ std::array<std::uint32_t, 4> philox4x32_10(std::array<std::uint32_t, 4> counter,
 }
 
 void validate(const NoiseOptions& options) {
-  require(options.samples >= 1 && options.samples <= k_most_samples, "samples (perturbed pose)",
+  require(options.samples >= 1 && options.samples <= k_most_draws, "samples (perturbed pose)",
           options.samples, "1 to 4096");
   const PriorRow& prior = row_of(options.prior);
   if (!prior.has_score()) {

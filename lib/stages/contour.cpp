@@ -9,8 +9,6 @@
 namespace dpr {
 namespace {
 
-cl_uint index(std::size_t value) { return static_cast<cl_uint>(value); }
-
 /// Whether the colours of two faces can differ at the edge that they share: those of meshes with colours of
 /// faces can, and those of vertices of the faces' own.
 bool may_jump(const Mesh& mesh, const WeldedEdge& edge) {
@@ -47,10 +45,10 @@ bool is_seam(const Mesh& mesh, std::span<const glm::vec3> positions, const Welde
 
 cl_uint4 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge,
                 std::size_t first_vertex, std::size_t first_face) {
-  cl_uint4 row{{index(first_vertex) + edge.first, index(first_vertex) + edge.second,
-                index(first_face) + edge.face, DPR_NO_FACE}};
+  cl_uint4 row{{to_uint(first_vertex) + edge.first, to_uint(first_vertex) + edge.second,
+                to_uint(first_face) + edge.face, DPR_NO_FACE}};
   if (!edge.other) return row;
-  row.s[3] = (index(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
+  row.s[3] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
   if (may_jump(mesh, edge)) row.s[2] |= DPR_EDGE_FLAG;
   if (is_seam(mesh, positions, edge)) row.s[2] |= DPR_EDGE_SEAM;
   return row;
@@ -83,7 +81,7 @@ Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3
   for (std::size_t v = 0; v < first_vertex; ++v) starts[v + 1] += starts[v];
   std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
   for (std::size_t edge = 0; edge < count; ++edge) {
-    for (cl_uint end = 0; end < 2; ++end) by_vertex[next[rows[edge].s[end]]++] = index(2 * edge) + end;
+    for (cl_uint end = 0; end < 2; ++end) by_vertex[next[rows[edge].s[end]]++] = to_uint(2 * edge) + end;
   }
   if (rows.empty()) rows.emplace_back();  // never read, but an argument all the same
   edges.upload(device, rows);
@@ -117,8 +115,8 @@ std::size_t view_edges(const ContourInputs& in) { return in.p.views * edges_of_v
 
 shared::ContourParams params(const ContourInputs& in) {
   shared::ContourParams c{};
-  c.edges = index(edges_of_view(in));
-  c.mesh_edges = index(in.edges.count);
+  c.edges = to_uint(edges_of_view(in));
+  c.mesh_edges = to_uint(in.edges.count);
   c.shading = in.shading ? static_cast<cl_uint>(*in.shading) + DPR_FLAT : DPR_UNLIT;
   return c;
 }
@@ -176,13 +174,13 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
   pair_count_.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
-  fill_(view_edges(in), in.p, params(in), index(capacity), in.edges.edges, in.edges.end_starts, in.edges.ends,
-        facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
+  fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.end_starts,
+        in.edges.ends, facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
         in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts_, pair_count_, place_contour_,
         pair_tile, places_);
   sort_(pairs, pair_count_, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
-  link_(pairs, index(capacity), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
+  link_(pairs, to_uint(capacity), pair_count_, places_, place_contour_, pair_contour, edge_pairs_);
 }
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,

@@ -7,8 +7,6 @@
 namespace dpr {
 namespace {
 
-cl_uint index(std::size_t value) { return static_cast<cl_uint>(value); }
-
 Incidence make_incidence(Device::Impl& device, const std::vector<cl_uint4>& faces, std::size_t targets) {
   std::vector<cl_uint> starts(targets + 1, 0), corners(faces.size() * 3);
   for (const cl_uint4& face : faces) {
@@ -18,7 +16,7 @@ Incidence make_incidence(Device::Impl& device, const std::vector<cl_uint4>& face
   std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
   for (std::size_t face = 0; face < faces.size(); ++face) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      corners[next[faces[face].s[corner]]++] = index(face * 3 + corner);
+      corners[next[faces[face].s[corner]]++] = to_uint(face * 3 + corner);
     }
   }
   Incidence incidence;
@@ -35,12 +33,12 @@ std::vector<glm::vec3> mesh_colors(const Mesh& mesh) {
 }
 
 cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_color) {
-  const cl_uint base = index(first_color);
+  const cl_uint base = to_uint(first_color);
   if (!mesh.vertex_colors.empty()) {
     const glm::uvec3& f = mesh.faces[face];
     return {{base + f.x, base + f.y, base + f.z, 0}};
   }
-  const cl_uint color = mesh.face_colors.empty() ? base : index(first_color + face);
+  const cl_uint color = mesh.face_colors.empty() ? base : to_uint(first_color + face);
   return {{color, color, color, 0}};
 }
 
@@ -54,11 +52,11 @@ cl_uint4 corner_texcoords(const Mesh& mesh, std::size_t face, cl_uint first_texc
 
 shared::Texture device_texture(const Texture& texture, std::size_t first_texel) {
   shared::Texture t{};
-  t.first = index(first_texel);
-  t.width = index(static_cast<std::size_t>(texture.width));
-  t.height = index(static_cast<std::size_t>(texture.height));
+  t.first = to_uint(first_texel);
+  t.width = to_uint(static_cast<std::size_t>(texture.width));
+  t.height = to_uint(static_cast<std::size_t>(texture.height));
   if (texture.filter == Filter::trilinear) {
-    t.levels = index(static_cast<std::size_t>(std::bit_width(std::max(t.width, t.height))));
+    t.levels = to_uint(static_cast<std::size_t>(std::bit_width(std::max(t.width, t.height))));
   } else {
     t.levels = 1;
   }
@@ -100,16 +98,16 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;
     const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
-    const cl_uint base = index(all_positions.size());
+    const cl_uint base = to_uint(all_positions.size());
     meshes.push_back({all_positions.size(), mesh.positions.size(), all_colors.size(), mesh_color.size()});
     for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
       const glm::uvec3& f = mesh.faces[face];
-      all_faces.push_back({{base + f.x, base + f.y, base + f.z, index(m)}});
+      all_faces.push_back({{base + f.x, base + f.y, base + f.z, to_uint(m)}});
       all_face_colors.push_back(corner_colors(mesh, face, all_colors.size()));
     }
     for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
     for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
-    all_mesh.resize(all_positions.size(), index(m));
+    all_mesh.resize(all_positions.size(), to_uint(m));
   }
   vertices = all_positions.size();
   faces = all_faces.size();
@@ -133,7 +131,8 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
   std::vector<cl_uint4> all_faces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;
-    const cl_uint first_texture = index(textures.list.size()), first_texcoord = index(all_texcoords.size());
+    const cl_uint first_texture = to_uint(textures.list.size()),
+                  first_texcoord = to_uint(all_texcoords.size());
     for (std::size_t face = 0; face < mesh.faces.size(); ++face)
       all_faces.push_back(corner_texcoords(mesh, face, first_texcoord, first_texture));
     if (mesh.textures.empty()) continue;

@@ -172,20 +172,6 @@ at::Tensor light_gradients(SceneGradient& gradient) {
 
 }  // namespace
 
-at::Tensor checked(const at::Tensor& tensor, const std::string& name,
-                   std::initializer_list<std::int64_t> shape, const char* expected) {
-  if (tensor.scalar_type() != at::kFloat || !tensor.device().is_cpu()) {
-    throw InvalidArgument(name + " (dpr::render)", tensor.toString(), "a float32 tensor on the CPU");
-  }
-  bool fits = tensor.dim() == static_cast<std::int64_t>(shape.size());
-  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
-    const std::int64_t wanted = shape.begin()[i];
-    fits = wanted < 0 || tensor.size(static_cast<std::int64_t>(i)) == wanted;
-  }
-  if (!fits) throw InvalidArgument(name + " (dpr::render)", shape_text(tensor), expected);
-  return tensor.contiguous();
-}
-
 Inputs checked(const Inputs& in, std::int64_t faces) {
   Inputs out;
   out.views = checked(in.views, "views", {-1, 4, 4}, "[view, 4, 4]");
@@ -205,12 +191,6 @@ Inputs checked(const Inputs& in, std::int64_t faces) {
                               ", one a face, in the second dimension");
   }
   return out;
-}
-
-Lights unpack(Lights lights, const at::Tensor& numbers) {
-  const float* next = numbers.data_ptr<float>();
-  for_each_light_number(lights, [&](std::string_view, float& number) { number = *next++; });
-  return lights;
 }
 
 Topology topology_of(const Inputs& in, std::shared_ptr<const Faces> faces, const RenderSettings& settings,

@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "dpr/light.hpp"
-#include "scene/light_table.hpp"
 #include "torch/render_settings.hpp"
 #include "torch/renderer_pool.hpp"
 
@@ -21,9 +20,6 @@ struct Inputs {
 
 /// The same, contiguous. Throws InvalidArgument for types, devices and shapes that do not fit.
 Inputs checked(const Inputs& in, std::int64_t faces);
-/// A float32 tensor of the CPU of that shape, -1 standing for any size, contiguous. Throws InvalidArgument.
-at::Tensor checked(const at::Tensor& tensor, const std::string& name,
-                   std::initializer_list<std::int64_t> shape, const char* expected);
 
 /// How a batch is rendered.
 struct BatchOptions {
@@ -63,21 +59,7 @@ struct Gradients {
 Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,
                          const Wanted& wanted, const at::Tensor& grad_image);
 
-/// How many numbers a light of a kind of lib/scene/light_table.hpp has.
-template <typename Kind>
-std::int64_t count_numbers(Kind) {
-  std::int64_t count = 0;
-  typename Kind::Light light;
-  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
-    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
-  });
-  return count;
-}
-
 /// Throws c10::Error where a derivative of a derivative is asked for.
 void require_first_derivative();
-
-/// Lights with these numbers, in the order of for_each_light_number().
-Lights unpack(Lights lights, const at::Tensor& numbers);
 
 }  // namespace dpr::torch_op

@@ -1,10 +1,11 @@
-// The library's errors as torch's.
+// The library's errors as torch's, and the check of the tensors that are given.
 #pragma once
 
 #include <ATen/core/Tensor.h>
 #include <c10/util/Exception.h>
 
 #include <exception>
+#include <initializer_list>
 #include <string>
 
 #include "dpr/error.hpp"
@@ -40,6 +41,21 @@ inline std::string shape_text(const at::Tensor& tensor) {
   std::string text = "[";
   for (const std::int64_t size : tensor.sizes()) text += (text.size() > 1 ? ", " : "") + std::to_string(size);
   return text + "]";
+}
+
+/// The tensor itself, if it is contiguous. -1 stands for any size.
+inline at::Tensor checked(const at::Tensor& tensor, const std::string& name,
+                          std::initializer_list<std::int64_t> shape, const char* expected) {
+  if (tensor.scalar_type() != at::kFloat || !tensor.device().is_cpu()) {
+    throw InvalidArgument(name + " (dpr::render)", tensor.toString(), "a float32 tensor on the CPU");
+  }
+  bool fits = tensor.dim() == static_cast<std::int64_t>(shape.size());
+  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
+    const std::int64_t wanted = shape.begin()[i];
+    fits = wanted < 0 || tensor.size(static_cast<std::int64_t>(i)) == wanted;
+  }
+  if (!fits) throw InvalidArgument(name + " (dpr::render)", shape_text(tensor), expected);
+  return tensor.contiguous();
 }
 
 }  // namespace dpr::torch_op

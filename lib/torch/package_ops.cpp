@@ -14,10 +14,10 @@
 
 #include "base/name_list.hpp"
 #include "dpr/aov.hpp"
-#include "scene/light_table.hpp"
 #include "torch/batch.hpp"
 #include "torch/batch_renderer.hpp"
 #include "torch/errors.hpp"
+#include "torch/light_tensors.hpp"
 
 namespace dpr::torch_op {
 namespace {

@@ -1,8 +1,11 @@
 // dpr bench as a user runs it: measure, compare, draw; and what it says of wrong input.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <set>
 
+#include "base/input_file.hpp"
 #include "results_file.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"
@@ -46,8 +49,9 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("bench: measures, keeps, compares and draws") {
     if (is_skipped()) return;
     const TempDir folder;
-    const Outcome measured = bench(folder, {"--workload", "cube128", "--repetitions", "1", "--max-seconds",
-                                            "0", "--stage", "aggregate", "-o", "a.json"});
+    const Outcome measured =
+        bench(folder, {"--workload", "cube128", "--repetitions", "1", "--max-seconds", "0", "--stage",
+                       "aggregate", "-o", "a.json", "--csv", "a.csv", "--workload", "cube128"});
     CAPTURE(measured.err);
     REQUIRE(measured.status == 0);
     CHECK(contains(measured.out, "cube128 gaussian barrier monte_carlo M=128"));
@@ -56,10 +60,19 @@ TEST_SUITE("bench-smoke") {
     CHECK(results["device"]["peak_gflops"].get<double>() > 0);
     CHECK(results["first_image_ms"].get<double>() > 0);
     CHECK(contains(results["build_options"].get<std::string>(), "-cl-std=CL1.2"));
+    CHECK(contains(results["environment"]["date"].get<std::string>(), "Z"));
+    CHECK(results["environment"]["cpus"].get<unsigned>() > 0);
+    std::set<std::string> names;
     for (const auto& row : results["results"]) {
       CHECK(row["status"] == "ok");
       CHECK(row["stages"].size() == 1);
+      CHECK(row["forward_ms"]["runs"].size() == 1);
+      names.insert(dpr::bench::row_name(row));
     }
+    CHECK(names.size() == results["results"].size());  // a workload that is named twice is measured once
+    const std::string csv = dpr::read_file(folder / "a.csv");
+    CHECK(csv.starts_with("workload,preset,"));
+    CHECK(static_cast<std::size_t>(std::ranges::count(csv, '\n')) == results["results"].size() + 1);
     const Outcome compared = bench(folder, {"--compare", "a.json", "a.json", "-o", "c.json"});
     CHECK(compared.status == 0);
     CHECK(contains(compared.out, std::to_string(2 * results["results"].size()) + " same"));
@@ -67,7 +80,8 @@ TEST_SUITE("bench-smoke") {
     const Outcome drawn = bench(folder, {"--report", "report", "a.json", "sweep.json"});
     CAPTURE(drawn.err);
     CHECK(drawn.status == 0);
-    for (const char* const picture : {"stages.png", "scaling.png", "memory.png", "devices.png"}) {
+    for (const char* const picture :
+         {"stages.png", "roofline.png", "scaling.png", "memory.png", "devices.png"}) {
       CHECK(std::filesystem::file_size(folder / "report" / picture) > 1000);
     }
   }
@@ -115,6 +129,7 @@ TEST_SUITE("bench-smoke") {
     check_fails(folder, {"--compare", "empty.json", "missing.json"}, "missing.json");
     check_fails(folder, {"--compare", "empty.json", "other.json"}, "schema");
     check_fails(folder, {"--compare", "text.json", "empty.json"}, "text.json");
+    check_fails(folder, {"--fail-above", "1.1"}, "--compare");
     check_fails(folder, {"--report", "report"}, "files");
     check_fails(folder, {"--report", "report", "empty.json"}, "no measured rows");
     check_fails(folder, {"empty.json"}, "--report");

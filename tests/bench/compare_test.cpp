@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "csv.hpp"
 #include "dpr/error.hpp"
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
@@ -75,6 +76,40 @@ TEST_SUITE("bench-smoke") {
     const std::string lines = dpr::bench::to_lines(comparison);
     CHECK(dpr::test::contains(lines, "1 faster  1 slower"));
     CHECK(dpr::test::contains(lines, "only in a: sphere64"));
+  }
+
+  TEST_CASE("a comparison fails above a ratio where a row is clearly slower, and nowhere else") {
+    const Json fast = timing(9, 10, 11), slow = timing(14, 15, 16), unclear = timing(5, 15, 25);
+    const auto against = [&](const Json& forward, const Json& backward) {
+      return compare(results(Json::array({row("cube128", fast, fast)})),
+                     results(Json::array({row("cube128", forward, backward)})));
+    };
+    dpr::bench::require_none_slower(against(fast, unclear), 1.1);
+    dpr::bench::require_none_slower(against(fast, slow), 1.6);
+    DPR_CHECK_MESSAGE_HAS(dpr::Error, dpr::bench::require_none_slower(against(fast, slow), 1.4),
+                          "cube128 gaussian barrier exact, backward");
+  }
+
+  TEST_CASE("what makes files hard to compare is said") {
+    Json a = results(Json::array({row("cube128", timing(1, 1, 1), timing(1, 1, 1))}));
+    CHECK(compare(a, a)["warnings"].empty());
+    a["device"].update(Json{{"driver", "1"}, {"peak_gflops", 100}});
+    a["load"] = {{"before", 0.1}, {"after", 0.2}};
+    Json b = a;
+    b["device"].update(Json{{"driver", "2"}, {"peak_gflops", 150}});
+    b["load"]["after"] = 4.0;
+    CHECK(compare(a, b)["warnings"] ==
+          Json::array({"driver: 1 and 2", "peak GFLOP/s: 100 and 150", "load after: 0.2 and 4.0"}));
+    CHECK(dpr::test::contains(dpr::bench::to_lines(compare(a, b)), "not alike: driver"));
+  }
+
+  TEST_CASE("values that CSV would take apart are quoted") {
+    Json failed = row("million", timing(1, 1, 1), timing(1, 1, 1));
+    failed["reason"] = "too large, for \"this\"";
+    failed.erase("forward_ms");
+    const std::string csv = dpr::bench::to_csv(results(Json::array({failed})));
+    CHECK(dpr::test::contains(csv, ",ok,\"too large, for \"\"this\"\"\"\r\n"));
+    CHECK(dpr::test::contains(csv, ",,,,,,,1.0,1.0,1.0,,,15,"));
   }
 
   TEST_CASE("rows of a sweep differ by what it varies") {

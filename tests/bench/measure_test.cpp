@@ -94,6 +94,8 @@ TEST_SUITE("bench-smoke") {
     CHECK(q["median"] == 3);
     CHECK(q["q1"] == 2);
     CHECK(q["q3"] == 4);
+    CHECK(q["min"] == 1);
+    CHECK(q["p95"] == 5);
     CHECK(q["n"] == 5);
   }
 

@@ -1,0 +1,34 @@
+// Lights as the operator's users give them, tensors by kind, and as its numbers.
+#pragma once
+
+#include "dpr/light.hpp"
+#include "scene/light_table.hpp"
+#include "torch/render.hpp"
+
+namespace dpr::torch_op {
+
+/// How many numbers a light of a kind has (scene/light_table.hpp).
+template <typename Kind>
+std::int64_t count_numbers(Kind) {
+  std::int64_t count = 0;
+  typename Kind::Light light;
+  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
+    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
+  });
+  return count;
+}
+
+/// Lights whose numbers are yet to come, and a tensor of these, in their order.
+struct PackedLights {
+  Lights lights;
+  at::Tensor numbers;
+};
+
+/// By torch's own operations, which differentiate the packing. What is not given is the model's. Throws
+/// InvalidArgument for kinds that there are not, and tensors of other shapes.
+PackedLights pack(const LightTensors& given, const Lights& model);
+
+/// The lights with their numbers.
+Lights unpack(Lights lights, const at::Tensor& numbers);
+
+}  // namespace dpr::torch_op
