@@ -87,9 +87,9 @@ class PackageTest(unittest.TestCase):
     def test_refuses_another_torch(self):
         dpr._library.check(torch.__version__, torch._C._GLIBCXX_USE_CXX11_ABI)
         has_strings = torch._C._GLIBCXX_USE_CXX11_ABI
-        for version, strings, said in [("9.8.7+cpu", has_strings, "got 9.8.7, expected " + dpr.BUILT_FOR),
+        for version, strings, said in [("9.8.7+cpu", has_strings, "got 9.8.7.* expected " + dpr.BUILT_FOR),
                                        (torch.__version__, not has_strings, "before C++11")]:
-            with self.assertRaisesRegex(ImportError, said.replace("+", r"\+")):
+            with self.assertRaisesRegex(ImportError, said.replace("C++", r"C\+\+")):
                 dpr._library.check(version, strings)
         # Before anything is loaded: the library that this copy of the package names does not exist.
         with tempfile.TemporaryDirectory() as folder:

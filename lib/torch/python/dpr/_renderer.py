@@ -35,7 +35,7 @@ class Renderer:
     """
 
     def __init__(self, width, height, *, device="", **settings):
-        settings.setdefault("preset", "pixel")
+        settings = {"preset": "pixel", **settings}
         self.width, self.height, self.device = width, height, device
         self.settings = {name: _arguments.number(name, value) for name, value in settings.items()
                          if value is not None}
