@@ -144,7 +144,7 @@ void write_whole_file(const std::filesystem::path& file, const std::function<voi
   std::ostringstream text;
   write(text);
   if (!text) throw IoError(file, "cannot be written: its content could not be made");
-  write_whole_file(file, text.view());
+  write_whole_file(file, text.str());
 }
 
 }  // namespace dpr

@@ -34,24 +34,30 @@ bool read_with_openmesh(std::istream& in, const PlyHeader& header, PlyImporter& 
   }
 }
 
+/// Throws the reason why OpenMesh ended at that position, before the end of the faces.
+[[noreturn]] void fail_incomplete(const std::filesystem::path& file, const PlyHeader& header,
+                                  std::istream& in, std::streamoff position) {
+  in.seekg(0, std::ios::end);
+  if (position == in.tellg()) throw IoError(file, "the file is truncated");
+  if (header.binary) throw IoError(file, "OpenMesh cannot read the file");
+  const auto begin = static_cast<std::streamoff>(header.text.size());
+  std::string read(static_cast<std::size_t>(std::max<std::streamoff>(position - begin, 0)), ' ');
+  in.seekg(begin);
+  in.read(read.data(), static_cast<std::streamsize>(read.size()));
+  const auto lines = static_cast<std::size_t>(std::ranges::count(read, '\n'));
+  throw IoError(file, "got no number where one must be", header.lines + 1 + lines);
+}
+
 /// Throws unless OpenMesh came to the end of the faces, and the file does not go on.
-void check_end(const std::filesystem::path& file, const PlyHeader& header, bool complete,
-               std::istringstream& in) {
+void check_end(const std::filesystem::path& file, const PlyHeader& header, bool complete, std::istream& in) {
   in.exceptions(std::ios::goodbit);
-  const std::string_view text = in.view();
   const bool at_end = in.eof();
   in.clear();
-  const std::size_t position = at_end ? text.size() : static_cast<std::size_t>(in.tellg());
-  if (!complete && position == text.size()) throw IoError(file, "the file is truncated");
-  if (!complete && header.binary) throw IoError(file, "OpenMesh cannot read the file");
-  if (!complete) {
-    const std::string_view read = text.substr(header.text.size(), position - header.text.size());
-    const auto lines = static_cast<std::size_t>(std::ranges::count(read, '\n'));
-    throw IoError(file, "got no number where one must be", header.lines + 1 + lines);
-  }
+  if (at_end) in.seekg(0, std::ios::end);
+  if (!complete) fail_incomplete(file, header, in, in.tellg());
   if (!header.ends_with_faces) return;
-  const std::size_t rest = header.binary ? position : text.find_first_not_of(" \t\r\n", position);
-  if (rest < text.size())
+  if (!header.binary) in >> std::ws;
+  if (in.peek() != std::istream::traits_type::eof())
     throw IoError(file, "the file goes on after the last face that its header promises");
 }
 

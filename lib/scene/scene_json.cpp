@@ -6,7 +6,6 @@
 #include <limits>
 #include <string>
 
-#include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
@@ -220,12 +219,6 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Not
   return scene;
 }
 
-void validate_side(int value, const std::string& argument) {
-  if (value >= 1 && value <= checks::k_largest_side) return;
-  throw InvalidArgument(argument, std::to_string(value),
-                        "1 to " + std::to_string(checks::k_largest_side) + " pixels");
-}
-
 }  // namespace
 
 namespace {
@@ -279,21 +272,6 @@ SmoothingOptions parse_smoothing(const JsonNode& node) {
     if (const auto value = node.find(key)) read_option(*value, options.*member);
   });
   return options;
-}
-
-void validate(const Scene& scene) {
-  validate_side(scene.width, "width (scene)");
-  validate_side(scene.height, "height (scene)");
-  validate(scene.camera);
-  checks::require_finite(scene.background, "background (scene)");
-  if (scene.meshes.empty()) throw InvalidArgument("meshes (scene)", "none", "at least one");
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    const std::string name = checks::element("meshes", i);
-    validate(scene.meshes[i].mesh, name);
-    checks::require_affine(scene.meshes[i].transform, checks::in("transform", name));
-  }
-  if (scene.lights) validate(*scene.lights);
-  validate(scene.smoothing);
 }
 
 void resize(Scene& scene, glm::ivec2 size) {

@@ -17,7 +17,8 @@ class RenderError : public c10::Error {
  public:
   /// Of the exception that is being handled.
   explicit RenderError(const dpr::Error& error)
-      : c10::Error(std::string("dpr: error: ") + error.what(), /*backtrace=*/""),
+      : c10::Error(std::string("dpr: error: ") + error.what(),
+                   /*backtrace=*/{}),  // a string, later a pointer
         original_(std::current_exception()) {}
   std::exception_ptr original() const { return original_; }
 

@@ -7,22 +7,10 @@
 #include <vector>
 
 #include "base/name_list.hpp"
-#include "scene/light_table.hpp"
 #include "torch/errors.hpp"
 
 namespace dpr::torch_op {
 namespace {
-
-/// The numbers of a kind's light, one after the other.
-template <typename Kind>
-std::int64_t count_numbers(Kind) {
-  std::int64_t count = 0;
-  typename Kind::Light light;
-  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
-    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
-  });
-  return count;
-}
 
 void require_known(const LightTensors& given) {
   std::vector<std::string_view> keys{"ambient", "harmonics"};

@@ -2,9 +2,21 @@
 #pragma once
 
 #include "dpr/light.hpp"
+#include "scene/light_table.hpp"
 #include "torch/render.hpp"
 
 namespace dpr::torch_op {
+
+/// How many numbers a light of a kind has (scene/light_table.hpp).
+template <typename Kind>
+std::int64_t count_numbers(Kind) {
+  std::int64_t count = 0;
+  typename Kind::Light light;
+  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
+    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
+  });
+  return count;
+}
 
 /// Lights whose numbers are yet to come, and a tensor of these, in their order.
 struct PackedLights {

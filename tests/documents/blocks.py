@@ -87,7 +87,8 @@ def run(arguments):
     for folder in ("bench", "tests"):
         (work / folder).symlink_to(arguments.source.resolve() / folder)
     make_programs(work / "programs", build)
-    environment = {**os.environ, "PATH": f"{(work / 'programs').resolve()}:{os.environ['PATH']}"}
+    environment = {**os.environ, "PATH": f"{(work / 'programs').resolve()}:{os.environ['PATH']}",
+                   "PYTHONPATH": "build/release/python"}
 
     def call(what, *command):
         print(f"== {what}", flush=True)

@@ -1,7 +1,7 @@
 # Makes the Debian packages of the source tree DPR in BUILD, installs them into an empty root below WORK by dpkg,
 # against the packages of this system, and builds and runs programs in C and C++20 with what is installed there; and the
-# command, and where the operator is one of the packages, its test with PYTHON. GENERATOR and CXX are those of the build
-# tree, CONSUMER, C_PROGRAM and OPERATOR_TEST sources.
+# command, and where the operator is one of the packages, its tests with PYTHON. GENERATOR and CXX are those of the build
+# tree, CONSUMER, C_PROGRAM, OPERATOR_TEST and PYTHON_TEST sources.
 cmake_minimum_required(VERSION 3.25)
 function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
@@ -66,4 +66,6 @@ run(${prefix}/bin/dpr devices)
 file(STRINGS ${WORK}/consumer/operator.txt operator)
 if(operator AND PYTHON)
   run(${PYTHON} ${OPERATOR_TEST} ${operator})
+  set(ENV{PYTHONPATH} ${prefix}/lib/python3/dist-packages)
+  run(${PYTHON} ${PYTHON_TEST})
 endif()

@@ -1,0 +1,34 @@
+// What makes a scene one that can be rendered.
+#include "dpr/scene.hpp"
+
+#include <string>
+
+#include "base/checks.hpp"
+
+namespace dpr {
+namespace {
+
+void validate_side(int value, const std::string& argument) {
+  if (value >= 1 && value <= checks::k_largest_side) return;
+  throw InvalidArgument(argument, std::to_string(value),
+                        "1 to " + std::to_string(checks::k_largest_side) + " pixels");
+}
+
+}  // namespace
+
+void validate(const Scene& scene) {
+  validate_side(scene.width, "width (scene)");
+  validate_side(scene.height, "height (scene)");
+  validate(scene.camera);
+  checks::require_finite(scene.background, "background (scene)");
+  if (scene.meshes.empty()) throw InvalidArgument("meshes (scene)", "none", "at least one");
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const std::string name = checks::element("meshes", i);
+    validate(scene.meshes[i].mesh, name);
+    checks::require_affine(scene.meshes[i].transform, checks::in("transform", name));
+  }
+  if (scene.lights) validate(*scene.lights);
+  validate(scene.smoothing);
+}
+
+}  // namespace dpr

@@ -1,0 +1,112 @@
+#include "torch/renderer_pool.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "dpr/error.hpp"
+
+namespace dpr::torch_op {
+namespace {
+
+/// The process that opened the first device, 0 before. A fork has what an OpenCL implementation left in
+/// memory, but none of its threads: whoever calls it there waits for ever, also to release what there is.
+std::atomic<pid_t> opener{0};
+
+bool is_forked() {
+  const pid_t process = opener;
+  return process != 0 && process != getpid();
+}
+
+void require_own_process() {
+  if (!is_forked()) return;
+  throw InvalidArgument("process (dpr::render)", "a fork of one that had opened the device",
+                        "the start method \"spawn\", or a parent that renders nothing before it forks");
+}
+
+Scene scene_of(const Topology& topology) {
+  Scene scene;
+  scene.width = topology.width;
+  scene.height = topology.height;
+  Mesh mesh;
+  mesh.positions.resize(topology.vertices);
+  mesh.faces = *topology.faces;
+  (topology.face_colors ? mesh.face_colors : mesh.vertex_colors)
+      .resize(topology.face_colors ? mesh.faces.size() : topology.vertices);
+  scene.meshes.push_back({std::move(mesh)});
+  return scene;
+}
+
+}  // namespace
+
+bool Topology::operator==(const Topology& other) const {
+  return vertices == other.vertices && face_colors == other.face_colors && width == other.width &&
+         height == other.height && (faces == other.faces || *faces == *other.faces);
+}
+
+Device open_device_of_process(const std::string& selector) {
+  require_own_process();
+  Device device = open_device(selector);
+  opener = getpid();
+  return device;
+}
+
+RendererPool::~RendererPool() {
+  if (is_forked()) (void)state_.release();  // which is the parent's to release
+}
+
+Renderer RendererPool::take(const Topology& topology) {
+  require_own_process();
+  {
+    const std::lock_guard lock(mutex_);
+    State& state = *state_;
+    const auto found = std::find_if(state.free.rbegin(), state.free.rend(),
+                                    [&](const Free& free) { return free.topology == topology; });
+    if (found != state.free.rend()) {
+      Renderer renderer = std::move(found->renderer);
+      state.free.erase(std::next(found).base());
+      state.most_lent = std::max(state.most_lent, ++state.lent);
+      return renderer;
+    }
+  }
+  Renderer renderer(state_->device);
+  renderer.set_scene(scene_of(topology));
+  const std::lock_guard lock(mutex_);
+  state_->most_lent = std::max(state_->most_lent, ++state_->lent);
+  return renderer;
+}
+
+void RendererPool::put_back(Renderer renderer, Topology topology) {
+  const std::lock_guard lock(mutex_);
+  --state_->lent;
+  state_->free.push_back({std::move(renderer), std::move(topology)});
+  if (state_->free.size() > state_->most_lent) state_->free.pop_front();
+}
+
+void RendererPool::clear() {
+  require_own_process();
+  const std::lock_guard lock(mutex_);
+  state_->free.clear();
+}
+
+Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
+    : pool_(std::move(pool)),
+      topology_(std::move(topology)),
+      renderer_(std::make_unique<Renderer>(pool_->take(topology_))) {}
+
+Frame::~Frame() {
+  if (is_forked()) {
+    (void)renderer_.release();
+  } else {
+    pool_->put_back(std::move(*renderer_), std::move(topology_));
+  }
+}
+
+Renderer& Frame::renderer() {
+  require_own_process();
+  return *renderer_;
+}
+
+}  // namespace dpr::torch_op

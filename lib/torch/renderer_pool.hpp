@@ -1,0 +1,80 @@
+// Renderers of a device, lent to frames and kept for frames to come.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "dpr/renderer.hpp"
+
+namespace dpr::torch_op {
+
+using Faces = std::vector<glm::uvec3>;
+
+/// What a renderer keeps on the device from one batch to the next.
+struct Topology {
+  std::shared_ptr<const Faces> faces;
+  std::size_t vertices = 0;
+  bool face_colors = false;
+  int width = 0, height = 0;
+
+  bool operator==(const Topology& other) const;
+};
+
+/// Opens a device, as dpr::open_device(). OpenCL does not survive fork(): in a process that was forked from
+/// the one that opened a device this throws InvalidArgument, as RendererPool::take() does.
+Device open_device_of_process(const std::string& selector);
+
+/// Lends renderers whose scene is of a topology. Kept are those given back last: as many as were ever lent at
+/// once, but at least k_least. Safe to use from several threads.
+class RendererPool {
+ public:
+  explicit RendererPool(Device device) : state_(std::make_unique<State>(std::move(device))) {}
+  ~RendererPool();
+  RendererPool(const RendererPool&) = delete;
+  RendererPool& operator=(const RendererPool&) = delete;
+
+  Renderer take(const Topology& topology);
+  void put_back(Renderer renderer, Topology topology);
+  /// Forgets the renderers that are kept, with what they hold on the device.
+  void clear();
+
+ private:
+  static constexpr std::size_t k_least = 8;
+
+  struct Free {
+    Renderer renderer;
+    Topology topology;
+  };
+  struct State {
+    explicit State(Device device_) : device(std::move(device_)) {}
+    Device device;
+    std::list<Free> free;  // the last one was given back last
+    std::size_t lent = 0, most_lent = k_least;
+  };
+
+  std::mutex mutex_;
+  std::unique_ptr<State> state_;
+};
+
+/// A rendered batch: the renderer whose buffers hold what the backward pass differentiates, until it is given
+/// back.
+class Frame {
+ public:
+  Frame(std::shared_ptr<RendererPool> pool, Topology topology);
+  ~Frame();
+  Frame(const Frame&) = delete;
+  Frame& operator=(const Frame&) = delete;
+
+  /// Throws InvalidArgument in a process that was forked.
+  Renderer& renderer();
+
+ private:
+  std::shared_ptr<RendererPool> pool_;
+  Topology topology_;
+  std::unique_ptr<Renderer> renderer_;
+};
+
+}  // namespace dpr::torch_op
