@@ -71,7 +71,7 @@ void add_conditions(const Json& a, const Json& b, Json& warnings) {
   for (const char* const when : {"before", "after"}) {
     const std::string path = std::string("/load/") + when;
     const double in_a = number_at(a, path.c_str()), in_b = number_at(b, path.c_str());
-    if (std::fabs(in_a - in_b) > k_like_load)
+    if (a.contains("load") && b.contains("load") && std::fabs(in_a - in_b) > k_like_load)
       warnings.push_back(cli::format("load %s: %.1f and %.1f", when, in_a, in_b));
   }
 }
@@ -133,6 +133,10 @@ Json compare(const Json& a, const Json& b) {
 }
 
 void require_none_slower(const Json& comparison, double ratio) {
+  if (comparison["rows"].empty()) throw Error("the files have no measured row in common");
+  if (const Json& lost = comparison["only_in_a"]; !lost.empty())
+    throw Error("measured in the first file alone: " + lost.front().get<std::string>() +
+                (lost.size() > 1 ? " and " + std::to_string(lost.size() - 1) + " more" : ""));
   std::string names;
   for (const Json& row : comparison["rows"]) {
     for (const char* const pass : {"forward", "backward"}) {

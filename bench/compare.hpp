@@ -19,7 +19,7 @@ std::string verdict(const Json& first, const Json& second);
 Json compare(const Json& a, const Json& b);
 
 /// Throws Error, which names the rows that the comparison calls slower by more than the ratio, if there are
-/// any.
+/// any, or a row of the first file that the second does not have, or if no row is in both.
 void require_none_slower(const Json& comparison, double ratio);
 
 /// The comparison as lines of text, with the number of rows of each verdict at the end.

@@ -19,7 +19,7 @@ using cli::Json;
 
 /// Of PoCL, the ICD loader, this library, oclgrind, Mesa, Intel, NVIDIA and OpenMP.
 constexpr std::string_view k_prefixes[] = {"POCL_", "OCL_",     "OPENCL_", "DPR_",  "OCLGRIND_", "RUSTICL_",
-                                           "LP_",   "GALLIUM_", "NEO",     "CUDA_", "OMP_"};
+                                           "LP_",   "GALLIUM_", "NEO_",    "CUDA_", "OMP_"};
 
 Json variables() {
   Json found = Json::object();

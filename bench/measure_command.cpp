@@ -34,8 +34,7 @@ void print(const Json& row) {
   const Json& transfers = row["transfers"];
   std::printf(
       "%-44s forward %10.3f ms   backward %10.3f ms   %9zu fragments   %8.1f kB to, %8.1f kB from the "
-      "device, "
-      "%zu waits\n",
+      "device, %zu waits\n",
       name.c_str(), row["forward_ms"]["median"].get<double>(), row["backward_ms"]["median"].get<double>(),
       row["fragments"].get<std::size_t>(), transfers["bytes_to_device"].get<double>() / k_kilo,
       transfers["bytes_from_device"].get<double>() / k_kilo, transfers["host_waits"].get<std::size_t>());

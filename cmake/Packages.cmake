@@ -1,6 +1,7 @@
 # Debian packages by `cpack`, from a build with BUILD_SHARED_LIBS and the prefix /usr, as the preset "packages" has it:
 # libdprX.Y, the library; libdpr-image, what reads and writes image files; libdpr-dev; libdpr-torch and python3-dpr, the
-# operator and the Python package, where they are built; dpr, the command. Dependencies on other libraries are those that dpkg-shlibdeps finds.
+# operator and the Python package, where they are built; dpr, the command. Dependencies on other libraries are those that
+# dpkg-shlibdeps finds.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME dpr)
 set(CPACK_PACKAGE_CONTACT "The dpr project")

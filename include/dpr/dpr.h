@@ -190,7 +190,8 @@ DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* ke
  * takes the scene. */
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
 /* What backward passes compute: "positions", "colors", "transform", "camera", "lights", "smoothing",
- * "background", "texture" (the texels), "texcoords". Without this call all but "lights" and the last two. */
+ * "background", "texture" (the texels), "texcoords", "distortion" (of lenses). Without this call all but
+ * "lights" and the last three. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -229,14 +230,19 @@ DPR_API void dpr_renderer_destroy(dpr_renderer* renderer);
 
 /* ---- Losses ---- */
 
-/* How much each loss counts: means over pixels and colour channels, and 1 - IoU of the alpha channels. */
+/* How much each loss counts: means over pixels and colour channels, 1 - IoU of the alpha channels, robust
+ * (mse in which pixels of quite another colour hardly count), and 1 - the mean structural similarity, of
+ * images of at least 11x11 pixels. dpr/image_loss.hpp has the formulas. */
 typedef struct dpr_loss_weights {
   size_t size;
   float mse, l1, silhouette;
+  float robust;
+  float robust_scale; /* of robust: at least 1e-6, a colour difference */
+  float ssim;
 } dpr_loss_weights;
 
 #define DPR_LOSS_WEIGHTS_INIT \
-  { sizeof(dpr_loss_weights), 0, 0, 0 }
+  { sizeof(dpr_loss_weights), 0, 0, 0, 0, 0.1f, 0 }
 
 /* Against a target for each view, [view][height][width][4], `count` floats. */
 DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights,
@@ -270,8 +276,10 @@ DPR_API void dpr_gradient_destroy(dpr_gradient* gradient);
 
 /* ---- Everything on the device ---- */
 
-/* What changes in a scene comes from the caller's buffers, images and gradients stay in buffers, and no call
- * waits for the device or moves a byte to or from it: dpr/opencl_handles.hpp says all of it. */
+/* Positions, colours, texels, texture coordinates and transforms come from the caller's buffers, images and
+ * gradients stay in buffers, and no call waits for the device or moves a byte to or from it, except
+ * dpr_renderer_frame_history() and those frames and backward passes of which dpr/opencl_handles.hpp says so:
+ * it says all of this. */
 
 /* Vectors of floats in a cl_mem of the device's context. One that a call fills is the library's, not
  * retained. */
@@ -319,7 +327,7 @@ DPR_API dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, size_
 /* Object to world, [view][mesh] of twelve floats: the upper three rows of a matrix. */
 DPR_API dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
                                                     const dpr_events* events);
-/* Frames that need no more than this are whole; until the next scene. */
+/* Frames that need no more than this are whole; until the next scene. Each count is at most 3435973832. */
 DPR_API dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room);
 /* A frame that exceeds its room is emptied. */
 DPR_API dpr_status dpr_renderer_forward_on_device(dpr_renderer* renderer, const dpr_events* events);

@@ -71,7 +71,9 @@ class DPR_API MultiDeviceRenderer {
   SceneGradient gradient(std::span<const Image> grad_images);
 
   /// One target a view, as ImageLoss, without attributes. They are uploaded where and when they are needed
-  /// first, then kept.
+  /// first, then kept until the next set_loss(), or until views are dealt in other chunks that share some
+  /// with theirs. Each device may come to hold those of all views, once: plan as for an ImageLoss of all on
+  /// each.
   void set_loss(const LossOptions& options, std::span<const Image> targets);
   void set_loss(LossWeights weights, std::span<const Image> targets);
   /// A loss of a mesh's shape alone, as MeshLoss, until the next set_scene(): its gradient joins that of the

@@ -1,6 +1,6 @@
 // For programs with OpenCL objects of their own, by OpenCL's C handles: everything that changes in a scene
-// comes from buffers on the device, images and gradients stay in buffers there, and no call waits.
-// dpr/opencl.hpp does the same with the C++ bindings.
+// comes from buffers on the device, images and gradients stay in buffers there, and no call waits unless it
+// says so. dpr/opencl.hpp does the same with the C++ bindings.
 #pragma once
 
 #include <CL/cl.h>
@@ -28,8 +28,8 @@ DPR_API Device adopt_device(cl_context context, cl_command_queue queue);
 struct BufferSpan {
   cl_mem buffer = nullptr;
   std::size_t offset = 0;  ///< bytes before the first vector
-  std::size_t stride =
-      0;  ///< bytes from one vector to the next; 0: they are packed, 12 bytes for three floats
+  /// Bytes from one vector to the next; 0: they are packed, 12 bytes for three floats.
+  std::size_t stride = 0;
 };
 
 /// Vectors of floats in a buffer of the library's. The handle is not retained for the caller; the buffer is
@@ -54,8 +54,9 @@ struct Events {
 // The setters of Renderer, from buffers. They enqueue a copy into the renderer, which no later change of the
 // buffer reaches before the next call. Numbers that are not finite count as 0. Renderer::scene() and views()
 // keep the values that the host has given. The host does not know where vertices are then: every frame is
-// prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
-// closed mesh.
+// prepared for faces that cross the near plane, noise on the pixel keeps the faces that look away in a closed
+// mesh, and AttributeImages::forward() and losses of attributes throw InvalidArgument: until
+// Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
 
 /// Of a mesh of the scene: [vertex] of three floats, object space.
 DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
@@ -83,7 +84,8 @@ DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, co
 /// cameras in lit scenes then.
 DPR_API void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events = {});
 
-/// How much room frames have.
+/// How much room frames have: at most 3435973832 of each, which with the headroom of buffers are fewer than
+/// 2^32.
 struct FrameRoom {
   std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them
   /// With noise on the pixel: (8x8 tile, contour) pairs. An edge becomes a contour where colours that are
@@ -92,12 +94,13 @@ struct FrameRoom {
 };
 
 /// Makes frames of forward_on_device() certain that need no more than this; until the next set_scene().
+/// Throws InvalidArgument for more than FrameRoom can say.
 DPR_API void reserve(Renderer& renderer, const FrameRoom& room);
 
 /// Renderer::forward() for a program that keeps everything on the device: enqueues the frame, and neither
 /// waits nor reads. What the host cannot count, it makes room for: as much as reserve() asks for, and a
 /// quarter more than the last frame took of which it knows the counts. A frame that exceeds its room is
-/// emptied: it has the image and the gradients of one in which nothing is seen.
+/// emptied: it has the image and the gradients of one in which nothing is visible.
 ///
 /// The host learns the counts from the first frame of a scene, and of another number of views, unless there
 /// is reserve(); and from whatever needs a whole frame: Renderer::image(), statistics(), frame_history(), ...
@@ -120,10 +123,10 @@ DPR_API BufferView frame_history_view(Renderer& renderer);
 /// device: what GradientRequest asks for, to single precision, not checked for being finite. Neither waits
 /// nor reads, but for the first after a change of the views, lights, smoothing or request by the host.
 /// @param grad_images  d loss / d image, [view][height][width] of four floats; packed and at offset 0 it is
-/// not copied, but with noise on the pixel that is wider than eight samples
+/// not copied, except with noise on the pixel wider than eight samples
 DPR_API void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events = {});
 
-/// The images, float4 RGBA [view][height][width]. Those of a frame that was emptied included. Valid until the
+/// The images, float4 RGBA [view][height][width]. An emptied frame's image is valid too. Valid until the
 /// next set_scene(), set_views() or set_smoothing(); written by forward() and forward_on_device().
 DPR_API BufferView image_view(Renderer& renderer);
 /// Copies them, four floats each.
@@ -135,8 +138,8 @@ DPR_API void copy_images(Renderer& renderer, const BufferSpan& images, const Eve
 /// "lights.point[0].diffuse", "sigma", "background", ... Arrays are [vertex] and so on as SceneGradient has
 /// them. Numbers are packed, and those of one name lie side by side in the order of views, then meshes or
 /// lights. Valid until the next set_scene(), set_views(), set_shapes(), set_lights(), set_smoothing() or
-/// set_gradients(); written by backward_on_device(). Throws InvalidArgument for a name that the scene has
-/// not, or does not ask for, and before the first.
+/// set_gradients(); written by backward_on_device(). Throws InvalidArgument for a gradient that the scene
+/// does not have or did not ask for, and before the first backward_on_device().
 DPR_API BufferView gradient_view(Renderer& renderer, const std::string& name);
 /// Copies one.
 DPR_API void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,

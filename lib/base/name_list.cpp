@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <vector>
 
 #include "dpr/error.hpp"
 
@@ -40,6 +39,19 @@ std::string joined(std::span<const std::string_view> names) {
   std::string list;
   for (const std::string_view name : names) list += (list.empty() ? "" : "|") + std::string(name);
   return list;
+}
+
+std::vector<std::string> split_list(std::string_view text) {
+  std::vector<std::string> items;
+  while (!text.empty() || !items.empty()) {
+    const std::size_t comma = std::min(text.find(','), text.size());
+    const std::string_view item = text.substr(0, comma);
+    const std::size_t begin = std::min(item.find_first_not_of(' '), item.size());
+    items.emplace_back(item.substr(begin, item.find_last_not_of(' ') + 1 - begin));
+    if (comma == text.size()) break;
+    text.remove_prefix(comma + 1);
+  }
+  return items;
 }
 
 std::size_t position_of(std::string_view word, std::span<const std::string_view> names,

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dpr {
 
@@ -13,6 +14,9 @@ namespace dpr {
 std::string one_of(std::span<const std::string_view> names);
 /// "a|b|c", as --help has it.
 std::string joined(std::span<const std::string_view> names);
+
+/// "a, b,c" as its items, without the spaces around them. An item may be empty; an empty text has none.
+std::vector<std::string> split_list(std::string_view text);
 
 /// Where a name stands in the list. Throws InvalidArgument, which calls what the word is for `argument`, for
 /// a word that is none of them.

@@ -13,11 +13,20 @@ using dpr::c::guarded;
 namespace dpr::c {
 namespace {
 
+/// Whether the scene has what the row is the gradient of; of a view's camera, whether that has.
+bool exists(const Renderer& renderer, const GradientRow& row, GradientIndex index) {
+  if (!row.exists) return true;
+  if (row.of != GradientOf::view) return row.exists(renderer.scene());
+  Scene seen;
+  seen.camera = renderer.views()[index.view].camera;
+  return row.exists(seen);
+}
+
 /// The arrays that the scene asked for and has.
-std::vector<dpr_gradient::Array> arrays_of(const Scene& scene, SceneGradient gradient) {
+std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradient gradient) {
   std::vector<dpr_gradient::Array> arrays;
   for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
-    if (!(scene.gradients.*row.wanted) || (row.exists && !row.exists(scene))) return;
+    if (!(renderer.scene().gradients.*row.wanted) || !exists(renderer, row, index)) return;
     dpr_gradient::Array copy{name_of(row, index), {}};
     transform_numbers(array, [&](double number) {
       copy.values.push_back(number);
@@ -29,7 +38,7 @@ std::vector<dpr_gradient::Array> arrays_of(const Scene& scene, SceneGradient gra
 }
 
 void give_gradient(dpr_gradient** out, const Renderer& renderer, SceneGradient gradient) {
-  give(out, arrays_of(renderer.scene(), std::move(gradient)));
+  give(out, arrays_of(renderer, std::move(gradient)));
 }
 
 const dpr_gradient::Array& array_named(const dpr_gradient* gradient, const char* name) {

@@ -1,4 +1,5 @@
 // Renderers and losses of the C interface.
+#include <cstddef>
 #include <cstring>
 
 #include "base/checks.hpp"
@@ -66,6 +67,17 @@ void require_count(std::size_t count, std::size_t expected, const char* argument
   if (count == expected) return;
   throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count),
                         std::to_string(expected));
+}
+
+/// What a program's version of the struct has. The first was padded to where robust begins.
+LossWeights to_weights(const dpr_loss_weights* given) {
+  const auto weights = versioned<dpr_loss_weights>(given, DPR_LOSS_WEIGHTS_INIT, "weights");
+  LossWeights converted{.mse = weights.mse, .l1 = weights.l1, .silhouette = weights.silhouette};
+  if (weights.size <= offsetof(dpr_loss_weights, robust_scale)) return converted;
+  converted.robust = weights.robust;
+  converted.robust_scale = weights.robust_scale;
+  converted.ssim = weights.ssim;
+  return converted;
 }
 
 }  // namespace
@@ -169,7 +181,7 @@ dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* wei
   return guarded([&] {
     deref(loss, "loss");
     deref(device, "device");
-    const auto w = dpr::c::versioned<dpr_loss_weights>(weights, DPR_LOSS_WEIGHTS_INIT, "weights");
+    const dpr::LossWeights wanted = dpr::c::to_weights(weights);
     dpr::c::require_views(views);
     constexpr int k_most = dpr::checks::k_largest_side;
     if (width < 1 || height < 1 || width > k_most || height > k_most) {
@@ -181,9 +193,7 @@ dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* wei
         count, views * static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * dpr::c::k_pixel,
         "targets");
     const std::vector<dpr::Image> images = dpr::c::to_images(values, views, width, height);
-    give(loss,
-         dpr::ImageLoss(device->device,
-                        dpr::LossWeights{.mse = w.mse, .l1 = w.l1, .silhouette = w.silhouette}, images));
+    give(loss, dpr::ImageLoss(device->device, wanted, images));
   });
 }
 

@@ -158,8 +158,9 @@ void add_loss_options(CLI::App& command, ShapeOptions& solver) {
   add("--mse", solver.loss.mse, "Mean squared difference of colours");
   add("--robust", solver.loss.robust,
       "Squared difference of colours that leaves pixels of other colours out");
-  add("--ssim", solver.loss.ssim, "1 - structural similarity, of images of 11x11 pixels and more");
-  add("--robust-scale", solver.loss.robust_scale, "Colour difference from which on it does");
+  add("--robust-scale", solver.loss.robust_scale,
+      "Colour difference from which on --robust leaves pixels out");
+  add("--ssim", solver.loss.ssim, "1 - structural similarity; the smallest level needs 11x11 pixels");
   add("--laplacian", solver.regularizers.laplacian,
       "Sum of squared distances of vertices from their neighbours' mean");
   add("--edge-length", solver.regularizers.edge_length, "Mean squared length of edges");

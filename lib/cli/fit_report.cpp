@@ -167,6 +167,7 @@ std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>
     try {
       return on(devices_[d]);
     } catch (const DeviceError&) {  // lost: the next may not be
+    } catch (const BuildError&) {
     }
   }
   return on(devices_.back());

@@ -121,15 +121,6 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   }
 }
 
-/// A pose of one image gains nothing from several devices.
-Device open_only_device(const CommonOptions& common) {
-  const std::vector<Device> devices = open_devices(common);
-  if (devices.size() == 1) return devices.front();
-  throw InvalidArgument("--device (command line)", "a list of " + std::to_string(devices.size()) + " devices",
-                        "one: the host compares the images of all hypotheses, and several devices would wait "
-                        "for it");
-}
-
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // What can be wrong about the output is found out before the work, not after it.
   require_writable(options.output);
@@ -141,7 +132,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
   const Image target = read_target(options.target, options.descent.loss, common.encoding());
-  const Device device = open_only_device(common);
+  const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
   });
@@ -170,8 +161,7 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
   add("--robust", method.robust_scale,
       "For clutter and occlusion: pixels of other colours hardly count; a number is the colour difference "
-      "from which on, "
-      "else the residuals tell",
+      "from which on, else the residuals tell",
       "[FLOAT]")
       ->expected(0, 1);
   command

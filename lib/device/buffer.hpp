@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -13,6 +14,13 @@ namespace dpr {
 
 /// Room to make for elements that may become more from frame to frame.
 constexpr std::size_t with_headroom(std::size_t count) { return count + count / 4; }
+
+/// An index or a count, as kernels take it. Throws std::logic_error for what 32 bits do not hold: the checks
+/// of sizes come before.
+inline cl_uint to_uint(std::size_t value) {
+  if (value > std::numeric_limits<cl_uint>::max()) throw std::logic_error("an index of more than 32 bits");
+  return static_cast<cl_uint>(value);
+}
 
 /// How many elements a buffer holds: a number, or an upper bound where so far only the device knows it.
 struct Length {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <sstream>
 
+#include "base/name_list.hpp"
 #include "device/context.hpp"
 
 namespace dpr {
@@ -46,13 +46,6 @@ std::optional<Parts> parse_parts(const std::string& text) {
 
 bool names_one(std::span<const DeviceInfo> devices, const std::string& text) {
   return std::ranges::any_of(devices, [&](const DeviceInfo& info) { return matches(info, text); });
-}
-
-std::vector<std::string> items_of(const std::string& selectors) {
-  std::vector<std::string> items;
-  std::istringstream text(selectors);
-  for (std::string item; std::getline(text, item, ',');) items.push_back(item);
-  return items;
 }
 
 }  // namespace
@@ -96,7 +89,10 @@ std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, co
   const auto is_taken = [&](std::size_t position) {
     return std::ranges::any_of(choices, [&](const DeviceChoice& c) { return c.position == position; });
   };
-  for (const std::string& item : items_of(selectors)) {
+  for (const std::string& item : split_list(selectors)) {
+    if (item.empty())
+      throw InvalidArgument(where, "'" + selectors + "', in which one is empty",
+                            "devices separated by commas");
     const auto parts = names_one(devices, item) ? std::nullopt : parse_parts(item);
     const std::string& wanted = parts ? parts->device : item;
     std::size_t position = 0;

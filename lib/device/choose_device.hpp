@@ -32,8 +32,8 @@ struct DeviceChoice {
 bool names_several(std::span<const DeviceInfo> devices, const std::string& selectors);
 
 /// The devices that such a text names. Each item takes the first that matches and is not taken yet. Throws
-/// InvalidArgument, which calls the text `where`, for an item that finds none, and for more parts than
-/// compute units.
+/// InvalidArgument, which calls the text `where`, for an item that is empty or finds none, and for
+/// more parts than compute units.
 std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, const std::string& selectors,
                                          const std::string& where);
 

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <sstream>
 
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
@@ -154,6 +153,13 @@ void print_result(const std::string& folder, const learn::TrainingResult& result
               100 * result.last.render_share);
 }
 
+/// Of a list of devices the ranks of a machine take one after the other, by turns.
+Device device_of(const CommonOptions& common, const learn::Ranks& ranks) {
+  if (ranks.count == 1) return open_device(common);
+  const std::vector<Device> devices = open_devices(common);
+  return devices[static_cast<std::size_t>(ranks.local_rank) % devices.size()];
+}
+
 /// Trains as one rank, or alone.
 void train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
@@ -163,7 +169,7 @@ void train(const TrainCommand& command, const CommonOptions& common) {
   learn::TrainingResult result;
   {
     Progress bar(static_cast<unsigned>(o.steps), common.quiet);
-    result = learn::train(open_device(common), training, validation, o, command.output,
+    result = learn::train(device_of(common, o.ranks), training, validation, o, command.output,
                           [&](const learn::TrainingProgress& p) {
                             const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
                             const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
@@ -181,14 +187,6 @@ void train(const TrainCommand& command, const CommonOptions& common) {
   if (!common.quiet) print_result(command.output, result);
 }
 
-/// The selector of a rank's device: of a list, one after the other by turns.
-std::string device_of(const std::string& selectors, int local_rank) {
-  std::vector<std::string> list;
-  std::istringstream text(selectors);
-  for (std::string selector; std::getline(text, selector, ',');) list.push_back(selector);
-  return list.empty() ? "" : list[static_cast<std::size_t>(local_rank) % list.size()];
-}
-
 void run_train(TrainCommand command, CommonOptions common) {
   learn::Ranks& ranks = command.training.ranks;
   ranks = learn::ranks_of([](const char* variable) { return std::getenv(variable); });
@@ -201,7 +199,6 @@ void run_train(TrainCommand command, CommonOptions common) {
     throw InvalidArgument("ranks (dpr learn)", std::to_string(*command.ranks),
                           std::to_string(ranks.count) + ", as WORLD_SIZE says, or no --ranks");
   }
-  if (ranks.count > 1) common.device = device_of(common.device, ranks.local_rank);
   common.quiet = common.quiet || ranks.rank != 0;
   train(command, common);
 }

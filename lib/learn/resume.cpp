@@ -7,22 +7,15 @@
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
+#include "base/name_list.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::learn {
 namespace {
 
-std::vector<std::string> parts_of(const std::string& settings) {
-  std::vector<std::string> parts;
-  std::istringstream text(settings);
-  for (std::string part; std::getline(text, part, ',');)
-    parts.push_back(part.substr(part.find_first_not_of(' ')));
-  return parts;
-}
-
 /// Those parts of two settings that are not the same.
 std::pair<std::string, std::string> differences(const std::string& first, const std::string& second) {
-  const std::vector<std::string> there = parts_of(first), here = parts_of(second);
+  const std::vector<std::string> there = split_list(first), here = split_list(second);
   std::pair<std::string, std::string> result;
   for (std::size_t i = 0; i < std::max(there.size(), here.size()); ++i) {
     const std::string a = i < there.size() ? there[i] : "", b = i < here.size() ? here[i] : "";

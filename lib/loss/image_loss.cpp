@@ -73,6 +73,23 @@ Image shrink(const Image& large) {
   return small;
 }
 
+/// Throws InvalidArgument unless every level holds windows, and every mask leaves some there.
+void check_windows(const LossOptions& options, const Image& target) {
+  int width = target.width, height = target.height;
+  for (unsigned level = 1; level < options.levels; ++level) {
+    width = (width + 1) / 2;
+    height = (height + 1) / 2;
+  }
+  require_window(width, height);
+  for (const Image& mask : options.masks) {
+    Image smaller = mask;
+    for (unsigned level = 0; level < options.levels; ++level) {
+      if (level > 0) smaller = shrink(smaller);
+      static_cast<void>(ssim_windows(std::span(&smaller, 1)));
+    }
+  }
+}
+
 }  // namespace
 
 void check_loss(const LossOptions& options, std::span<const Image> targets) {
@@ -85,14 +102,7 @@ void check_loss(const LossOptions& options, std::span<const Image> targets) {
     throw InvalidArgument("has_alpha (loss)", std::to_string(options.has_alpha.size()) + " values",
                           "one for each of the " + std::to_string(targets.size()) + " targets, or none");
   }
-  if (options.weights.ssim > 0) {
-    int width = targets[0].width, height = targets[0].height;
-    for (unsigned level = 1; level < options.levels; ++level) {
-      width = (width + 1) / 2;
-      height = (height + 1) / 2;
-    }
-    require_window(width, height);
-  }
+  if (options.weights.ssim > 0) check_windows(options, targets[0]);
   for (const AttributeTarget& target : options.attributes) check_attribute_target(target, targets);
 }
 
@@ -115,10 +125,7 @@ std::vector<std::string_view> loss_names() {
 }
 
 LossKind parse_loss(std::string_view word, std::string_view where) {
-  const std::vector<std::string_view> names = loss_names();
-  const auto found = std::ranges::find(names, word);
-  if (found != names.end()) return static_cast<LossKind>(found - names.begin());
-  throw InvalidArgument(std::string(where), "'" + std::string(word) + "'", one_of(names));
+  return static_cast<LossKind>(position_of(word, loss_names(), std::string(where)));
 }
 
 LossWeights LossWeights::only(LossKind kind) {

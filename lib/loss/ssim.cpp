@@ -2,7 +2,6 @@
 
 #include "base/checks.hpp"
 #include "image_losses.h"
-#include "stages/geometry.hpp"
 
 namespace dpr {
 

@@ -41,6 +41,16 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   return scene;
 }
 
+/// Of views with shapes of their own the device's positions are read.
+void require_known_places(const Renderer::Impl& source) {
+  bool are_known = !source.has_device_poses;
+  for (std::size_t m = 0; source.frame.position_stride == 0 && m < source.scene.meshes.size(); ++m)
+    are_known = are_known && source.near_plane.knows(m);
+  if (are_known) return;
+  throw InvalidArgument("renderer (AttributeImages::forward)", "positions or transforms from a buffer",
+                        "those of Renderer's own setters: the host computes what surfaces show");
+}
+
 /// What the renderer's backward pass has to find.
 GradientRequest request_of(const GradientRequest& wanted, std::optional<Attribute> attribute) {
   GradientRequest request = no_gradients();
@@ -164,17 +174,21 @@ std::vector<glm::vec3> AttributeImages::Impl::values_of(const Scene& source, std
 }
 
 void AttributeImages::Impl::forward(const Renderer::Impl& source) {
+  require_known_places(source);
   if (!attribute && values.size() != channels * source.geometry->vertices) {
     throw InvalidArgument(
         "values (attribute images)", std::to_string(values.size()),
         std::to_string(channels * source.geometry->vertices) + ", vertices of the scene x channels");
   }
   follow(source);
+  const bool shows_texcoords = attribute == Attribute::texcoords;
+  const Scene texcoords = shows_texcoords ? texcoords_in_force(source) : Scene();
+  const Scene& scene = shows_texcoords ? texcoords : source.scene;
   std::vector<glm::vec3> colors, positions;
   for (std::size_t pass = 0; pass < passes(); ++pass) {
     for (std::size_t view = 0; view < source.views.size(); ++view) {
       const std::vector<glm::vec3> shown = pass < groups()
-                                               ? values_of(source.scene, pass, view)
+                                               ? values_of(scene, pass, view)
                                                : std::vector(renderer.impl().geometry->colors, glm::vec3(1));
       colors.insert(colors.end(), shown.begin(), shown.end());
     }

@@ -1,6 +1,7 @@
 #include "renderer/attribute_values.hpp"
 
 #include "base/checks.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr {
 
@@ -87,6 +88,23 @@ std::vector<glm::vec3> attribute_values(Attribute attribute, const ShownView& sh
     }
   });
   return values;
+}
+
+Scene texcoords_in_force(const Renderer::Impl& source) {
+  Scene scene;
+  for (std::size_t m = 0; m < source.scene.meshes.size(); ++m) {
+    const Mesh& mesh = source.scene.meshes[m].mesh;
+    Mesh& in_force = scene.meshes.emplace_back().mesh;
+    in_force.texcoords = mesh.texcoords;
+    in_force.face_texcoords = mesh.face_texcoords;
+    const MeshRange& range = source.geometry->meshes[m];
+    if (range.texcoords == 0) continue;  // without textures only the host has them
+    std::vector<cl_float4> values(range.texcoords);
+    source.geometry->textures.texcoord_values.download(values, range.first_texcoord);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      in_force.texcoords[i] = glm::vec2(values[i].s[0], values[i].s[1]);
+  }
+  return scene;
 }
 
 std::vector<glm::vec3> texcoord_values(const Scene& scene) {

@@ -26,6 +26,9 @@ struct ShownView {
 
 /// What the view shows of an attribute, [vertex] or [face] by its domain.
 std::vector<glm::vec3> attribute_values(Attribute attribute, const ShownView& shown);
+/// The scene's meshes, of which there is nothing but the texture coordinates and the faces' indices of them.
+/// Those are the ones in force, which a buffer may have given, so that only the device knows them. Blocks.
+Scene texcoords_in_force(const Renderer::Impl& source);
 /// The texture coordinates of all meshes, [corner]. Throws InvalidArgument where one has none.
 std::vector<glm::vec3> texcoord_values(const Scene& scene);
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/name_list.hpp"
+#include "renderer/attribute_values.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
@@ -127,7 +128,7 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
   result.height = m.scene.height;
   std::vector<AovPixel> pixels = read_samples(m, view);
   if (m.pixel_noise) pixels = to_pixels(m, view, pixels);
-  const std::vector<std::array<glm::vec2, 3>> texcoords = corner_texcoords(m.scene);
+  const std::vector<std::array<glm::vec2, 3>> texcoords = corner_texcoords(texcoords_in_force(m));
   for (const AovPixel& pixel : pixels) {
     const bool shows_face = pixel.face != DPR_NO_FACE;
     result.depth.push_back(pixel.depth);

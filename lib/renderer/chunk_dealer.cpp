@@ -98,6 +98,12 @@ void ChunkDealer::lose(std::size_t device, std::size_t chunk) {
   end(device, chunk, State::waiting);
 }
 
+void ChunkDealer::withdraw(std::size_t device) {
+  const std::scoped_lock lock(mutex_);
+  lost_[device] = true;
+  changed_.notify_all();
+}
+
 void ChunkDealer::finish_all(double seconds) {
   for (std::size_t d = 0; d < paces_.size(); ++d) {
     if (!has_rendered_[d]) paces_[d].idle_seconds += seconds;

@@ -46,12 +46,13 @@ class ChunkDealer {
   void give_up(std::size_t device, std::size_t chunk);
   /// The device is lost, and its chunk is to be dealt again.
   void lose(std::size_t device, std::size_t chunk);
+  /// The device takes no chunk any more; one that it has it may still end.
+  void withdraw(std::size_t device);
   /// To be called at the end, with the time that everything took.
   void finish_all(double seconds);
 
   bool is_lost(std::size_t device) const { return lost_[device]; }
   bool is_done() const { return left_ == 0; }
-  const std::vector<Chunk>& chunks() const { return chunks_; }
 
  private:
   enum class State { waiting, taken, done };

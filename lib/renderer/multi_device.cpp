@@ -7,6 +7,7 @@
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
+#include "renderer/finite.hpp"
 #include "renderer/gradient_sum.hpp"
 #include "renderer/multi_device_impl.hpp"
 #include "renderer/setter_checks.hpp"
@@ -26,6 +27,7 @@ MultiDeviceRenderer& MultiDeviceRenderer::operator=(MultiDeviceRenderer&&) noexc
 
 void MultiDeviceRenderer::set_scene(const Scene& scene) {
   validate(scene);
+  require_scales(scene.camera, scene.smoothing, scene.lights.has_value());
   Impl& m = *impl_;
   Scene new_scene = scene;
   std::vector<View> only{own_view(scene)};
@@ -49,6 +51,8 @@ void MultiDeviceRenderer::set_chunk(std::size_t views) { impl_->chunk_views = vi
 void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
   impl_->require_views("MultiDeviceRenderer::set_smoothing");
   validate(smoothing);
+  for (const View& view : impl_->views)
+    require_scales(view.camera, smoothing, impl_->scene.lights.has_value());
   impl_->scene.smoothing = smoothing;
   ++impl_->now.smoothing;
 }

@@ -7,6 +7,7 @@
 
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 
 namespace dpr {
@@ -34,21 +35,22 @@ ImageLoss OwnLoss::make(const Device& device, const Chunk& chunk) const {
       part(targets)};
 }
 
-void MultiDeviceRenderer::Impl::catch_up(Worker& worker) const {
-  Renderer& renderer = worker.renderer;
+/// By the setters that check nothing: what was set is checked, but a scene's own camera, or the views of the
+/// last chunk, need not suit a smoothing and lights that came with other views.
+void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> its_views,
+                                         std::size_t first_view) const {
+  Renderer::Impl& renderer = worker.renderer.impl();
   if (worker.has.scene != now.scene) {
     Versions all = now;
     renderer.set_scene(scene);
     std::swap(worker.has, all);
-    return;
   }
-  if (worker.has.smoothing != now.smoothing) {
-    renderer.set_smoothing(scene.smoothing);
+  if (worker.has.smoothing != now.smoothing || worker.has.lights != now.lights) {
+    renderer.set_views(its_views, first_view, scene.smoothing, scene.lights);
     worker.has.smoothing = now.smoothing;
-  }
-  if (worker.has.lights != now.lights) {
-    renderer.set_lights(scene.lights);
     worker.has.lights = now.lights;
+  } else {
+    renderer.set_views(its_views, first_view);
   }
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     if (worker.has.positions[m] != now.positions[m]) {
@@ -77,7 +79,8 @@ void MultiDeviceRenderer::Impl::require_views(const char* caller) const {
 
 std::vector<Chunk> MultiDeviceRenderer::Impl::chunks_of(std::size_t count) const {
   const std::size_t size = chunk_views > 0 ? chunk_views : (count + k_chunks - 1) / k_chunks;
-  return make_chunks(count, std::clamp(size, std::size_t{1}, std::max(most_views(scene), std::size_t{1})));
+  const std::size_t most = most_views(scene, raster_of(scene));
+  return make_chunks(count, std::clamp(size, std::size_t{1}, std::max(most, std::size_t{1})));
 }
 
 void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work) {
@@ -107,7 +110,12 @@ void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work
   const auto start = Clock::now();
   {
     std::vector<std::jthread> threads;
-    for (std::size_t w = 1; w < workers.size(); ++w) threads.emplace_back(run, w);
+    try {
+      for (std::size_t w = 1; w < workers.size(); ++w) threads.emplace_back(run, w);
+    } catch (...) {  // no thread: those that run must not wait for those that never will
+      for (std::size_t w = 0; w < workers.size(); ++w) dealer.withdraw(w);
+      throw;
+    }
     run(0);
   }
   dealer.finish_all(seconds_since(start));
@@ -118,9 +126,8 @@ void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work
 }
 
 void MultiDeviceRenderer::Impl::render(Worker& worker, const Batch& of, std::size_t chunk) const {
-  catch_up(worker);
   const Chunk part = of.views_of(chunk);
-  worker.renderer.set_views(std::span(views).subspan(part.first, part.size()), of.chunks[chunk].first);
+  catch_up(worker, std::span(views).subspan(part.first, part.size()), of.chunks[chunk].first);
   worker.renderer.forward();
   worker.views_rendered += part.size();
 }
@@ -151,8 +158,12 @@ ImageLoss& MultiDeviceRenderer::Impl::loss_of(Worker& worker, const Batch& of, s
   const Chunk part = of.views_of(chunk);
   const auto key = std::pair(part.first, part.last);
   auto known = worker.losses.find(key);
-  if (known == worker.losses.end())
+  if (known == worker.losses.end()) {
+    std::erase_if(worker.losses, [&](const auto& other) {
+      return other.first.first < part.last && part.first < other.first.second;
+    });
     known = worker.losses.emplace(key, loss.make(worker.renderer.device(), part)).first;
+  }
   known->second.impl().set_views_of_mean(of.chunks.back().last);
   return known->second;
 }

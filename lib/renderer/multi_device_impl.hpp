@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "dpr/multi_device.hpp"
@@ -66,8 +67,8 @@ struct MultiDeviceRenderer::Impl {
   std::optional<OwnMeshLoss> mesh_loss;
   std::uint64_t losses = 0, mesh_losses = 0;  // how often they have been set
 
-  /// Brings a device's renderer up to what has been set.
-  void catch_up(Worker& worker) const;
+  /// Brings a device's renderer up to what has been set, with those views, the first of that number.
+  void catch_up(Worker& worker, std::span<const View> its_views, std::size_t first_view) const;
 
   void require_views(const char* caller) const;
 
@@ -97,7 +98,8 @@ struct MultiDeviceRenderer::Impl {
   /// Notes which devices are lost; where all are, throws what the first has met and forgets that.
   void settle_losses(const ChunkDealer& dealer, const std::vector<std::exception_ptr>& met);
 
-  /// The losses of a chunk and of the mesh, as a device has them.
+  /// The losses of a chunk and of the mesh, as a device has them. Of chunks that overlap it keeps one, so
+  /// that no target is there twice.
   ImageLoss& loss_of(Worker& worker, const Batch& of, std::size_t chunk) const;
 
   MeshLoss& mesh_loss_of(Worker& worker) const;

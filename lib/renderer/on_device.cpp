@@ -100,8 +100,24 @@ void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Eve
   enqueue(m, events, [&] { m.take_view_matrices(from); });
 }
 
+namespace {
+
+/// With the headroom of buffers it can still be counted.
+void require_countable(std::size_t count, const char* name) {
+  constexpr std::size_t k_most = 0xfffffffeU / 5 * 4;
+  static_assert(with_headroom(k_most) <= 0xfffffffeU);
+  if (count <= k_most) return;
+  throw InvalidArgument(std::string(name) + " (reserve)", std::to_string(count),
+                        "at most " + std::to_string(k_most));
+}
+
+}  // namespace
+
 void reserve(Renderer& renderer, const FrameRoom& room) {
   renderer.impl().require_scene("reserve");
+  require_countable(room.pairs, "pairs");
+  require_countable(room.fragments, "fragments");
+  require_countable(room.contours, "contours");
   renderer.impl().reserve({room.pairs, room.fragments, room.contours});
 }
 
@@ -205,6 +221,15 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
   return std::nullopt;
 }
 
+/// Whether the scene has what the row is the gradient of; of a view's camera, whether that has.
+bool exists(const Renderer::Impl& m, const GradientRow& row, GradientIndex index) {
+  if (!row.exists) return true;
+  if (row.of != GradientOf::view) return row.exists(m.scene);
+  Scene seen;
+  seen.camera = m.views[index.view].camera;
+  return row.exists(seen);
+}
+
 /// A number, a vector or a list of vectors among the numbers, from `first` on.
 BufferView numbers_view(const Renderer::Impl& m, const GradientArray& array, std::size_t first,
                         std::size_t numbers) {
@@ -228,7 +253,7 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
   std::optional<BufferView> found;
   std::size_t first = 0;
   for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
-    const bool is_there = m.scene.gradients.*row.wanted && (!row.exists || row.exists(m.scene));
+    const bool is_there = m.scene.gradients.*row.wanted && exists(m, row, index);
     if (!is_summed(row)) {
       if (is_there && !found) found = mesh_gradient(m, row, index.item, name);
       return;

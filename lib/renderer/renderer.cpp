@@ -252,6 +252,7 @@ void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images)
 
 void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
                                       const AddToGradient& add_to_positions) {
+  device_gradient_frame = 0;  // its buffers are written again
   const GradientRequest& wanted = scene.gradients;
   if (has_device_cameras && wanted.camera && shade.lit()) {
     throw InvalidArgument("gradient of the camera (backward)",

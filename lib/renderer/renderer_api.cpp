@@ -92,6 +92,7 @@ void Renderer::set_gradients(const GradientRequest& gradients) {
   impl_->require_scene("Renderer::set_gradients");
   impl_->scene.gradients = gradients;
   impl_->gradient_map.reset();
+  impl_->device_gradient_frame = 0;  // its gradients are those of another request
 }
 
 const Scene& Renderer::scene() const { return impl_->scene; }

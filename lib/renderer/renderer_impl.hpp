@@ -70,6 +70,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// What the setters are given is checked already.
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views, std::size_t first_view);
+  /// All that depends on each other in one step: none need suit what was there of the others.
+  void set_views(std::span<const View> views, std::size_t first_view, const Smoothing& smoothing,
+                 const std::optional<Lights>& lights);
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_cull(Cull cull) noexcept;
   void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);

@@ -57,12 +57,6 @@ float blur_distance(const Smoothing& smoothing) {
   return smoothing.distance == DistanceMetric::euclidean ? radius : std::sqrt(radius);
 }
 
-/// Samples along a side of the frame, with the margin.
-std::size_t samples_of_side(int pixels, const Raster& raster) {
-  return static_cast<std::size_t>(pixels) * static_cast<std::size_t>(raster.supersampling) +
-         2 * static_cast<std::size_t>(raster.margin);
-}
-
 /// NDC are the frame's own: the raster has the same middle, and reaches beyond them.
 void set_raster(shared::FrameParams& p, const Scene& scene, const Raster& raster) noexcept {
   p.width = static_cast<cl_uint>(samples_of_side(scene.width, raster));
@@ -113,11 +107,11 @@ void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_v
 
 /// Throws InvalidArgument for a raster whose samples cannot be counted, or named by two 16-bit numbers.
 void check_raster(const Scene& scene, std::size_t views, const Raster& raster) {
-  constexpr std::size_t k_most_on_side = 1U << 15U, k_most = 0xfffffffeU / DPR_PIXEL_CHANNELS;
+  constexpr std::size_t k_most_on_side = 1U << 15U;
   const std::size_t width = samples_of_side(scene.width, raster),
                     height = samples_of_side(scene.height, raster);
   if (raster.margin == 0 && raster.supersampling == 1) return;  // the frame itself
-  if (std::max(width, height) <= k_most_on_side && width * height <= k_most / views) return;
+  if (std::max(width, height) <= k_most_on_side && views <= most_views(scene, raster)) return;
   throw InvalidArgument("sigma and supersampling (smoothing)",
                         "a raster of " + std::to_string(width) + "x" + std::to_string(height) + " samples",
                         "smaller ones: at most " + std::to_string(k_most_on_side) +
@@ -171,6 +165,20 @@ void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t firs
   set(spare_views_);
 }
 
+void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view,
+                               const Smoothing& smoothing, const std::optional<Lights>& lights) {
+  check_frame_size(scene, new_views.size(), first_view);
+  std::optional<Lights> new_lights = lights;
+  Shade::Lighting lighting = shade.prepare(lights, is_textured(scene));
+  SmoothingSetting new_smoothing = prepare(smoothing, scene, new_views.size());
+  fill(spare_views_, scene, *geometry, new_views, first_view);
+
+  std::swap(scene.lights, new_lights);
+  shade.set(std::move(lighting));
+  set(spare_views_);
+  set(std::move(new_smoothing));
+}
+
 void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& its,
                           std::span<const View> its_views, std::size_t first_view) const {
   std::vector<shared::ViewParams> cameras;
@@ -210,9 +218,7 @@ SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene
             nullptr,
             {}};
   }
-  const double scale = pixel_scale(smoothing, std::min(of.width, of.height)).value;
-  BlurKernel kernel =
-      blur_kernel(smoothing.occupancy_prior, scale, static_cast<int>(smoothing.supersampling));
+  BlurKernel kernel = pixel_blur(smoothing, of);
   const Raster around{kernel.supersampling, kernel.margin};
   check_raster(of, its_views, around);
   const std::shared_ptr<PixelNoise> stages =

@@ -115,15 +115,31 @@ void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::
   check_values("texcoords", values, scene.meshes[mesh].mesh.texcoords.size());
 }
 
-std::size_t most_views(const Scene& scene) {
+std::size_t samples_of_side(int pixels, const Raster& raster) {
+  return static_cast<std::size_t>(pixels) * static_cast<std::size_t>(raster.supersampling) +
+         2 * static_cast<std::size_t>(raster.margin);
+}
+
+BlurKernel pixel_blur(const Smoothing& smoothing, const Scene& of) {
+  const double scale = pixel_scale(smoothing, std::min(of.width, of.height)).value;
+  return blur_kernel(smoothing.occupancy_prior, scale, static_cast<int>(smoothing.supersampling));
+}
+
+Raster raster_of(const Scene& scene) {
+  if (scene.smoothing.noise != Noise::pixel) return {};
+  const BlurKernel kernel = pixel_blur(scene.smoothing, scene);
+  return {kernel.supersampling, kernel.margin};
+}
+
+std::size_t most_views(const Scene& scene, const Raster& raster) {
   std::size_t vertices = 0, faces = 0;
   for (const Instance& instance : scene.meshes) {
     vertices += instance.mesh.positions.size();
     faces += instance.mesh.faces.size();
   }
-  const std::size_t pixels = static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+  const std::size_t samples = samples_of_side(scene.width, raster) * samples_of_side(scene.height, raster);
   const std::size_t largest =
-      std::max({pixels * DPR_PIXEL_CHANNELS, vertices * DPR_LENS_CHANNELS, faces * 3});
+      std::max({samples * DPR_PIXEL_CHANNELS, vertices * DPR_LENS_CHANNELS, faces * 3});
   return 0xfffffffeU / largest;
 }
 

@@ -7,6 +7,8 @@
 
 #include "device/opencl_bindings.hpp"
 #include "dpr/renderer.hpp"
+#include "renderer/pixel_noise.hpp"
+#include "smoothing/blur_kernel.hpp"
 
 namespace dpr {
 
@@ -40,7 +42,17 @@ auto& colors_of(AnyMesh& mesh) {
   return mesh.vertex_colors.empty() ? mesh.face_colors : mesh.vertex_colors;
 }
 
-/// How many views of the scene a frame may have, so that what is counted of them can be counted.
-std::size_t most_views(const Scene& scene);
+/// Samples along a side of the frame, with the margin.
+std::size_t samples_of_side(int pixels, const Raster& raster);
+
+/// The blur of noise on the pixel in frames of the scene's size. Throws as blur_kernel().
+BlurKernel pixel_blur(const Smoothing& smoothing, const Scene& of);
+
+/// What the scene's own smoothing needs around its frame. Throws as blur_kernel().
+Raster raster_of(const Scene& scene);
+
+/// How many views of the scene a frame may have, so that what is counted of them can be counted: pixels, the
+/// raster's samples, vertices and faces.
+std::size_t most_views(const Scene& scene, const Raster& raster = {});
 
 }  // namespace dpr

@@ -1,6 +1,7 @@
 #include "scene/gradient_table.hpp"
 
 #include <array>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "scene/light_table.hpp"
@@ -163,16 +164,21 @@ void add_numbers(const GradientArray& to, const GradientArray& from) {
 }
 
 void add(SceneGradient& to, const SceneGradient& from) {
-  SceneGradient added = from;
+  SceneGradient sum = to, added = from;
+  for_each_light_kind([&](auto kind) {
+    auto& lights = sum.*kind.gradients;
+    if (lights.empty()) lights.resize((added.*kind.gradients).size());
+  });
   for (const GradientRow& row : gradient_rows()) {
-    const GradientIndex has = count_arrays(row, to), more = count_arrays(row, from);
+    const GradientIndex has = count_arrays(row, sum), more = count_arrays(row, added);
     if ((row.lights && more.item == 0) || (has.view == more.view && has.item == more.item)) continue;
     throw InvalidArgument("gradient (add)", std::to_string(more.view * more.item) + " of " + row.path,
                           std::to_string(has.view * has.item) + ": the gradient of the same scene and views");
   }
   for_each_array(added, [&](const GradientRow& row, GradientIndex i, const GradientArray& array) {
-    add_numbers(row.array(to, i), array);
+    add_numbers(row.array(sum, i), array);
   });
+  to = std::move(sum);
 }
 
 std::string name_of(const GradientRow& row, GradientIndex index) {

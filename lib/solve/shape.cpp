@@ -18,7 +18,7 @@
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
-#include "solve/resample.hpp"
+#include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
 
@@ -38,11 +38,6 @@ void add(std::vector<double>& values, std::span<const double> steps) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] += steps[i];
 }
 
-/// Pixels of a level, of one of the finest.
-double pixel_scale(const ShapeOptions& options, unsigned level) {
-  return std::ldexp(1.0, static_cast<int>(options.levels - 1 - level));
-}
-
 /// The smoothing with a blur that many times as wide, in the image as in depth.
 Smoothing widened(Smoothing smoothing, double factor) {
   const double power = smoothing.distance == DistanceMetric::squared ? 2 : 1;
@@ -51,63 +46,6 @@ Smoothing widened(Smoothing smoothing, double factor) {
   smoothing.gamma *= static_cast<float>(factor);
   return smoothing;
 }
-
-/// The views of a level in batches, one after the other: batch b has the views b, b + batches, ...
-struct Level {
-  Level(const ShapeViews& all, const ShapeOptions& options, unsigned level)
-      : width(side(all.width, options, level)), height(side(all.height, options, level)) {
-    const std::size_t count = (all.views.size() + options.batch - 1) / options.batch;
-    for (std::size_t batch = 0; batch < count; ++batch) {
-      starts.push_back(order.size());
-      for (std::size_t i = batch; i < all.views.size(); i += count) order.push_back(i);
-    }
-    starts.push_back(order.size());
-    for (const std::size_t i : order) {
-      const Camera& camera = all.views[i].camera;
-      views.push_back({resample(camera, all.width, all.height, width, height), {glm::mat4(1.0F)}});
-    }
-  }
-
-  /// Which views an iteration looks at: the first and how many.
-  std::pair<std::size_t, std::size_t> batch(unsigned iteration) const {
-    const std::size_t b = iteration % (starts.size() - 1);
-    return {starts[b], starts[b + 1] - starts[b]};
-  }
-
-  int width, height;
-  std::vector<std::size_t> order;   // which of all views
-  std::vector<std::size_t> starts;  // [batch + 1]
-  std::vector<View> views;
-
- private:
-  static int side(int pixels, const ShapeOptions& options, unsigned level) {
-    return std::max(static_cast<int>(std::lround(pixels / pixel_scale(options, level))), 1);
-  }
-};
-
-/// What the views of a level are compared with.
-struct Targets {
-  Targets(const ShapeViews& all, const Level& level) {
-    const auto has_mask = [](const ShapeView& view) { return !view.mask.pixels.empty(); };
-    const bool any_mask = std::ranges::any_of(all.views, has_mask);
-    for (const std::size_t i : level.order) {
-      const ShapeView& view = all.views[i];
-      images.push_back(resample(view.image, level.width, level.height));
-      has_alpha.push_back(view.has_alpha ? 1 : 0);
-      if (!any_mask) continue;
-      masks.push_back(has_mask(view) ? resample(view.mask, level.width, level.height)
-                                     : Image(level.width, level.height, glm::vec4(1)));
-    }
-  }
-
-  /// Valid as long as this.
-  LossOptions options(const LossWeights& weights) const {
-    return {.weights = weights, .has_alpha = has_alpha, .masks = masks};
-  }
-
-  std::vector<Image> images, masks;
-  std::vector<unsigned char> has_alpha;
-};
 
 OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) {
   const bool large = options.steps == ShapeSteps::large_steps;
@@ -144,7 +82,7 @@ class Run {
     if (remeshes) make_mesh_anew(level);
     if (is_new_level || remeshes) prepare();
     if (is_new_level) {
-      const Targets targets(views_, *level_);
+      const ShapeTargets targets(views_, *level_);
       renderer_.set_loss(targets.options(options_.loss), targets.images);
     }
     const double rate = std::pow(options_.learning_rate_end, progress(in_level));
@@ -292,7 +230,7 @@ class Run {
   Smoothing finest_;
   MultiDeviceRenderer renderer_;
   Optimizer position_optimizer_, color_optimizer_;
-  std::optional<Level> level_;
+  std::optional<ShapeLevel> level_;
   std::optional<LargeSteps> steps_;  // of the current mesh
   ShapeState state_;
 };
@@ -318,6 +256,12 @@ void check(const ShapeViews& views) {
   if (views.smoothing) validate(*views.smoothing);
 }
 
+bool compares_colors(const LossWeights& weights) {
+  return std::ranges::any_of(image_losses(), [&](const ImageLossRow& loss) {
+    return !loss.reads_alpha && weights.*loss.weight > 0;
+  });
+}
+
 void check(const ShapeOptions& o, const ShapeViews& views) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
@@ -331,7 +275,7 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
   require(positive(o.blur), "blur (shape)", o.blur, "a finite number above 0");
   require(positive(o.blur_end), "blur_end (shape)", o.blur_end, "a finite number above 0");
   const bool all_have_alpha = std::ranges::all_of(views.views, &ShapeView::has_alpha);
-  if (!all_have_alpha && !(o.loss.mse + o.loss.l1 + o.loss.robust > 0)) {
+  if (!all_have_alpha && !compares_colors(o.loss)) {
     throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
                           "one of colours too");
   }
@@ -387,7 +331,7 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
   check(options_, views_);
   start_ = make_start(views_);
   check_mesh_loss(options_.regularizers, start_);
-  const Targets targets(views_, Level(views_, options_, 0));
+  const ShapeTargets targets(views_, ShapeLevel(views_, options_, 0));
   check_loss(targets.options(options_.loss), targets.images);
 }
 

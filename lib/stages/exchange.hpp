@@ -2,7 +2,6 @@
 #pragma once
 
 #include "device/kernel.hpp"
-#include "stages/geometry.hpp"
 
 namespace dpr {
 

@@ -74,9 +74,6 @@ struct Geometry {
   void add_textures(Device::Impl& device, const Scene& scene);
 };
 
-/// An index or a count, as kernels take it.
-inline cl_uint to_uint(std::size_t value) { return static_cast<cl_uint>(value); }
-
 /// Whether a mesh of the scene has textures.
 bool is_textured(const Scene& scene);
 

@@ -132,14 +132,37 @@ at::Tensor rigid_view_gradients(std::span<const View> views, const SceneGradient
   return grad;
 }
 
+/// One view that every valid smoothing goes with, and all lights.
+View neutral_view() {
+  constexpr float k_longest = 1e36F;  // of the lengths that renderer/finite.hpp lets pass, for any gamma
+  View view{{}, {glm::mat4(1.0F)}};
+  view.camera.znear = 1;
+  view.camera.zfar = k_longest;
+  return view;
+}
+
+/// Smoothing, lights and views, each of which its setter checks against the others. Until all are set some
+/// are those of the renderer's last batch, which need not go with these.
+void upload_settings(Renderer& renderer, std::span<const View> views, const BatchOptions& options) {
+  const auto set = [&] {
+    renderer.set_smoothing(options.settings.smoothing());
+    if (options.lights || renderer.scene().lights) renderer.set_lights(options.lights);
+    renderer.set_views(views, options.first_view);
+  };
+  try {
+    set();
+  } catch (const InvalidArgument&) {
+    renderer.set_views(std::array{neutral_view()});
+    set();
+  }
+}
+
 /// One shape for all views stays one unless separate ones are asked for.
 void upload(Renderer& renderer, const Inputs& in, const BatchOptions& options) {
   const std::int64_t count = in.views.size(0);
-  renderer.set_smoothing(options.settings.smoothing());
+  upload_settings(renderer, make_views(in, options.settings), options);
   renderer.set_cull(options.settings.cull());
-  if (options.lights || renderer.scene().lights) renderer.set_lights(options.lights);
   renderer.set_background(rows<glm::vec3>(in.background)[0]);
-  renderer.set_views(make_views(in, options.settings), options.first_view);
   const bool own_shapes = count > 1 && (options.separate_shapes || in.vertices.size(0) > 1);
   const bool own_colors = count > 1 && in.colors.size(0) > 1;
   if (!own_shapes) renderer.set_positions(0, rows<glm::vec3>(in.vertices));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/name_list.hpp"
@@ -18,6 +19,30 @@ void require_known(const LightTensors& given) {
   for (const auto& entry : given) {
     if (std::ranges::find(keys, entry.key()) == keys.end())
       throw InvalidArgument("lights (dpr::render_lit)", "\"" + entry.key() + "\"", one_of(keys));
+  }
+}
+
+/// Throws InvalidArgument unless these are the counts of coefficients of harmonics and of each kind's lights
+/// that have these numbers.
+void require_counts(const at::Tensor& numbers, at::IntArrayRef counts) {
+  constexpr std::int64_t k_of_color = 3;
+  std::vector<std::int64_t> sizes{k_of_color};
+  for_each_light_kind([&](auto kind) { sizes.push_back(count_numbers(kind)); });
+  if (counts.size() != sizes.size()) {
+    throw InvalidArgument("light_counts (dpr::_render)", std::to_string(counts.size()) + " counts",
+                          "none, or " + std::to_string(sizes.size()) + ", of harmonics and each kind");
+  }
+  std::int64_t expected = k_of_color;  // ambient light
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (counts[i] < 0 || counts[i] > numbers.numel()) {
+      throw InvalidArgument("light_counts (dpr::_render)", std::to_string(counts[i]),
+                            "0 or more, of lights whose numbers are given");
+    }
+    expected += counts[i] * sizes[i];
+  }
+  if (numbers.numel() != expected) {
+    throw InvalidArgument("lights (dpr::_render)", std::to_string(numbers.numel()) + " numbers",
+                          std::to_string(expected) + ", by light_counts");
   }
 }
 
@@ -55,6 +80,16 @@ Lights unpack(Lights lights, const at::Tensor& numbers) {
   const float* next = numbers.data_ptr<float>();
   for_each_light_number(lights, [&](std::string_view, float& number) { number = *next++; });
   return lights;
+}
+
+std::optional<Lights> unpack_counted(const at::Tensor& tensor, at::IntArrayRef counts, Lights lights) {
+  if (counts.empty()) return {};
+  const at::Tensor numbers = checked(tensor, "lights", {-1}, "[number]");
+  require_counts(numbers, counts);
+  const auto* count = counts.begin();
+  lights.harmonics.resize(static_cast<std::size_t>(*count++));
+  for_each_light_kind([&](auto kind) { (lights.*kind.lights).resize(static_cast<std::size_t>(*count++)); });
+  return unpack(std::move(lights), numbers);
 }
 
 }  // namespace dpr::torch_op

@@ -1,6 +1,11 @@
 // Lights as the operator's users give them, tensors by kind, and as its numbers.
 #pragma once
 
+#include <c10/util/ArrayRef.h>
+
+#include <cstdint>
+#include <optional>
+
 #include "dpr/light.hpp"
 #include "scene/light_table.hpp"
 #include "torch/render.hpp"
@@ -28,7 +33,12 @@ struct PackedLights {
 /// InvalidArgument for kinds that there are not, and tensors of other shapes.
 PackedLights pack(const LightTensors& given, const Lights& model);
 
-/// The lights with their numbers.
+/// The lights with their numbers, which are as many as the lights have.
 Lights unpack(Lights lights, const at::Tensor& numbers);
+
+/// Lights of a tensor's numbers, and of as many coefficients of harmonics and lights of each kind; none if
+/// nothing is counted. What has no numbers stays as it is in `lights`. Throws InvalidArgument unless the
+/// counts fit the numbers.
+std::optional<Lights> unpack_counted(const at::Tensor& tensor, at::IntArrayRef counts, Lights lights);
 
 }  // namespace dpr::torch_op

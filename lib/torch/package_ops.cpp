@@ -5,8 +5,6 @@
 #include <torch/library.h>
 
 #include <array>
-#include <charconv>
-#include <map>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -14,10 +12,12 @@
 
 #include "base/name_list.hpp"
 #include "dpr/aov.hpp"
+#include "renderer/renderer_impl.hpp"
 #include "torch/batch.hpp"
 #include "torch/batch_renderer.hpp"
 #include "torch/errors.hpp"
 #include "torch/light_tensors.hpp"
+#include "torch/output_tensors.hpp"
 
 namespace dpr::torch_op {
 namespace {
@@ -25,53 +25,6 @@ namespace {
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
 using Words = std::vector<std::string>;
-
-/// Renderers by the name of their device, for as long as the process lives: OpenCL may be gone before objects
-/// that the process destroys as it ends.
-class Pools {
- public:
-  static Pools& of_process() {
-    static auto* const pools = new Pools;
-    return *pools;
-  }
-
-  std::shared_ptr<RendererPool> get(const std::string& device) {
-    const std::lock_guard lock(mutex_);
-    std::shared_ptr<RendererPool>& pool = pools_[device];
-    if (!pool) pool = std::make_shared<RendererPool>(open_device_of_process(device));
-    return pool;
-  }
-  void clear() {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [device, pool] : pools_) {
-      if (pool) pool->clear();
-    }
-  }
-
- private:
-  std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<RendererPool>> pools_;
-};
-
-/// "sigma=1e-3": a whole number, a number, or else a word.
-void set_from_text(RenderSettings& settings, const std::string& text) {
-  const std::size_t at = text.find('=');
-  const std::string name = text.substr(0, at), value = at == std::string::npos ? "" : text.substr(at + 1);
-  const char* const end = value.data() + value.size();
-  const auto parses_as = [&](auto& number) {
-    const auto [rest, error] = std::from_chars(value.data(), end, number);
-    return error == std::errc() && rest == end && !value.empty();
-  };
-  std::int64_t whole = 0;
-  double number = 0;
-  if (parses_as(whole)) {
-    settings.set(name, whole);
-  } else if (parses_as(number)) {
-    settings.set(name, number);
-  } else {
-    settings.set(name, value);
-  }
-}
 
 RenderSettings settings_from(std::int64_t width, std::int64_t height, const Words& texts) {
   RenderSettings settings(width, height);
@@ -100,16 +53,6 @@ Frame& frame_of(const at::Tensor& tensor) {
   return static_cast<FrameOwner*>(storage.data_ptr().get_context())->frame;
 }
 
-/// Lights of these numbers, and of as many coefficients of harmonics and lights of each kind; none if nothing
-/// is counted.
-std::optional<Lights> lights_of(const at::Tensor& numbers, at::IntArrayRef counts, Lights lights) {
-  if (counts.empty()) return {};
-  const auto* count = counts.begin();
-  lights.harmonics.resize(static_cast<std::size_t>(*count++));
-  for_each_light_kind([&](auto kind) { (lights.*kind.lights).resize(static_cast<std::size_t>(*count++)); });
-  return unpack(std::move(lights), checked(numbers, "lights", {-1}, "[number]"));
-}
-
 /// What dpr::_render takes beside the tensors with gradients.
 struct Call {
   std::string device;
@@ -126,6 +69,22 @@ struct Call {
 /// Those tensors' order in the operators.
 enum Input : std::size_t { vertices, colors, views, intrinsics, background, lights, smoothing, input_count };
 
+void require_each_input(std::size_t count, const char* name) {
+  if (count == input_count) return;
+  throw InvalidArgument(name, std::to_string(count) + " elements", std::to_string(input_count));
+}
+
+/// Sets what the tensor has a number of, by its name.
+void set_numbers(RenderSettings& settings, const Words& names, const at::Tensor& tensor) {
+  const at::Tensor numbers = checked(tensor, "smoothing", {-1}, "[number]");
+  if (numbers.numel() != static_cast<std::int64_t>(names.size())) {
+    throw InvalidArgument("smoothing_names (dpr::_render)", std::to_string(names.size()) + " names",
+                          std::to_string(numbers.numel()) + ", one a number");
+  }
+  for (std::size_t i = 0; i < names.size(); ++i)
+    settings.set(names[i], static_cast<double>(numbers.data_ptr<float>()[i]));
+}
+
 Inputs inputs_of(at::TensorList tensors) {
   return {tensors[vertices], tensors[colors], tensors[views], tensors[intrinsics], tensors[background]};
 }
@@ -133,18 +92,17 @@ Inputs inputs_of(at::TensorList tensors) {
 std::tuple<at::Tensor, at::Tensor> render_call(const Call& call, at::TensorList tensors,
                                                bool separate_shapes) {
   return with_torch_errors([&] {
+    require_each_input(tensors.size(), "inputs (dpr::_render)");
     RenderSettings settings = settings_from(call.width, call.height, call.settings);
-    const at::Tensor numbers = checked(tensors[smoothing], "smoothing", {-1}, "[number]");
-    for (std::size_t i = 0; i < call.smoothing_names.size(); ++i)
-      settings.set(call.smoothing_names[i], static_cast<double>(numbers.data_ptr<float>()[i]));
+    set_numbers(settings, call.smoothing_names, tensors[smoothing]);
     const auto faces = std::make_shared<const Faces>(read_faces(call.faces));
     const Inputs in = checked(inputs_of(tensors), static_cast<std::int64_t>(faces->size()));
     std::unique_ptr<FrameOwner> owner(new FrameOwner{
-        {Pools::of_process().get(call.device), topology_of(in, faces, settings, call.face_colors)}});
+        {RendererPools::of_process().get(call.device), topology_of(in, faces, settings, call.face_colors)}});
     Renderer& renderer = owner->frame.renderer();
     const at::Tensor image =
         render_batch(renderer, in,
-                     {settings, lights_of(tensors[lights], call.light_counts, settings.lights()),
+                     {settings, unpack_counted(tensors[lights], call.light_counts, settings.lights()),
                       separate_shapes, static_cast<std::size_t>(call.first_view)});
     return std::tuple(image, tensor_of(std::move(owner)));
   });
@@ -165,6 +123,8 @@ at::Tensor select_smoothing(const at::Tensor& gradients, const Words& names) {
 std::vector<at::Tensor> gradients(const at::Tensor& frame, const at::Tensor& grad_image,
                                   at::TensorList tensors, Words smoothing_names, c10::List<bool> w) {
   return with_torch_errors([&] {
+    require_each_input(tensors.size(), "inputs (dpr::_gradients)");
+    require_each_input(w.size(), "wanted (dpr::_gradients)");
     const Wanted wanted{w[vertices],   w[colors], w[views],    w[intrinsics],
                         w[background], w[lights], w[smoothing]};
     const Gradients grad =
@@ -179,43 +139,16 @@ std::vector<at::Tensor> gradients(const at::Tensor& frame, const at::Tensor& gra
   });
 }
 
-/// Of dpr::_is_empty: whether no triangle of any view was rendered.
+/// Of dpr::_is_empty: whether no triangle of any view was rendered. The statistics read a word of every
+/// triangle from the device, which only a frame without fragments needs.
 bool is_empty(const at::Tensor& frame) {
   return with_torch_errors([&] {
-    const RenderStatistics statistics = frame_of(frame).renderer().statistics();
+    const Renderer& renderer = frame_of(frame).renderer();
+    renderer.impl().require_forward("dpr::_is_empty");
+    if (renderer.impl().rasterize.frame_fragments > 0) return false;
+    const RenderStatistics statistics = renderer.statistics();
     return statistics.faces_dropped == statistics.faces;
   });
-}
-
-/// An auxiliary output of every view.
-at::Tensor stack_outputs(const std::vector<AuxiliaryOutputs>& views, Aov aov) {
-  const auto copy = [&](const auto& list, at::IntArrayRef channels) {
-    std::vector<std::int64_t> shape{views.front().height, views.front().width};
-    shape.insert(shape.end(), channels.begin(), channels.end());
-    using Value = typename std::decay_t<decltype(views.front().*list)>::value_type;
-    const auto type = std::is_same_v<Value, std::int32_t> ? at::kInt : at::kFloat;
-    std::vector<at::Tensor> tensors;
-    for (const AuxiliaryOutputs& view : views) {
-      // from_blob() takes no constant memory; the copy reads it alone.
-      tensors.push_back(at::from_blob(const_cast<Value*>((view.*list).data()), shape, type));
-    }
-    return at::stack(tensors);
-  };
-  switch (aov) {
-    case Aov::depth:
-      return copy(&AuxiliaryOutputs::depth, {});
-    case Aov::normal:
-      return copy(&AuxiliaryOutputs::normal, {3});
-    case Aov::face_id:
-      return copy(&AuxiliaryOutputs::face_id, {}).to(at::kLong);
-    case Aov::barycentrics:
-      return copy(&AuxiliaryOutputs::barycentrics, {3});
-    case Aov::effective_faces:
-      return copy(&AuxiliaryOutputs::effective_faces, {});
-    case Aov::uv:
-      break;
-  }
-  throw InvalidArgument("outputs (dpr.render)", "uv", "an output of meshes without texture coordinates");
 }
 
 /// Of dpr::_auxiliary, whose sizes are for those that compute shapes alone.
@@ -303,6 +236,7 @@ std::tuple<at::Tensor, at::Tensor> render_with_derivatives(std::string device, s
                                                            std::vector<std::int64_t> light_counts,
                                                            Words smoothing_names, std::int64_t first_view,
                                                            bool face_colors, bool separate_shapes) {
+  with_torch_errors([&] { require_each_input(t.size(), "inputs (dpr::_render)"); });
   const Call call{std::move(device),          width,      height,
                   std::move(settings),        faces,      std::move(light_counts),
                   std::move(smoothing_names), first_view, face_colors};
@@ -326,7 +260,7 @@ TORCH_LIBRARY_FRAGMENT(dpr, m) {
   m.def("_auxiliary(Tensor frame, str[] names, int views, int height, int width) -> Tensor[]");
   m.def("_check_settings(int width, int height, str[] settings) -> ()", &check_settings);
   m.def("_light_kinds() -> Dict(str, int)", &light_kinds);
-  m.def("_release() -> ()", [] { Pools::of_process().clear(); });
+  m.def("_release() -> ()", [] { RendererPools::of_process().clear(); });
 }
 
 TORCH_LIBRARY_IMPL(dpr, CPU, m) {

@@ -118,9 +118,8 @@ TORCH_LIBRARY(dpr, m) {
       "Tensor intrinsics, Tensor background) -> Tensor",
       &render);
   m.def(
-      "render_lit(__torch__.torch.classes.dpr.Renderer renderer, Tensor vertices, Tensor colors, Tensor "
-      "views, "
-      "Tensor intrinsics, Tensor background, Dict(str, Tensor) lights) -> Tensor",
+      "render_lit(__torch__.torch.classes.dpr.Renderer renderer, Tensor vertices, Tensor colors, "
+      "Tensor views, Tensor intrinsics, Tensor background, Dict(str, Tensor) lights) -> Tensor",
       &render_lit);
 }
 

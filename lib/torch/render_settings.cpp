@@ -1,6 +1,7 @@
 #include "torch/render_settings.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -103,6 +104,25 @@ void RenderSettings::set_clipping(Camera& camera, std::span<const glm::vec3> poi
     camera.znear = std::min(power_of_two_below(nearest), camera.zfar / 2);
   }
   camera.zfar = zfar_.value_or(std::max(camera.zfar, 2 * camera.znear));
+}
+
+void set_from_text(RenderSettings& settings, const std::string& text) {
+  const std::size_t at = text.find('=');
+  const std::string name = text.substr(0, at), value = at == std::string::npos ? "" : text.substr(at + 1);
+  const char* const end = value.data() + value.size();
+  const auto parses_as = [&](auto& number) {
+    const auto [rest, error] = std::from_chars(value.data(), end, number);
+    return error == std::errc() && rest == end && !value.empty();
+  };
+  std::int64_t whole = 0;
+  double number = 0;
+  if (parses_as(whole)) {
+    settings.set(name, whole);
+  } else if (parses_as(number)) {
+    settings.set(name, number);
+  } else {
+    settings.set(name, value);
+  }
 }
 
 }  // namespace dpr::torch_op

@@ -47,4 +47,7 @@ class RenderSettings {
   Cull cull_ = Cull::none;
 };
 
+/// Sets by "sigma=1e-3": a whole number, a number, or else a word.
+void set_from_text(RenderSettings& settings, const std::string& text);
+
 }  // namespace dpr::torch_op

@@ -79,16 +79,38 @@ Renderer RendererPool::take(const Topology& topology) {
 }
 
 void RendererPool::put_back(Renderer renderer, Topology topology) {
+  std::list<Free> dropped;  // which outlives the lock: releasing buffers takes its time
   const std::lock_guard lock(mutex_);
-  --state_->lent;
-  state_->free.push_back({std::move(renderer), std::move(topology)});
-  if (state_->free.size() > state_->most_lent) state_->free.pop_front();
+  State& state = *state_;
+  --state.lent;
+  state.free.push_back({std::move(renderer), std::move(topology)});
+  if (state.free.size() > state.most_lent) dropped.splice(dropped.end(), state.free, state.free.begin());
 }
 
 void RendererPool::clear() {
   require_own_process();
+  std::list<Free> dropped;
   const std::lock_guard lock(mutex_);
-  state_->free.clear();
+  dropped.swap(state_->free);
+}
+
+RendererPools& RendererPools::of_process() {
+  static auto* const pools = new RendererPools;
+  return *pools;
+}
+
+std::shared_ptr<RendererPool> RendererPools::get(const std::string& device) {
+  const std::lock_guard lock(mutex_);
+  std::shared_ptr<RendererPool>& pool = pools_[device];
+  if (!pool) pool = std::make_shared<RendererPool>(open_device_of_process(device));
+  return pool;
+}
+
+void RendererPools::clear() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [device, pool] : pools_) {
+    if (pool) pool->clear();
+  }
 }
 
 Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
@@ -99,8 +121,12 @@ Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
 Frame::~Frame() {
   if (is_forked()) {
     (void)renderer_.release();
-  } else {
+    return;
+  }
+  try {
     pool_->put_back(std::move(*renderer_), std::move(topology_));
+  } catch (...) {
+    // Without memory to keep the renderer it is let go.
   }
 }
 

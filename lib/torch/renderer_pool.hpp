@@ -3,8 +3,10 @@
 
 #include <glm/glm.hpp>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "dpr/renderer.hpp"
@@ -57,6 +59,22 @@ class RendererPool {
 
   std::mutex mutex_;
   std::unique_ptr<State> state_;
+};
+
+/// Renderers by the name of their device, for as long as the process lives: OpenCL may be gone before objects
+/// that the process destroys as it ends. Safe to use from several threads.
+class RendererPools {
+ public:
+  static RendererPools& of_process();
+
+  /// Opens the device at first, as open_device_of_process().
+  std::shared_ptr<RendererPool> get(const std::string& device);
+  /// Clears all pools.
+  void clear();
+
+ private:
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<RendererPool>> pools_;
 };
 
 /// A rendered batch: the renderer whose buffers hold what the backward pass differentiates, until it is given

@@ -88,6 +88,12 @@ TEST_SUITE("bench-smoke") {
     dpr::bench::require_none_slower(against(fast, slow), 1.6);
     DPR_CHECK_MESSAGE_HAS(dpr::Error, dpr::bench::require_none_slower(against(fast, slow), 1.4),
                           "cube128 gaussian barrier exact, backward");
+    const Json one = results(Json::array({row("cube128", fast, fast)}));
+    const Json two = results(Json::array({row("cube128", fast, fast), row("million", fast, fast)}));
+    dpr::bench::require_none_slower(compare(one, two), 1.1);
+    DPR_CHECK_MESSAGE_HAS(dpr::Error, dpr::bench::require_none_slower(compare(two, one), 1.1), "million");
+    DPR_CHECK_MESSAGE_HAS(
+        dpr::Error, dpr::bench::require_none_slower(compare(results(Json::array()), one), 1.1), "in common");
   }
 
   TEST_CASE("what makes files hard to compare is said") {

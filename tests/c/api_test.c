@@ -306,6 +306,63 @@ static void test_wrong_textures(dpr_scene* scene) {
   REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.textures[0].texels");
 }
 
+/* A loss of the renderer's images against black. */
+static double loss_of(const dpr_device* device, const dpr_renderer* renderer,
+                      const dpr_loss_weights* weights) {
+  float black[FLOATS];
+  double value = -1;
+  size_t i;
+  dpr_loss* loss = NULL;
+  for (i = 0; i < FLOATS; ++i) black[i] = 0;
+  OK(dpr_loss_create(device, weights, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  dpr_loss_destroy(loss);
+  return value;
+}
+
+/* Every weight counts, and a program compiled before there were the later ones has none of them. */
+static void test_losses(const dpr_device* device, const dpr_scene* scene) {
+  struct {
+    size_t size;
+    float mse, l1, silhouette;
+  } older;
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT, as_older;
+  double mse, robust;
+  float unused[FLOATS];
+  size_t i;
+  dpr_renderer* renderer = NULL;
+  dpr_loss* none = NULL;
+  for (i = 0; i < FLOATS; ++i) unused[i] = 0;
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  EXPECT(weights.robust == 0 && weights.robust_scale == 0.1f && weights.ssim == 0);
+  weights.mse = 1;
+  mse = loss_of(device, renderer, &weights);
+  EXPECT(mse > 0);
+  /* As long as in the first version, whose padding may hold anything. */
+  memset(&as_older, 0xff, sizeof as_older);
+  memset(&older, 0xff, sizeof older);
+  older.size = sizeof older;
+  older.mse = 1, older.l1 = 0, older.silhouette = 0;
+  memcpy(&as_older, &older, sizeof older);
+  EXPECT(loss_of(device, renderer, &as_older) == mse);
+  weights.mse = 0, weights.robust = 1;
+  robust = loss_of(device, renderer, &weights);
+  EXPECT(robust > 0 && robust < 0.5 * mse); /* the triangle is far from black */
+  weights.robust_scale = 1e3f;
+  EXPECT(fabs(loss_of(device, renderer, &weights) / mse - 1) < 1e-4);
+  weights.robust_scale = 0;
+  REFUSED(dpr_loss_create(device, &weights, unused, FLOATS, 1, SIDE, SIDE, &none), "robust_scale");
+  weights.robust = 0, weights.robust_scale = 0.1f, weights.ssim = 1;
+  EXPECT(loss_of(device, renderer, &weights) > 0.01);
+  weights.ssim = -1;
+  REFUSED(dpr_loss_create(device, &weights, unused, FLOATS, 1, SIDE, SIDE, &none), "weight");
+  weights.size = sizeof weights + 1;
+  REFUSED(dpr_loss_create(device, &weights, unused, FLOATS, 1, SIDE, SIDE, &none), "weights.size");
+  dpr_renderer_destroy(renderer);
+}
+
 /* The same image and gradient without the host: positions from a buffer, the gradient into one. */
 static void test_on_device(cl_context context, cl_command_queue queue, dpr_renderer* renderer,
                            const float* image, const double* expected) {
@@ -339,6 +396,8 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   OK(dpr_renderer_gradient_view(renderer, "sigma", &view));
   EXPECT(view.count == 1 && view.components == 1);
   OK(dpr_renderer_reserve(renderer, &room));
+  room.fragments = (size_t)-1;
+  REFUSED(dpr_renderer_reserve(renderer, &room), "fragments (reserve)");
   OK(dpr_renderer_frame_history(renderer, &emptied, &room));
   EXPECT(emptied == 0 && room.pairs > 0 && room.fragments > 0);
   REFUSED(dpr_renderer_set_positions_from(renderer, 0, &to, NULL), "only write");
@@ -464,6 +523,17 @@ static void test_cameras(const dpr_device* device) {
     OK(dpr_gradient_read(gradient, names[kind], &slope, 1));
     EXPECT(slope != 0);
     REFUSED(dpr_gradient_read(gradient, names[1 - kind], &slope, 1), "name (gradient)");
+    dpr_gradient_destroy(gradient);
+    gradient = NULL;
+    camera = three_units_away(); /* a view's camera has what it has, whatever the scene's */
+    camera.fx = camera.fy = 20, camera.cx = camera.cy = SIDE / 2;
+    OK(dpr_renderer_set_views(renderer, &camera, 1, NULL, 0));
+    OK(dpr_renderer_forward(renderer));
+    OK(dpr_backward_pixels(renderer, ones, FLOATS, &gradient));
+    slope = 0;
+    OK(dpr_gradient_read(gradient, "views[0].camera.intrinsics.fx", &slope, 1));
+    EXPECT(slope != 0);
+    REFUSED(dpr_gradient_read(gradient, names[kind], &slope, 1), "name (gradient)");
     camera.distortion = nan;
     REFUSED(dpr_scene_set_camera(scene, &camera), "k2");
     dpr_gradient_destroy(gradient);
@@ -604,6 +674,7 @@ int main(void) {
   EXPECT(name != NULL && strlen(name) > 0);
   scene = make_scene();
   test_descent(device, scene);
+  test_losses(device, scene);
   test_views(device, scene);
   test_textures(device);
   test_wrap_and_filter(device);

@@ -108,6 +108,16 @@ TEST_SUITE("pipeline") {
     CHECK(history[0]["height"] == 16);
     CHECK(history[0]["sigma"].get<double>() == doctest::Approx(25 * 3e-4));  // --blur is 5 times --blur-end
     CHECK(history[0]["gamma"].get<double>() == doctest::Approx(5 * 1e-3));   // the file's
+    // An image without alpha has no silhouette: something must compare its colours.
+    const auto with_losses = [&](const std::vector<std::string>& losses) {
+      return run_command(folder, with({"fit", "--views", "views.json", "-o", "mesh.ply", "--levels", "1",
+                                       "--iterations", "1", "--l1", "0"},
+                                      losses));
+    };
+    const auto refused = with_losses({});
+    CHECK(refused.status == 1);
+    CHECK(contains(refused.err, "silhouettes alone"));
+    CHECK(with_losses({"--ssim", "1"}).status == 0);
   }
 }
 

@@ -103,6 +103,7 @@ TEST_SUITE("unit") {
     };
     using List = std::vector<std::size_t>;
     CHECK(positions("0,3") == List{0, 3});
+    CHECK(positions("0, gpu") == List{0, 2});
     CHECK(positions("gpu,gpu,gpu") == List{2, 3, 4});
     CHECK(positions("another,cpu/2,7777/0") == List{4, 0, 0, 1});
     CHECK(positions("cpu/4") == List{0, 0, 0, 0});
@@ -115,7 +116,8 @@ TEST_SUITE("unit") {
       DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, positions(selectors), word);
     };
     refuses("cpu,cpu", "got 'cpu' in 'cpu,cpu', expected one more device, of 0 (cpu, a CPU), 1");
-    refuses("cpu,,gpu", "got ''");
+    refuses("cpu,,gpu", "one is empty");
+    refuses("cpu,", "one is empty");
     refuses("cpu/5", "at most 4 parts");
     refuses("0,nothing/2", "'nothing/2'");
     refuses("cpu/0", "'cpu/0'");

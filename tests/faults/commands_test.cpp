@@ -107,7 +107,10 @@ void check_fault(const Command& command, const std::map<std::string, std::string
   const Outcome outcome = run_with_fault(folder, log, command, function, nth);
   CAPTURE(outcome.err);
   const std::vector<Calls> calls = read_log(log.read("log"));
-  CHECK(std::ranges::count(calls, true, &Calls::failed) == 1);
+  const auto failed = std::ranges::count(calls, true, &Calls::failed);
+  // How often events are asked whether they have run is a matter of time: the last time may not come again.
+  const bool is_polled = function == "clGetEventInfo";
+  CHECK((failed == 1 || (is_polled && failed == 0 && outcome.status == 0)));
   const std::map<std::string, std::string> found = contents(folder);
   if (outcome.status == 0) {
     CHECK(found == expected);

@@ -109,4 +109,26 @@ TEST_SUITE("unit") {
     CHECK(dealer.is_lost(0));
     CHECK_FALSE(dealer.is_lost(1));
   }
+
+  TEST_CASE("dealing: a slow device does not wait for a faster one that is withdrawn") {
+    std::vector<Pace> paces{pace_of(1), pace_of(100)};
+    ChunkDealer dealer(make_chunks(3, 1), paces, {false, false});
+    std::thread waiting([&] {
+      while (const auto chunk = dealer.take(1)) dealer.finish(1, *chunk, 100);
+    });
+    dealer.withdraw(0);
+    CHECK_FALSE(dealer.take(0).has_value());
+    waiting.join();
+    CHECK(dealer.is_done());
+  }
+
+  TEST_CASE("dealing: once all are withdrawn nothing more is dealt, and what was is ended") {
+    std::vector<Pace> paces(2);
+    ChunkDealer dealer(make_chunks(3, 1), paces, {false, false});
+    CHECK(dealer.take(1) == 0);
+    for (const std::size_t d : {0U, 1U}) dealer.withdraw(d);
+    dealer.finish(1, 0, 1);
+    for (const std::size_t d : {0U, 1U}) CHECK_FALSE(dealer.take(d).has_value());
+    CHECK_FALSE(dealer.is_done());
+  }
 }

@@ -11,6 +11,7 @@
 #include "dpr/dpr.hpp"
 #include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
+#include "renderer/setter_checks.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
@@ -238,13 +239,72 @@ TEST_SUITE("pipeline") {
       for (std::size_t i = 0; i < result.values.size(); ++i) result.values[i] -= expected.values[i];
       CHECK(norm(result.values) <= 1e-5 * norm(expected.values));
     }
+    // Batches that overlap, as a window on the views moves on and back.
+    several.set_chunk(0);
+    const std::vector<double> per_view = several.evaluate().per_view;
+    for (const std::size_t from : {std::size_t{0}, std::size_t{1}, views - 2, std::size_t{0}}) {
+      CHECK(std::ranges::equal(several.evaluate(from, 2).per_view, std::span(per_view).subspan(from, 2)));
+    }
+    CHECK(several.evaluate().per_view == per_view);
     several.set_scene(scene);  // forgets the mesh loss
     several.set_views(ring(scene, views));
     CHECK(several.evaluate(first, count).mesh_loss == 0);
   }
 }
 
+TEST_SUITE("pipeline") {
+  TEST_CASE("several devices: smoothing and lights need suit the views they are rendered with alone") {
+    Scene scene = small_scene();
+    scene.camera.zfar = scene.camera.znear + 0.1F;
+    std::vector<View> far = ring(scene, 3);
+    for (View& view : far) view.camera.zfar = view.camera.znear + 100;
+    Smoothing smoothing = scene.smoothing;
+    smoothing.gamma = 2e-36F;  // 1 / (gamma (zfar - znear)) is too large for the scene's own camera
+    Renderer alone(open_device());
+    alone.set_scene(scene);
+    alone.set_views(far);
+    alone.set_smoothing(smoothing);
+    alone.forward();
+    for (const bool has_rendered : {false, true}) {
+      CAPTURE(has_rendered);
+      MultiDeviceRenderer renderer(devices(2));
+      renderer.set_scene(scene);
+      renderer.set_chunk(2);
+      if (has_rendered) CHECK(renderer.render().size() == 1);
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_smoothing(smoothing), "gamma (smoothing)");
+      renderer.set_views(far);
+      renderer.set_smoothing(smoothing);
+      renderer.set_lights(scene.lights);
+      const std::vector<Image> images = renderer.render();
+      REQUIRE(images.size() == far.size());
+      for (std::size_t v = 0; v < far.size(); ++v) CHECK(images[v].pixels == alone.image(v).pixels);
+    }
+    scene.smoothing = smoothing;
+    MultiDeviceRenderer renderer(devices(1));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "gamma (smoothing)");
+  }
+}
+
 TEST_SUITE("robustness") {
+  TEST_CASE("several devices: chunks are no larger than the samples of the pixel's noise let frames be") {
+    Scene scene = small_scene();
+    scene.width = scene.height = 2048;
+    scene.smoothing = smoothing_preset("pixel");
+    scene.smoothing.supersampling = 4;
+    const Raster raster = raster_of(scene);
+    CHECK(raster.supersampling == 4);
+    const std::size_t most = most_views(scene, raster);
+    REQUIRE(most > 1);
+    CHECK(most < most_views(scene));
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    CHECK_NOTHROW(renderer.set_views(ring(scene, most)));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views(ring(scene, most + 1)),
+                          "sigma and supersampling (smoothing)");
+    scene.smoothing.noise = Noise::triangle;
+    CHECK(most_views(scene, raster_of(scene)) == most_views(scene));
+  }
+
   TEST_CASE("several devices: a batch that is too large for a frame but not for a chunk") {
     Scene scene = small_scene();
     scene.width = scene.height = 4096;
@@ -285,6 +345,18 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(0, 0), "at least one of the 3");
     renderer.set_loss(LossWeights::only(LossKind::l1), random_images(scene, 2));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "2 images");
+    // A mask that leaves no window on the second level.
+    Scene wide = scene;
+    wide.width = wide.height = 24;
+    Image mask(24, 24, glm::vec4(0));
+    mask.at(6, 12) = glm::vec4(1);
+    const std::vector<Image> targets(2, Image(24, 24)), masks{Image(24, 24, glm::vec4(1)), mask};
+    const LossOptions one_level{.weights = {.ssim = 1}, .masks = masks};
+    LossOptions two_levels = one_level;
+    two_levels.levels = 2;
+    other.set_scene(wide);
+    CHECK_NOTHROW(other.set_loss(one_level, targets));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, other.set_loss(two_levels, targets), "mask (ssim)");
     // An error of one chunk, here a target of another size, is the error of the call.
     renderer.set_loss(LossWeights::only(LossKind::l1), std::vector<Image>(3, Image(5, 4)));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.evaluate(), "target size");

@@ -367,6 +367,59 @@ TEST_SUITE("pipeline") {
     backward_on_device(renderer, image_view(renderer).span());
     for (const glm::vec4& p : read_image(caller, renderer).pixels) CHECK(p == glm::vec4(scene.background, 0));
   }
+
+  TEST_CASE("on device: attributes and auxiliary outputs have the texture coordinates of a buffer") {
+    const Caller caller;
+    const Device device = adopt_device(caller.context(), caller.queue());
+    const Scene scene =
+        textured_scene(make_cube(), random_texture(5, 3, Wrap::repeat, Filter::bilinear), 16, 14);
+    std::vector<glm::vec2> texcoords = scene.meshes[0].mesh.texcoords;
+    for (glm::vec2& uv : texcoords) uv = 0.5F * uv + glm::vec2(0.1F, 0.3F);
+    Renderer ordinary(device), renderer(device);
+    for (Renderer* const r : {&ordinary, &renderer}) r->set_scene(scene);
+    ordinary.set_texcoords(0, texcoords);
+    set_texcoords(renderer, 0, {caller.buffer(packed(std::span<const glm::vec2>(texcoords)))()});
+    std::vector<Image> images;
+    std::vector<AuxiliaryOutputs> outputs;
+    for (Renderer* const r : {&ordinary, &renderer}) {
+      r->forward();
+      AttributeImages attribute(device, Attribute::texcoords);
+      attribute.forward(*r);
+      images.push_back(attribute.image());
+      outputs.push_back(auxiliary_outputs(*r));
+    }
+    CHECK(dpr::test::pipeline::same_bits(images[1], images[0]));
+    CHECK(outputs[1].uv == outputs[0].uv);
+    Renderer before(device);
+    before.set_scene(scene);
+    before.forward();
+    CHECK(auxiliary_outputs(before).uv != outputs[0].uv);
+  }
+
+  TEST_CASE("on device: gradients of a view's camera are those of its own kind") {
+    const Caller caller;
+    const Device device = adopt_device(caller.context(), caller.queue());
+    Scene scene = cube_scene(16, 14);  // whose camera has a field of view
+    scene.gradients.camera = true;
+    View view{scene.camera, {scene.meshes[0].transform}};
+    view.camera.intrinsics = Intrinsics{20.0F, 21.0F, 8.0F, 7.0F};
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    renderer.set_views(std::span(&view, 1));
+    renderer.forward();
+    const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
+    const SceneGradient expected = renderer.backward(std::span(&grad, 1));
+    forward_on_device(renderer);
+    backward_on_device(renderer, {caller.buffer(packed(std::span<const glm::vec4>(grad.pixels)))()});
+    const char* const names[] = {"fx", "fy", "cx", "cy"};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string name = std::string("views[0].camera.intrinsics.") + names[k];
+      const double wanted = expected.views[0].camera.intrinsics[k];
+      CHECK(wanted != 0);
+      CHECK(is_near(read_view(caller, gradient_view(renderer, name)), {static_cast<float>(wanted)}));
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_view(renderer, "views[0].camera.fov_y_degrees"), "name");
+  }
 }
 
 TEST_SUITE("robustness") {
@@ -419,5 +472,88 @@ TEST_SUITE("robustness") {
     const cl_event handle = foreign();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, forward_on_device(renderer, {.wait = {&handle, 1}}),
                           "another context");
+  }
+
+  TEST_CASE("on device: gradients of another request or pass are not given") {
+    const Caller caller;
+    Scene scene = cube_scene(12, 10);
+    scene.gradients.smoothing = false;
+    Renderer renderer(adopt_device(caller.context(), caller.queue()));
+    renderer.set_scene(scene);
+    forward_on_device(renderer);
+    backward_on_device(renderer, image_view(renderer).span());
+    CHECK(gradient_view(renderer, "meshes[0].positions").count == scene.meshes[0].mesh.positions.size());
+    scene.gradients.smoothing = true;
+    renderer.set_gradients(scene.gradients);
+    for (const char* const name : {"sigma", "meshes[0].positions"})
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_view(renderer, name), "backward_on_device() first");
+    backward_on_device(renderer, image_view(renderer).span());
+    CHECK(gradient_view(renderer, "sigma").count == 1);
+    const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
+    renderer.backward(std::span(&grad, 1));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_view(renderer, "sigma"), "backward_on_device() first");
+    backward_on_device(renderer, image_view(renderer).span());
+    CHECK(gradient_view(renderer, "sigma").count == 1);
+  }
+
+  TEST_CASE("on device: room that cannot be counted is refused") {
+    constexpr std::size_t k_most = 3435973832, k_wraps = std::numeric_limits<std::size_t>::max() / 5 * 4 + 8;
+    const Caller caller;
+    Device device = adopt_device(caller.context(), caller.queue());
+    device.set_memory_budget(std::size_t{1} << 30U);
+    Renderer fresh(device), renderer(device);
+    for (Renderer* const r : {&fresh, &renderer}) r->set_scene(cube_scene(12, 10));
+    for (const std::size_t count : {k_most + 1, k_wraps, std::numeric_limits<std::size_t>::max()}) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, reserve(renderer, {.pairs = count}), "pairs (reserve)");
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, reserve(renderer, {.fragments = count}), "fragments (reserve)");
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, reserve(renderer, {.contours = count}), "at most 3435973832");
+    }
+    reserve(renderer, {.fragments = k_most});  // beyond the budget: the frame is measured
+    fresh.forward();
+    forward_on_device(renderer);
+    CHECK(dpr::test::pipeline::same_bits(read_image(caller, renderer), fresh.image()));
+  }
+
+  TEST_CASE("on device: attributes of places that only the device knows are refused") {
+    const Caller caller;
+    const Scene scene = cube_scene(12, 10);
+    const std::vector<glm::vec3>& positions = scene.meshes[0].mesh.positions;
+    const Device device = adopt_device(caller.context(), caller.queue());
+    Renderer renderer(device);
+    renderer.set_scene(scene);
+    const View view = renderer.views()[0];
+    AttributeImages depth(device, Attribute::depth);
+    const cl::Buffer places = caller.buffer(packed(std::span(positions))),
+                     transforms = caller.buffer(rows_of(view.transforms[0])),
+                     matrices = caller.buffer(rows_of(view.camera.view));
+    const auto is_refused = [&] {
+      renderer.forward();
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, depth.forward(renderer),
+                            "got positions or transforms from a buffer");
+    };
+    const auto is_accepted = [&] {
+      renderer.forward();
+      depth.forward(renderer);
+    };
+    set_positions(renderer, 0, {places()});
+    is_refused();
+    set_shapes(renderer, {places()}, {});  // which are read
+    is_accepted();
+    set_shapes(renderer, {}, {});
+    is_refused();
+    renderer.set_positions(0, positions);
+    is_accepted();
+    set_transforms(renderer, {transforms()});
+    is_refused();
+    renderer.set_views(std::span(&view, 1));
+    is_accepted();
+    set_view_matrices(renderer, {matrices()});
+    is_refused();
+    const Image target = random_image(scene.width, scene.height, 0.0F, 1.0F);
+    const AttributeTarget of_depth{.weights = {.mse = 1}, .targets = std::span(&target, 1)};
+    ImageLoss loss(device, {.attributes = std::span(&of_depth, 1)}, std::span(&target, 1));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, loss.evaluate(renderer), "from a buffer");
+    renderer.set_scene(scene);
+    is_accepted();
   }
 }

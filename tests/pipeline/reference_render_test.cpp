@@ -391,6 +391,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       const Image target = random_image(size, size, 0.0F, 1.0F, 9);
       for (const std::string_view kind : loss_names()) {
+        if (kind == to_string(LossKind::ssim)) continue;  // ssim_test has images that hold its windows
         const std::string name = std::string(kind) + " " + std::string(to_string(composition));
         CAPTURE(name);
         ImageLoss loss(device, LossWeights::only(parse_loss(kind, "kind")), std::span(&target, 1));
@@ -408,7 +409,7 @@ TEST_SUITE("pipeline") {
         }
       }
     }
-    MESSAGE("worst of 6 losses:\n" << worst.text());
+    MESSAGE("worst of 8 losses:\n" << worst.text());
   }
 
   TEST_CASE("reference: another scene is told apart, in the image and in every block") {

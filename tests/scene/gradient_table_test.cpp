@@ -7,6 +7,7 @@
 #include <string>
 
 #include "scene/gradient_table.hpp"
+#include "support/messages.hpp"
 
 using namespace dpr;
 
@@ -33,6 +34,46 @@ SceneGradient sample_gradient() {
 }  // namespace
 
 TEST_SUITE("unit") {
+  TEST_CASE("adding gradients: lights that one of them lacks count as 0, whichever it is") {
+    SceneGradient lit = sample_gradient();
+    double count = 0;
+    transform_numbers(lit, [&](double) { return ++count; });
+    SceneGradient unlit = sample_gradient();
+    unlit.lights.clear();
+    unlit.directional.clear();
+    unlit.spot.clear();
+    unlit.harmonics.clear();
+    SceneGradient sum = unlit, other = lit;
+    add(sum, lit);
+    add(other, unlit);
+    for (SceneGradient* found : {&sum, &other}) {
+      REQUIRE(found->spot.size() == 1);
+      double expected = 0;
+      transform_numbers(*found, [&](double value) {
+        CHECK(value == ++expected);
+        return value;
+      });
+      CHECK(expected == count);
+    }
+    add(sum, lit);
+    CHECK(sum.spot[0].position.x == 2 * lit.spot[0].position.x);
+    CHECK(sum.harmonics[1].z == 2 * lit.harmonics[1].z);
+  }
+
+  TEST_CASE("adding gradients: what cannot be added leaves the sum as it was") {
+    SceneGradient sum = sample_gradient(), ones = sample_gradient();
+    transform_numbers(ones, [](double) { return 1.0; });
+    ones.harmonics.pop_back();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, add(sum, ones), "gradient (add)");
+    ones.harmonics.emplace_back(1.0F);
+    ones.spot.resize(2);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, add(sum, ones), "lights.spot");
+    transform_numbers(sum, [](double value) {
+      CHECK(value == 0);
+      return value;
+    });
+  }
+
   TEST_CASE("gradient table: every number is visited once, whatever it belongs to") {
     SceneGradient gradient = sample_gradient();
     double count = 0;

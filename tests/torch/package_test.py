@@ -223,6 +223,12 @@ class PackageTest(unittest.TestCase):
             renderer([TETRAHEDRON], faces, views, intrinsics)
         with self.assertRaisesRegex(ValueError, "colors .* got Tensor, expected a list of 2"):
             renderer(listed, faces, views, intrinsics, colors=colors[0])
+        with self.assertRaisesRegex(ValueError, "vertices .* got 3 in the first dimension, expected 2"):
+            renderer(pad([TETRAHEDRON] * 3, batch_first=True), padded_faces, views, intrinsics)
+        with self.assertRaisesRegex(ValueError, r"intrinsics .* got \[3, 4\], expected \[2, 4\] or \[2, 9\]"):
+            renderer(listed, faces, views, cameras(3)[1])
+        with self.assertRaisesRegex(ValueError, r"views .* got \[0, 4, 4\], expected at least one view"):
+            renderer([], [], views[:0], intrinsics[:0])
         padded_faces[1, 0, 1] = -1
         with self.assertRaisesRegex(ValueError, "faces .* -1 behind it"):
             renderer(pad(leaves(), batch_first=True), padded_faces, views, intrinsics)
@@ -294,6 +300,8 @@ class PackageTest(unittest.TestCase):
             (ValueError, "background", {"background": torch.ones(4)}),
             (ValueError, "lights .* got 'lamp', expected ambient, harmonics", {"lights": {"lamp": torch.ones(3)}}),
             (ValueError, r"lights.spot .* expected \[L, 14\]", {"lights": {"spot": torch.ones(1, 9)}}),
+            (TypeError, "lights.point .* got list, expected a tensor", {"lights": {"point": [[1.0] * 9]}}),
+            (ValueError, r"lights.point .* got \[\], expected \[L, 9\]", {"lights": {"point": torch.tensor(1.0)}}),
             (ValueError, "sigma", {"sigma": torch.ones(2)}),
             (RuntimeError, "sigma", {"sigma": -1.0}),
             (RuntimeError, "width", {"width": 0}),
@@ -309,6 +317,72 @@ class PackageTest(unittest.TestCase):
         with self.assertRaises(NotImplementedError):  # of torch: there is nothing to copy
             dpr.render(**{**good, "vertices": TETRAHEDRON.to("meta"), "copy": True})
         self.assert_same(dpr.render(**good, copy=True), expected)
+
+    def test_wrong_arguments_of_the_operators(self):
+        views, intrinsics = cameras(1)
+        inputs = [TETRAHEDRON[None], random(1, 4, 3), views, intrinsics, torch.zeros(3), torch.empty(0), torch.empty(0)]
+
+        def render(inputs, light_counts=(), names=()):
+            return torch.ops.dpr._render("", SIZE, SIZE, ["preset=pixel"], FACES, inputs, list(light_counts),
+                                         list(names), 0, False, False)
+
+        def with_lights(count, *light_counts):
+            return render(inputs[:5] + [torch.ones(count), inputs[6]], light_counts)
+
+        with_lights(12, 0, 1, 0, 0)
+        for words, call in [
+                (r"light_counts .* got 2 counts, expected none, or 4", lambda: with_lights(12, 0, 1)),
+                (r"light_counts .* got 5 counts", lambda: with_lights(12, 0, 1, 0, 0, 0)),
+                (r"light_counts .* got -1, expected 0 or more", lambda: with_lights(12, 0, -1, 0, 0)),
+                (r"light_counts .* got 4611686018427387904", lambda: with_lights(12, 0, 1 << 62, 0, 0)),
+                (r"lights .* got 3 numbers, expected 12", lambda: with_lights(3, 0, 1, 0, 0)),
+                (r"lights .* got 13 numbers, expected 12", lambda: with_lights(13, 0, 1, 0, 0)),
+                (r"smoothing_names .* got 1 names, expected 0", lambda: render(inputs, names=["sigma"])),
+                (r"smoothing_names .* got 0 names, expected 2", lambda: render(inputs[:6] + [torch.ones(2)])),
+                (r"inputs .* got 6 elements, expected 7", lambda: render(inputs[:6])),
+        ]:
+            with self.subTest(words), self.assertRaisesRegex(RuntimeError, words):
+                call()
+        image, frame = render(inputs)
+        for count, wanted, words in [(6, 7, "inputs"), (7, 6, "wanted")]:
+            with self.subTest(words), self.assertRaisesRegex(RuntimeError, words + " .* got 6 elements, expected 7"):
+                torch.ops.dpr._gradients(frame, image, inputs[:count], [], [True] * wanted)
+
+    def test_no_call_depends_on_the_last_one(self):
+        """A kept renderer's views, smoothing and lights need not go with those of the next call."""
+        views, intrinsics = cameras(1)
+        lights = {"ambient": torch.ones(3), "point": torch.ones(1, 9)}
+
+        def render(znear=1, zfar=10, gamma=5e-2, projection=intrinsics, count=1, **arguments):
+            settings = {**SMOOTH, "znear": znear, "zfar": zfar, "gamma": gamma}
+            return dpr.render(TETRAHEDRON, FACES, views.repeat(count, 1, 1), projection.repeat(count, 1), width=SIZE,
+                              height=SIZE, **arguments, **settings)
+
+        def render_far():
+            return render(znear=1e10, zfar=2e10)  # further than lights may be
+
+        def render_near():
+            return render(znear=1e-20, zfar=2e-20)  # too short for the next gamma
+
+        def render_orthographic():
+            return render(projection=torch.tensor([[3.0]]), lights=lights, count=3)
+
+        def fail():
+            with self.assertRaisesRegex(RuntimeError, "znear to zfar .* with lights"):
+                render(znear=1e10, zfar=2e10, lights=lights)
+
+        last_calls = [render_far, render_near, render_orthographic, fail]
+        calls = [{"lights": lights}, {"gamma": 1e-20}, {"distance": "euclidean", "lights": lights}, {}]
+        for arguments in calls:
+            dpr.release()
+            expected = render(**arguments)
+            self.assertGreater(expected[..., 3].sum(), 10)
+            for last_call in last_calls:
+                with self.subTest(str(arguments), after=last_call.__name__):
+                    with warnings.catch_warnings():
+                        warnings.simplefilter("ignore")
+                        last_call()
+                    self.assert_same(render(**arguments), expected)
 
     def test_strides(self):
         views, intrinsics = cameras(2)

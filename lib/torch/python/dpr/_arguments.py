@@ -65,9 +65,12 @@ def lights(given, kinds, copy):
     counts = []
     for name, shape in [("harmonics", (9, 3)), *((kind, ("L", size)) for kind, size in kinds.items())]:
         tensor = given.get(name)
-        counts.append(0 if tensor is None else tensor.shape[0])
-        if tensor is not None:
-            parts.append(floats(f"lights.{name}", tensor, [shape], copy).flatten())
+        if tensor is None:
+            counts.append(0)
+            continue
+        tensor = floats(f"lights.{name}", tensor, [shape], copy)
+        counts.append(tensor.shape[0])
+        parts.append(tensor.flatten())
     return torch.cat(parts), counts
 
 
@@ -79,7 +82,12 @@ def lists_of_padded(vertices, faces, colors, face_colors):
         fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
     vertex_counts = [int(mesh.max()) + 1 if len(mesh) else 0 for mesh in meshes]
 
-    def cut(padded, counts):
-        return None if padded is None else [mesh[:count] for mesh, count in zip(padded, counts)]
+    def cut(name, padded, counts):
+        if padded is None:
+            return None
+        if len(padded) != len(counts):
+            fail(ValueError, name, f"{len(padded)} in the first dimension", f"{len(counts)}, as faces are padded")
+        return [mesh[:count] for mesh, count in zip(padded, counts)]
 
-    return cut(vertices, vertex_counts), meshes, cut(colors, vertex_counts), cut(face_colors, face_counts)
+    return (cut("vertices", vertices, vertex_counts), meshes, cut("colors", colors, vertex_counts),
+            cut("face_colors", face_colors, face_counts))

@@ -97,6 +97,9 @@ class Renderer:
         """Meshes that differ, one a view. Sampled noise is that of the views' places in the batch."""
         views = _arguments.floats("views", views, [("N", 4, 4)], shared[-1])
         count = views.shape[0]
+        if count == 0:
+            _arguments.fail(ValueError, "views", [0, 4, 4], "at least one view")
+        intrinsics = _arguments.floats("intrinsics", intrinsics, [(count, n) for n in (4, 9, 1)], shared[-1])
         nothing = [None] * count
         lists = {"vertices": vertices, "faces": faces, "colors": nothing if colors is None else colors,
                  "face_colors": nothing if face_colors is None else face_colors}

@@ -1,0 +1,42 @@
+// A level of the shape solver: its views and targets at the level's size.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "dpr/image_loss.hpp"
+#include "dpr/shape.hpp"
+
+namespace dpr {
+
+/// Pixels of a level, of one of the finest.
+double pixel_scale(const ShapeOptions& options, unsigned level);
+
+/// The views of a level in batches, one after the other: batch b has the views b, b + batches, ...
+struct ShapeLevel {
+  ShapeLevel(const ShapeViews& all, const ShapeOptions& options, unsigned level);
+
+  /// Which views an iteration looks at: the first and how many.
+  std::pair<std::size_t, std::size_t> batch(unsigned iteration) const;
+
+  int width, height;
+  std::vector<std::size_t> order;   // which of all views
+  std::vector<std::size_t> starts;  // [batch + 1]
+  std::vector<View> views;
+};
+
+/// What the views of a level are compared with.
+struct ShapeTargets {
+  ShapeTargets(const ShapeViews& all, const ShapeLevel& level);
+
+  /// Valid as long as this.
+  LossOptions options(const LossWeights& weights) const {
+    return {.weights = weights, .has_alpha = has_alpha, .masks = masks};
+  }
+
+  std::vector<Image> images, masks;
+  std::vector<unsigned char> has_alpha;
+};
+
+}  // namespace dpr
