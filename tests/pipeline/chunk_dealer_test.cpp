@@ -1,5 +1,5 @@
 // Which device is dealt which chunk, in a clock of the test's own.
-#include "renderer/chunk_dealer.hpp"
+#include "multi_device/chunk_dealer.hpp"
 
 #include <doctest/doctest.h>
 

@@ -8,8 +8,8 @@
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "renderer/finite.hpp"
-#include "renderer/gradient_sum.hpp"
-#include "renderer/multi_device_impl.hpp"
+#include "multi_device/gradient_sum.hpp"
+#include "multi_device/multi_device_impl.hpp"
 #include "renderer/setter_checks.hpp"
 
 namespace dpr {

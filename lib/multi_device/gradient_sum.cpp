@@ -1,4 +1,4 @@
-#include "renderer/gradient_sum.hpp"
+#include "multi_device/gradient_sum.hpp"
 
 #include <algorithm>
 #include <iterator>

@@ -1,5 +1,5 @@
 // The work of several devices on one batch.
-#include "renderer/multi_device_impl.hpp"
+#include "multi_device/multi_device_impl.hpp"
 
 #include <algorithm>
 #include <chrono>

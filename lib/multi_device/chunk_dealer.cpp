@@ -1,4 +1,4 @@
-#include "renderer/chunk_dealer.hpp"
+#include "multi_device/chunk_dealer.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "dpr/multi_device.hpp"
-#include "renderer/chunk_dealer.hpp"
+#include "multi_device/chunk_dealer.hpp"
 
 namespace dpr {
 
