@@ -79,7 +79,8 @@ class DPR_API ImageLoss {
   ImageLoss& operator=(ImageLoss&&) noexcept;
 
   /// The loss of the renderer's last images; keeps d loss / d image on the device for Renderer::backward.
-  /// Blocks. Throws InvalidArgument for images of another number or size, and a renderer of another Device.
+  /// Blocks. Throws InvalidArgument for images of another number or size, for a renderer of another Device, and
+  /// for losses on attributes where the renderer's positions or transforms came from a buffer.
   double evaluate(const Renderer& renderer);
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;

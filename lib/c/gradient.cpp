@@ -13,20 +13,12 @@ using dpr::c::guarded;
 namespace dpr::c {
 namespace {
 
-/// Whether the scene has what the row is the gradient of; of a view's camera, whether that has.
-bool exists(const Renderer& renderer, const GradientRow& row, GradientIndex index) {
-  if (!row.exists) return true;
-  if (row.of != GradientOf::view) return row.exists(renderer.scene());
-  Scene seen;
-  seen.camera = renderer.views()[index.view].camera;
-  return row.exists(seen);
-}
-
 /// The arrays that the scene asked for and has.
 std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradient gradient) {
   std::vector<dpr_gradient::Array> arrays;
   for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
-    if (!(renderer.scene().gradients.*row.wanted) || !exists(renderer, row, index)) return;
+    if (!(renderer.scene().gradients.*row.wanted) || !exists(row, index, renderer.scene(), renderer.views()))
+      return;
     dpr_gradient::Array copy{name_of(row, index), {}};
     transform_numbers(array, [&](double number) {
       copy.values.push_back(number);

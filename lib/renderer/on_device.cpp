@@ -221,15 +221,6 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
   return std::nullopt;
 }
 
-/// Whether the scene has what the row is the gradient of; of a view's camera, whether that has.
-bool exists(const Renderer::Impl& m, const GradientRow& row, GradientIndex index) {
-  if (!row.exists) return true;
-  if (row.of != GradientOf::view) return row.exists(m.scene);
-  Scene seen;
-  seen.camera = m.views[index.view].camera;
-  return row.exists(seen);
-}
-
 /// A number, a vector or a list of vectors among the numbers, from `first` on.
 BufferView numbers_view(const Renderer::Impl& m, const GradientArray& array, std::size_t first,
                         std::size_t numbers) {
@@ -253,7 +244,7 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
   std::optional<BufferView> found;
   std::size_t first = 0;
   for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
-    const bool is_there = m.scene.gradients.*row.wanted && exists(m, row, index);
+    const bool is_there = m.scene.gradients.*row.wanted && exists(row, index, m.scene, m.views);
     if (!is_summed(row)) {
       if (is_there && !found) found = mesh_gradient(m, row, index.item, name);
       return;

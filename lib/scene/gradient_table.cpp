@@ -125,6 +125,14 @@ GradientRequest no_gradients() {
   return request;
 }
 
+bool exists(const GradientRow& row, GradientIndex index, const Scene& scene, std::span<const View> views) {
+  if (!row.exists) return true;
+  if (row.of != GradientOf::view) return row.exists(scene);
+  Scene seen;
+  seen.camera = views[index.view].camera;
+  return row.exists(seen);
+}
+
 GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient) {
   const std::size_t views = gradient.views.size();
   switch (row.of) {

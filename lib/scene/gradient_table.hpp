@@ -58,6 +58,10 @@ struct GradientRow {
 };
 std::span<const GradientRow> gradient_rows();
 
+/// Whether there is what one array of a row is the gradient of: in the scene, or in its view where the row is
+/// of views.
+bool exists(const GradientRow& row, GradientIndex index, const Scene& scene, std::span<const View> views);
+
 /// How many arrays of a row a gradient has.
 GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient);
 

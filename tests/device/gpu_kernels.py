@@ -20,6 +20,8 @@ CLANG = ["clang-19", "-x", "cl", "-cl-std=CL1.2", "-Xclang", "-finclude-default-
 LIBRARY = pathlib.Path("/usr/lib/clc")
 AMD = ["-target", "amdgcn-mesa-mesa3d", "-mcpu=gfx1030"]
 NVIDIA = ["-target", "nvptx64-nvidia-nvcl", "-march=sm_90"]
+AMD_BUILTINS = "gfx1030-amdgcn-mesa-mesa3d.bc"
+NVIDIA_BUILTINS = "nvptx64--nvidiacl.bc"
 KEYS = ["amd_vgprs", "amd_sgprs", "amd_scratch_bytes", "amd_local_bytes", "amd_occupancy", "nvidia_registers", "nvidia_stack_bytes"]
 
 
@@ -65,8 +67,8 @@ def measure(kernels):
         for source in sorted(kernels.glob("*.cl")):
             if "kernel void" not in source.read_text():
                 continue  # it joins others
-            needs = amd_needs(compile_to(folder / "amd.s", source, AMD, "gfx1030-amdgcn-mesa-mesa3d.bc"))
-            compile_to(folder / "nvidia.ptx", source, NVIDIA, "nvptx64--nvidiacl.bc")
+            needs = amd_needs(compile_to(folder / "amd.s", source, AMD, AMD_BUILTINS))
+            compile_to(folder / "nvidia.ptx", source, NVIDIA, NVIDIA_BUILTINS)
             if has_ptxas():
                 for kernel, values in nvidia_needs(folder / "nvidia.ptx", folder).items():
                     needs[kernel].update(values)
@@ -100,7 +102,8 @@ def differences(rows, table):
 
 
 def main():
-    if not shutil.which("clang-19") or not LIBRARY.exists():
+    # libclc-15, which Mesa's OpenCL needs, takes the place of libclc-19.
+    if not shutil.which("clang-19") or not all((LIBRARY / name).exists() for name in (AMD_BUILTINS, NVIDIA_BUILTINS)):
         print("skipped: no clang-19 or libclc-19")
         return
     kernels, table = pathlib.Path(sys.argv[1]), sys.argv[2]
