@@ -55,7 +55,7 @@ std::string footer() {
   std::string text = "Workloads:\n";
   for (const auto& names : {bench::workload_names(), bench::sweep_names()}) {
     for (const std::string_view name : names) {
-      const std::string pad(18 - name.size(), ' ');
+      const std::string pad(20 - name.size(), ' ');
       text += "  " + std::string(name) + pad + std::string(bench::describe(name)) + "\n";
     }
   }

@@ -102,7 +102,8 @@ std::string printable(const std::string& text) {
 }
 
 std::string place(const std::filesystem::path& file, std::optional<std::size_t> line) {
-  return line ? file.string() + ":" + std::to_string(*line) : file.string();
+  const std::string name = file.empty() ? "\"\"" : file.string();
+  return line ? name + ":" + std::to_string(*line) : name;
 }
 
 // The first line of a compiler's output that says something is wrong, or its first line at all.

@@ -66,7 +66,12 @@ int fail_to_parse(const CLI::App& application, const CLI::ParseError& error) {
   if (is_command) problem = "no such command: " + unknown.front();
   if (is_option) problem = "no such option: " + unknown.front();
   if (is_command || is_option) expected = did_you_mean(application, unknown.front());
-  return fail("arguments (" + name + "): got \"" + problem + "\", expected " + expected + "what \"" + name +
+  // "--output is required"
+  constexpr std::string_view k_missing = " is required";
+  const std::string got = problem.ends_with(k_missing)
+                              ? "no " + problem.substr(0, problem.size() - k_missing.size())
+                              : "\"" + problem + "\"";
+  return fail("arguments (" + name + "): got " + got + ", expected " + expected + "what \"" + name +
                   " --help\" describes",
               k_wrong_input);
 }

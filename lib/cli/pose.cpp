@@ -69,10 +69,11 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
     return;
   }
   if (options.search || gives_any(command, k_least_squares_group)) {
-    throw InvalidArgument("--method (command line)",
-                          std::string("descent with ") +
-                              (options.search ? "--search, which is" : "an option of") + " least squares'",
-                          "options of one method; those of the descent and of the smoothing imply it");
+    throw InvalidArgument(
+        "options (command line)",
+        options.search ? "--search with those of the descent"
+                       : "those of least squares with those of the descent",
+        "those of one method: all of the smoothing are the descent's, --search is least squares'");
   }
   options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
   options.descent.optimizer.kind = parse_optimizer(options.optimizer);

@@ -52,6 +52,9 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   const float half_tangent = std::tan(glm::radians(k_fov_y_degrees / 2)) * std::min(1.0F, aspect);
   const float radius = k_margin * std::max(sphere.radius, 1e-6F);
   const float distance = radius / std::sin(std::atan(half_tangent));
+  if (!std::isfinite(distance))
+    throw IoError(options.mesh,
+                  "a mesh as large as numbers can be, expected one that a camera can stand before");
   Camera camera = orbit_camera(distance, options.elevation, options.azimuth, sphere.center);
   camera.fov_y_degrees = k_fov_y_degrees;
   camera.znear = distance - radius;
@@ -137,9 +140,8 @@ void run(const RenderOptions& options, CommonOptions& common) {
                 statistics.faces);
     if (statistics.faces_dropped > 0) {
       std::printf(
-          ", %zu of them dropped: outside the image, nearer than znear, beyond zfar, culled, the hidden back "
-          "of "
-          "a closed mesh, or without area",
+          ", of which %zu cannot be seen: the back of a closed mesh, outside the image, nearer than znear, "
+          "beyond zfar, culled, or without area",
           statistics.faces_dropped);
     }
     std::printf("\n");

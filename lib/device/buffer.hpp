@@ -118,9 +118,7 @@ class Buffer {
     const std::size_t capacity = (count / k_padding + 2) * k_padding;
     int error = CL_SUCCESS;
     cl::Buffer buffer(device.context, CL_MEM_READ_WRITE, capacity * sizeof(T), nullptr, &error);
-    if (error != CL_SUCCESS) {
-      throw DeviceError(error, "clCreateBuffer of " + std::to_string(capacity * sizeof(T)) + " bytes");
-    }
+    if (error != CL_SUCCESS) throw DeviceError(error, allocation_name(device.info, capacity * sizeof(T)));
     buffer_ = std::move(buffer);
     device_ = &device;
     capacity_ = capacity;

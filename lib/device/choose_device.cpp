@@ -40,7 +40,7 @@ std::optional<Parts> parse_parts(const std::string& text) {
   const std::size_t slash = text.rfind('/');
   if (slash == std::string::npos) return std::nullopt;
   const auto count = parse_index(text.substr(slash + 1));
-  if (!count || *count < 1 || *count > std::numeric_limits<unsigned>::max()) return std::nullopt;
+  if (!count || *count > std::numeric_limits<unsigned>::max()) return std::nullopt;
   return Parts{text.substr(0, slash), static_cast<unsigned>(*count)};
 }
 
@@ -103,10 +103,10 @@ std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, co
                             "one more device, of " + device_names(devices));
     }
     const unsigned units = devices[position].compute_units;
-    if (parts && parts->count > units) {
-      throw InvalidArgument(
-          where, "'" + item + "'",
-          "at most " + std::to_string(units) + " parts, the compute units of " + devices[position].name);
+    if (parts && (parts->count < 1 || parts->count > units)) {
+      throw InvalidArgument(where, "'" + item + "'",
+                            "1 to " + std::to_string(units) + " parts, as many as " + devices[position].name +
+                                " has compute units for this process");
     }
     choices.push_back({position, parts ? parts->count : 1});
   }

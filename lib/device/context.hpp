@@ -91,6 +91,10 @@ struct Device::Impl {
   std::list<PendingWrite> writes_;
 };
 
+/// The call that allocates a buffer, as its error names it: where the device has no buffers so large, with
+/// what helps.
+std::string allocation_name(const DeviceInfo& info, std::size_t bytes);
+
 /// Describes a device of a platform; index, default and lanes are filled in by list_devices().
 DeviceInfo describe(const cl::Platform& platform, const cl::Device& device);
 

@@ -248,4 +248,13 @@ void Device::set_memory_budget(std::size_t bytes) {
   impl_->memory_budget = bytes;
 }
 
+std::string allocation_name(const DeviceInfo& info, std::size_t bytes) {
+  std::string name = "clCreateBuffer of " + std::to_string(bytes) + " bytes";
+  if (info.max_allocation_bytes > 0 && bytes > info.max_allocation_bytes) {
+    name += ", more than the " + std::to_string(info.max_allocation_bytes) + " of " + info.name +
+            ": smaller images or fewer views at once fit";
+  }
+  return name;
+}
+
 }  // namespace dpr

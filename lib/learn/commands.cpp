@@ -148,9 +148,14 @@ std::string validation_text(const learn::TrainingProgress& progress) {
 }
 
 void print_result(const std::string& folder, const learn::TrainingResult& result) {
-  std::printf("%s: %zu steps%s; %.0f s in this run, %.0f%% of them in the renderer\n", folder.c_str(),
-              result.losses.size(), validation_text(result.last).c_str(), result.last.seconds,
-              100 * result.last.render_share);
+  std::printf("%s: %zu steps%s; ", folder.c_str(), result.losses.size(),
+              validation_text(result.last).c_str());
+  if (result.last.step == 0) {
+    std::printf("nothing was left to do\n");
+  } else {
+    std::printf("%.0f s in this run, %.0f%% of them in the renderer\n", result.last.seconds,
+                100 * result.last.render_share);
+  }
 }
 
 /// Of a list of devices the ranks of a machine take one after the other, by turns.
@@ -163,19 +168,20 @@ Device device_of(const CommonOptions& common, const learn::Ranks& ranks) {
 /// Trains as one rank, or alone.
 void train(const TrainCommand& command, const CommonOptions& common) {
   const Dataset training = read(command.data, Split::train), validation = read(command.data, Split::val);
-  learn::training_smoothing(command.training);  // a wrong method leaves no folder behind
   const learn::TrainingOptions& o = command.training;
+  learn::training_smoothing(o);  // a wrong method or device leaves no folder behind
+  const Device device = device_of(common, o.ranks);
   if (o.ranks.rank == 0) make_folder(command.output);
   learn::TrainingResult result;
   {
     Progress bar(static_cast<unsigned>(o.steps), common.quiet);
-    result = learn::train(device_of(common, o.ranks), training, validation, o, command.output,
-                          [&](const learn::TrainingProgress& p) {
-                            const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
-                            const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
-                            bar.update(static_cast<unsigned>(p.step), std::max(steps, time),
-                                       format("loss %.4f", p.loss) + validation_text(p));
-                          });
+    result =
+        learn::train(device, training, validation, o, command.output, [&](const learn::TrainingProgress& p) {
+          const double steps = static_cast<double>(p.step) / static_cast<double>(o.steps);
+          const double time = o.minutes > 0 ? p.seconds / (60 * o.minutes) : 0;
+          bar.update(static_cast<unsigned>(p.step), std::max(steps, time),
+                     format("loss %.4f", p.loss) + validation_text(p));
+        });
   }
   if (o.ranks.rank != 0) return;
   const std::filesystem::path folder(command.output);
@@ -263,6 +269,12 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->type_name("N");
   add_output_options(*command, common);
   add_device_options(*command, common);
+  command->get_option("--device")
+      ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST")
+      ->description(
+          "Which OpenCL device; of a list the ranks of a machine take one each (default: DPR_DEVICE, else a "
+          "GPU, else "
+          "an accelerator, else a CPU)");
   command->footer("Example: dpr learn train --data data -o run --minutes 30");
   command->callback([options, &common] { run_train(*options, common); });
 }

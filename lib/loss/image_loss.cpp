@@ -28,7 +28,8 @@ void check_weights(const LossWeights& weights, bool may_be_0) {
   for (const ImageLossRow& loss : k_losses) {
     const float weight = weights.*loss.weight;
     if (!(weight >= 0) || !std::isfinite(weight)) {
-      throw InvalidArgument("weight (loss)", std::to_string(weight), "a finite number, at least 0");
+      throw InvalidArgument("weight of " + std::string(loss.name) + " (loss)", std::to_string(weight),
+                            "a finite number, at least 0");
     }
     sum += weight;
   }

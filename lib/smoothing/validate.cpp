@@ -118,7 +118,7 @@ void validate_noise(const Smoothing& s) {
                "a symmetric one, which does not shift the image");
   require_with(s.occupancy_width == OccupancyWidth::fixed,
                std::string("occupancy_width ") + std::string(to_string(s.occupancy_width)),
-               "occupancy_width fixed");
+               "occupancy_width fixed, as preset pixel has it");
   require_with(!s.blur_radius, "a blur_radius", "none: no triangle is blurred");
 }
 

@@ -202,7 +202,8 @@ Inputs checked(const Inputs& in, std::int64_t faces) {
   if (count == 0) throw InvalidArgument("views (dpr::render)", shape_text(out.views), "at least one view");
   out.vertices = checked(in.vertices, "vertices", {-1, -1, 3}, "[view or 1, vertex, 3]");
   out.colors = checked(in.colors, "colors", {-1, -1, 3}, "[view or 1, vertex or face, 3]");
-  out.intrinsics = checked(in.intrinsics, "intrinsics", {count, -1}, "[view, 4, 9 or 1]");
+  out.intrinsics = checked(in.intrinsics, "intrinsics", {count, -1},
+                           "[" + std::to_string(count) + ", 4, 9 or 1], a row for each view");
   require_projection(out.intrinsics);
   out.background = checked(in.background, "background", {3}, "[3]");
   require_batch(out.vertices, "vertices", count);

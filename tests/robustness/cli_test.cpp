@@ -113,6 +113,8 @@ TEST_SUITE("robustness") {
                 {"render", "cube.ply", "--elevaton", "3"});
     check_fails(folder, 1, "no such option: --colour\", expected what",
                 {"render", "cube.ply", "-o", "a.png", "--colour", "red"});
+    check_fails(folder, 1, "got no --output, expected what \"dpr render --help\"", {"render", "cube.ply"});
+    check_fails(folder, 1, "got the extension \"\"", {"render", "cube.ply", "-o", ""});
   }
 
   TEST_CASE("cli: a memory budget makes bands, and the same image") {

@@ -65,7 +65,8 @@ class Renderer:
                      diffuse, specular), "spot" [L, 14] (position, direction, angle and inner angle in degrees, diffuse,
                      specular). Without a dictionary colours are as they are.
         sigma, gamma, alpha   instead of the settings': numbers, or tensors of one number
-        outputs      names of "depth", "normal", "face_id", "barycentrics", "effective_faces"
+        outputs      names of "depth", "normal", "face_id", "barycentrics", "effective_faces". Depth and normal are those of
+                     what may cover a pixel, at full size wherever alpha is above 0: weigh them by alpha
         copy         whether tensors on other devices are copied to the CPU, and the images back
 
         Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and of their colours; or
