@@ -142,6 +142,7 @@ ContourInputs Renderer::Impl::contour_inputs() const {
           *geometry,
           *pixel_noise->edges,
           transform,
+          setup.facing,
           clip.faces,
           scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
 }
