@@ -40,10 +40,10 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
   if (wants_colors() && frame.color_stride != 0) {
-    gather.per_view(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+    gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                     grad_colors);
   } else if (wants_colors()) {
-    gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+    gather.over_views(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                       grad_colors);
   }
   if (wants_texcoords()) {

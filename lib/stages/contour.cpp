@@ -155,7 +155,7 @@ void Contour::count(const ContourInputs& in) {
   }
   counts_.resize(device_, view_edges(in));
   count_(view_edges(in), in.p, params(in), in.edges.edges, in.facing, in.transform.ndc, in.transform.world,
-         in.geometry.face_vertices, in.clipped, in.geometry.face_colors, in.geometry.colors_of(in.p),
+         in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
          counts_);
   scan_(view_edges(in), counts_, pair_starts);
 }
@@ -167,7 +167,7 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
     buffer->resize(device_, Length::at_most(pairs));
   fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.end_starts,
         in.edges.ends, in.facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
-        in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
+        in.geometry.face_colors(), in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
         pair_tile, places_);
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
