@@ -1,14 +1,9 @@
-// Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a
-// plain sum would lose what is left. The order of additions is fixed, so the result is the same from run to
-// run.
+// Sums over segments, channel by channel. The order of additions is fixed, so the result is the same from run
+// to run.
+#include "compensated.h"
 #include "tile_lanes.h"
 
-/// Adds x to a sum and its running error (Neumaier 1974). Adding zero changes no bit of either.
-static inline void compensated_add(realn* sum, realn* error, realn x) {
-  const realn t = *sum + x;
-  *error += choose(fabs(*sum) >= fabs(x), (*sum - t) + x, (x - t) + *sum);
-  *sum = t;
-}
+DPR_COMPENSATED_ADD(compensated_add, realn)
 
 /// A vector whose lanes from `last` on are zero.
 static inline realn load_until(uint first, uint last, global const float* values) {

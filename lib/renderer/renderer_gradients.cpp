@@ -183,7 +183,8 @@ void Renderer::Impl::sum_gradients() {
        aggregate.channels},
       sigma,
       {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
-       views.size() * scene.meshes.size(), 1, view_vertex_starts, transform.channels},
+       views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
+       transform.slots},
       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs},
       {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
        shade.light_channels, pairs}};
