@@ -319,7 +319,8 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
 
 /// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between, and
 /// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
-/// per (view, vertex). Deterministic. Inputs as contour_facing, contour_gather and contour_count, and
+/// per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
+/// in      views          ViewParams[view]
 /// in      corner_starts  uint[vertex + 1]      runs of `corners`
 /// in      corners        uint[corner]          face * 3 + corner, by vertex
 /// in out  grad_ndc       float4[view][vertex]
