@@ -117,7 +117,7 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
 }
 
 /// One work-item per pixel. Deterministic. Arguments as aggregate_forward, but a pixel's slots begin at
-/// starts[pixel], sorted by depth, and those are left that anything is seen of.
+/// starts[pixel], sorted by depth, and those are left that anything is seen of. A fragment alone has no slot.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
                                     global const float* restrict depth,
@@ -134,6 +134,14 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
     return;
   }
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  if (starts[pixel] + 1 == starts[pixel + 1]) {  // most pixels of a sharp image: no cluster to look for
+    const uint k = list[starts[pixel]];
+    const float transparency = fragment_transparency(f, k);
+    slot_counts[pixel] = occupancy[k] > 0.0f ? 1 : 0;
+    image[pixel] =
+        (float4)(occupancy[k] * fragment_color(f, k) + transparency * p.background.xyz, 1.0f - transparency);
+    return;
+  }
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
   const uint count = gather_slots(f, starts[pixel], starts[pixel + 1], pixel_slots);

@@ -67,13 +67,14 @@ static inline Triangle triangle_of(const Outline o, int second, float orientatio
 /// in      world     float4[view][vertex]
 /// in      ndc       float4[view][vertex]
 /// out     clipped   ClippedFace[view][face]
-/// in out  kept, counts, triangles  as setup_forward leaves them, which drops these faces: what the raster
-///                   sees of them is set up. Of a quadrilateral the triangle of the first three corners
+/// in out  facing, kept, counts, triangles  as setup_forward leaves them, which drops these faces: what the
+///                   raster sees of them is set up. Of a quadrilateral the triangle of the first three
+///                   corners
 kernel void clip_forward(const FrameParams p, global const ViewParams* restrict views,
                          global const uint4* restrict faces, global const float4* restrict world,
                          global const float4* restrict ndc, global ClippedFace* restrict clipped,
-                         global uint* restrict kept, global uint* restrict counts,
-                         global Triangle* restrict triangles) {
+                         global uint* restrict facing, global uint* restrict kept,
+                         global uint* restrict counts, global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
@@ -110,6 +111,7 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   if (orientation == 0 || (float)orientation == p.culled) return;
   c.orientation = (float)orientation;
   clipped[i] = c;
+  facing[i] = facing_of(orientation);
 
   float2 lowest = o.corner[0].xy, highest = lowest;
   for (int k = 1; k < 4; ++k) {

@@ -17,31 +17,6 @@
 /// The sine of the angle between faces from which they count as shaded differently.
 #define DPR_LEAST_CREASE 1e-4f
 
-/// How faces look. Dropped is what setup drops for its depth, its area or its facing. One work-item per
-/// (view, face).
-/// in   views   ViewParams[view]
-/// in   faces   uint4[face]            vertex indices
-/// in   ndc     float4[view][vertex]
-/// in   clipped ClippedFace[view][face]  read where p.clips is set
-/// out  facing  uint[view][face]
-kernel void contour_facing(const FrameParams p, global const ViewParams* restrict views,
-                           global const uint4* restrict faces, global const float4* restrict ndc,
-                           global const ClippedFace* restrict clipped, global uint* restrict facing) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= p.views * p.faces) return;
-  const uint view = i / p.faces;
-  const uint4 face = faces[i - view * p.faces];
-  global const float4* vertices = ndc + view * p.vertices;
-  const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
-  // Written so that a NaN fails.
-  const int in_view =
-      fmin(fmin(a.z, b.z), c.z) >= views[view].znear && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY;
-  int side = in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
-  if (p.clips && clipped[i].corners != 0) side = (int)clipped[i].orientation;
-  if ((float)side == p.culled) side = 0;
-  facing[i] = side > 0 ? DPR_FACE_FRONT : side < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
-}
-
 /// Everything that says what an edge is; of one view.
 typedef struct {
   global const uint* facing;         // [face]
@@ -89,6 +64,15 @@ static inline int stands_for_both(uint4 edge, global const uint* facing) {
   const int own_rank = own == DPR_FACE_DROPPED ? 0 : own == DPR_FACE_BACK ? 1 : 2;
   const int other_rank = other == DPR_FACE_DROPPED ? 0 : other == DPR_FACE_BACK ? 1 : 2;
   return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
+}
+
+/// Whether an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
+static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
+  if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
+  const uint4 record = s.edges.edges[edge];
+  if (!has_other_face(record) || (record.z & (DPR_EDGE_FLAG | DPR_EDGE_SEAM))) return 0;
+  const EdgeSides sides = edge_sides(record, s.facing);
+  return sides.own == -sides.other;
 }
 
 static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shading) {
@@ -158,7 +142,7 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
 /// in   edges        uint4[edge]           of the scene; see DPR_EDGE_FLAG
-/// in   facing       uint[view][face]
+/// in   facing       uint[view][face]      as setup and clipping leave it
 /// in   ndc, world   float4[view][vertex]
 /// in   faces, face_colors  uint4[face]    vertices and colours of the corners
 /// in   clipped      ClippedFace[view][face]  read where p.clips is set
@@ -175,6 +159,8 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
   const uint view = i / c.edges;
   const ContourScene s =
       scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);
+  counts[i] = 0;
+  if (is_within_surface(s, i - view * c.edges, c.shading)) return;
   const ViewEdge edge = view_edge(s.edges, i - view * c.edges);
   uint count = 0;
   if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
@@ -333,7 +319,8 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
 
 /// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between, and
 /// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
-/// per (view, vertex). Deterministic. Inputs as contour_facing, contour_gather and contour_count, and
+/// per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
+/// in      views          ViewParams[view]
 /// in      corner_starts  uint[vertex + 1]      runs of `corners`
 /// in      corners        uint[corner]          face * 3 + corner, by vertex
 /// in out  grad_ndc       float4[view][vertex]

@@ -6,11 +6,6 @@
 #include "clip.h"
 #include "geometry.h"
 
-/// How a face looks from a view.
-#define DPR_FACE_DROPPED 0
-#define DPR_FACE_FRONT 1 /* its corners wind counter-clockwise in NDC */
-#define DPR_FACE_BACK 2
-
 /// What an edge is in a view. What a contour occludes lies behind it; a crease has surface on both sides.
 #define DPR_NO_CONTOUR 0
 #define DPR_OCCLUDES 1

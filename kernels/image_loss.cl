@@ -11,55 +11,63 @@ static inline LossPixel make_pixel(float4 image, float4 target, float inverse_sc
   return p;
 }
 
+/// Whether a loss is one of the `used`; their sums lie one behind the other, in the order of the losses.
+#define DPR_IS_USED(used, name) (((used) >> name##_number & 1u) != 0)
+
 /// What every pixel adds to the sums of its view. One work-item per pixel.
 /// in   pixels         of all views
+/// in   used           bit k: loss k counts
 /// in   inverse_scale_squared  of the robust loss
 /// in   image, target  float4[view][pixel]  RGBA
 /// in   mask           float[view][pixel]   how much a pixel counts
-/// out  channels       float[DPR_LOSS_SUMS][view][pixel]
-kernel void image_loss_forward(const uint pixels, const float inverse_scale_squared,
+/// out  channels       float[sum used][view][pixel]
+kernel void image_loss_forward(const uint pixels, const uint used, const float inverse_scale_squared,
                                global const float4* restrict image, global const float4* restrict target,
                                global const float* restrict mask, global float* restrict channels) {
   const uint i = (uint)get_global_id(0);
   if (i >= pixels) return;
   const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
-  float sums[DPR_LOSS_SUMS];
-#define DPR_ADD_PIXEL(name) name##_add(pixel, sums + name##_first);
+  const float weight = mask[i];
+  uint place = i;
+#define DPR_ADD_PIXEL(name)                                                                     \
+  if (DPR_IS_USED(used, name)) {                                                                \
+    float sums[name##_sums];                                                                    \
+    name##_add(pixel, sums);                                                                    \
+    for (uint k = 0; k < name##_sums; ++k, place += pixels) channels[place] = weight * sums[k]; \
+  }
   DPR_IMAGE_LOSSES(DPR_ADD_PIXEL)
-#pragma unroll
-  for (uint k = 0; k < DPR_LOSS_SUMS; ++k) channels[k * pixels + i] = mask[i] * sums[k];
 }
 
 /// d loss / d image of the mean over the views and levels. One work-item per pixel.
 /// in   views, pixels_per_view
 /// in   images         that the mean is over: levels times views, which may be more than these
-/// in   inverse_scale_squared  of the robust loss
-/// in   image, target  float4[view][pixel]  RGBA
-/// in   mask           float[view][pixel]   how much a pixel counts
-/// in   sums           float[DPR_LOSS_SUMS][view]
+/// in   used, inverse_scale_squared, image, target, mask  as image_loss_forward
+/// in   sums           float[sum used][view]
 /// in   weights        float[view][DPR_LOSS_COUNT]
 /// in   channels       float[view]  the sum of the mask times the colour channels
 /// out  grad_image     float4[view][pixel]
 kernel void image_loss_backward(const uint views, const uint pixels_per_view, const uint images,
-                                const float inverse_scale_squared, global const float4* restrict image,
-                                global const float4* restrict target, global const float* restrict mask,
-                                global const float* restrict sums, global const float* restrict weights,
-                                global const float* restrict channels, global float4* restrict grad_image) {
+                                const uint used, const float inverse_scale_squared,
+                                global const float4* restrict image, global const float4* restrict target,
+                                global const float* restrict mask, global const float* restrict sums,
+                                global const float* restrict weights, global const float* restrict channels,
+                                global float4* restrict grad_image) {
   const uint i = (uint)get_global_id(0);
   if (i >= views * pixels_per_view) return;
   const uint view = i / pixels_per_view;
   const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
-  float of_view[DPR_LOSS_SUMS];
-#pragma unroll
-  for (uint k = 0; k < DPR_LOSS_SUMS; ++k) of_view[k] = sums[k * views + view];
   global const float* weight = weights + view * DPR_LOSS_COUNT;
+  uint place = view;
   float4 grad = 0.0f;
-#define DPR_ADD_GRADIENT(name)       \
-  if (weight[name##_number] != 0.0f) \
-    grad += name##_gradient(weight[name##_number], pixel, of_view + name##_first);
+#define DPR_ADD_GRADIENT(name)                                                                         \
+  if (DPR_IS_USED(used, name)) {                                                                       \
+    float of_view[name##_sums];                                                                        \
+    for (uint k = 0; k < name##_sums; ++k, place += views) of_view[k] = sums[place];                   \
+    if (weight[name##_number] != 0.0f) grad += name##_gradient(weight[name##_number], pixel, of_view); \
+  }
   DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
   const float mean = 1.0f / channels[view];
-  grad_image[i] = (float4)(mean * grad.xyz, grad.w) / (float)images * mask[i];
+  grad_image[i] = (float4)(mean * grad.xyz, grad.w) * (mask[i] / (float)images);
 }
 
 /// A level of a pyramid from the one before: means of blocks of 2x2 pixels, at the border of those that are

@@ -42,11 +42,9 @@ typedef struct {
 /// In the order of dpr::LossKind.
 #define DPR_IMAGE_LOSSES(X) X(mse) X(l1) X(silhouette) X(robust) X(ssim)
 
-/// Their numbers, and where the sums of each begin.
+/// Their numbers.
 #define DPR_LOSS_NUMBER(name) name##_number,
-#define DPR_LOSS_FIRST_SUM(name) name##_first, name##_last = name##_first + name##_sums - 1,
 enum { DPR_IMAGE_LOSSES(DPR_LOSS_NUMBER) DPR_LOSS_COUNT };
-enum { DPR_IMAGE_LOSSES(DPR_LOSS_FIRST_SUM) DPR_LOSS_SUMS };
 
 #ifndef __OPENCL_C_VERSION__
 }  // namespace dpr::shared

@@ -3,12 +3,42 @@
 // has the list of its own.
 #include "rasterize.h"
 
-#define DPR_ROW_MASK 0xffu
+/// Pixels of a tile that a work-item of the listing kernels has to itself: on a CPU all of them, so that it
+/// reads the pairs of the tile once.
+#if DPR_WIDTH == 1
+#define DPR_TILE_SHARE 1
+#else
+#define DPR_TILE_SHARE (DPR_TILE * DPR_TILE)
+#endif
 
-/// A row of a mask: bit k is column k of the tile.
-static inline uint mask_row(uint2 mask, uint row) {
-  return ((row < 4 ? mask.x : mask.y) >> (8 * (row & 3))) & DPR_ROW_MASK;
+/// What a work-item of the listing kernels has.
+typedef struct {
+  uint tile;               // of all views
+  uint first;              // of its pixels, as the masks count them: 8 * row + column
+  uint view, column, row;  // where the tile begins
+} TileShare;
+
+static inline TileShare tile_share(const FrameParams p, uint i) {
+  const uint tiles = p.tiles_x * p.tiles_y, shares = DPR_TILE * DPR_TILE / DPR_TILE_SHARE;
+  TileShare s;
+  s.tile = i / shares;
+  s.first = i % shares * DPR_TILE_SHARE;
+  s.view = s.tile / tiles;
+  s.row = s.tile % tiles / p.tiles_x * DPR_TILE;
+  s.column = s.tile % p.tiles_x * DPR_TILE;
+  return s;
 }
+
+/// The pixel of a share that the masks call `bit`, if it is in the image.
+static inline int is_in_image(const FrameParams p, const TileShare s, uint bit) {
+  return s.row + bit / DPR_TILE < p.height && s.column + bit % DPR_TILE < p.width;
+}
+static inline uint pixel_of(const FrameParams p, const TileShare s, uint bit) {
+  return (s.view * p.height + s.row + bit / DPR_TILE) * p.width + s.column + bit % DPR_TILE;
+}
+
+static inline ulong whole_mask(uint2 mask) { return (ulong)mask.y << 32 | mask.x; }
+static inline uint lowest_bit_of(ulong mask) { return 63 - (uint)clz(mask & -mask); }
 
 /// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur
 /// distance. One work-item for every pair within the capacity; where there is no pair, nothing is covered.
@@ -34,30 +64,34 @@ kernel void rasterize_cover(const FrameParams p, const uint capacity, global con
   counts[pair] = popcount(mask.x) + popcount(mask.y);
 }
 
-/// Counts the fragments of every pixel. One work-item per vector of pixels of a tile's row.
+/// Counts the fragments of every pixel. One work-item per share of a tile.
 /// in   tile_starts  uint[view * tile + 1]  runs of pairs
 /// in   masks        as rasterize_cover leaves them
 /// out  counts       uint[view][height][width]
 kernel void rasterize_count(const FrameParams p, global const uint* restrict tile_starts,
                             global const uint2* restrict masks, global uint* restrict counts) {
-  const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
-  const uint tiles = p.tiles_x * p.tiles_y;
-  const uint i = (uint)get_global_id(0);
-  if (i >= p.views * tiles * parts) return;
-  const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
-  const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
-  const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
-  if (row >= p.height) return;
-
-  uintn sum = 0;
-  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
-    const uint bits = mask_row(masks[pair], part / DPR_TILE) >> (part % DPR_TILE);
-    sum += ((uintn)(bits) >> convert_uintn(DPR_LANE_INDEX)) & 1u;
+  const TileShare s = tile_share(p, (uint)get_global_id(0));
+  if (s.view >= p.views) return;
+  uintn sums[DPR_TILE_SHARE / DPR_WIDTH];
+  for (uint v = 0; v < DPR_TILE_SHARE / DPR_WIDTH; ++v) sums[v] = 0;
+  for (uint pair = tile_starts[s.tile]; pair < tile_starts[s.tile + 1]; ++pair) {
+    const ulong mask = whole_mask(masks[pair]) >> s.first;
+#pragma unroll
+    for (uint v = 0; v < DPR_TILE_SHARE / DPR_WIDTH; ++v)
+      sums[v] += ((uintn)((uint)(mask >> (v * DPR_WIDTH))) >> convert_uintn(DPR_LANE_INDEX)) & 1u;
   }
-  uint lanes[DPR_WIDTH];
-  store_n(sum, 0, lanes);
-  const uint pixel = (tile / tiles * p.height + row) * p.width + column;
-  for (uint lane = 0; lane < DPR_WIDTH && column + lane < p.width; ++lane) counts[pixel + lane] = lanes[lane];
+  for (uint v = 0; v < DPR_TILE_SHARE / DPR_WIDTH; ++v) {
+    const uint bit = s.first + v * DPR_WIDTH;
+    if (!is_in_image(p, s, bit)) continue;
+    if (is_in_image(p, s, bit + DPR_WIDTH - 1)) {
+      store_n(sums[v], pixel_of(p, s, bit), counts);
+      continue;
+    }
+    uint lanes[DPR_WIDTH];
+    store_n(sums[v], 0, lanes);
+    for (uint lane = 0; is_in_image(p, s, bit + lane); ++lane)
+      counts[pixel_of(p, s, bit + lane)] = lanes[lane];
+  }
 }
 
 /// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views,
@@ -128,38 +162,32 @@ kernel void rasterize_rebase(const uint first, const uint columns, const uint ro
   band_starts[run] = before + starts[run] - starts[begin];
 }
 
-/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per vector of
-/// pixels of a tile's row, up to `last_vector`.
+/// Lists the fragments of every pixel of a band, in the order of the faces. One work-item per share of a
+/// tile, up to `last_share`.
 /// in   tile_starts, masks  as rasterize_count
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixel_starts     uint[pixel + 1]  runs of the lists
 /// out  lists            uint[...]        fragments, by pixel
-kernel void rasterize_list(const FrameParams p, const uint last_vector,
+kernel void rasterize_list(const FrameParams p, const uint last_share,
                            global const uint* restrict tile_starts, global const uint2* restrict masks,
                            global const uint* restrict fragment_starts,
                            global const uint* restrict pixel_starts, global uint* restrict lists) {
-  const uint parts = DPR_TILE * DPR_TILE / DPR_WIDTH;
-  const uint tiles = p.tiles_x * p.tiles_y;
   const uint i = (uint)get_global_id(0);
-  if (i >= last_vector) return;
-  const uint tile = i / parts, in_view = tile % tiles, part = i % parts * DPR_WIDTH;
-  const uint row = in_view / p.tiles_x * DPR_TILE + part / DPR_TILE;
-  const uint column = in_view % p.tiles_x * DPR_TILE + part % DPR_TILE;
-  if (row >= p.height) return;
-
-  const uint pixel = (tile / tiles * p.height + row) * p.width + column;
-  uint next[DPR_WIDTH];
-  for (uint lane = 0; lane < DPR_WIDTH; ++lane)
-    next[lane] = column + lane < p.width ? pixel_starts[pixel + lane] : 0;
-  // The pixels of the tile before this vector: their bits say how many of a pair's fragments come first.
-  const uint2 before =
-      (uint2)(part < 32 ? (1u << part) - 1u : 0xffffffffu, part < 32 ? 0u : (1u << (part - 32)) - 1u);
-  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
-    const uint2 mask = masks[pair];
-    uint bits = mask_row(mask, part / DPR_TILE) >> (part % DPR_TILE) & ((1u << DPR_WIDTH) - 1u);
-    if (bits == 0) continue;
-    uint fragment = fragment_starts[pair] + popcount(mask.x & before.x) + popcount(mask.y & before.y);
-    for (; bits != 0; bits &= bits - 1) lists[next[lowest_bit(bits)]++] = fragment++;
+  if (i >= last_share) return;
+  const TileShare s = tile_share(p, i);
+  const uint first = tile_starts[s.tile], last = tile_starts[s.tile + 1];
+  if (first == last) return;
+  uint next[DPR_TILE_SHARE];
+  for (uint k = 0; k < DPR_TILE_SHARE; ++k)
+    next[k] = is_in_image(p, s, s.first + k) ? pixel_starts[pixel_of(p, s, s.first + k)] : 0;
+  // The share's pixels, and those before: their bits say how many of a pair's fragments come first.
+  const ulong own = (~0ul >> (DPR_TILE * DPR_TILE - DPR_TILE_SHARE)) << s.first,
+              before = (1ul << s.first) - 1;
+  for (uint pair = first; pair < last; ++pair) {
+    const ulong mask = whole_mask(masks[pair]);
+    uint fragment = fragment_starts[pair] + (uint)popcount(mask & before);
+    for (ulong bits = mask & own; bits != 0; bits &= bits - 1)
+      lists[next[lowest_bit_of(bits) - s.first]++] = fragment++;
   }
 }
 
@@ -169,7 +197,7 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
   uint lanes[DPR_WIDTH];
 #pragma unroll
   for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-    const uint bit = 63 - (uint)clz(*mask & -*mask);
+    const uint bit = lowest_bit_of(*mask);
     lanes[lane] = corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
     const ulong rest = *mask & (*mask - 1);
     *mask = rest != 0 ? rest : *mask;
@@ -204,7 +232,7 @@ kernel void rasterize_forward(const FrameParams p, const uint2 pairs,
     const uint corner = tile % p.tiles_x * DPR_TILE | tile / p.tiles_x * DPR_TILE << 16;
     const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
     const float error = side_error(p, t);
-    ulong mask = (ulong)masks[pair].y << 32 | masks[pair].x;
+    ulong mask = whole_mask(masks[pair]);
     for (uint i = first; i < last; i += DPR_WIDTH) {
       const uintn packed = take_pixels(&mask, corner);
       store_run_uint((uintn)(pair), i, end, fragment_pair);

@@ -1,14 +1,9 @@
-// Sums over segments, channel by channel, with Neumaier's compensation: sensitivities cancel heavily, and a
-// plain sum would lose what is left. The order of additions is fixed, so the result is the same from run to
-// run.
+// Sums over segments, channel by channel. The order of additions is fixed, so the result is the same from run
+// to run.
+#include "compensated.h"
 #include "tile_lanes.h"
 
-/// Adds x to a sum and its running error (Neumaier 1974). Adding zero changes no bit of either.
-static inline void compensated_add(realn* sum, realn* error, realn x) {
-  const realn t = *sum + x;
-  *error += choose(fabs(*sum) >= fabs(x), (*sum - t) + x, (x - t) + *sum);
-  *sum = t;
-}
+DPR_COMPENSATED_ADD(compensated_add, realn)
 
 /// A vector whose lanes from `last` on are zero.
 static inline realn load_until(uint first, uint last, global const float* values) {
@@ -19,8 +14,9 @@ static inline realn load_until(uint first, uint last, global const float* values
   return load_n(0, lanes);
 }
 
-/// Slot k sums the elements k, k + slots, k + 2 slots ... of its segment. One work-item per (channel,
-/// segment, vector of slots); `slots` is a multiple of the widest vector.
+/// Every slot sums its elements of its segment: on a GPU, where neighbours' loads go together, slot k those
+/// at k, k + slots, k + 2 slots ...; a vector of slots those of a run of its own, which a CPU's caches
+/// follow. One work-item per (channel, segment, vector of slots); `slots` is a multiple of the widest vector.
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
 /// in   values   float[channel][count], of so many `channels` and `segments`
 /// out  partial  float[channel][segment][2][slot]  sums, and their compensations
@@ -32,12 +28,16 @@ kernel void reduce_partial(const uint count, const uint channels, const uint seg
   if (i >= channels * segments * vectors) return;
   const uint slot = i % vectors * DPR_WIDTH, segment = i / vectors % segments,
              channel = i / vectors / segments;
-  const uint last = starts[(segment + 1) * stride];
+  const uint begin = starts[segment * stride], end = starts[(segment + 1) * stride];
+#if DPR_WIDTH == 1
+  const uint first = begin + slot, last = end, step = slots;
+#else
+  const uint run = (end - begin + slots - 1) / slots;  // vectors
+  const uint first = begin + slot * run, last = min(end, first + DPR_WIDTH * run), step = DPR_WIDTH;
+#endif
   global const float* of_channel = values + (size_t)channel * count;
   realn sum = 0.0f, error = 0.0f;
-  for (uint k = starts[segment * stride] + slot; k < last; k += slots) {
-    compensated_add(&sum, &error, load_until(k, last, of_channel));
-  }
+  for (uint k = first; k < last; k += step) compensated_add(&sum, &error, load_until(k, last, of_channel));
   global float* out = partial + (size_t)2 * slots * (channel * segments + segment) + slot;
   store_n(sum, 0, out);
   store_n(error, slots, out);

@@ -1,17 +1,18 @@
 // Triangles of a view: assembled from projected vertices, culled, bounded, and the tiles of each counted.
 #include "setup.h"
 
-/// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 for what is dropped: what
-/// reaches nearer than znear, lies wholly beyond zfar, has exactly no area, or reaches beyond DPR_MAX_NDC.
-static inline int orientation_of(float3 a, float3 b, float3 c, float znear, float zfar) {
-  const float2 lowest = fmin(fmin(a.xy, b.xy), c.xy), highest = fmax(fmax(a.xy, b.xy), c.xy);
-  const float2 reach = fmax(fabs(lowest), fabs(highest));
-  // Written so that a NaN fails.
-  const int in_range =
-      fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC;
-  const int in_view = a.z >= znear && b.z >= znear && c.z >= znear && fmin(fmin(a.z, b.z), c.z) < zfar &&
-                      fmax(fmax(a.z, b.z), c.z) < INFINITY;
-  return in_range && in_view ? side_of_line(a.xy, b.xy, c.xy) : 0;
+/// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 where it reaches nearer than
+/// znear or has exactly no area. Written so that a NaN fails.
+static inline int orientation_of(float3 a, float3 b, float3 c, float znear) {
+  const int in_view = a.z >= znear && b.z >= znear && c.z >= znear;
+  return in_view && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY ? side_of_line(a.xy, b.xy, c.xy) : 0;
+}
+
+/// False for what lies wholly beyond zfar, infinitely far, or reaches beyond DPR_MAX_NDC.
+static inline int is_in_range(float3 a, float3 b, float3 c, float zfar) {
+  const float2 reach = fmax(fmax(fabs(a.xy), fabs(b.xy)), fabs(c.xy));
+  return fmax(reach.x, reach.y) < DPR_MAX_NDC && fmin(fmin(a.z, b.z), c.z) < zfar &&
+         fmax(fmax(a.z, b.z), c.z) < INFINITY;
 }
 
 static inline uint count_tiles(const FrameParams p, const Triangle t) {
@@ -23,30 +24,34 @@ static inline uint count_tiles(const FrameParams p, const Triangle t) {
   return count;
 }
 
-/// Assembles the triangles, and counts the tiles of each. Dropped is what orientation_of() drops, cannot be
-/// seen, or whose blurred bounds miss the image; what is kept has no tile where its bounds hold no sample, or
-/// it is small and owns none. One work-item per (view, face).
+/// Assembles the triangles, and counts the tiles of each. Dropped is what has no orientation, is culled or
+/// not in range, cannot be seen, or whose blurred bounds miss the image; what is kept has no tile where its
+/// bounds hold no sample, or it is small and owns none. One work-item per (view, face).
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
 /// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
+/// out  facing     uint[view][face]        see DPR_FACE_DROPPED; of what is not seen too
 /// out  kept       uint[view][face]        0 or 1
 /// out  counts     uint[view][face]        tiles that are listed for it
 /// out  triangles  Triangle[view][face]    not written where there is no tile
 kernel void setup_forward(const FrameParams p, global const ViewParams* restrict views,
                           global const uint4* restrict faces, global const float4* restrict ndc,
-                          global const float* restrict hidden, global uint* restrict kept,
-                          global uint* restrict counts, global Triangle* restrict triangles) {
+                          global const float* restrict hidden, global uint* restrict facing,
+                          global uint* restrict kept, global uint* restrict counts,
+                          global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
   const uint4 face = faces[i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
   const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
-  const int orientation = orientation_of(a, b, c, views[view].znear, views[view].zfar);
+  int orientation = orientation_of(a, b, c, views[view].znear);
+  if ((float)orientation == p.culled) orientation = 0;
+  facing[i] = facing_of(orientation);
   const PixelBounds bounds = bounds_of(p, fmin(fmin(a.xy, b.xy), c.xy), fmax(fmax(a.xy, b.xy), c.xy));
-  const int is_kept = orientation != 0 && (float)orientation != p.culled &&
-                      (float)orientation != hidden[view * p.meshes + face.w] && meets_image(p, bounds);
+  const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
+                      is_in_range(a, b, c, views[view].zfar) && meets_image(p, bounds);
   kept[i] = is_kept ? 1 : 0;
   counts[i] = 0;
   if (!is_kept) return;

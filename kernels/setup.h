@@ -7,6 +7,11 @@
 /// Corners further away than this, NDC, have squared distances that single precision does not hold.
 #define DPR_MAX_NDC 1e18f
 
+/// How a face of that orientation looks.
+static inline uint facing_of(int orientation) {
+  return orientation > 0 ? DPR_FACE_FRONT : orientation < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
+}
+
 /// Blurred bounds in pixels, of what lies between two corners of NDC.
 typedef struct {
   float left, top, right, bottom;

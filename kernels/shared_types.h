@@ -115,6 +115,12 @@ using float4 = cl_float4;
 #define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
 
+/// How a face looks from a view: which way its corners wind in NDC. Dropped is what is culled, has no area or
+/// reaches nearer than the near plane, if the plane leaves nothing of it.
+#define DPR_FACE_DROPPED 0
+#define DPR_FACE_FRONT 1 /* counter-clockwise */
+#define DPR_FACE_BACK 2
+
 /// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own
 /// face where colours or normals may jump there, in the other where it goes through the edge in the same
 /// direction. DPR_EDGE_SEAM is set in the own face where the texture jumps.

@@ -16,8 +16,8 @@
 namespace dpr {
 namespace {
 
-#define DPR_LOSS_ROW(name)                                                                       \
-  ImageLossRow{#name, &LossWeights::name, shared::name##_first, shared::name##_reads_alpha != 0, \
+#define DPR_LOSS_ROW(name)                                                                      \
+  ImageLossRow{#name, &LossWeights::name, shared::name##_sums, shared::name##_reads_alpha != 0, \
                shared::name##_value},
 constexpr std::array k_losses{DPR_IMAGE_LOSSES(DPR_LOSS_ROW)};
 #define DPR_LOSS_ORDER(name) static_assert(static_cast<int>(LossKind::name) == shared::name##_number);
@@ -152,6 +152,8 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
     const bool shows_alpha = options.has_alpha.empty() || options.has_alpha[view] != 0;
     for (const ImageLossRow& loss : k_losses)
       view_weights.push_back(loss.reads_alpha && !shows_alpha ? 0 : options.weights.*loss.weight);
+    for (std::size_t loss = 0; loss < k_losses.size(); ++loss)
+      used |= weight(view, loss) != 0 ? 1U << loss : 0U;
   }
   device_weights.upload(device.impl(), view_weights);
   if (options.weights.ssim > 0) {
@@ -172,6 +174,12 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
   }
   for (const AttributeTarget& target : options.attributes)
     attributes.emplace_back(device, target, options.levels);
+}
+
+std::size_t ImageLoss::Impl::sums_before(std::size_t loss) const {
+  std::size_t sums = 0;
+  for (std::size_t before = 0; before < loss; ++before) sums += is_used(before) ? k_losses[before].sums : 0;
+  return sums;
 }
 
 void ImageLoss::Impl::set_views_of_mean(std::size_t count) {
@@ -202,7 +210,7 @@ ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> target
   if (ssim) level.windows.upload(d, ssim_windows(masks));
   level.device_channels.upload(d, level.channels);
   level.view_starts.upload(d, starts);
-  level.per_pixel.resize(d, shared::DPR_LOSS_SUMS * values.size());
+  level.per_pixel.resize(d, sums_before(k_losses.size()) * values.size());
   level.grad_image.resize(d, values.size());
   return level;
 }
@@ -253,14 +261,19 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
       shrink(pixels, static_cast<cl_uint>(before.width), static_cast<cl_uint>(before.height),
              static_cast<cl_uint>(pixels), l == 1 ? full : before.image, level.image);
     }
+    if (used == 0) {  // attributes alone
+      level.grad_image.fill(cl_float4{});
+      continue;
+    }
     const Buffer<cl_float4>& image = l == 0 ? full : level.image;
-    forward(pixels, static_cast<cl_uint>(pixels), inverse_scale_squared, image, level.target, level.mask,
-            level.per_pixel);
-    if (ssim) ssim->forward(windowed(level, image), shared::ssim_first * pixels, level.per_pixel);
-    reduce({pixels, shared::DPR_LOSS_SUMS, views, 1, level.view_starts, level.per_pixel}, level.sums);
+    forward(pixels, static_cast<cl_uint>(pixels), used, inverse_scale_squared, image, level.target,
+            level.mask, level.per_pixel);
+    if (ssim)
+      ssim->forward(windowed(level, image), sums_before(shared::ssim_number) * pixels, level.per_pixel);
+    reduce({pixels, sums_before(k_losses.size()), views, 1, level.view_starts, level.per_pixel}, level.sums);
     backward(pixels, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
-             static_cast<cl_uint>(views_of_mean * levels.size()), inverse_scale_squared, image, level.target,
-             level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
+             static_cast<cl_uint>(views_of_mean * levels.size()), used, inverse_scale_squared, image,
+             level.target, level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
     if (ssim) ssim->backward(windowed(level, image), ssim_weights, level.grad_image);
   }
   for (std::size_t l = levels.size() - 1; l > 0; --l) {
@@ -280,13 +293,14 @@ void ImageLoss::Impl::add_attribute_gradients(SceneGradient& gradient) {
 void ImageLoss::Impl::add_values(const Level& level) {
   const std::vector<float> sums = level.sums.download();
   for (std::size_t view = 0; view < views; ++view) {
-    std::array<double, shared::DPR_LOSS_SUMS> of_view{};
-    for (std::size_t k = 0; k < of_view.size(); ++k) of_view[k] = static_cast<double>(sums[k * views + view]);
+    std::vector<double> of_view;
+    for (std::size_t place = view; place < sums.size(); place += views)
+      of_view.push_back(static_cast<double>(sums[place]));
     for (std::size_t l = 0; l < k_losses.size(); ++l) {
-      per_view[view] +=
-          k_losses[l].value(static_cast<double>(weight(view, l)), &of_view[k_losses[l].first_sum],
-                            static_cast<double>(level.channels[view])) /
-          static_cast<double>(levels.size());
+      if (!is_used(l)) continue;
+      per_view[view] += k_losses[l].value(static_cast<double>(weight(view, l)), &of_view[sums_before(l)],
+                                          static_cast<double>(level.channels[view])) /
+                        static_cast<double>(levels.size());
     }
   }
 }

@@ -17,8 +17,8 @@ namespace dpr {
 struct ImageLossRow {
   std::string_view name;
   float LossWeights::*weight;
-  std::size_t first_sum;  ///< of DPR_LOSS_SUMS
-  bool reads_alpha;       ///< counts only where the target has a silhouette
+  std::size_t sums;  ///< numbers that it sums over the pixels of a view
+  bool reads_alpha;  ///< counts only where the target has a silhouette
   /// Weight times the loss of a view of so many pixels times colour channels, from its sums.
   double (*value)(double weight, const double* sums, double channels);
 };
@@ -43,7 +43,7 @@ struct ImageLoss::Impl {
     Buffer<float> device_channels;
     Buffer<float> windows;          // [view][height][width] of ssim, where it counts
     Buffer<cl_uint> view_starts;    // [view + 1] pixels
-    Buffer<float> per_pixel, sums;  // [DPR_LOSS_SUMS][view][pixel], [DPR_LOSS_SUMS][view]
+    Buffer<float> per_pixel, sums;  // [sum used][view][pixel], [sum used][view]
     Buffer<cl_float4> image;        // [view][height][width] of smaller levels than the first
     Buffer<cl_float4> grad_image;   // [view][height][width]
 
@@ -77,6 +77,10 @@ struct ImageLoss::Impl {
   /// Adds the gradients of the attributes after evaluate().
   void add_attribute_gradients(SceneGradient& gradient);
   void add_values(const Level& level);
+  /// A loss that counts in some view.
+  bool is_used(std::size_t loss) const { return (used >> loss & 1U) != 0; }
+  /// How many sums the losses before it need that count.
+  std::size_t sums_before(std::size_t loss) const;
 
   Device device;
   int width, height;
@@ -84,12 +88,13 @@ struct ImageLoss::Impl {
   std::size_t views_of_mean;
   std::vector<double> per_view;
   std::vector<float> view_weights;  // [view][loss]
+  cl_uint used = 0;                 // bit k: is_used(k)
   float inverse_scale_squared;
   std::uint64_t frame_number = 0;  // of the render that grad_image belongs to; 0: none
 
-  Kernel<cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, Out<float>> forward;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, In<float>, In<float>,
-         In<float>, Out<cl_float4>>
+  Kernel<cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, Out<float>> forward;
+  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, In<float>,
+         In<float>, In<float>, Out<cl_float4>>
       backward;
   Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> shrink, shrink_backward;
   Reduce reduce;

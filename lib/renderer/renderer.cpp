@@ -137,13 +137,10 @@ std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
 }
 
 ContourInputs Renderer::Impl::contour_inputs() const {
-  return {frame,
-          device_views,
-          *geometry,
-          *pixel_noise->edges,
-          transform,
-          clip.faces,
-          scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
+  return {frame,      device_views,
+          *geometry,  *pixel_noise->edges,
+          transform,  setup.facing,
+          clip.faces, scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
 }
 
 Blur::Size Renderer::Impl::image_size() const {
@@ -278,7 +275,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (pixel_noise)
       pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc, clip.grad);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
-    transform.backward(frame, device_views, *geometry, shade.lit(), grad_ndc, clip.grad, grad_world);
+    transform.backward(frame, device_views, shade.lit(), grad_ndc, clip.grad, grad_world);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
   gather_mesh_gradients(add_to_positions);

@@ -40,10 +40,10 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
   if (wants_colors() && frame.color_stride != 0) {
-    gather.per_view(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+    gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                     grad_colors);
   } else if (wants_colors()) {
-    gather.over_views(frame, geometry->colors, bin, geometry->color_corners, shade.grad_corner_colors,
+    gather.over_views(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                       grad_colors);
   }
   if (wants_texcoords()) {
@@ -183,7 +183,8 @@ void Renderer::Impl::sum_gradients() {
        aggregate.channels},
       sigma,
       {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
-       views.size() * scene.meshes.size(), 1, view_vertex_starts, transform.channels},
+       views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
+       transform.slots},
       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs},
       {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
        shade.light_channels, pairs}};

@@ -37,7 +37,6 @@ struct OnDevice {
 struct ViewSet {
   std::vector<View> views;
   DeviceViews device_views;
-  Buffer<cl_uint> view_vertex_starts;  // [view * mesh + 1] of [view][vertex]: segments of the pose gradients
   shared::FrameParams frame{};
   bool has_device_poses = false, has_device_cameras = false;  // which the host does not know
 

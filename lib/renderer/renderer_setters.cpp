@@ -130,7 +130,7 @@ Smoothing without_distance_noise(Smoothing smoothing) {
 
 std::size_t ViewSet::bytes() const {
   return device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
-         view_vertex_starts.capacity_bytes();
+         device_views.vertex_starts.capacity_bytes();
 }
 
 void Renderer::Impl::set_scene(const Scene& wanted) {
@@ -196,7 +196,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
   prepared.views.assign(its_views.begin(), its_views.end());
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);
-  prepared.view_vertex_starts.upload(device.impl(), starts);
+  prepared.device_views.vertex_starts.upload(device.impl(), starts);
 }
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {

@@ -89,11 +89,12 @@ Weights fine_weights(const PriorRow& row, double scale, int radius) {
                  [&row](double x) { return tapered_density(row, x); });
 }
 
-/// Four boxes as wide as the grid's spacing, one after the other: the cubic B-spline on samples. Copies a
-/// spacing apart add up to a constant.
+/// Boxes as wide as the grid's spacing, one after the other, whose result is the quintic B-spline on samples.
+/// Copies a spacing apart add up to a constant.
+constexpr int k_boxes = 6;
 Weights spline(int decimation) {
   Weights weights{1};
-  for (int box = 0; box < 4; ++box) {
+  for (int box = 0; box < k_boxes; ++box) {
     Weights wider(weights.size() + static_cast<std::size_t>(decimation) - 1);
     for (std::size_t i = 0; i < weights.size(); ++i) {
       for (int k = 0; k < decimation; ++k) wider[i + static_cast<std::size_t>(k)] += weights[i] / decimation;
@@ -103,8 +104,9 @@ Weights spline(int decimation) {
   return weights;
 }
 
-/// The Fourier transform of the density, of scale 1, from samples of it.
+/// The Fourier transform of the density, of scale 1; where the prior has none of its own, from samples.
 double spectrum(const PriorRow& row, double frequency) {
+  if (row.spectrum != nullptr) return row.spectrum(frequency);
   constexpr int k_samples_per_scale = 8;
   const int last = static_cast<int>(row.pixel_reach * k_samples_per_scale);
   double sum = tapered_density(row, 0), integral = sum;
@@ -127,7 +129,7 @@ Weights coarse_weights(const PriorRow& row, double scale, int decimation, int ra
     const double frequency = static_cast<double>(i) / period;  // of the coarse grid
     const double box =
         i == 0 ? 1 : std::sin(pi * frequency) / (decimation * std::sin(pi * frequency / decimation));
-    double amplitude = spectrum(row, frequency * scale / decimation) / std::pow(box, 8);
+    double amplitude = spectrum(row, frequency * scale / decimation) / std::pow(box, 2 * k_boxes);
     if (i > 0 && 2 * i < period) amplitude *= 2;  // for the negative frequency
     for (int node = -radius; node <= radius; ++node) {
       weights[static_cast<std::size_t>(node + radius)] += amplitude * std::cos(2 * pi * frequency * node);
@@ -183,8 +185,8 @@ void set_coarse(BlurKernel& kernel, const PriorRow& row, double scale) {
   const int spacing = std::max(k_least_spacing, static_cast<int>(scale / std::max(k_nodes, row.pixel_nodes)));
   const int radius = static_cast<int>(std::ceil(row.pixel_reach * scale / spacing)) - 1;
   kernel.decimation = spacing;
-  // A pixel's outermost node lies two spacings from it, its outermost neighbour reaches two further.
-  kernel.margin = (radius + 4) * spacing - 4;
+  // To a pixel's outermost node, from there to its outermost neighbour, and to what that reads.
+  kernel.margin = radius * spacing + k_boxes * (spacing - 1);
   Weights weights = spline(spacing);
   kernel.reduce = rounded(weights);
   for (double& weight : weights) weight *= spacing;

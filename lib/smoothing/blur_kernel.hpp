@@ -11,12 +11,12 @@ namespace dpr {
 /// the raster's expectation where the noise moves the sample to. All weights are symmetric about their
 /// middle.
 ///
-/// Up to a scale of 8 samples, Cauchy 14, `decimation` is 1 and `weights` lead from samples to pixels. Above,
-/// the raster is projected to a coarse grid by cubic B-splines (`reduce`), convolved there (`weights`), and
-/// expanded by the same splines
-/// (`expand`), so that the cost of a pixel does not grow with the scale. The splines' own blur is divided out
-/// of the weights. The error of the kernel is below 1e-4 of its peak. The uniform density has jumps, which
-/// splines cannot follow: it is convolved sample by sample at every scale.
+/// Up to a scale of some samples (Gaussian 4, logistic 8, Cauchy 14) `decimation` is 1 and `weights` lead
+/// from samples to pixels. Above, the raster is projected to a coarse grid by quintic B-splines (`reduce`),
+/// convolved there (`weights`), and expanded by the same splines (`expand`), so that the cost of a pixel does
+/// not grow with the scale. The splines' own blur is divided out of the weights. The error of the kernel is
+/// below 2e-4 of its peak. The uniform density has jumps, which splines cannot follow: it is convolved sample
+/// by sample at every scale.
 struct BlurKernel {
   int margin = 0;                                ///< samples that the raster needs on each side of the frame
   int supersampling = 1;                         ///< samples of a pixel along the axis

@@ -10,6 +10,11 @@ namespace {
 
 double gaussian_density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
 
+double gaussian_spectrum(double frequency) {
+  const double x = 2 * std::numbers::pi * frequency;
+  return std::exp(-0.5 * x * x);
+}
+
 /// 1 - Phi(x) = tail. Newton's method on ln(1 - Phi), which is concave and falls: from the right of the
 /// solution it converges monotonically. It starts there, because 1 - Phi(x) <= exp(-x^2 / 2) / 2.
 double gaussian_upper_quantile(double tail) {
@@ -39,7 +44,9 @@ constexpr std::array<PriorRow, 5> k_priors{
       .density = gaussian_density,
       .score = [](double z) { return z; },
       .variance = 1,
-      .pixel_reach = 4.5},
+      .pixel_reach = 4.5,
+      .spectrum = gaussian_spectrum,
+      .pixel_nodes = 2},
      {.prior = Prior::cauchy,
       .name = "cauchy",
       .upper_quantile = [](double tail) { return 1 / std::tan(std::numbers::pi * tail); },

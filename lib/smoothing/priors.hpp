@@ -27,7 +27,9 @@ struct PriorRow {
   /// Noise of a pixel's position: where it ends, in scales, and how far before that its density, there below
   /// 4e-4 of the peak, Cauchy's below 3e-2, starts to fall to zero.
   double pixel_reach = 0, pixel_taper = 0.5;
-  /// Nodes of a coarse grid that a scale needs for an error below 1e-4 of the peak.
+  /// The Fourier transform of the density; null where it is that of what is left of it within the reach.
+  double (*spectrum)(double frequency) = nullptr;
+  /// Nodes of a coarse grid that a scale needs for an error below 2e-4 of the peak.
   double pixel_nodes = 4;
 
   bool has_score() const { return score != nullptr; }

@@ -36,7 +36,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
   cross_(tiles_of(in.p), in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
-         in.geometry.face_vertices, contour.facing, in.transform.ndc, in.clipped, contour.tile_starts,
+         in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.tile_starts,
          contour.pair_contour, front, winner, cut);
 }
 
@@ -55,8 +55,8 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
             grad_cut_, grad_raster);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
-                  in.geometry.face_vertices, contour.facing, in.transform.ndc, in.clipped,
-                  contour.pair_contour, contour.pair_tile, winner, cut, grad_cut_, grad_ends);
+                  in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
+                  contour.pair_tile, winner, cut, grad_cut_, grad_ends);
 }
 
 std::size_t Antialias::bytes() const {

@@ -70,16 +70,21 @@ Blur::Axis Blur::axis(std::size_t pixels) const {
   const std::size_t in_frame = pixels * static_cast<std::size_t>(k.supersampling);
   const std::size_t samples = in_frame + 2 * static_cast<std::size_t>(k.margin);
   if (!is_coarse()) return {pixels, samples, samples, pixels};
-  // Nodes whose splines reach into the frame, from the one before it on.
-  const auto spacing = static_cast<std::size_t>(k.decimation);
-  const std::size_t out = (in_frame + 2 * spacing - 3) / spacing + 2;
+  // Nodes whose splines reach into the frame.
+  const std::size_t spacing = static_cast<std::size_t>(k.decimation), reach = k.reduce.size() / 2;
+  const std::size_t out = nodes_before_frame() + (in_frame - 1 + reach) / spacing + 1;
   return {pixels, samples, out + k.weights.size() - 1, out};
+}
+
+std::size_t Blur::nodes_before_frame() const {
+  return now_.kernel.reduce.size() / 2 / static_cast<std::size_t>(now_.kernel.decimation);
 }
 
 shared::BlurPass Blur::reduction(const Axis& axis) const {
   const BlurKernel& k = now_.kernel;
   const int radius = to_int(k.weights.size() / 2);
-  const int offset = k.margin + to_int(k.reduce.size() / 2) - (1 + radius) * k.decimation;
+  const int before = to_int(nodes_before_frame()) + radius;
+  const int offset = k.margin + to_int(k.reduce.size() / 2) - before * k.decimation;
   return pass_of(axis.in, axis.samples, k.decimation, 1, offset, k.reduce.size());
 }
 
@@ -91,8 +96,9 @@ shared::BlurPass Blur::convolution(const Axis& axis) const {
 
 shared::BlurPass Blur::expansion(const Axis& axis) const {
   const BlurKernel& k = now_.kernel;
-  // The middle of the spline of node 0, which has one before it, at sample 0.
-  const int offset = k.decimation + to_int(k.reduce.size() / 2) + k.supersampling - 1;
+  // The middle of the spline of the first node that is not before the frame, at sample 0.
+  const int before = to_int(nodes_before_frame()) * k.decimation;
+  const int offset = before + to_int(k.reduce.size() / 2) + k.supersampling - 1;
   return pass_of(axis.pixels, axis.out, k.supersampling, k.decimation, offset, k.expand.size());
 }
 

@@ -51,6 +51,8 @@ class Blur {
     std::size_t pixels, samples, in, out;
   };
   Axis axis(std::size_t pixels) const;
+  /// Of the coarse grid: those whose splines reach into it.
+  std::size_t nodes_before_frame() const;
   bool is_coarse() const { return now_.kernel.decimation > 1; }
 
   using Pass = shared::BlurPass;

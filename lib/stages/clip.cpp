@@ -17,7 +17,7 @@ void Clip::forward(const shared::FrameParams& p, const DeviceViews& views, const
   const std::size_t count = std::size_t{p.views} * p.faces;
   faces.resize(device_, count);
   kernels_->forward(count, p, views.cameras, geometry.face_vertices, transform.world, transform.ndc, faces,
-                    setup.kept, setup.counts, setup.triangles);
+                    setup.facing, setup.kept, setup.counts, setup.triangles);
 }
 
 void Clip::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,

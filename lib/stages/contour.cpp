@@ -96,7 +96,6 @@ std::size_t Edges::bytes() const {
 
 Contour::Contour(Device::Impl& device)
     : device_(device),
-      facing_(device, "contour.cl", "contour_facing"),
       count_(device, "contour.cl", "contour_count"),
       fill_(device, "contour.cl", "contour_fill"),
       link_(device, "bin.cl", "bin_link"),
@@ -150,16 +149,13 @@ std::size_t Contour::capacity_for(std::size_t count) const {
 }
 
 void Contour::count(const ContourInputs& in) {
-  const std::size_t faces = std::size_t{in.p.views} * in.p.faces;
   if (view_edges(in) > std::numeric_limits<cl_uint>::max() / DPR_CONTOUR_FLAGS) {
     throw InvalidArgument("edges (frame)", std::to_string(view_edges(in)),
                           "fewer, so that they can be counted");
   }
-  facing.resize(device_, faces);
-  facing_(faces, in.p, in.views.cameras, in.geometry.face_vertices, in.transform.ndc, in.clipped, facing);
   counts_.resize(device_, view_edges(in));
-  count_(view_edges(in), in.p, params(in), in.edges.edges, facing, in.transform.ndc, in.transform.world,
-         in.geometry.face_vertices, in.clipped, in.geometry.face_colors, in.geometry.colors_of(in.p),
+  count_(view_edges(in), in.p, params(in), in.edges.edges, in.facing, in.transform.ndc, in.transform.world,
+         in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
          counts_);
   scan_(view_edges(in), counts_, pair_starts);
 }
@@ -170,8 +166,8 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
   fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.end_starts,
-        in.edges.ends, facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
-        in.geometry.face_colors, in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
+        in.edges.ends, in.facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
+        in.geometry.face_colors(), in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
         pair_tile, places_);
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
@@ -192,8 +188,8 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
 
 std::size_t Contour::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
-  for (const Buffer<cl_uint>* buffer : {&facing, &pair_contour, &pair_tile, &tile_starts, &counts_,
-                                        &pair_count, &pair_starts, &edge_pairs_, &place_contour_, &places_}) {
+  for (const Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &tile_starts, &counts_, &pair_count,
+                                        &pair_starts, &edge_pairs_, &place_contour_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

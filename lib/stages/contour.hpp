@@ -35,6 +35,7 @@ struct ContourInputs {
   const Geometry& geometry;
   const Edges& edges;
   const Transform& transform;
+  const Buffer<cl_uint>& facing;               ///< [view][face] Setup::facing
   const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set
   std::optional<Shading> shading;              ///< of a lit scene
 };
@@ -64,7 +65,6 @@ class Contour {
   std::size_t pairs = 0;         ///< or the capacity, until the number is known
   Buffer<cl_uint> pair_count;    ///< [1] how many there are, 0 where they do not fit
   Buffer<cl_uint> pair_starts;   ///< [view * edge + 1] runs of the edges' pairs
-  Buffer<cl_uint> facing;        ///< [view][face] DPR_FACE_FRONT, ...
   Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
   Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
   Buffer<cl_uint> tile_starts;   ///< [view * tile + 1] runs of pairs
@@ -76,9 +76,6 @@ class Contour {
   void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<shared::ClippedFace>,
-         Out<cl_uint>>
-      facing_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
          In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
       count_;

@@ -90,37 +90,50 @@ void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::siz
 }
 
 Geometry::Geometry(Device::Impl& device, const Scene& scene) {
-  std::vector<cl_float4> all_positions, all_colors;
+  std::vector<cl_float4> all_positions;
   std::vector<cl_uint> all_mesh;
-  std::vector<cl_uint4> all_faces, all_face_colors;
+  std::vector<cl_uint4> all_faces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;
-    const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
     const cl_uint base = to_uint(all_positions.size());
-    meshes.push_back({all_positions.size(), mesh.positions.size(), all_colors.size(), mesh_color.size()});
-    for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
-      const glm::uvec3& f = mesh.faces[face];
+    meshes.push_back({.first_vertex = all_positions.size(), .vertices = mesh.positions.size()});
+    for (const glm::uvec3& f : mesh.faces)
       all_faces.push_back({{base + f.x, base + f.y, base + f.z, to_uint(m)}});
-      all_face_colors.push_back(corner_colors(mesh, face, all_colors.size()));
-    }
     for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
-    for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
     all_mesh.resize(all_positions.size(), to_uint(m));
   }
   vertices = all_positions.size();
   faces = all_faces.size();
-  colors = all_colors.size();
   if (faces > std::numeric_limits<cl_uint>::max() / 3) {
     throw InvalidArgument("faces (scene)", std::to_string(faces), "at most 2^32 / 3");
   }
   positions.upload(device, all_positions);
   vertex_mesh.upload(device, all_mesh);
   face_vertices.upload(device, all_faces);
-  face_colors.upload(device, all_face_colors);
-  color_values.upload(device, all_colors);
   vertex_corners = make_incidence(device, all_faces, vertices);
-  color_corners = make_incidence(device, all_face_colors, colors);
+  add_colors(device, scene);
   if (is_textured(scene)) add_textures(device, scene);
+}
+
+void Geometry::add_colors(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_float4> all_colors;
+  std::vector<cl_uint4> all_faces;
+  colors_by_vertex_ =
+      std::ranges::all_of(scene.meshes, [](const Instance& i) { return !i.mesh.vertex_colors.empty(); });
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = scene.meshes[m].mesh;
+    const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
+    meshes[m].first_color = all_colors.size();
+    meshes[m].colors = mesh_color.size();
+    for (std::size_t face = 0; face < mesh.faces.size() && !colors_by_vertex_; ++face)
+      all_faces.push_back(corner_colors(mesh, face, all_colors.size()));
+    for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
+  }
+  colors = all_colors.size();
+  color_values.upload(device, all_colors);
+  if (colors_by_vertex_) return;
+  face_colors_.upload(device, all_faces);
+  color_corners_ = make_incidence(device, all_faces, colors);
 }
 
 /// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.
@@ -165,10 +178,10 @@ std::size_t Textures::bytes() const {
 
 std::size_t Geometry::bytes() const {
   std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() +
-                      face_vertices.capacity_bytes() + face_colors.capacity_bytes() +
+                      face_vertices.capacity_bytes() + face_colors_.capacity_bytes() +
                       color_values.capacity_bytes() + view_positions.capacity_bytes() +
                       view_colors.capacity_bytes() + textures.bytes();
-  for (const Incidence* incidence : {&vertex_corners, &color_corners}) {
+  for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }
   return bytes;

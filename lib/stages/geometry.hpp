@@ -20,7 +20,7 @@ struct Incidence {
 
 /// Where a mesh lies in the joined buffers.
 struct MeshRange {
-  std::size_t first_vertex, vertices, first_color, colors;
+  std::size_t first_vertex = 0, vertices = 0, first_color = 0, colors = 0;
   std::size_t first_texcoord = 0, texcoords = 0;  // of textured meshes
   std::size_t first_texture = 0;
 };
@@ -54,10 +54,9 @@ struct Geometry {
   Buffer<cl_float4> positions;                    ///< [vertex] object space
   Buffer<cl_uint> vertex_mesh;                    ///< [vertex]
   Buffer<cl_uint4> face_vertices;                 ///< [face] vertex indices; w = mesh
-  Buffer<cl_uint4> face_colors;                   ///< [face] colour of each corner
   Buffer<cl_float4> color_values;                 ///< [color]
   Buffer<cl_float4> view_positions, view_colors;  ///< [view][vertex], [view][color]: of views' own shapes
-  Incidence vertex_corners, color_corners;
+  Incidence vertex_corners;
   Textures textures;
 
   /// What the kernels read with the frame's strides.
@@ -68,10 +67,20 @@ struct Geometry {
     return p.color_stride != 0 ? view_colors : color_values;
   }
 
+  /// [face] colour of each corner, and the corners of every colour. Where all meshes have colours of
+  /// vertices, those are numbered as the vertices are.
+  const Buffer<cl_uint4>& face_colors() const { return colors_by_vertex_ ? face_vertices : face_colors_; }
+  const Incidence& color_corners() const { return colors_by_vertex_ ? vertex_corners : color_corners_; }
+
   std::size_t bytes() const;
 
  private:
+  void add_colors(Device::Impl& device, const Scene& scene);
   void add_textures(Device::Impl& device, const Scene& scene);
+
+  bool colors_by_vertex_ = false;
+  Buffer<cl_uint4> face_colors_;  // where they are not
+  Incidence color_corners_;
 };
 
 /// Whether a mesh of the scene has textures.

@@ -19,9 +19,9 @@ Rasterize::Rasterize(Device::Impl& device)
 
 namespace {
 
-/// Work-items of the listing kernels for a tile: vectors of pixels.
-std::size_t vectors_of_tile(const Device::Impl& device) {
-  return std::size_t{DPR_TILE} * DPR_TILE / std::min<std::size_t>(device.info.lanes, DPR_TILE);
+/// Work-items of the listing kernels for a tile: as rasterize.cl shares it out.
+std::size_t shares_of_tile(const Device::Impl& device) {
+  return device.info.lanes == 1 ? std::size_t{DPR_TILE} * DPR_TILE : 1;
 }
 
 std::size_t pixels_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
@@ -72,7 +72,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
   if (clip != nullptr) clip->cover(p, triangles, bin, masks, counts_);
   scan_(length(pairs), counts_, fragment_starts);
-  count_(tiles_of(p) * vectors_of_tile(device_), p, bin.tile_starts, masks, counts_);
+  count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
@@ -182,8 +182,8 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
     buffer->resize(device_, fragment_length());
   for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2})
     buffer->resize(device_, fragment_length());
-  const std::size_t vectors = vectors_of_tile(device_);
-  const Range listing(next.tiles.first * vectors, next.tiles.count * vectors);
+  const std::size_t shares = shares_of_tile(device_);
+  const Range listing(next.tiles.first * shares, next.tiles.count * shares);
   list_(listing, p, listing.last(), bin.tile_starts, masks, fragment_starts, pixel_starts, list);
   const PairGroups groups(device_, next.pairs);
   forward_(groups.count, p, groups.pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,

@@ -4,15 +4,11 @@
 #include <bit>
 
 namespace dpr {
-namespace {
 
-/// Partial sums of a segment: enough to keep a device busy, of enough elements each to be worth a work-item.
-std::size_t slots_of(std::size_t elements_of_segment) {
+std::size_t slots_of_segments(std::size_t elements_of_segment) {
   constexpr std::size_t k_elements_of_slot = 64, k_least = 16, k_most = 1024;
   return std::clamp(std::bit_floor(elements_of_segment / k_elements_of_slot), k_least, k_most);
 }
-
-}  // namespace
 
 Reduce::Reduce(Device::Impl& device)
     : device_(device),
@@ -22,7 +18,11 @@ Reduce::Reduce(Device::Impl& device)
 void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_sum) {
   const std::size_t count = what.channels * what.segments;
   if (count == 0) return;
-  const auto slots = static_cast<cl_uint>(slots_of(what.expected / what.segments));
+  if (what.slots != 0) {
+    final_sums_(count, to_uint(count), to_uint(what.slots), to_uint(first_sum), what.values, sums);
+    return;
+  }
+  const auto slots = static_cast<cl_uint>(slots_of_segments(what.expected / what.segments));
   partial_.resize(device_, 2 * count * slots);
   const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
   partial_sums_(count * slots / width, static_cast<cl_uint>(what.count), static_cast<cl_uint>(what.channels),

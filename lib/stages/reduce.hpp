@@ -16,7 +16,11 @@ struct Summation {
   const Buffer<cl_uint>& starts;
   const Buffer<float>& values;
   std::size_t expected = count;
+  std::size_t slots = 0;  ///< not 0: values are [channel][segment][2][slot], sums already and what they lost
 };
+
+/// Partial sums of a segment: enough to keep a device busy, of enough elements each to be worth a work-item.
+std::size_t slots_of_segments(std::size_t elements_of_segment);
 
 class Reduce {
  public:

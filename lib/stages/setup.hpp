@@ -15,18 +15,20 @@ class Setup {
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                const Buffer<cl_float4>& ndc, const Buffer<float>& hidden);
 
+  Buffer<cl_uint> facing;              ///< [view][face] DPR_FACE_FRONT, ...
   Buffer<cl_uint> kept;                ///< [view][face] 0 where a triangle is dropped, 1 where not
   Buffer<cl_uint> counts;              ///< [view][face] tiles that are listed for a triangle
   Buffer<shared::Triangle> triangles;  ///< [view][face] of those that have tiles
 
   std::size_t bytes() const {
-    return kept.capacity_bytes() + counts.capacity_bytes() + triangles.capacity_bytes();
+    return facing.capacity_bytes() + kept.capacity_bytes() + counts.capacity_bytes() +
+           triangles.capacity_bytes();
   }
 
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>, Out<cl_uint>,
-         Out<cl_uint>, Out<shared::Triangle>>
+         Out<cl_uint>, Out<cl_uint>, Out<shared::Triangle>>
       forward_;
 };
 

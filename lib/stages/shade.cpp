@@ -64,7 +64,7 @@ void Shade::forward(const ShadeInputs& in) {
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     forward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
-             in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
+             in.geometry.face_colors(), in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
              color.red, color.green, color.blue);
   }
 }
@@ -79,7 +79,7 @@ void Shade::light(const ShadeInputs& in) {
                                   in.transform.world, normals_);
   }
   now_.kernels->forward(pairs, in.p, now_.params, pairs.last(), in.views.cameras, now_.lights,
-                        in.geometry.face_vertices, in.geometry.face_colors, in.geometry.colors_of(in.p),
+                        in.geometry.face_vertices, in.geometry.face_colors(), in.geometry.colors_of(in.p),
                         in.transform.world, normals_, in.bin.pair_face, in.rasterize.fragment_starts,
                         in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green, base_.blue, color.red,
                         color.green, color.blue);
@@ -95,7 +95,7 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
   } else if (!lit()) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     backward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
-              in.geometry.face_colors, in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
+              in.geometry.face_colors(), in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
               grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
   }
 }
@@ -107,7 +107,7 @@ void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
   now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
-                         in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
+                         in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
                          in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
                          in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red,
                          base_.green, base_.blue, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
@@ -133,7 +133,7 @@ void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::
   light_channels.resize(device_, light_channel_count() * in.bin.pairs);
   now_.kernels->backward_lights(
       pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
-      in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors,
+      in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
       in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
       in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green,
       base_.blue, grad.red, grad.green, grad.blue, light_channels);

@@ -25,9 +25,10 @@ void Surface::forward(const SurfaceInputs& in, ColorPlanes& base) {
   const Textures& t = in.geometry.textures;
   const Range pairs = in.rasterize.pairs(in.bin);
   base.resize(device_, in.rasterize.fragment_length());
-  forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors,
-           in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values, t.textures, t.texel_values,
-           in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2, base.red, base.green, base.blue);
+  forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
+           in.geometry.face_colors(), in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
+           t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
+           base.red, base.green, base.blue);
 }
 
 void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds,
@@ -38,7 +39,7 @@ void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bo
   grad_corner_texcoords.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_steps_.resize(device_, std::size_t{9} * in.bin.pairs);
   backward_(pairs, in.p, pairs.last(), adds ? 1 : 0, in.bin.pair_face, in.rasterize.fragment_starts,
-            in.geometry.face_colors, in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
+            in.geometry.face_colors(), in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
             t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
             grad_base.red, grad_base.green, grad_base.blue, grad_bary1, grad_bary2, grad_corner_colors,
             grad_corner_texcoords, grad_steps_);
@@ -62,10 +63,10 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
   parts.resize(device_, places);
   grad_seen.resize(device_, places);
   list_(pairs, in.p, pairs.last(), static_cast<cl_uint>(t.texels), static_cast<cl_uint>(levels),
-        in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors, in.geometry.colors_of(in.p),
-        t.face_texcoords, t.texcoord_values, t.textures, in.triangles, in.clipped, in.rasterize.bary1,
-        in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue, place_count, cells, numbers,
-        parts, grad_seen);
+        in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors(),
+        in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values, t.textures, in.triangles,
+        in.clipped, in.rasterize.bary1, in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue,
+        place_count, cells, numbers, parts, grad_seen);
 }
 
 std::size_t Surface::bytes() const {

@@ -1,5 +1,7 @@
 #include "stages/transform.hpp"
 
+#include <algorithm>
+
 namespace dpr {
 
 Transform::Transform(Device::Impl& device)
@@ -15,14 +17,16 @@ void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, 
   forward_(count, p, views.cameras, views.models, geometry.positions_of(p), geometry.vertex_mesh, world, ndc);
 }
 
-void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                         bool lit, const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
+void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
+                         const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
                          Buffer<cl_float4>& grad_world) {
-  const std::size_t count = std::size_t{p.views} * p.vertices;
-  grad_world.resize(device_, count);
-  channels.resize(device_, (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * count);
-  backward_(count, p, lit ? 1 : 0, views.cameras, views.models, geometry.vertex_mesh, world, grad_ndc,
-            grad_clip, grad_world, channels);
+  const std::size_t segments = std::size_t{p.views} * p.meshes;
+  slots = slots_of_segments(p.vertices / std::max(p.meshes, 1U));
+  grad_world.resize(device_, std::size_t{p.views} * p.vertices);
+  partial_sums.resize(device_,
+                      (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * segments * 2 * slots);
+  backward_(segments * slots, p, lit ? 1 : 0, to_uint(slots), views.cameras, views.models,
+            views.vertex_starts, world, grad_ndc, grad_clip, grad_world, partial_sums);
 }
 
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,

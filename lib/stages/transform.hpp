@@ -3,6 +3,7 @@
 
 #include "device/kernel.hpp"
 #include "stages/geometry.hpp"
+#include "stages/reduce.hpp"
 
 namespace dpr {
 
@@ -10,6 +11,7 @@ namespace dpr {
 struct DeviceViews {
   Buffer<shared::ViewParams> cameras;  ///< [view]
   Buffer<cl_float4> models;            ///< [view][mesh][3] rows of object to world
+  Buffer<cl_uint> vertex_starts;       ///< [view * mesh + 1] runs of [view][vertex]
 };
 
 class Transform {
@@ -19,20 +21,22 @@ class Transform {
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
   /// `grad_clip` is what clipped faces add where p.clips is set, [view][vertex] of x times depth, y times
   /// depth and depth. `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient.
-  /// Fills `channels`.
-  void backward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry, bool lit,
+  /// Fills `partial_sums`.
+  void backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
                 const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
                 Buffer<cl_float4>& grad_world);
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                           const Buffer<cl_float4>& grad_world);
 
-  Buffer<cl_float4> world;           ///< [view][vertex]
-  Buffer<cl_float4> ndc;             ///< [view][vertex] x, y, view depth
-  Buffer<float> channels;            ///< [DPR_POSE_CHANNELS or, distorted, DPR_LENS_CHANNELS][view][vertex]
+  Buffer<cl_float4> world;  ///< [view][vertex]
+  Buffer<cl_float4> ndc;    ///< [view][vertex] x, y, view depth
+  /// [DPR_POSE_CHANNELS or, distorted, DPR_LENS_CHANNELS][view][mesh][2][slot]: see Summation.
+  Buffer<float> partial_sums;
+  std::size_t slots = 0;
   Buffer<cl_float4> grad_positions;  ///< [vertex], of views' own shapes [view][vertex]; object space
 
   std::size_t bytes() const {
-    return world.capacity_bytes() + ndc.capacity_bytes() + channels.capacity_bytes() +
+    return world.capacity_bytes() + ndc.capacity_bytes() + partial_sums.capacity_bytes() +
            grad_positions.capacity_bytes();
   }
 
@@ -41,8 +45,8 @@ class Transform {
   Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>,
          Out<cl_float4>, Out<cl_float4>>
       forward_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>, In<cl_float4>,
-         In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
+  Kernel<shared::FrameParams, cl_uint, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>,
+         In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
       backward_;
   Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> backward_positions_;
 };

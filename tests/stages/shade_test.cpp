@@ -145,7 +145,7 @@ class Shaded {
     pair_face = m.bin.pair_face.download();
     bary1 = m.rasterize.bary1.download();
     bary2 = m.rasterize.bary2.download();
-    face_colors = m.geometry->face_colors.download();
+    face_colors = m.geometry->face_colors().download();
     colors = m.geometry->color_values.download();
     const std::vector<cl_float4> world = m.transform.world.download();
     const std::vector<dpr::shared::ViewParams> cameras = m.device_views.cameras.download();

@@ -6,6 +6,7 @@
 
 #include "stages/antialias.hpp"
 #include "stages/contour.hpp"
+#include "stages/setup.hpp"
 #include "support/probe.hpp"
 
 namespace dpr::test {
@@ -16,6 +17,7 @@ class ContourFrame {
   ContourFrame(const Mesh& mesh, int width, int height)
       : geometry(device_impl(), scene_of(mesh)),
         transform(device_impl()),
+        setup(device_impl()),
         edges(device_impl(), scene_of(mesh), mesh.positions),
         contour(device_impl()),
         antialias(device_impl()) {
@@ -33,6 +35,8 @@ class ContourFrame {
     camera.zfar = 100;
     camera.inverse_range = 1.0F / 99;
     views.cameras.upload(device_impl(), std::span(&camera, 1));
+    const float none = 0;
+    hidden_.upload(device_impl(), std::span(&none, 1));
     place(mesh.positions);
   }
 
@@ -44,7 +48,11 @@ class ContourFrame {
     transform.world.upload(device_impl(), values);
   }
 
-  ContourInputs inputs() const { return {p, views, geometry, edges, transform, clipped, shading}; }
+  /// Sets the faces up as they are now.
+  ContourInputs inputs() {
+    setup.forward(p, views, geometry, transform.ndc, hidden_);
+    return {p, views, geometry, edges, transform, setup.facing, clipped, shading};
+  }
 
   std::size_t samples() const { return std::size_t{p.width} * p.height; }
 
@@ -52,6 +60,7 @@ class ContourFrame {
   DeviceViews views;
   Geometry geometry;
   Transform transform;
+  Setup setup;
   Buffer<shared::ClippedFace> clipped;
   Edges edges;
   std::optional<Shading> shading;
@@ -65,6 +74,8 @@ class ContourFrame {
     scene.meshes.push_back({mesh});
     return scene;
   }
+
+  Buffer<float> hidden_;
 };
 
 }  // namespace dpr::test
