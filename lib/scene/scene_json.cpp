@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
