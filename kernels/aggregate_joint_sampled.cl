@@ -66,6 +66,11 @@ static inline Pixel load_pixel(const AggregateParams p, uint pixel, global const
   return q;
 }
 
+/// In units of the distances' noise; where sigma is 0 and they have none, all that is listed covers.
+static inline float in_sigmas(const AggregateParams p, float value, float otherwise) {
+  return p.sigma > 0.0f ? value / p.sigma : otherwise;
+}
+
 /// A fragment's two coordinates, in units of the noise, and its face.
 typedef struct {
   float x, beta;
@@ -74,7 +79,7 @@ typedef struct {
 
 static inline Coordinates load_fragment(const AggregateParams p, const Pixel q, const Layers f, uint k) {
   Coordinates c;
-  c.x = f.distance[k] / p.sigma;
+  c.x = in_sigmas(p, f.distance[k], INFINITY);
   c.beta = (q.nearest - f.fragments.depth[k]) * q.depth_scale;
   c.face = face_of_fragment(p, q.run, f.face, k);
   return c;
@@ -256,13 +261,14 @@ kernel void aggregate_joint_sampled_backward(
     // The colours' gradients are written last; until then their places hold sums.
     const FragmentSums collected = {grad_red, grad_distance, grad_green, grad_depth, grad_blue};
     const PixelSums sums = add_samples(p, q, f, grad, collected);
-    by_sigma = scale_estimate(p.sampling, sums.sigma, sums.y) / p.sigma;
+    by_sigma = in_sigmas(p, scale_estimate(p.sampling, sums.sigma, sums.y), 0.0f);
     by_gamma = scale_estimate(p.sampling, sums.gamma, sums.y) / p.gamma;
     for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];
       const float weight = grad_red[k] / (float)p.sampling.samples;
       background_weight -= weight;
-      grad_distance[k] = score_estimate(p.sampling, grad_distance[k], grad_green[k], sums.y) / p.sigma;
+      const float by_distance = score_estimate(p.sampling, grad_distance[k], grad_green[k], sums.y);
+      grad_distance[k] = in_sigmas(p, by_distance, 0.0f);
       grad_depth[k] = -score_estimate(p.sampling, grad_depth[k], grad_blue[k], sums.y) * q.depth_scale;
       grad_red[k] = weight * grad.x;
       grad_green[k] = weight * grad.y;

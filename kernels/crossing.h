@@ -13,11 +13,11 @@
 
 /// An edge on the raster, as the rows cross it or the columns.
 typedef struct {
-  float2 a, b;     // NDC
+  float2 a, b;  // NDC
   int is_by_rows;
-  int ascends;     // b is above a by rows, to the right of a by columns
-  float inverse;   // of the edge's extent across the lines
-  float slope;     // of its other coordinate by that across the lines
+  int ascends;    // b is above a by rows, to the right of a by columns
+  float inverse;  // of the edge's extent across the lines
+  float slope;    // of its other coordinate by that across the lines
 } RasterEdge;
 
 static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
@@ -85,17 +85,23 @@ static inline int is_before_line(const FrameParams p, const RasterEdge e, float2
   return e.is_by_rows ? point.y >= at.y : point.x <= at.x;
 }
 
+/// Where the edge's line crosses a line of samples, in samples along it.
+static inline float position_on_line(const FrameParams p, const RasterEdge e, int line) {
+  const float2 at = pixel_centre(p, line, line);
+  const float2 crossing = e.is_by_rows ? (float2)(e.a.x + (at.y - e.a.y) * e.slope, at.y)
+                                       : (float2)(at.x, e.a.y + (at.x - e.a.x) * e.slope);
+  const float2 in_samples = to_samples(p, crossing);
+  return e.is_by_rows ? in_samples.x : in_samples.y;
+}
+
 /// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the
 /// triangles have them.
 static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
   Crossing c;
   const float2 at = pixel_centre(p, line, line);
-  const float2 crossing = e.is_by_rows ? (float2)(e.a.x + (at.y - e.a.y) * e.slope, at.y)
-                                       : (float2)(at.x, e.a.y + (at.x - e.a.x) * e.slope);
-  const float2 in_samples = to_samples(p, crossing);
   c.exists = is_before_line(p, e, e.a, line) != is_before_line(p, e, e.b, line);
   c.line = line;
-  c.position = e.is_by_rows ? in_samples.x : in_samples.y;
+  c.position = position_on_line(p, e, line);
   c.along = clamp((e.is_by_rows ? at.y - e.a.y : at.x - e.a.x) * e.inverse, 0.0f, 1.0f);
   const float size = (float)(e.is_by_rows ? p.width : p.height);
   int first = (int)floor(clamp(c.position, -2.0f, size));

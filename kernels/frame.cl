@@ -11,5 +11,6 @@
 #include "image_loss.cl"
 #include "contour.cl"
 #include "antialias_cross.cl"
+#include "antialias_second.cl"
 #include "antialias.cl"
 #include "blur.cl"

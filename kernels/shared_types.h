@@ -137,6 +137,9 @@ using float4 = cl_float4;
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu
 
+/// Crossings that a tile has room for beside those that won their steps.
+#define DPR_SECOND_CROSSINGS 8
+
 /// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge
 /// lengths; and its hinges: 1 - cos, and that squared.
 #define DPR_MESH_LOSS_CHANNELS 2
@@ -290,6 +293,14 @@ typedef struct AntialiasParams {
   uint unused0;
 } AntialiasParams;
 
+/// A crossing of a step that another contour has won. Planes of steps as antialias_cross.cl has them.
+typedef struct SecondCrossing {
+  DPR_SHARED_NAME(SecondCrossing)
+  uint step, contour;
+  uint reference; /* the nearest step that the contour has won: it shows the jump across it */
+  float cut;      /* of the contour: as that of the winner */
+} SecondCrossing;
+
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its
 /// sizes.
 typedef struct MeshLossParams {
@@ -309,6 +320,17 @@ typedef struct BlurPass {
   uint out_length, in_length; /* pixels along the pass */
   int out_step, in_step, offset, taps;
 } BlurPass;
+
+/// The blur by samples of the noise.
+typedef struct ShiftParams {
+  DPR_SHARED_NAME(ShiftParams)
+  Sampling sampling;
+  uint views, first_view;     /* first of the batch that names the noise */
+  uint width, height;         /* pixels of an image */
+  uint supersampling, margin; /* of the raster around it */
+  uint radius;                /* samples: of the largest shift */
+  uint unused;
+} ShiftParams;
 
 #ifndef __OPENCL_C_VERSION__
 #undef DPR_SHARED_NAME

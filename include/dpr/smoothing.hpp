@@ -26,7 +26,11 @@ enum class Composition { barrier, joint };
 /// sigma.
 enum class Noise { triangle, pixel };
 
-/// exact: closed form or quadrature, no variance. monte_carlo: `samples` draws, eq. (11)-(16).
+/// exact: closed form or quadrature, no variance. monte_carlo: `samples` draws, eq. (11)-(16). With noise of
+/// the pixel the occupancy's estimator is that of its position: monte_carlo is the mean of `samples` rigid
+/// frames, each shifted by a draw that all pixels of a view share, in whole samples of the raster (so that it
+/// is rendered once, and a sample costs a shift of it). Gradients are those of the shifted frames; that by
+/// sigma is a score estimate.
 enum class Estimator { exact, monte_carlo };
 
 /// Control variate of the sampled gradients: what is subtracted from every sample. rigid: the unperturbed
@@ -86,10 +90,11 @@ struct Smoothing {
 /// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
 ///   half's value is correlated with the score. With stratified draws it is refused: every other sample's
 ///   stratum tells of one's own, which biases the gradient.
-/// - Noise of the pixel needs a symmetric occupancy_prior, so not Gumbel's (it would shift the image), the
-///   exact estimators, a fixed width and no blur_radius: no triangle is blurred. Its scale is sigma with
-///   Euclidean distances, else the root of sigma, NDC; the occupancy_threshold has no part in it.
-///   `supersampling` is of the pixel's noise alone.
+/// - Noise of the pixel needs a symmetric occupancy_prior, so not Gumbel's (it would shift the image), a
+///   fixed width and no blur_radius: no triangle is blurred. Its scale is sigma with Euclidean distances,
+///   else the root of sigma, NDC; the occupancy_threshold has no part in it. Each stage may be sampled by
+///   itself, whatever the composition, and the position with the uniform prior too: its draws are whole
+///   samples, whose probabilities have a score. `supersampling` is of the pixel's noise alone.
 DPR_API void validate(const Smoothing& smoothing);
 
 /// The blur radius in force: `blur_radius`, or the distance at which the occupancy has fallen to

@@ -25,23 +25,37 @@ void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raste
                          float reach) {
   antialias.cross(in, contour, reach);
   antialias.forward(in.p, contour, raster, blended_);
-  image.resize(device_, size.views * size.width * size.height);
-  blur.forward(size, blended_, image);
+  if (sampled) sampled->draw(size, in.p.first_view);
+  blur_forward(size, blended_, image);
   blur_holds_image_ = true;
+}
+
+void PixelNoise::blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended,
+                              Buffer<cl_float4>& pixels) {
+  pixels.resize(device_, size.views * size.width * size.height);
+  if (sampled) {
+    sampled->forward(blended, pixels);
+  } else {
+    blur.forward(size, blended, pixels);
+  }
 }
 
 void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
                         Buffer<cl_float4>& pixels) {
   antialias.forward(in.p, contour, samples, other_blended_);
-  pixels.resize(device_, size.views * size.width * size.height);
-  blur.forward(size, other_blended_, pixels);
+  blur_forward(size, other_blended_, pixels);
   blur_holds_image_ = false;
 }
 
 void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
                           const BufferRef<cl_float4>& grad_image, bool by_scale) {
-  blur.backward(size, grad_image, grad_blended_);
-  if (by_scale) {
+  if (sampled) {
+    sampled->backward(grad_image, grad_blended_);
+    if (by_scale) sampled->backward_scale(blended_, grad_image);
+  } else {
+    blur.backward(size, grad_image, grad_blended_);
+  }
+  if (by_scale && !sampled) {
     if (!blur_holds_image_) blur.forward(size, blended_, image);
     blur_holds_image_ = true;
     blur.backward_scale(size, blended_, grad_image);
@@ -50,9 +64,9 @@ void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& rast
 }
 
 std::size_t PixelNoise::bytes() const {
-  return contour.bytes() + antialias.bytes() + blur.bytes() + (edges ? edges->bytes() : 0) +
-         image.capacity_bytes() + grad_raster.capacity_bytes() + blended_.capacity_bytes() +
-         grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
+  return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
+         (edges ? edges->bytes() : 0) + image.capacity_bytes() + grad_raster.capacity_bytes() +
+         blended_.capacity_bytes() + grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
 }
 
 }  // namespace dpr

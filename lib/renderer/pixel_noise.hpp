@@ -1,11 +1,13 @@
 // Noise on the pixel: from the samples of the rigid image to the image, and back.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "renderer/back_faces.hpp"
 #include "stages/antialias.hpp"
 #include "stages/blur.hpp"
+#include "stages/blur_sampled.hpp"
 #include "stages/contour.hpp"
 
 namespace dpr {
@@ -33,8 +35,9 @@ class PixelNoise {
   Contour contour;
   Antialias antialias;
   Blur blur;
-  std::optional<Edges> edges;  // of the scene; made for its first frame
-  BackFaces back_faces;        // of the edges' meshes
+  std::shared_ptr<BlurSampled> sampled;  // takes its place where the noise is sampled
+  std::optional<Edges> edges;            // of the scene; made for its first frame
+  BackFaces back_faces;                  // of the edges' meshes
 
   /// From samples to the image, after the antialiasing's find_front() of all bands.
   void forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
@@ -46,12 +49,16 @@ class PixelNoise {
   void smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
               Buffer<cl_float4>& pixels);
 
+  const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
+
   Buffer<cl_float4> image;        ///< [view][height][width] RGBA
   Buffer<cl_float4> grad_raster;  ///< of the samples
 
   std::size_t bytes() const;
 
  private:
+  void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
+
   Buffer<cl_float4> blended_, grad_blended_, other_blended_;
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;

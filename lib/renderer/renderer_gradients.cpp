@@ -190,7 +190,7 @@ void Renderer::Impl::sum_gradients() {
        shade.light_channels, pairs}};
   if (scale)
     all.push_back(
-        {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->blur.grad_scale});
+        {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->grad_scale()});
   add_sums(all);
 }
 

@@ -52,6 +52,7 @@ struct SmoothingSetting {
   Raster raster;
   std::shared_ptr<PixelNoise> pixel_noise;  // none: the triangles'
   Blur::Setting blur;
+  std::shared_ptr<BlurSampled> blur_sampled;  // none: exact
 };
 
 /// Adds a gradient of the positions ([vertex], object space) to the one that is there.

@@ -123,6 +123,8 @@ void check_raster(const Scene& scene, std::size_t views, const Raster& raster) {
 Smoothing without_distance_noise(Smoothing smoothing) {
   smoothing.occupancy_width = OccupancyWidth::zero;
   smoothing.occupancy_prior = Prior::gaussian;  // has no part in it
+  smoothing.occupancy_estimator = Estimator::exact;
+  smoothing.sigma = 0;
   return smoothing;
 }
 
@@ -216,17 +218,22 @@ SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene
             blur_distance(smoothing),
             {},
             nullptr,
-            {}};
+            {},
+            nullptr};
   }
   BlurKernel kernel = pixel_blur(smoothing, of);
   const Raster around{kernel.supersampling, kernel.margin};
   check_raster(of, its_views, around);
   const std::shared_ptr<PixelNoise> stages =
       pixel_noise ? pixel_noise : std::make_shared<PixelNoise>(device.impl());
+  std::shared_ptr<BlurSampled> sampled;
+  if (smoothing.occupancy_estimator == Estimator::monte_carlo) {
+    sampled = std::make_shared<BlurSampled>(device.impl(), smoothing, pixel_shifts(smoothing, of), kernel);
+  }
   Blur::Setting blur = stages->blur.prepare(std::move(kernel));
   const Smoothing rigid = without_distance_noise(smoothing);
   return {smoothing, occupancy.prepare(rigid), aggregate.prepare(rigid), 0.0F, around,
-          stages,    std::move(blur)};
+          stages,    std::move(blur),          std::move(sampled)};
 }
 
 void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
@@ -239,7 +246,10 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
   gradient_map.reset();
   if ((pixel_noise != nullptr) != (prepared.pixel_noise != nullptr)) last_counts.reset();
   std::swap(pixel_noise, prepared.pixel_noise);
-  if (pixel_noise) pixel_noise->blur.set(std::move(prepared.blur));
+  if (pixel_noise) {
+    pixel_noise->blur.set(std::move(prepared.blur));
+    pixel_noise->sampled = std::move(prepared.blur_sampled);
+  }
   occupancy.set(std::move(prepared.occupancy));
   aggregate.set(std::move(prepared.aggregate));
   rendered = false;

@@ -120,9 +120,22 @@ std::size_t samples_of_side(int pixels, const Raster& raster) {
          2 * static_cast<std::size_t>(raster.margin);
 }
 
+namespace {
+
+double scale_in_pixels(const Smoothing& smoothing, const Scene& of) {
+  return pixel_scale(smoothing, std::min(of.width, of.height)).value;
+}
+
+}  // namespace
+
 BlurKernel pixel_blur(const Smoothing& smoothing, const Scene& of) {
-  const double scale = pixel_scale(smoothing, std::min(of.width, of.height)).value;
-  return blur_kernel(smoothing.occupancy_prior, scale, static_cast<int>(smoothing.supersampling));
+  return blur_kernel(smoothing.occupancy_prior, scale_in_pixels(smoothing, of),
+                     static_cast<int>(smoothing.supersampling));
+}
+
+ShiftTable pixel_shifts(const Smoothing& smoothing, const Scene& of) {
+  return shift_table(smoothing.occupancy_prior, scale_in_pixels(smoothing, of),
+                     static_cast<int>(smoothing.supersampling));
 }
 
 Raster raster_of(const Scene& scene) {

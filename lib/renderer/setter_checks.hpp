@@ -47,6 +47,8 @@ std::size_t samples_of_side(int pixels, const Raster& raster);
 
 /// The blur of noise on the pixel in frames of the scene's size. Throws as blur_kernel().
 BlurKernel pixel_blur(const Smoothing& smoothing, const Scene& of);
+/// The shifts by which it is sampled.
+ShiftTable pixel_shifts(const Smoothing& smoothing, const Scene& of);
 
 /// What the scene's own smoothing needs around its frame. Throws as blur_kernel().
 Raster raster_of(const Scene& scene);

@@ -160,18 +160,24 @@ Weights over_pixel(const Weights& weights, int supersampling) {
   return mean;
 }
 
-/// `weights_of` and its central difference, both over the pixel's samples where they lead there.
+/// The central difference of `weights_of`.
 template <class WeightsOf>
-void set_weights(BlurKernel& kernel, double scale, int pixel_samples, const WeightsOf& weights_of) {
+Weights by_scale(double scale, const WeightsOf& weights_of) {
   constexpr double k_relative_step = 1e-4;
   const double step = k_relative_step * scale;
-  kernel.weights = rounded(over_pixel(weights_of(scale), pixel_samples));
   Weights change(weights_of(scale).size());
-  if (scale > 0) {  // at 0 the derivative is 0, as it is by a variance's root
-    const Weights above = weights_of(scale + step), below = weights_of(scale - step);
-    for (std::size_t i = 0; i < change.size(); ++i)
-      change[i] = (above[i] - below[i]) / (2 * step) * kernel.supersampling;
-  }
+  if (scale <= 0) return change;  // at 0 the derivative is 0, as it is by a variance's root
+  const Weights above = weights_of(scale + step), below = weights_of(scale - step);
+  for (std::size_t i = 0; i < change.size(); ++i) change[i] = (above[i] - below[i]) / (2 * step);
+  return change;
+}
+
+/// `weights_of` and its derivative, both over the pixel's samples where they lead there.
+template <class WeightsOf>
+void set_weights(BlurKernel& kernel, double scale, int pixel_samples, const WeightsOf& weights_of) {
+  kernel.weights = rounded(over_pixel(weights_of(scale), pixel_samples));
+  Weights change = by_scale(scale, weights_of);
+  for (double& weight : change) weight *= kernel.supersampling;
   kernel.weights_by_scale = rounded(over_pixel(change, pixel_samples));
 }
 
@@ -195,10 +201,8 @@ void set_coarse(BlurKernel& kernel, const PriorRow& row, double scale) {
   set_weights(kernel, scale, 1, [&](double s) { return coarse_weights(row, s, spacing, radius); });
 }
 
-}  // namespace
-
-BlurKernel blur_kernel(Prior prior, double scale, int supersampling) {
-  const PriorRow& row = row_of(prior);
+/// Returns the scale in samples, after checks of all three.
+double checked_scale(const PriorRow& row, double scale, int supersampling) {
   if (!row.is_symmetric()) {
     throw InvalidArgument("occupancy_prior (noise of the pixel)", std::string(row.name),
                           "a symmetric one: others shift the image");
@@ -211,11 +215,35 @@ BlurKernel blur_kernel(Prior prior, double scale, int supersampling) {
     throw InvalidArgument("scale (noise of the pixel)", checks::text(scale) + " pixels",
                           "at least 0 and at most " + checks::text(k_largest_scale / supersampling));
   }
+  return in_samples;
+}
+
+}  // namespace
+
+BlurKernel blur_kernel(Prior prior, double scale, int supersampling) {
+  const PriorRow& row = row_of(prior);
+  const double in_samples = checked_scale(row, scale, supersampling);
   BlurKernel kernel;
   kernel.supersampling = supersampling;
   const bool is_coarse = in_samples >= k_least_spacing * row.pixel_nodes && prior != Prior::uniform;
   (is_coarse ? set_coarse : set_fine)(kernel, row, in_samples);
   return kernel;
+}
+
+ShiftTable shift_table(Prior prior, double scale, int supersampling) {
+  const PriorRow& row = row_of(prior);
+  const double in_samples = checked_scale(row, scale, supersampling);
+  const int radius = sample_radius(row, sampled_width(row, in_samples));
+  const auto weights_of = [&](double s) { return fine_weights(row, s, radius); };
+  const Weights weights = weights_of(in_samples), change = by_scale(in_samples, weights_of);
+  ShiftTable table;
+  double sum = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    sum += weights[i];
+    table.cumulative.push_back(static_cast<float>(sum));
+    table.scores.push_back(weights[i] > 0 ? static_cast<float>(supersampling * change[i] / weights[i]) : 0);
+  }
+  return table;
 }
 
 }  // namespace dpr

@@ -34,4 +34,15 @@ struct BlurKernel {
 /// Throws InvalidArgument, for the Gumbel prior too: it is not symmetric, so that it would shift the image.
 BlurKernel blur_kernel(Prior prior, double scale, int supersampling);
 
+/// By how many samples a draw of the noise shifts the raster along one axis: from -radius to radius, with the
+/// probabilities that are the weights of the blur without a coarse grid.
+struct ShiftTable {
+  std::vector<float> cumulative;  ///< [2 radius + 1] that the shift is at most so much
+  std::vector<float> scores;      ///< [2 radius + 1] d ln probability / d scale in pixels
+  int radius() const { return static_cast<int>(cumulative.size() / 2); }
+};
+
+/// Arguments as blur_kernel() takes them; its margin is at least the radius.
+ShiftTable shift_table(Prior prior, double scale, int supersampling);
+
 }  // namespace dpr

@@ -70,12 +70,13 @@ void validate_sampling(const Smoothing& s) {
 void validate_estimators(const Smoothing& s) {
   const bool occupancy = s.occupancy_estimator == Estimator::monte_carlo;
   const bool aggregation = s.aggregation_estimator == Estimator::monte_carlo;
-  if (s.composition == Composition::joint && occupancy != aggregation) {
+  const bool of_triangles = s.noise == Noise::triangle;
+  if (of_triangles && s.composition == Composition::joint && occupancy != aggregation) {
     throw InvalidArgument(std::string(occupancy ? "occupancy" : "aggregation") + "_estimator (smoothing)",
                           "monte_carlo beside an exact stage in the joint composition",
                           "the same for both: a sample perturbs distances and depths together");
   }
-  if (occupancy) validate_sampled_prior(s.occupancy_prior, s.draws, "occupancy");
+  if (occupancy && of_triangles) validate_sampled_prior(s.occupancy_prior, s.draws, "occupancy");
   if (aggregation) validate_sampled_prior(s.depth_prior, s.draws, "aggregation");
   if (occupancy || aggregation) validate_sampling(s);
 }
@@ -112,7 +113,6 @@ void validate_noise(const Smoothing& s) {
       throw InvalidArgument("noise (smoothing)", "pixel with " + with,
                             std::string("pixel with ") + expected + ", or triangle");
   };
-  require_with(!is_sampled(s), "monte_carlo", "the exact estimators");
   require_with(row_of(s.occupancy_prior).is_symmetric(),
                std::string("the ") + std::string(row_of(s.occupancy_prior).name) + " occupancy_prior",
                "a symmetric one, which does not shift the image");

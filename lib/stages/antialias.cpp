@@ -3,6 +3,8 @@
 namespace dpr {
 namespace {
 
+constexpr std::size_t k_tile_words = 4;  // as kernels/visibility.h has them
+
 std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
 
 std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
@@ -21,8 +23,11 @@ Antialias::Antialias(Device::Impl& device)
     : device_(device),
       front_(device, "antialias_cross.cl", "antialias_front"),
       cross_(device, "antialias_cross.cl", "antialias_cross"),
+      second_find_(device, "antialias_second.cl", "antialias_second_find"),
       forward_(device, "antialias.cl", "antialias_forward"),
       backward_(device, "antialias.cl", "antialias_backward"),
+      second_forward_(device, "antialias_second.cl", "antialias_second_forward"),
+      second_backward_(device, "antialias_second.cl", "antialias_second_backward"),
       cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
 
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
@@ -35,33 +40,47 @@ void Antialias::find_front(const shared::FrameParams& p, const Rasterize& raster
 void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
-  cross_(tiles_of(in.p), in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
-         in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.tile_starts,
-         contour.pair_contour, front, winner, cut);
+  const std::size_t tiles = tiles_of(in.p);
+  crowded_.resize(device_, k_tile_words * tiles);
+  second_counts.resize(device_, tiles);
+  seconds.resize(device_, DPR_SECOND_CROSSINGS * tiles);
+  cross_(tiles, in.p, params(in, depth_reach), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
+         in.facing, in.transform.ndc, in.clipped, contour.tile_starts, contour.pair_contour, front, winner,
+         cut, crowded_);
+  second_find_(tiles, in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
+               in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.tile_starts,
+               contour.pair_contour, front, winner, crowded_, second_counts, seconds);
 }
 
 void Antialias::forward(const shared::FrameParams& p, const Contour& contour, const Buffer<cl_float4>& raster,
                         Buffer<cl_float4>& blended) {
   blended.resize(device_, samples_of(p));
   forward_(tiles_of(p) * DPR_TILE, p, contour.tile_starts, winner, cut, raster, blended);
+  second_forward_(tiles_of(p), p, second_counts, seconds, cut, raster, blended);
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
                          const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster) {
   const std::size_t samples = samples_of(in.p);
   grad_cut_.resize(device_, 2 * samples);
+  grad_seconds_.resize(device_, seconds.size());
   grad_raster.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
   backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
             grad_cut_, grad_raster);
+  second_backward_(tiles_of(in.p), in.p, second_counts, seconds, cut, raster, grad_blended, grad_cut_,
+                   grad_raster, grad_seconds_);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
-                  contour.pair_tile, winner, cut, grad_cut_, grad_ends);
+                  contour.pair_tile, winner, cut, grad_cut_, second_counts, seconds, grad_seconds_,
+                  grad_ends);
 }
 
 std::size_t Antialias::bytes() const {
-  std::size_t bytes = winner.capacity_bytes() + grad_ends.capacity_bytes();
-  for (const Buffer<float>* buffer : {&front, &cut, &grad_cut_}) bytes += buffer->capacity_bytes();
+  std::size_t bytes = winner.capacity_bytes() + crowded_.capacity_bytes() + second_counts.capacity_bytes() +
+                      seconds.capacity_bytes() + grad_ends.capacity_bytes();
+  for (const Buffer<float>* buffer : {&front, &cut, &grad_cut_, &grad_seconds_})
+    bytes += buffer->capacity_bytes();
   return bytes;
 }
 

@@ -155,7 +155,22 @@ std::vector<Entry> entries() {
           DPR_FIELD(BlurPass, out_step),
           DPR_FIELD(BlurPass, in_step),
           DPR_FIELD(BlurPass, offset),
-          DPR_FIELD(BlurPass, taps)};
+          DPR_FIELD(BlurPass, taps),
+          DPR_SIZE(ShiftParams),
+          DPR_FIELD(ShiftParams, sampling),
+          DPR_FIELD(ShiftParams, views),
+          DPR_FIELD(ShiftParams, first_view),
+          DPR_FIELD(ShiftParams, width),
+          DPR_FIELD(ShiftParams, height),
+          DPR_FIELD(ShiftParams, supersampling),
+          DPR_FIELD(ShiftParams, margin),
+          DPR_FIELD(ShiftParams, radius),
+          DPR_FIELD(ShiftParams, unused),
+          DPR_SIZE(SecondCrossing),
+          DPR_FIELD(SecondCrossing, step),
+          DPR_FIELD(SecondCrossing, contour),
+          DPR_FIELD(SecondCrossing, reference),
+          DPR_FIELD(SecondCrossing, cut)};
 }
 
 /// What the device says of every entry.

@@ -1,4 +1,5 @@
-// Sampled aggregation over exact occupancies, and the sampled joint composition, end to end: the mean over
+// Sampled aggregation over exact occupancies, the sampled joint composition, and rigid frames shifted by
+// samples of the pixel's noise, end to end: the mean over
 // many seeds is the exact image, and the exact gradient of every block, within the standard error. Sampled
 // inside sampled approaches neither (the logarithm of a sampled occupancy is biased): determinism_test.cpp.
 #include <doctest/doctest.h>
@@ -6,7 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dpr/dpr.hpp"
@@ -77,7 +81,7 @@ struct Sample {
 Sample sample(const Device& device, Scene scene, const Image& grad, const std::vector<Figure>& figures,
               int seeds) {
   scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
-  if (scene.smoothing.composition == Composition::joint) {
+  if (scene.smoothing.composition == Composition::joint || scene.smoothing.noise == Noise::pixel) {
     scene.smoothing.occupancy_estimator = Estimator::monte_carlo;
   }
   Renderer renderer(device);
@@ -128,14 +132,28 @@ struct Case {
   Composition composition;
   Prior prior;
   dpr::test::SamplingMode mode;
+  Noise noise = Noise::triangle;
   std::string name() const {
-    return std::string(to_string(composition)) + " " + std::string(to_string(prior)) + " " + mode.name();
+    return std::string(to_string(noise)) + " " + std::string(to_string(composition)) + " " +
+           std::string(to_string(prior)) + " " + mode.name();
   }
 };
 
+/// With noise of the pixel: every prior that is symmetric, the Gaussian in every mode.
+std::vector<Case> pixel_cases() {
+  std::vector<Case> list;
+  const dpr::test::SamplingMode usual{VarianceReduction::rigid, Draws::independent};
+  for (const Prior prior : {Prior::cauchy, Prior::logistic, Prior::uniform})
+    list.push_back({Composition::joint, prior, usual, Noise::pixel});
+  for (const dpr::test::SamplingMode& mode : dpr::test::sampling_modes(Prior::gaussian))
+    list.push_back({Composition::joint, Prior::gaussian, mode, Noise::pixel});
+  list.push_back({Composition::barrier, Prior::gaussian, usual, Noise::pixel});
+  return list;
+}
+
 /// Both compositions: every prior with the rigid baseline, the Gaussian in every mode.
 std::vector<Case> cases() {
-  std::vector<Case> list;
+  std::vector<Case> list = pixel_cases();
   for (const Composition composition : {Composition::barrier, Composition::joint}) {
     for (const Prior prior : dpr::test::k_sampled_priors) {
       for (const dpr::test::SamplingMode& mode : dpr::test::sampling_modes(prior)) {
@@ -153,11 +171,40 @@ Scene scene_of_case(const Case& c, int size) {
   scene.smoothing.composition = c.composition;
   scene.smoothing.variance_reduction = c.mode.reduction;
   scene.smoothing.draws = c.mode.draws;
+  if (c.noise == Noise::pixel) {
+    scene.smoothing.noise = Noise::pixel;
+    scene.smoothing.occupancy_prior = c.prior;
+    scene.smoothing.depth_prior = Prior::gaussian;
+    scene.smoothing.sigma = static_cast<float>(std::pow(4.0 / size, 2));  // two pixels
+    scene.smoothing.blur_radius.reset();
+    return scene;
+  }
   if (c.composition == Composition::barrier) return scene;
   // The exact joint composition has no Cauchy depths.
   scene.smoothing.occupancy_prior = c.prior;
   if (c.prior == Prior::cauchy) scene.smoothing.depth_prior = Prior::gaussian;
   return scene;
+}
+
+/// By which `image` shows `frame` inside its border, where the raster ends: at most so many pixels.
+std::optional<std::pair<int, int>> shift_between(const Image& frame, const Image& image, int most) {
+  const auto is_shifted_by = [&](int dx, int dy) {
+    for (int y = std::max(0, 1 - dy); y < std::min(image.height, image.height - 1 - dy); ++y) {
+      for (int x = std::max(0, 1 - dx); x < std::min(image.width, image.width - 1 - dx); ++x) {
+        const auto from = static_cast<std::size_t>((y + dy) * image.width + x + dx);
+        const glm::vec4 apart =
+            glm::abs(image.pixels[static_cast<std::size_t>(y * image.width + x)] - frame.pixels[from]);
+        if (std::max({apart.x, apart.y, apart.z, apart.w}) > 1e-4F) return false;
+      }
+    }
+    return true;
+  };
+  for (int dy = -most; dy <= most; ++dy) {
+    for (int dx = -most; dx <= most; ++dx) {
+      if (is_shifted_by(dx, dy)) return std::pair(dx, dy);
+    }
+  }
+  return std::nullopt;
 }
 
 /// Which way to a sharper image of the cube in another pose: the gradients of all blocks stand out in it.
@@ -258,5 +305,33 @@ TEST_SUITE("statistical") {
     REQUIRE(figures[0].name == "image");
     CHECK(few.standard_error[0] / many.standard_error[0] > 1.5);
     CHECK(few.standard_error[0] / many.standard_error[0] < 2.7);
+  }
+
+  TEST_CASE("monte carlo: with noise of the pixel a sample is a rigid frame, shifted") {
+    const int size = reduced(32, 10);
+    Scene scene = scene_of_case({Composition::joint, Prior::gaussian, {}, Noise::pixel}, size);
+    scene.smoothing.gamma = 1e-8F;
+    scene.smoothing.occupancy_estimator = Estimator::monte_carlo;
+    scene.smoothing.samples = 1;
+    Scene rigid = scene;
+    rigid.smoothing.occupancy_estimator = Estimator::exact;
+    rigid.smoothing.sigma = 1e-12F;
+    const Device device = open_device();
+    Renderer sampled(device), still(device);
+    still.set_scene(rigid);
+    still.forward();
+    const Image frame = still.image();
+    std::set<std::pair<int, int>> shifts;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+      scene.smoothing.seed = seed;
+      sampled.set_scene(scene);
+      sampled.forward();
+      const Image image = sampled.image();
+      sampled.forward();
+      CHECK(image.pixels == sampled.image().pixels);
+      if (const auto shift = shift_between(frame, image, size / 4)) shifts.insert(*shift);
+    }
+    // Those that are shifted further leave too little to compare.
+    CHECK(shifts.size() >= static_cast<std::size_t>(reduced(4, 2)));
   }
 }

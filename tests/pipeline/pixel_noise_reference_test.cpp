@@ -150,13 +150,13 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
   return list;
 }
 
-/// Where a crease ends in a silhouette, both cross the same step at last, and the silhouette takes it: of the
-/// geometry's gradients a share that falls as the resolution grows. So it is where what the near plane cuts
-/// leaves a silhouette. A silhouette alone has no such steps; that of a triangle has sharper corners.
+/// At a corner the contours that meet there take more or less than their share of the cells around it: of the
+/// geometry's gradients a share that falls as the resolution grows, more where corners are sharp, and most
+/// where the near plane cuts surfaces open that hide parts of each other.
 struct Tolerance {
   double geometry, others;  // times the width
 };
-constexpr Tolerance k_silhouette{0.2, 0.1}, k_triangle{0.4, 0.1}, k_creases{1.8, 0.1}, k_cut{1.8, 0.2};
+constexpr Tolerance k_silhouette{0.2, 0.1}, k_triangle{0.4, 0.1}, k_creases{0.4, 0.1}, k_cut{1.8, 0.2};
 
 double tolerance_of(const Direction& d, const Tolerance& t) {
   return (d.name == "sigma" || d.name == "background" ? t.others : t.geometry) / reduced(k_width, 8);

@@ -276,8 +276,12 @@ TEST_SUITE("robustness") {
       change(smoothing);
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(smoothing), part);
     };
-    check([](Smoothing& s) { s.occupancy_estimator = s.aggregation_estimator = Estimator::monte_carlo; },
-          "noise (smoothing): got pixel with monte_carlo, expected pixel with the exact estimators");
+    check(
+        [](Smoothing& s) {
+          s.aggregation_estimator = Estimator::monte_carlo;
+          s.depth_prior = Prior::uniform;
+        },
+        "aggregation_estimator (smoothing): got monte_carlo with the uniform prior");
     check([](Smoothing& s) { s.occupancy_prior = Prior::gumbel; },
           "got pixel with the gumbel occupancy_prior");
     check([](Smoothing& s) { s.occupancy_width = OccupancyWidth::zero; },
@@ -296,6 +300,10 @@ TEST_SUITE("robustness") {
       smoothing.occupancy_prior = smoothing.depth_prior = prior;
       CHECK_NOTHROW(validate(smoothing));
     }
+    smoothing.occupancy_estimator = Estimator::monte_carlo;  // of the uniform prior, in either composition
+    CHECK_NOTHROW(validate(smoothing));
+    smoothing.composition = Composition::joint;
+    CHECK_NOTHROW(validate(smoothing));
   }
 
   TEST_CASE("unknown words") {

@@ -261,7 +261,7 @@ TEST_SUITE("gradient") {
     test::poison(grad_raster, frame.samples(), cl_float4{{test::k_poison, 0, 0, 0}});
     frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
     CHECK(dot(grad, image) == doctest::Approx(dot(grad_raster.download(), samples.colors)).epsilon(1e-5));
-    CHECK(dot(grad, image) != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-4));
+    CHECK(dot(grad, image) != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-5));
   }
 
   TEST_CASE("antialias: ends of edges against differences") {

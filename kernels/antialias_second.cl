@@ -1,0 +1,239 @@
+// Crossings that come second. Where contours meet, two of them cross one step between samples. Its winner
+// (antialias_cross.cl) takes the whole jump from one sample to the other for its own, and what lies between
+// the two has a colour that neither sample shows: without more, gradients lack about a sample's length at
+// every corner. The second contour knows its own jump J from the nearest step along it that it has for
+// itself. With w and c what the winner and the second cut, the winner's cell gets w J back, and c J is the
+// second's. So each jump counts where it is.
+//
+// Such steps are few: a tile lists its own, and adds those of the tiles around it to its samples.
+#include "visibility.h"
+
+/// How many lines away a contour looks for a step of its own. Crossings are at most twice as far along the
+/// lines: it lies in the tile or in one around it.
+#define DPR_REFERENCE_LINES 3
+
+/// Set in a reference whose samples lie the other way round.
+#define DPR_TURNED 0x80000000u
+
+static inline int is_on_raster(const FrameParams p, const RasterEdge e, const Crossing x) {
+  return x.exists && x.column >= 0 && x.row >= 0 && x.column + e.is_by_rows < (int)p.width &&
+         x.row + !e.is_by_rows < (int)p.height;
+}
+
+static inline uint tile_of_sample(const FrameParams p, uint view, uint column, uint row) {
+  return (view * p.tiles_y + row / DPR_TILE) * p.tiles_x + column / DPR_TILE;
+}
+
+/// The step of a crossing, if the contour crosses it alone. With DPR_TURNED where its first sample lies on
+/// the other side of the contour.
+static inline uint own_step(const FrameParams p, uint view, uint contour, const TileContour c, int by_rows,
+                            int line, int first_is_within, global const uint* restrict winner,
+                            global const uint* restrict crowded) {
+  const RasterEdge e = raster_edge(c.a, c.b, by_rows);
+  const Crossing x = cross_line(p, e, line);
+  if (!is_on_raster(p, e, x)) return DPR_NO_CROSSING;
+  const uint step = step_of(p, view, e, x);
+  const uint tile = tile_of_sample(p, view, (uint)x.column, (uint)x.row);
+  if (winner[step] != contour || has_bit(crowded + DPR_TILE_WORDS * tile, bit_in_tile(e, x)))
+    return DPR_NO_CROSSING;
+  return first_is_inner(c, e) == first_is_within ? step : step | DPR_TURNED;
+}
+
+/// The nearest such step, on the lines of a crossing or on those across; DPR_NO_CROSSING if there is none.
+static inline uint find_reference(const FrameParams p, uint view, uint contour, const TileContour c,
+                                  const RasterEdge e, const Crossing x, global const uint* restrict winner,
+                                  global const uint* restrict crowded) {
+  const int is_inner = first_is_inner(c, e), across = e.is_by_rows ? x.column : x.row;
+  for (int away = 1; away <= DPR_REFERENCE_LINES; ++away) {
+    for (int side = 0; side < 2; ++side) {
+      const int line = side ? x.line + away : x.line - away, other = side ? across + away : across + 1 - away;
+      uint step = own_step(p, view, contour, c, e.is_by_rows, line, is_inner, winner, crowded);
+      if (step != DPR_NO_CROSSING) return step;
+      step = own_step(p, view, contour, c, !e.is_by_rows, other, is_inner, winner, crowded);
+      if (step != DPR_NO_CROSSING) return step;
+    }
+  }
+  return DPR_NO_CROSSING;
+}
+
+static inline int have_end_in_common(uint4 a, uint4 b) {
+  return a.x == b.x || a.x == b.y || a.y == b.x || a.y == b.y || own_face(a) == own_face(b);
+}
+
+/// Whether something hides a contour at a step that another has won. Of the two samples only the one on its
+/// own side of the winner is asked: the other may show what the winner bounds.
+static inline int is_second_hidden(const FrameParams p, const CrossingScene v, const TileContour winner,
+                                   const TileContour c, const RasterEdge e, const Crossing x, float depth) {
+  const RasterEdge of_winner = raster_edge(winner.a, winner.b, e.is_by_rows);
+  const Crossing at = cross_line(p, of_winner, x.line);
+  const int is_first = x.position < at.position, inner_first = first_is_inner(c, e);
+  if (c.flags & DPR_CONTOUR_CREASE) {
+    const int column = x.column + (e.is_by_rows && !is_first), row = x.row + (!e.is_by_rows && !is_first);
+    const float front = v.front[row * (int)p.width + column], slack = v.reach + DPR_DEPTH_SLACK * depth;
+    return hides_crease(p, c, v.faces, v.ndc, inner_first == is_first, pixel_centre(p, column, row), front,
+                        depth, slack);
+  }
+  if (inner_first != is_first && is_hidden(p, v, c, e, x, 0, depth)) return 1;
+  // What the winner bounds hides what lies behind it; contours that meet lie on one surface.
+  return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
+         mix_depths(p, winner.depths, at.along) < depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
+         !have_end_in_common(winner.record, c.record);
+}
+
+/// False only if none of the tile's steps where an edge may cross a line has another contour for its winner.
+static inline int may_be_second(const FrameParams p, uint view, uint contour, const RasterEdge e, int line,
+                                const TileSamples s, global const uint* restrict winner) {
+  const int low = e.is_by_rows ? s.first_column : s.first_row,
+            high = e.is_by_rows ? s.last_column : s.last_row;
+  const int middle = (int)floor(clamp(position_on_line(p, e, line), (float)(low - 2), (float)(high + 2)));
+  Crossing x = {1, line, line, line, 0.0f, 0.0f, 0.0f};
+  for (int first = max(middle - 1, low); first < min(middle + 2, high); ++first) {
+    x.column = e.is_by_rows ? first : line;
+    x.row = e.is_by_rows ? line : first;
+    const uint other = winner[step_of(p, view, e, x)];
+    if (other != DPR_NO_CROSSING && other != contour) return 1;
+  }
+  return 0;
+}
+
+/// Lists the seconds of a tile, as many as there is room for. One work-item per tile of all views.
+/// Deterministic. Inputs as antialias_cross has and leaves them, and
+/// out  counts   uint[tile]
+/// out  seconds  SecondCrossing[tile][DPR_SECOND_CROSSINGS]
+kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
+                                  global const ViewParams* restrict views, global const uint4* restrict edges,
+                                  global const uint4* restrict faces, global const uint* restrict facing,
+                                  global const float4* restrict ndc,
+                                  global const ClippedFace* restrict clipped,
+                                  global const uint* restrict tile_starts,
+                                  global const uint* restrict pair_contour,
+                                  global const float* restrict front, global const uint* restrict winner,
+                                  global const uint* restrict crowded, global uint* restrict counts,
+                                  global SecondCrossing* restrict seconds) {
+  const uint tile = (uint)get_global_id(0), view = tile / (p.tiles_x * p.tiles_y);
+  if (view >= p.views) return;
+  counts[tile] = 0;
+  if (tile_starts[tile + 1] - tile_starts[tile] < 2) return;
+  const TileSamples s = tile_samples(p, tile);
+  const CrossingScene v = {faces, ndc, front + view * p.width * p.height,
+                           a.depth_reach / views[view].inverse_range};
+  uint count = 0;
+  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
+    const uint contour = pair_contour[pair];
+    const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
+    for (int by_rows = 0; by_rows < 2; ++by_rows) {
+      const float weight = by_rows ? c.by_rows : 1.0f - c.by_rows;
+      const RasterEdge e = raster_edge(c.a, c.b, by_rows);
+      const int2 lines = lines_of_edge(p, e, s);
+      for (int line = lines.x; line < lines.y && count < DPR_SECOND_CROSSINGS; ++line) {
+        if (!may_be_second(p, view, contour, e, line, s, winner)) continue;
+        const Crossing x = cross_line(p, e, line);
+        if (!is_step_of(p, e, x, s)) continue;
+        const uint step = step_of(p, view, e, x), first = winner[step];
+        if (first == DPR_NO_CROSSING) continue;
+        const float depth = mix_depths(p, c.depths, x.along);
+        if (first == contour) continue;
+        const TileContour other = load_contour(p, a, first, edges, faces, facing, ndc, clipped);
+        if (is_second_hidden(p, v, other, c, e, x, depth)) continue;
+        const uint reference = find_reference(p, view, contour, c, e, x, winner, crowded);
+        if (reference == DPR_NO_CROSSING) continue;
+        const SecondCrossing second = {step, contour, reference, weight * line_cut(p, c, e, x)};
+        seconds[DPR_SECOND_CROSSINGS * tile + count++] = second;
+      }
+    }
+  }
+  counts[tile] = count;
+}
+
+/// The samples at both ends of a step.
+static inline uint2 ends_of_step(const FrameParams p, uint step) {
+  const uint pixels = p.views * p.width * p.height;
+  return step < pixels ? (uint2)(step, step + 1) : (uint2)(step - pixels, step - pixels + p.width);
+}
+
+/// The samples at the ends of a reference, the first on the side of the second's first.
+static inline uint2 ends_of_reference(const FrameParams p, uint reference) {
+  const uint2 ends = ends_of_step(p, reference & ~DPR_TURNED);
+  return reference & DPR_TURNED ? ends.yx : ends;
+}
+
+/// The sample whose cell is cut.
+static inline uint cut_sample(const FrameParams p, uint step, float cut) {
+  const uint2 ends = ends_of_step(p, step);
+  return cut < 0.0f ? ends.x : ends.y;
+}
+
+static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
+  const uint line = sample / p.width;
+  return tile_of_sample(p, line / p.height, sample % p.width, line % p.height) == tile;
+}
+
+/// The columns or rows [x, y] of tiles that touch one.
+static inline uint2 tiles_around(uint at, uint count) {
+  return (uint2)(at > 0 ? at - 1 : 0, min(at + 1, count - 1));
+}
+
+/// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
+/// in      counts, seconds  as antialias_second_find leaves them
+/// in      cut              float[2][pixel]  of the winners
+/// in      raster           float4[pixel]    the samples
+/// in out  blended          float4[pixel]
+kernel void antialias_second_forward(const FrameParams p, global const uint* restrict counts,
+                                     global const SecondCrossing* restrict seconds,
+                                     global const float* restrict cut, global const float4* restrict raster,
+                                     global float4* restrict blended) {
+  const uint tile = (uint)get_global_id(0), in_view = tile % (p.tiles_x * p.tiles_y);
+  if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  const uint2 columns = tiles_around(in_view % p.tiles_x, p.tiles_x);
+  const uint2 rows = tiles_around(in_view / p.tiles_x, p.tiles_y);
+  for (uint row = rows.x; row <= rows.y; ++row) {
+    for (uint column = columns.x; column <= columns.y; ++column) {
+      const uint near = tile - in_view + row * p.tiles_x + column;
+      for (uint k = 0; k < counts[near]; ++k) {
+        const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
+        const uint2 ends = ends_of_reference(p, c.reference);
+        const float4 jump = raster[ends.y] - raster[ends.x];
+        const uint of_winner = cut_sample(p, c.step, cut[c.step]), own = cut_sample(p, c.step, c.cut);
+        if (is_in_tile(p, tile, of_winner)) blended[of_winner] += cut[c.step] * jump;
+        if (is_in_tile(p, tile, own)) blended[own] -= c.cut * jump;
+      }
+    }
+  }
+}
+
+/// The gradients of what winners and seconds cut, and of the samples at the references. One work-item per
+/// tile. Deterministic. Inputs as antialias_second_forward, and
+/// in      grad_blended  float4[pixel]
+/// in out  grad_cut      float[2][pixel]
+/// in out  grad_raster   float4[pixel]
+/// out     grad_seconds  float[tile][DPR_SECOND_CROSSINGS]
+kernel void antialias_second_backward(const FrameParams p, global const uint* restrict counts,
+                                      global const SecondCrossing* restrict seconds,
+                                      global const float* restrict cut, global const float4* restrict raster,
+                                      global const float4* restrict grad_blended,
+                                      global float* restrict grad_cut, global float4* restrict grad_raster,
+                                      global float* restrict grad_seconds) {
+  const uint tile = (uint)get_global_id(0), in_view = tile % (p.tiles_x * p.tiles_y);
+  if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  const uint2 columns = tiles_around(in_view % p.tiles_x, p.tiles_x);
+  const uint2 rows = tiles_around(in_view / p.tiles_x, p.tiles_y);
+  for (uint row = rows.x; row <= rows.y; ++row) {
+    for (uint column = columns.x; column <= columns.y; ++column) {
+      const uint near = tile - in_view + row * p.tiles_x + column;
+      for (uint k = 0; k < counts[near]; ++k) {
+        const uint place = DPR_SECOND_CROSSINGS * near + k;
+        const SecondCrossing c = seconds[place];
+        const uint2 ends = ends_of_reference(p, c.reference);
+        const float4 grad_of_winner = grad_blended[cut_sample(p, c.step, cut[c.step])];
+        const float4 grad_own = grad_blended[cut_sample(p, c.step, c.cut)];
+        const float4 grad_jump = cut[c.step] * grad_of_winner - c.cut * grad_own;
+        if (is_in_tile(p, tile, ends.x)) grad_raster[ends.x] -= grad_jump;
+        if (is_in_tile(p, tile, ends.y)) grad_raster[ends.y] += grad_jump;
+        if (near != tile) continue;
+        const float4 jump = raster[ends.y] - raster[ends.x];
+        if (cut[c.step] != 0.0f) grad_cut[c.step] += dot(grad_of_winner, jump);
+        grad_seconds[place] = -dot(grad_own, jump);
+      }
+    }
+  }
+}

@@ -1,0 +1,144 @@
+// Contours of a tile and their crossings' visibility: what the search for crossings, that for those that come
+// second, and the way back from both have in common.
+#ifndef DPR_VISIBILITY_H
+#define DPR_VISIBILITY_H
+
+#include "crossing.h"
+
+/// Depths that differ by less than this part of them are not told apart.
+#define DPR_DEPTH_SLACK 1e-5f
+
+/// Depths across a crease follow its faces up to this part of their change within a step.
+#define DPR_CREASE_SLACK 0.5f
+
+/// A contour of a tile.
+typedef struct {
+  float2 a, b;    // its ends, NDC
+  float2 depths;  // of its ends
+  uint4 record;
+  uint view, flags;
+  int inner;      // on which side of a -> b its surface lies: inner_side()
+  float by_rows;  // how much it counts by rows
+} TileContour;
+
+static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
+                                       global const uint4* restrict edges, global const uint4* restrict faces,
+                                       global const uint* restrict facing, global const float4* restrict ndc,
+                                       global const ClippedFace* restrict clipped) {
+  TileContour c;
+  const uint numbered = contour / DPR_CONTOUR_FLAGS;
+  c.flags = contour % DPR_CONTOUR_FLAGS;
+  c.view = numbered / a.edges;
+  const ViewEdge e = view_edge(edges_of_view(p, c.view, a.mesh_edges, edges, faces, ndc, clipped),
+                               numbered - c.view * a.edges);
+  c.record = e.record;
+  c.a = e.end[0].xy;
+  c.b = e.end[1].xy;
+  c.depths = (float2)(e.end[0].z, e.end[1].z);
+  c.inner = inner_side(edge_sides(c.record, facing + c.view * p.faces));
+  c.by_rows = weight_by_rows(c.b - c.a);
+  return c;
+}
+
+/// What its ends add to a crossing: nothing where they have no corners that count.
+static inline CornerArea corner_of(const FrameParams p, const TileContour c, const RasterEdge e,
+                                   const Crossing x, int is_second) {
+  const CornerArea none = {0.0f, 0.0f, 0.0f, 0.0f};
+  const uint flag = is_second ? DPR_CONTOUR_SECOND_END : DPR_CONTOUR_FIRST_END;
+  return c.flags & flag ? corner_area(p, e, x, is_second ? e.b : e.a) : none;
+}
+
+/// What a crossing takes of a cell, if its lines are all that count.
+static inline float line_cut(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
+  return x.t - 0.5f + corner_of(p, c, e, x, 0).area + corner_of(p, c, e, x, 1).area;
+}
+
+/// Whether the first sample of a step is on the contour's inner side.
+static inline int first_is_inner(const TileContour c, const RasterEdge e) {
+  return (c.inner > 0) == e.ascends;
+}
+
+static inline float mix_depths(const FrameParams p, float2 depths, float along) {
+  return p.perspective_correct ? 1.0f / ((1.0f - along) / depths.x + along / depths.y)
+                               : depths.x + along * (depths.y - depths.x);
+}
+
+/// The depth of a face's plane at a sample; that of the edge where the face is too thin to say, or does not
+/// reach.
+static inline float plane_depth(const FrameParams p, const TileContour c, float3 across, float2 sample,
+                                float otherwise) {
+  const float2 ab = c.b - c.a, ac = across.xy - c.a, as = sample - c.a;
+  const float area = ab.x * ac.y - ab.y * ac.x;
+  if (!(fabs(area) > DPR_SLIVER_AREA)) return otherwise;
+  const float third = (ab.x * as.y - ab.y * as.x) / area, second = (as.x * ac.y - as.y * ac.x) / area;
+  const float first = 1.0f - second - third;
+  if (!p.perspective_correct) return first * c.depths.x + second * c.depths.y + third * across.z;
+  const float inverse = first / c.depths.x + second / c.depths.y + third / across.z;
+  return inverse > 0.0f ? 1.0f / inverse : otherwise;
+}
+
+/// Whether something hides a crease from one of the step's samples: what lies nearer there than the face on
+/// its side.
+static inline int hides_crease(const FrameParams p, const TileContour c, global const uint4* restrict faces,
+                               global const float4* restrict ndc, int own, float2 sample, float front,
+                               float depth, float slack) {
+  const uint4 face = faces[own ? own_face(c.record) : other_face(c.record)];
+  const float3 across = ndc[c.view * p.vertices + corner_across(face, c.record.x, c.record.y)].xyz;
+  const float expected = plane_depth(p, c, across, sample, depth);
+  return front < expected - slack - DPR_CREASE_SLACK * fabs(expected - depth);
+}
+
+/// The depth of the surface that a sample shows, at a crossing `distance` steps away, as the sample beyond
+/// continues it; the sample's own if that is further.
+static inline float depth_at_crossing(float front, float beyond, float distance) {
+  const float continued = front + distance * (front - beyond);
+  return continued > front && continued < INFINITY ? continued : front;
+}
+
+/// What the crossings of a tile are found by.
+typedef struct {
+  global const uint4* faces;
+  global const float4* ndc;
+  global const float* front;  // of the view
+  float reach;                // view depth behind the nearest that may still be seen
+} CrossingScene;
+
+/// Whether something hides a contour from the step that it crosses.
+static inline int is_hidden(const FrameParams p, const CrossingScene v, const TileContour c,
+                            const RasterEdge e, const Crossing x, int is_crease, float depth) {
+  const int to_next = e.is_by_rows ? 1 : (int)p.width, first = x.row * (int)p.width + x.column;
+  const int inner_first = first_is_inner(c, e);
+  const float slack = v.reach + DPR_DEPTH_SLACK * depth;
+  if (is_crease) {
+    const float2 here = pixel_centre(p, x.column, x.row);
+    const float2 next = pixel_centre(p, x.column + e.is_by_rows, x.row + !e.is_by_rows);
+    return hides_crease(p, c, v.faces, v.ndc, inner_first, here, v.front[first], depth, slack) ||
+           hides_crease(p, c, v.faces, v.ndc, !inner_first, next, v.front[first + to_next], depth, slack);
+  }
+  const int outer = inner_first ? first + to_next : first, outwards = inner_first ? to_next : -to_next;
+  const int place = (e.is_by_rows ? x.column : x.row) + (inner_first ? 2 : -1);
+  const int is_inside = place >= 0 && place < (int)(e.is_by_rows ? p.width : p.height);
+  const float beyond = is_inside ? v.front[outer + outwards] : INFINITY;
+  return depth_at_crossing(v.front[outer], beyond, inner_first ? 1.0f - x.t : x.t) < depth - slack;
+}
+
+/// The place of a crossing's step in the planes of steps, of which each has `pixels`.
+static inline uint step_of(const FrameParams p, uint view, const RasterEdge e, const Crossing x) {
+  const uint pixels = p.views * p.width * p.height;
+  return (e.is_by_rows ? 0 : pixels) + (view * p.height + (uint)x.row) * p.width + (uint)x.column;
+}
+
+/// Words that hold a bit for every step of a tile.
+#define DPR_TILE_WORDS 4
+
+/// The bit of a crossing's step among those of its tile.
+static inline uint bit_in_tile(const RasterEdge e, const Crossing x) {
+  const uint in_tile = (uint)(x.row % DPR_TILE) * DPR_TILE + (uint)(x.column % DPR_TILE);
+  return (e.is_by_rows ? 0 : DPR_TILE * DPR_TILE) + in_tile;
+}
+
+static inline int has_bit(global const uint* words, uint bit) {
+  return (int)(words[bit / 32] >> bit % 32 & 1u);
+}
+
+#endif

@@ -1,0 +1,76 @@
+#include "stages/blur_sampled.hpp"
+
+#include "stages/occupancy.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_samples_per_draw = 8;  // as kernels/noise.h has them
+
+}  // namespace
+
+BlurSampled::BlurSampled(Device::Impl& device, const Smoothing& smoothing, const ShiftTable& table,
+                         const BlurKernel& kernel)
+    : device_(device),
+      draw_(device, "blur_sampled.cl", "blur_sampled_draw"),
+      forward_(device, "blur_sampled.cl", "blur_sampled_forward"),
+      backward_(device, "blur_sampled.cl", "blur_sampled_backward"),
+      scale_(device, "blur_sampled.cl", "blur_sampled_scale"),
+      reduce_(device) {
+  params_.sampling = sampling_params(smoothing);
+  params_.supersampling = static_cast<cl_uint>(kernel.supersampling);
+  params_.margin = static_cast<cl_uint>(kernel.margin);
+  params_.radius = static_cast<cl_uint>(table.radius());
+  cumulative_.upload(device, table.cumulative);
+  scores_.upload(device, table.scores);
+}
+
+std::size_t BlurSampled::pixels() const {
+  return std::size_t{params_.views} * params_.height * params_.width;
+}
+
+void BlurSampled::draw(const Blur::Size& size, cl_uint first_view) {
+  if (starts_.size() != size.views + 1 || params_.width != size.width || params_.height != size.height) {
+    std::vector<cl_uint> starts;
+    for (std::size_t view = 0; view <= size.views; ++view)
+      starts.push_back(static_cast<cl_uint>(view * size.height * size.width));
+    starts_.upload(device_, starts);
+  }
+  params_.views = static_cast<cl_uint>(size.views);
+  params_.first_view = first_view;
+  params_.width = static_cast<cl_uint>(size.width);
+  params_.height = static_cast<cl_uint>(size.height);
+  const std::size_t samples = params_.sampling.samples;
+  shifts_.resize(device_, size.views * samples);
+  shift_scores_.resize(device_, size.views * samples);
+  draw_(size.views * ((samples + k_samples_per_draw - 1) / k_samples_per_draw), params_, cumulative_, scores_,
+        shifts_, shift_scores_);
+}
+
+void BlurSampled::forward(const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
+  image.resize(device_, pixels());
+  forward_(pixels(), params_, shifts_, raster, image);
+}
+
+void BlurSampled::backward(const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster) {
+  const std::size_t around = 2 * std::size_t{params_.margin}, per_pixel = params_.supersampling;
+  const std::size_t samples =
+      params_.views * (params_.height * per_pixel + around) * (params_.width * per_pixel + around);
+  grad_raster.resize(device_, samples);
+  backward_(samples, params_, shifts_, grad_image, grad_raster);
+}
+
+void BlurSampled::backward_scale(const Buffer<cl_float4>& raster, const BufferRef<cl_float4>& grad_image) {
+  products_.resize(device_, pixels());
+  scale_(pixels(), params_, shifts_, shift_scores_, raster, grad_image, products_);
+  reduce_({pixels(), 1, params_.views, 1, starts_, products_}, grad_scale);
+}
+
+std::size_t BlurSampled::bytes() const {
+  std::size_t bytes = shifts_.capacity_bytes() + starts_.capacity_bytes() + reduce_.bytes();
+  for (const Buffer<float>* buffer : {&cumulative_, &scores_, &shift_scores_, &products_, &grad_scale})
+    bytes += buffer->capacity_bytes();
+  return bytes;
+}
+
+}  // namespace dpr
