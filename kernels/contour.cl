@@ -1,7 +1,7 @@
 // Contours of a view: the edges where its rigid image may jump. An edge is one if both of its faces lie on
 // the same side of it in the image (facing changes, or there is one face only), or if its faces' colours or
-// normals differ there, or their textures or their places in these. Listed by tile, like triangles: pairs of
-// tile and contour, counted, listed in the order of the edges, sorted by tile, linked.
+// normals differ there, or their textures or their places in these, or their materials. Listed by tile, like
+// triangles: pairs of tile and contour, counted, listed in the order of the edges, sorted by tile, linked.
 //
 // Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once.
 // Where both faces have vertices of their own, there are two edges, one on each face's: as long as they
@@ -93,6 +93,7 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
   if (sides.own != -sides.other) return DPR_OCCLUDES;
   if (sides.own == 0) return DPR_NO_CONTOUR;
   if (edge.z & DPR_EDGE_SEAM) return DPR_CREASE;
+  if (shading != DPR_UNLIT && (edge.w & DPR_EDGE_SEAM)) return DPR_CREASE;
   if (shading == DPR_FLAT && normals_differ(s, edge)) return DPR_CREASE;
   if (!(edge.z & DPR_EDGE_FLAG)) return DPR_NO_CONTOUR;
   if (is_split && shading != DPR_UNLIT && shading != DPR_FLAT) return DPR_CREASE;

@@ -23,7 +23,7 @@ static inline int side_of_face(uint facing) {
 
 static inline int has_other_face(uint4 edge) { return edge.w != DPR_NO_FACE; }
 static inline uint own_face(uint4 edge) { return edge.z & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM); }
-static inline uint other_face(uint4 edge) { return edge.w & ~DPR_EDGE_FLAG; }
+static inline uint other_face(uint4 edge) { return edge.w & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM); }
 
 /// `facing` is the view's.
 static inline EdgeSides edge_sides(uint4 edge, global const uint* facing) {

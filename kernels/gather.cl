@@ -29,3 +29,26 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
   }
   grad[i] = (float4)(sum, 0.0f);
 }
+
+/// The same of faces, in an order that brings together those of one material; the views are added up. One
+/// work-item per place of `faces`.
+/// in   pair_starts, face_pairs  as gather_corners
+/// in   ordered   uint[face]
+/// in   partial   float[pair][DPR_MATERIAL_CHANNELS]
+/// out  channels  float[DPR_MATERIAL_CHANNELS][face]  in that order
+kernel void gather_faces(const FrameParams p, global const uint* restrict pair_starts,
+                         global const uint* restrict face_pairs, global const uint* restrict ordered,
+                         global const float* restrict partial, global float* restrict channels) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.faces) return;
+  float4 sum = (float4)(0.0f);
+  for (uint view = 0; view < p.views; ++view) {
+    const uint face = view * p.faces + ordered[i];
+    for (uint place = pair_starts[face]; place < pair_starts[face + 1]; ++place)
+      sum += vload4(face_pairs[place], partial);
+  }
+  channels[i] = sum.x;
+  channels[p.faces + i] = sum.y;
+  channels[2 * p.faces + i] = sum.z;
+  channels[3 * p.faces + i] = sum.w;
+}

@@ -82,8 +82,8 @@ static inline Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS
 }
 
 /// factor = ambient + environment + sum diffuse * lambert, specular = sum specular * highlight, RGB each.
-static inline void light_point(const LightingParams lp, global const Light* restrict lights, Vec3n position,
-                               Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
+static inline void light_point(const LightingParams lp, global const Light* restrict lights, float shininess,
+                               Vec3n position, Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
   *factor = splat3(lp.ambient);
   *specular = zero3n();
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
@@ -93,7 +93,7 @@ static inline void light_point(const LightingParams lp, global const Light* rest
     for (int k = 0; k < DPR_HARMONICS; ++k) *factor = mad3n(splat3(lp.harmonics[k]), basis[k], *factor);
   }
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
+    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
     *factor = mad3n(splat3(lights[l].diffuse), through_cone(t, t.lambert), *factor);
     *specular = mad3n(splat3(lights[l].specular), through_cone(t, t.highlight), *specular);
   }
@@ -102,6 +102,7 @@ static inline void light_point(const LightingParams lp, global const Light* rest
 /// Gradients of a point in the light.
 typedef struct {
   Vec3n position, normal, eye;  // of the unit normal
+  realn shininess;
 } PointGradient;
 
 /// Gradients of what is known of a light: of the unit axis.
@@ -131,6 +132,7 @@ static inline void light_term_backward(const LightTerm t, float4 eye, global con
   const realn grad_highlight = through_cone(t, by_specular);
   const realn grad_base =
       choose(t.base > 0.0f, grad_highlight * shininess * t.highlight / max(t.base, 1e-30f), (realn)(0.0f));
+  point->shininess += grad_highlight * t.highlight * log(max(t.base, 1e-30f));
   realn grad_cosine = choose(cosine > 0.0f, through_cone(t, by_diffuse), (realn)(0.0f));
   Vec3n grad_to_light, grad_to_eye;
   if (DPR_SHADING == DPR_BLINN) {
@@ -167,10 +169,17 @@ static inline LightGradient zero_light_gradient(void) {
   return g;
 }
 
+static inline PointGradient zero_point_gradient(void) {
+  PointGradient g;
+  g.position = g.normal = g.eye = zero3n();
+  g.shininess = 0.0f;
+  return g;
+}
+
 /// Adds the gradients through the light at a point.
 static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
-                                        float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                        Vec3n grad_specular, PointGradient* point) {
+                                        float shininess, float4 eye, Vec3n position, Vec3n normal,
+                                        Vec3n grad_factor, Vec3n grad_specular, PointGradient* point) {
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
     realn grad_basis[DPR_HARMONICS];
 #pragma unroll
@@ -179,19 +188,18 @@ static inline void light_point_backward(const LightingParams lp, global const Li
   }
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights + l, lp.shininess);
-    light_term_backward(t, eye, lights + l, lp.shininess, normal, grad_factor, grad_specular, point, &unused);
+    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
+    light_term_backward(t, eye, lights + l, shininess, normal, grad_factor, grad_specular, point, &unused);
   }
 }
 
 /// Adds the gradients of a light at a point.
-static inline void add_light_gradient(const LightingParams lp, global const Light* light, float4 eye,
-                                      Vec3n position, Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
+static inline void add_light_gradient(global const Light* light, float shininess, float4 eye, Vec3n position,
+                                      Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,
                                       LightGradient* g) {
-  const LightTerm t = light_term(position, normal, eye, light, lp.shininess);
-  PointGradient unused;
-  unused.position = unused.normal = unused.eye = zero3n();
-  light_term_backward(t, eye, light, lp.shininess, normal, grad_factor, grad_specular, &unused, g);
+  const LightTerm t = light_term(position, normal, eye, light, shininess);
+  PointGradient unused = zero_point_gradient();
+  light_term_backward(t, eye, light, shininess, normal, grad_factor, grad_specular, &unused, g);
 }
 
 /// Adds the gradients of the harmonics at a normal.

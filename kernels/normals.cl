@@ -1,4 +1,5 @@
-// Vertex normals in world space: the faces' area-weighted normals, summed in order and normalised; and back.
+// Normals in world space: of vertices, the faces' area-weighted normals, summed in order and normalised;
+// those that meshes give, turned with the mesh; and back. A view has those of all vertices, then those given.
 #include "shared_types.h"
 
 /// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
@@ -9,12 +10,21 @@ static inline float3 face_normal(global const float4* world, uint4 face) {
   return cross(world[face.y].xyz - a, world[face.z].xyz - a);
 }
 
+/// Of length one, or zero where there is no direction; w = 1 / length, or zero.
+static inline float4 unit_normal(float3 sum) {
+  const float size = length(sum);
+  const int has_direction = size > DPR_MIN_NORMAL && size < INFINITY;
+  const float inverse = has_direction ? 1.0f / size : 0.0f;
+  return has_direction ? (float4)(sum * inverse, inverse) : (float4)(0.0f);
+}
+
 /// One work-item per (view, vertex).
 /// in   faces          uint4[face]           vertex indices
 /// in   corner_starts  uint[vertex + 1]      runs of `corners`
 /// in   corners        uint[corner]          the faces around a vertex, as face * 3 + corner
 /// in   world          float4[view][vertex]  world space
-/// out  normals        float4[view][vertex]  unit, or zero; w = 1 / length of the sum, or zero
+/// out  normals        float4[view][normal]  those of vertices: unit, or zero; w = 1 / length of the sum, or
+///      zero
 kernel void normals_forward(const FrameParams p, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
                             global const float4* restrict world, global float4* restrict normals) {
@@ -25,26 +35,57 @@ kernel void normals_forward(const FrameParams p, global const uint4* restrict fa
   for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
     sum += face_normal(world + view * p.vertices, faces[corners[k] / 3]);
   }
-  const float size = length(sum);
-  const int has_direction = size > DPR_MIN_NORMAL && size < INFINITY;
-  const float inverse = has_direction ? 1.0f / size : 0.0f;
-  normals[i] = has_direction ? (float4)(sum * inverse, inverse) : (float4)(0.0f);
+  normals[view * p.normals + vertex] = unit_normal(sum);
 }
 
-/// From the unit normals' gradients to those of the sums. One work-item per (view, vertex).
-/// in      normals       as normals_forward left them
-/// in out  grad_normals  float4[view][vertex]
+/// The transposed inverse of a model's linear part, but for a factor above 0, by rows: it takes normals to
+/// world space, also where the model mirrors.
+typedef struct {
+  float3 row[3];
+} NormalMap;
+
+static inline NormalMap normal_map(global const float4* model) {
+  const float3 a = model[0].xyz, b = model[1].xyz, c = model[2].xyz;
+  const float3 bc = cross(b, c);
+  const float side = dot(a, bc) < 0.0f ? -1.0f : 1.0f;
+  NormalMap m;
+  m.row[0] = side * bc;
+  m.row[1] = side * cross(c, a);
+  m.row[2] = side * cross(a, b);
+  return m;
+}
+
+/// One work-item per (view, given normal).
+/// in   models       float4[view][mesh][3]  rows of the models' matrices
+/// in   given        float4[given]          object space; any length
+/// in   given_mesh   uint[given]
+/// out  normals      float4[view][normal]   those given: as normals_forward
+kernel void normals_given_forward(const FrameParams p, global const float4* restrict models,
+                                  global const float4* restrict given, global const uint* restrict given_mesh,
+                                  global float4* restrict normals) {
+  const uint i = (uint)get_global_id(0), count = p.normals - p.vertices;
+  if (i >= p.views * count) return;
+  const uint view = i / count, g = i - view * count;
+  const NormalMap m = normal_map(models + 3 * (view * p.meshes + given_mesh[g]));
+  const float3 n = given[g].xyz;
+  normals[view * p.normals + p.vertices + g] =
+      unit_normal((float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n)));
+}
+
+/// From the unit normals' gradients to those of the sums. One work-item per (view, normal).
+/// in      normals       as the forward kernels left them
+/// in out  grad_normals  float4[view][normal]
 kernel void normals_backward_normalize(const FrameParams p, global const float4* restrict normals,
                                        global float4* restrict grad_normals) {
   const uint i = (uint)get_global_id(0);
-  if (i >= p.views * p.vertices) return;
+  if (i >= p.views * p.normals) return;
   const float3 n = normals[i].xyz, g = grad_normals[i].xyz;
   grad_normals[i] = (float4)((g - n * dot(n, g)) * normals[i].w, 0.0f);
 }
 
 /// From the sums' gradients to the world positions': a face's normal belongs to its three vertices' sums.
 /// One work-item per (view, vertex). Faces, corners and world positions as normals_forward, and
-/// in      grad_sums   float4[view][vertex]
+/// in      grad_sums   float4[view][normal]
 /// in out  grad_world  float4[view][vertex]  added to
 kernel void normals_backward(const FrameParams p, global const uint4* restrict faces,
                              global const uint* restrict corner_starts, global const uint* restrict corners,
@@ -54,7 +95,7 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
   global const float4* positions = world + view * p.vertices;
-  global const float4* sums = grad_sums + view * p.vertices;
+  global const float4* sums = grad_sums + view * p.normals;
   float3 sum = (float3)(0.0f);
   for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
     const uint4 face = faces[corners[k] / 3];
@@ -67,4 +108,30 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
     if (any(g != 0.0f)) sum += cross(positions[next].xyz - positions[previous].xyz, g);
   }
   grad_world[i] += (float4)(sum, 0.0f);
+}
+
+/// From the gradients of the turned normals to those given, the views added up. One work-item per given
+/// normal. Models and given normals as normals_given_forward, and in   grad_sums   float4[view][normal] out
+/// grad_given  float4[given] out  channels    float[3][view][given]  of the model's rotation vector
+kernel void normals_given_backward(const FrameParams p, global const float4* restrict models,
+                                   global const float4* restrict given,
+                                   global const uint* restrict given_mesh,
+                                   global const float4* restrict grad_sums,
+                                   global float4* restrict grad_given, global float* restrict channels) {
+  const uint g = (uint)get_global_id(0), count = p.normals - p.vertices;
+  if (g >= count) return;
+  const float3 n = given[g].xyz;
+  float3 sum = (float3)(0.0f);
+  for (uint view = 0; view < p.views; ++view) {
+    const NormalMap m = normal_map(models + 3 * (view * p.meshes + given_mesh[g]));
+    const float3 grad = grad_sums[view * p.normals + p.vertices + g].xyz;
+    sum += m.row[0] * grad.x + m.row[1] * grad.y + m.row[2] * grad.z;
+    const float3 turned = (float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n));
+    const float3 by_rotation = cross(turned, grad);
+    global float* channel = channels + view * count + g;
+    channel[0] = by_rotation.x;
+    channel[p.views * count] = by_rotation.y;
+    channel[2 * p.views * count] = by_rotation.z;
+  }
+  grad_given[g] = (float4)(sum, 0.0f);
 }

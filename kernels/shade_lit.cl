@@ -1,7 +1,7 @@
-// Fragment colours with lights: base colour * factor + specular, where factor and specular come from the
-// light at the fragment (flat, Phong, Blinn) or interpolate those at the corners (Gouraud). DPR_SHADING says
-// which, DPR_LIGHTS in what lights, and DPR_BASE whether the base colour is interpolated here or comes from
-// the surface stage. Loops over the corners are unrolled, as in geometry.h.
+// Fragment colours with lights: base colour * factor + material * specular, where factor and specular come
+// from the light at the fragment (flat, Phong, Blinn) or interpolate those at the corners (Gouraud).
+// DPR_SHADING says which, DPR_LIGHTS in what lights, and DPR_BASE whether the base colour is interpolated
+// here or comes from the surface stage. Loops over the corners are unrolled, as in geometry.h.
 #include "tile_lanes.h"
 
 #include "lighting.h"
@@ -13,7 +13,7 @@
 /// A triangle's corners: colours, world positions, normals; and for Gouraud the light there.
 typedef struct {
   Vec3n color[3], position[3], normal[3], factor[3], specular[3];
-  float4 eye;
+  float4 eye, material;  // RGB of the specular coefficient, shininess
 } Surface;
 
 /// The face's own normal, of length one.
@@ -28,13 +28,18 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
                                    global const Light* restrict lights, global const uint4* restrict faces,
                                    global const uint4* restrict face_colors,
                                    global const float4* restrict colors, global const float4* restrict world,
-                                   global const float4* restrict normals) {
+                                   global const uint4* restrict face_normals,
+                                   global const float4* restrict normals,
+                                   global const float4* restrict materials) {
   const uint view = view_face / p.faces;
   const uint4 f = faces[view_face % p.faces], c = face_colors[view_face % p.faces];
-  const uint vertex[3] = {f.x, f.y, f.z}, color[3] = {c.x, c.y, c.z};
+  const uint4 n = face_normals[view_face % p.faces];
+  const uint vertex[3] = {f.x, f.y, f.z}, color[3] = {c.x, c.y, c.z}, normal[3] = {n.x, n.y, n.z};
   global const float4* corner = world + view * p.vertices;
   Surface s;
   s.eye = views[view].eye;
+  s.material = materials[c.w];
+  if (s.material.w == 0.0f) s.material.w = lp.shininess;
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     if (DPR_BASE == DPR_BASE_OF_CORNERS) s.color[k] = splat3(colors[view * p.color_stride + color[k]]);
@@ -42,10 +47,10 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
     if (DPR_SHADING == DPR_FLAT) {
       s.normal[k] = splat3(flat_normal(corner[f.x], corner[f.y], corner[f.z]));
     } else {
-      s.normal[k] = splat3(normals[view * p.vertices + vertex[k]]);
+      s.normal[k] = splat3(normals[view * p.normals + normal[k]]);
     }
     if (DPR_SHADING == DPR_GOURAUD) {
-      light_point(lp, lights, s.position[k], s.normal[k], s.eye, &s.factor[k], &s.specular[k]);
+      light_point(lp, lights, s.material.w, s.position[k], s.normal[k], s.eye, &s.factor[k], &s.specular[k]);
     }
   }
   return s;
@@ -73,7 +78,7 @@ static inline Shaded shade_fragment(const Surface s, const LightingParams lp,
     f.factor = interpolate3(s.factor, c1, c2);
     f.specular = interpolate3(s.specular, c1, c2);
   } else {
-    light_point(lp, lights, f.position, f.normal, s.eye, &f.factor, &f.specular);
+    light_point(lp, lights, s.material.w, f.position, f.normal, s.eye, &f.factor, &f.specular);
   }
   return f;
 }
@@ -96,7 +101,11 @@ static inline Vec3n load_base(intn in_run, uint first, global const float* red, 
 /// in   views   ViewParams[view]
 /// in   lights  Light[light]
 /// in   faces   uint4[face]            vertex indices
-/// in   world, normals  float4[view][vertex]; normals are not read by flat shading
+/// in   face_colors  as shade_forward; w = material
+/// in   world   float4[view][vertex]
+/// in   face_normals  uint4[face]      normals of the corners
+/// in   normals  float4[view][normal]; not read by flat shading
+/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, 0: that of the lights
 /// in   base_red, base_green, base_blue  float[fragment]  read where DPR_BASE says so; the colours are not,
 ///      then
 /// out  red, green, blue  float[fragment]
@@ -104,7 +113,9 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
                               global const ViewParams* restrict views, global const Light* restrict lights,
                               global const uint4* restrict faces, global const uint4* restrict face_colors,
                               global const float4* restrict colors, global const float4* restrict world,
-                              global const float4* restrict normals, global const uint* restrict pair_face,
+                              global const uint4* restrict face_normals,
+                              global const float4* restrict normals, global const float4* restrict materials,
+                              global const uint* restrict pair_face,
                               global const uint* restrict fragment_starts, global const float* restrict bary1,
                               global const float* restrict bary2, global const float* restrict base_red,
                               global const float* restrict base_green, global const float* restrict base_blue,
@@ -112,21 +123,22 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
                               global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const Surface s =
-      load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
+  const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
+                                 face_normals, normals, materials);
   const uint last = fragment_starts[pair + 1];
   for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
     const Vec3n base = load_base(lanes_before(last, i), i, base_red, base_green, base_blue);
     const Shaded f = shade_fragment(s, lp, lights, load_n(i, bary1), load_n(i, bary2), base);
-    store_run(f.base.x * f.factor.x + f.specular.x, i, last, red);
-    store_run(f.base.y * f.factor.y + f.specular.y, i, last, green);
-    store_run(f.base.z * f.factor.z + f.specular.z, i, last, blue);
+    store_run(f.base.x * f.factor.x + s.material.x * f.specular.x, i, last, red);
+    store_run(f.base.y * f.factor.y + s.material.y * f.specular.y, i, last, green);
+    store_run(f.base.z * f.factor.z + s.material.z * f.specular.z, i, last, blue);
   }
 }
 
 /// Gradients of a surface's corners, as sums over lanes.
 typedef struct {
-  Vec3n color[3], position[3], normal[3], factor[3], specular[3], eye;
+  Vec3n color[3], position[3], normal[3], factor[3], specular[3], eye, coefficient;
+  realn shininess;
 } SurfaceGradients;
 
 static inline void add_corners(Vec3n grad[3], Vec3n g, const realn c[3]) {
@@ -147,7 +159,8 @@ static inline void shade_fragment_backward(const Surface s, const LightingParams
                                            realn* grad_bary1, realn* grad_bary2) {
   const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
   const realn c[3] = {1.0f - c1 - c2, c1, c2};
-  const Vec3n grad_factor = mul3n(grad, f.base);
+  const Vec3n grad_factor = mul3n(grad, f.base), grad_specular = mul3n(grad, splat3(s.material));
+  g->coefficient = mad3n(mul3n(grad, f.specular), (realn)(1.0f), g->coefficient);
   *grad_base = mul3n(grad, f.factor);
   *grad_bary1 = *grad_bary2 = 0.0f;
   if (DPR_BASE == DPR_BASE_OF_CORNERS) {
@@ -157,16 +170,18 @@ static inline void shade_fragment_backward(const Surface s, const LightingParams
   }
   if (DPR_SHADING == DPR_GOURAUD) {
     add_corners(g->factor, grad_factor, c);
-    add_corners(g->specular, grad, c);
-    *grad_bary1 += along_corner(s.factor, 1, grad_factor) + along_corner(s.specular, 1, grad);
-    *grad_bary2 += along_corner(s.factor, 2, grad_factor) + along_corner(s.specular, 2, grad);
+    add_corners(g->specular, grad_specular, c);
+    *grad_bary1 += along_corner(s.factor, 1, grad_factor) + along_corner(s.specular, 1, grad_specular);
+    *grad_bary2 += along_corner(s.factor, 2, grad_factor) + along_corner(s.specular, 2, grad_specular);
     return;
   }
-  PointGradient point;
-  point.position = point.normal = zero3n();
+  PointGradient point = zero_point_gradient();
   point.eye = g->eye;
-  light_point_backward(lp, lights, s.eye, f.position, f.normal, grad_factor, grad, &point);
+  point.shininess = g->shininess;
+  light_point_backward(lp, lights, s.material.w, s.eye, f.position, f.normal, grad_factor, grad_specular,
+                       &point);
   g->eye = point.eye;
+  g->shininess = point.shininess;
   const Vec3n grad_normal = normalize3n_backward(f.normal, f.inverse_normal, point.normal);
   add_corners(g->position, point.position, c);
   add_corners(g->normal, grad_normal, c);
@@ -197,13 +212,15 @@ static inline void corners_backward(const Surface s, const LightingParams lp,
   for (int k = 0; k < 3; ++k) {
     const Vec3n grad_factor = scale3n(splat3(sum_vec3n(g->factor[k])), share);
     const Vec3n grad_specular = scale3n(splat3(sum_vec3n(g->specular[k])), share);
-    PointGradient point;
-    point.position = point.normal = zero3n();
+    PointGradient point = zero_point_gradient();
     point.eye = g->eye;
-    light_point_backward(lp, lights, s.eye, s.position[k], s.normal[k], grad_factor, grad_specular, &point);
+    point.shininess = g->shininess;
+    light_point_backward(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], grad_factor,
+                         grad_specular, &point);
     g->position[k] = point.position;
     g->normal[k] = point.normal;
     g->eye = point.eye;
+    g->shininess = point.shininess;
   }
 }
 
@@ -214,12 +231,14 @@ static inline void corners_backward(const Surface s, const LightingParams lp,
 ///      grad_colors is not, then
 /// out  grad_colors, grad_positions, grad_normals  float[pair][9]  of the corners; positions in world space.
 ///      grad_normals is not written by flat shading
+/// out  grad_materials  float[pair][DPR_MATERIAL_CHANNELS]
 /// out  grad_eye     float[3][pair]    of the camera centre
 kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, const uint pairs,
                                const uint last_pair, global const ViewParams* restrict views,
                                global const Light* restrict lights, global const uint4* restrict faces,
                                global const uint4* restrict face_colors, global const float4* restrict colors,
-                               global const float4* restrict world, global const float4* restrict normals,
+                               global const float4* restrict world, global const uint4* restrict face_normals,
+                               global const float4* restrict normals, global const float4* restrict materials,
                                global const uint* restrict pair_face,
                                global const uint* restrict fragment_starts,
                                global const float* restrict bary1, global const float* restrict bary2,
@@ -230,16 +249,18 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
                                global float* restrict grad_bary2, global float* restrict grad_base_red,
                                global float* restrict grad_base_green, global float* restrict grad_base_blue,
                                global float* restrict grad_colors, global float* restrict grad_positions,
-                               global float* restrict grad_normals, global float* restrict grad_eye) {
+                               global float* restrict grad_normals, global float* restrict grad_materials,
+                               global float* restrict grad_eye) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const Surface s =
-      load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
+  const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
+                                 face_normals, normals, materials);
   SurfaceGradients g;
 #pragma unroll
   for (int k = 0; k < 3; ++k)
     g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3n();
-  g.eye = zero3n();
+  g.eye = g.coefficient = zero3n();
+  g.shininess = 0.0f;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; i += DPR_WIDTH) {
     const intn in_run = lanes_before(last, i);
@@ -274,6 +295,8 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
     vstore3(position[k].xyz, 0, grad_positions + 9 * pair + 3 * k);
     if (DPR_SHADING != DPR_FLAT) vstore3(sum_vec3n(g.normal[k]).xyz, 0, grad_normals + 9 * pair + 3 * k);
   }
+  const float4 coefficient = sum_vec3n(g.coefficient);
+  vstore4((float4)(coefficient.xyz, sum_lanes(g.shininess)), pair, grad_materials);
   const float4 eye = sum_vec3n(g.eye);
   grad_eye[pair] = eye.x;
   grad_eye[pairs + pair] = eye.y;
@@ -297,12 +320,13 @@ static inline LightSums zero_light_sums(void) {
 
 /// Adds those at a point in the light; `l` is the light.
 static inline void add_light_sums(const LightingParams lp, uint l, global const Light* restrict lights,
-                                  float4 eye, Vec3n position, Vec3n normal, Vec3n grad_factor,
-                                  Vec3n grad_specular, LightSums* sums) {
+                                  float shininess, float4 eye, Vec3n position, Vec3n normal,
+                                  Vec3n grad_factor, Vec3n grad_specular, LightSums* sums) {
   if ((DPR_LIGHTS & DPR_LIGHTS_HARMONICS) && l == 0)
     add_harmonics_gradient(normal, grad_factor, sums->harmonics);
   if (l < lp.lights)
-    add_light_gradient(lp, lights + l, eye, position, normal, grad_factor, grad_specular, &sums->light);
+    add_light_gradient(lights + l, shininess, eye, position, normal, grad_factor, grad_specular,
+                       &sums->light);
 }
 
 static inline void store_channels(Vec3n v, uint channel, uint pairs, uint pair, global float* channels) {
@@ -334,7 +358,8 @@ kernel void shade_lit_backward_lights(
     global const ViewParams* restrict views, global const Light* restrict lights,
     global const uint4* restrict faces, global const uint4* restrict face_colors,
     global const float4* restrict colors, global const float4* restrict world,
-    global const float4* restrict normals, global const uint* restrict pair_face,
+    global const uint4* restrict face_normals, global const float4* restrict normals,
+    global const float4* restrict materials, global const uint* restrict pair_face,
     global const uint* restrict fragment_starts, global const float* restrict bary1,
     global const float* restrict bary2, global const float* restrict base_red,
     global const float* restrict base_green, global const float* restrict base_blue,
@@ -342,8 +367,8 @@ kernel void shade_lit_backward_lights(
     global const float* restrict grad_blue, global float* restrict channels) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= last_pair) return;
-  const Surface s =
-      load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world, normals);
+  const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
+                                 face_normals, normals, materials);
   LightSums sums = zero_light_sums();
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; i += DPR_WIDTH) {
@@ -352,17 +377,18 @@ kernel void shade_lit_backward_lights(
     const realn c1 = load_run(in_run, i, bary1), c2 = load_run(in_run, i, bary2);
     const Vec3n base = load_base(in_run, i, base_red, base_green, base_blue);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
-    const Vec3n grad_factor = mul3n(grad, f.base);
+    const Vec3n grad_factor = mul3n(grad, f.base), grad_specular = mul3n(grad, splat3(s.material));
     sums.ambient = mad3n(grad_factor, (realn)(1.0f), sums.ambient);
     if (DPR_SHADING != DPR_GOURAUD) {
-      add_light_sums(lp, light, lights, s.eye, f.position, f.normal, grad_factor, grad, &sums);
+      add_light_sums(lp, light, lights, s.material.w, s.eye, f.position, f.normal, grad_factor, grad_specular,
+                     &sums);
       continue;
     }
     const realn c[3] = {1.0f - c1 - c2, c1, c2};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      add_light_sums(lp, light, lights, s.eye, s.position[k], s.normal[k], scale3n(grad_factor, c[k]),
-                     scale3n(grad, c[k]), &sums);
+      add_light_sums(lp, light, lights, s.material.w, s.eye, s.position[k], s.normal[k],
+                     scale3n(grad_factor, c[k]), scale3n(grad_specular, c[k]), &sums);
     }
   }
   if (light == 0) {

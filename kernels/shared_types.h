@@ -83,8 +83,8 @@ using float4 = cl_float4;
 #define DPR_BASE_OF_CORNERS 0
 #define DPR_BASE_OF_FRAGMENTS 1
 
-/// What lies beyond a texture, in the order of dpr::Wrap (lib/image/texture_words.hpp has the names); what lies between its texels, in that of
-/// dpr::Filter; and the texture of a face that has none.
+/// What lies beyond a texture, in the order of dpr::Wrap (lib/image/texture_words.hpp has the names); what
+/// lies between its texels, in that of dpr::Filter; and the texture of a face that has none.
 #define DPR_REPEAT 0
 #define DPR_MIRROR 1
 #define DPR_CLAMP 2
@@ -123,7 +123,8 @@ using float4 = cl_float4;
 
 /// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own
 /// face where colours or normals may jump there, in the other where it goes through the edge in the same
-/// direction. DPR_EDGE_SEAM is set in the own face where the texture jumps.
+/// direction. DPR_EDGE_SEAM is set in the own face where the texture jumps, in the other where, in the light,
+/// materials or given normals do.
 #define DPR_EDGE_FLAG 0x80000000u
 #define DPR_EDGE_SEAM 0x40000000u
 
@@ -162,6 +163,7 @@ typedef struct FrameParams {
   uint clips;   /* some face may cross the near plane: ClippedFace says which; 0: none is read */
   uint orthographic; /* the views are; then perspective_correct is 0 */
   uint distorts;     /* some view does */
+  uint normals;      /* of a view: those of the vertices, then those that meshes give */
 } FrameParams;
 
 /// A camera, ready for the kernels.
@@ -222,6 +224,9 @@ typedef struct Light {
   float inverse_edge; /* 1 / (cos_inner - cos_outer) */
   uint unused0, unused1;
 } Light;
+
+/// Channels that shading's backward pass leaves per pair of its material.
+#define DPR_MATERIAL_CHANNELS 4 /* RGB of the specular coefficient, shininess */
 
 /// A texture, and where its texels lie among those of all.
 typedef struct Texture {

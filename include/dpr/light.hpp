@@ -44,8 +44,9 @@ inline constexpr std::size_t k_harmonics = 9;
 
 /// colour = base * (ambient + environment + sum_l a_l diffuse_l max(n.l, 0)) + sum_l a_l specular_l [n.l > 0]
 /// max(m, 0)^shininess; a_l is 1 but in a spot's cone; m = v.r, r = 2 (n.l) n - l (Phong 1975), or of blinn
-/// n.h, h = (l + v) / |l + v| (Blinn 1977). Normals follow the winding of the faces and are not turned to the
-/// viewer.
+/// n.h, h = (l + v) / |l + v| (Blinn 1977). Materials (dpr/mesh.hpp) multiply the highlights and may have an
+/// exponent of their own. Normals follow the winding of the faces, unless the mesh gives some, and are not
+/// turned to the viewer.
 ///
 /// The environment is distant light of radiance sum L_lm Y_lm(w) from the direction w, and what a white
 /// diffuse surface reflects of it (Ramamoorthi and Hanrahan 2001): sum a_l L_lm Y_lm(n), a = 1, 2/3, 1/4,

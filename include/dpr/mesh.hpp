@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,14 @@ namespace dpr {
 
 /// The texture of a face that has none.
 inline constexpr std::uint32_t k_no_texture = std::numeric_limits<std::uint32_t>::max();
+
+/// What a surface shows of the highlights of lights, whose formula is that of Lights.
+struct Material {
+  vec3 specular{1.0F};             ///< the lights' specular is multiplied by it
+  std::optional<float> shininess;  ///< >= 1; none: that of the lights
+
+  bool operator==(const Material&) const = default;
+};
 
 /// An indexed triangle mesh in object space. Any soup will do: shared or unshared vertices, non-manifold
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the
@@ -30,28 +39,37 @@ struct Mesh {
   std::vector<Texture> textures;      ///< of the base colour, or empty; they need face_texcoords
   /// [face] index into textures, or k_no_texture; empty: all faces have the first.
   std::vector<std::uint32_t> face_textures;
+  /// Normals that corners refer to, of any length; without, those of vertices come from the faces around
+  /// them. They stay what they are where positions move, and flat shading does not look at them.
+  std::vector<vec3> normals{};
+  std::vector<uvec3> face_normals{};            ///< [face] indices into normals, or empty
+  std::vector<Material> materials{};            ///< or empty: one that changes nothing
+  std::vector<std::uint32_t> face_materials{};  ///< [face] index into materials; empty: all have the first
 };
 
 /// Throws InvalidArgument unless the mesh can be rendered: at least one face, indices in range, finite
-/// positions, colours, texture coordinates and texels, arrays of matching length. `name` says in the message
-/// which mesh it is. O(vertices + faces + texels).
+/// positions, colours, normals, materials, texture coordinates and texels, arrays of matching length. `name`
+/// says in the message which mesh it is. O(vertices + faces + texels).
 DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 
 /// Reads OBJ, PLY, OFF or STL, once from front to back; the vertices are in the order of the file. Polygons
 /// become triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices,
-/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, and
-/// their textures (map_Kd) are the mesh's, if libraries and textures are regular files; dpr/notes.hpp tells
-/// what is left out. STL has no shared vertices: equal positions become one, and facets with two equal
-/// corners are left out. The texture coordinates of an OBJ (u, v; v up) are kept if every corner has some, or
-/// where there are textures; then faces without coordinates get (0, 0) and no texture. Throws IoError where
-/// the file is missing, malformed, truncated, goes on after its end or, being a pipe or a device, does not
-/// end; and InvalidArgument where its content cannot be rendered.
+/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, their
+/// textures (map_Kd) are the mesh's, and what they say of highlights (Ks, Ns, illum) its materials, if
+/// libraries and textures are regular files; dpr/notes.hpp tells what is left out. The normals of an OBJ are
+/// kept if every corner has one; those of a PLY's vertices, and their texture coordinates, if they are
+/// floats. STL has no shared vertices: equal positions become one, and facets with two equal corners are left
+/// out. The texture coordinates of an OBJ (u, v; v up) are kept if every corner has some, or where there are
+/// textures; then faces without coordinates get (0, 0) and no texture. Throws IoError where the file is
+/// missing, malformed, truncated, goes on after its end or, being a pipe or a device, does not end; and
+/// InvalidArgument where its content cannot be rendered.
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face
 /// colours: asking for that is an error, not a silent loss. PLY colours are bytes, as other programs expect
-/// them: clamped to [0, 1] and rounded. Texture coordinates go to OBJ only; textures are not written, see
-/// write_texture(). Throws IoError, and InvalidArgument where the mesh is not valid.
+/// them: clamped to [0, 1] and rounded. Texture coordinates and normals go to OBJ only; materials are not
+/// written, nor textures, see write_texture(). Throws IoError, and InvalidArgument where the mesh is not
+/// valid.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

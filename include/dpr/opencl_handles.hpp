@@ -134,12 +134,14 @@ DPR_API void copy_images(Renderer& renderer, const BufferSpan& images, const Eve
 
 /// A gradient of the last backward_on_device() by the name that gradient files and messages have for it:
 /// "meshes[0].positions", "meshes[0].colors", "meshes[0].texcoords", "meshes[0].textures[0]",
+/// "meshes[0].normals",
 /// "shapes.positions", "views[0].meshes[0].rotation", "views[0].camera.translation",
 /// "lights.point[0].diffuse", "sigma", "background", ... Arrays are [vertex] and so on as SceneGradient has
 /// them. Numbers are packed, and those of one name lie side by side in the order of views, then meshes or
 /// lights. Valid until the next set_scene(), set_views(), set_shapes(), set_lights(), set_smoothing() or
 /// set_gradients(); written by backward_on_device(). Throws InvalidArgument for a gradient that the scene
-/// does not have or did not ask for, and before the first backward_on_device().
+/// does not have or did not ask for, for those of materials, which the host has alone, and before the first
+/// backward_on_device().
 DPR_API BufferView gradient_view(Renderer& renderer, const std::string& name);
 /// Copies one.
 DPR_API void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,

@@ -47,6 +47,10 @@ struct MeshGradient {
   std::vector<vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
   std::vector<vec2> texcoords;  ///< [texcoord]; empty if not requested or without textures
   std::vector<std::vector<vec3>> textures;  ///< [texture][height * width]; empty if not requested
+  // Empty if not requested, or without lights.
+  std::vector<vec3> normals{};      ///< [normal] object space
+  std::vector<vec3> specular{};     ///< [material]
+  std::vector<double> shininess{};  ///< [material] of the exponent in force, the material's or the lights'
 };
 
 /// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the

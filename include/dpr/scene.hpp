@@ -38,6 +38,8 @@ struct GradientRequest {
   bool texture = false;     ///< texels of every texture
   bool texcoords = false;   ///< texture coordinates of textured meshes
   bool distortion = false;  ///< coefficients of lenses
+  bool normals = false;     ///< normals that meshes give; 0 without lights
+  bool materials = false;   ///< coefficients of the materials that meshes give; 0 without lights
 };
 
 struct Scene {

@@ -82,6 +82,7 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
           {"bounds", {{"low", vector_to_json(box.low)}, {"high", vector_to_json(box.high)}}},
           {"colors", colors_of(mesh)},
           {"texture_coordinates", mesh.texcoords.size()},
+          {"normals", mesh.normals.size()},
           {"textures", textures_to_json(mesh.textures)},
           {"materials", materials_to_json(materials)},
           {"notes", mesh_notes(mesh, facts)}};

@@ -56,6 +56,8 @@ Json to_json(const std::vector<glm::vec2>& vectors) {
   return list;
 }
 
+Json to_json(const std::vector<double>& numbers) { return numbers; }
+
 Json to_json(const std::vector<std::vector<glm::vec3>>& lists) {
   Json all = Json::array();
   for (const std::vector<glm::vec3>& list : lists) all.push_back(to_json(list));

@@ -17,6 +17,7 @@ double number(float value);
 Json to_json(const glm::dvec3& v);
 Json to_json(const std::vector<glm::vec3>& vectors);
 Json to_json(const std::vector<glm::vec2>& vectors);
+Json to_json(const std::vector<double>& numbers);
 Json to_json(const std::vector<std::vector<glm::vec3>>& lists);
 /// A list of rows.
 Json rows_to_json(const glm::dmat3& matrix);

@@ -10,7 +10,7 @@ namespace dpr::cli {
 namespace {
 
 /// A library that is not there has no materials; the reader of meshes says so.
-void read_library(const std::filesystem::path& file, Materials& materials) {
+void read_library(const std::filesystem::path& file, ObjMaterials& materials) {
   std::error_code error;
   if (std::filesystem::is_regular_file(file, error)) read_mtl(file, read_file(file), materials);
 }
@@ -21,7 +21,7 @@ std::vector<MeshMaterial> mesh_materials(const std::filesystem::path& file) {
   std::vector<MeshMaterial> used;
   if (lower_case_extension(file) != ".obj") return used;
   const std::string text = read_file(file);
-  Materials materials;
+  ObjMaterials materials;
   scan::Lines lines(scan::without_byte_order_mark(text));
   std::vector<std::string_view> words;
   while (lines.next()) {

@@ -53,6 +53,7 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
   Mesh result;
   result.texcoords = mesh.texcoords;
   result.textures = mesh.textures;
+  result.materials = mesh.materials;
   for (const Sum& sum : sums) {
     result.positions.emplace_back(sum.position / sum.count);
     if (!mesh.vertex_colors.empty()) result.vertex_colors.emplace_back(sum.color / sum.count);
@@ -66,6 +67,7 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
     if (!mesh.face_colors.empty()) result.face_colors.push_back(mesh.face_colors[i]);
     if (!mesh.face_texcoords.empty()) result.face_texcoords.push_back(mesh.face_texcoords[i]);
     if (!mesh.face_textures.empty()) result.face_textures.push_back(mesh.face_textures[i]);
+    if (!mesh.face_materials.empty()) result.face_materials.push_back(mesh.face_materials[i]);
   }
   return result.faces.empty() ? mesh : result;
 }

@@ -1,6 +1,8 @@
 // What makes a mesh one that can be rendered.
 #include "dpr/mesh.hpp"
 
+#include <cmath>
+
 #include "base/checks.hpp"
 
 namespace dpr {
@@ -62,6 +64,49 @@ void validate_textures(const Mesh& mesh, const std::string& name) {
   }
 }
 
+void validate_normals(const Mesh& mesh, const std::string& name) {
+  if (!mesh.face_normals.empty() && mesh.face_normals.size() != mesh.faces.size()) {
+    throw InvalidArgument(checks::in("face_normals", name), std::to_string(mesh.face_normals.size()),
+                          std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
+  }
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+    if (checks::is_finite(mesh.normals[i])) continue;
+    throw InvalidArgument(checks::in(checks::element("normals", i), name), checks::text(mesh.normals[i]),
+                          "finite numbers");
+  }
+  for (std::size_t i = 0; i < mesh.face_normals.size(); ++i) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t index = mesh.face_normals[i][corner];
+      if (index < mesh.normals.size()) continue;
+      throw InvalidArgument(checks::in(checks::element("face_normals", i), name),
+                            "normal " + std::to_string(index),
+                            "an index below the number of normals, " + std::to_string(mesh.normals.size()));
+    }
+  }
+}
+
+void validate_materials(const Mesh& mesh, const std::string& name) {
+  for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
+    const Material& material = mesh.materials[i];
+    const std::string which = checks::in(checks::element("materials", i), name);
+    if (!checks::is_finite(material.specular))
+      throw InvalidArgument("specular of " + which, checks::text(material.specular), "finite numbers");
+    const float shininess = material.shininess.value_or(1);
+    if (!(shininess >= 1 && std::isfinite(shininess)))
+      throw InvalidArgument("shininess of " + which, checks::text(shininess), "a finite number >= 1");
+  }
+  if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.faces.size()) {
+    throw InvalidArgument(checks::in("face_materials", name), std::to_string(mesh.face_materials.size()),
+                          std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
+  }
+  for (std::size_t i = 0; i < mesh.face_materials.size(); ++i) {
+    if (mesh.face_materials[i] < mesh.materials.size()) continue;
+    throw InvalidArgument(checks::in(checks::element("face_materials", i), name),
+                          "material " + std::to_string(mesh.face_materials[i]),
+                          "an index below the number of materials, " + std::to_string(mesh.materials.size()));
+  }
+}
+
 void validate_faces(const Mesh& mesh, const std::string& name) {
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     for (int corner = 0; corner < 3; ++corner) {
@@ -93,6 +138,8 @@ void validate(const Mesh& mesh, const std::string& name) {
   validate_colors(mesh.face_colors, mesh.faces.size(), "face_colors", "faces", name);
   validate_texcoords(mesh, name);
   validate_textures(mesh, name);
+  validate_normals(mesh, name);
+  validate_materials(mesh, name);
 }
 
 }  // namespace dpr

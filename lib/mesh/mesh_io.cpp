@@ -29,14 +29,21 @@ std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
     if (!mesh.vertex_colors.empty()) append(text, mesh.vertex_colors[i]);
     text += '\n';
   }
-  const bool has_texcoords = !mesh.face_texcoords.empty();
+  const bool has_texcoords = !mesh.face_texcoords.empty(), has_normals = !mesh.face_normals.empty();
   for (const glm::vec2& uv : mesh.texcoords)
     text += "vt " + checks::text(uv.x) + " " + checks::text(uv.y) + "\n";
+  for (const glm::vec3& normal : mesh.normals) {
+    text += "vn";
+    append(text, normal);
+    text += '\n';
+  }
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     text += "f";
     for (int i = 0; i < 3; ++i) {
       text += " " + std::to_string(mesh.faces[f][i] + 1);
-      if (has_texcoords) text += "/" + std::to_string(mesh.face_texcoords[f][i] + 1);
+      if (has_texcoords || has_normals) text += "/";
+      if (has_texcoords) text += std::to_string(mesh.face_texcoords[f][i] + 1);
+      if (has_normals) text += "/" + std::to_string(mesh.face_normals[f][i] + 1);
     }
     text += '\n';
   }

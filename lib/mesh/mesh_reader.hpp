@@ -30,9 +30,18 @@ Mesh read_ply(const std::filesystem::path& file, std::string bytes);
 Mesh read_off(const std::filesystem::path& file, std::string_view text);
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 
+/// How a material of OBJ reflects light, as far as it is said.
+struct ObjReflection {
+  std::optional<glm::vec3> diffuse, specular;  ///< Kd, Ks
+  std::optional<float> shininess;              ///< Ns
+  bool has_highlights = true;                  ///< illum is 2 or more, or not given
+  float opacity = 1;                           ///< d, or 1 - Tr
+  std::string unread;                          ///< maps that are not read, separated by commas
+};
+
 /// A material of OBJ, as far as it is of use.
-struct Material {
-  std::optional<glm::vec3> diffuse;  ///< Kd
+struct ObjMaterial {
+  ObjReflection reflection;
 
   // map_Kd
   std::string texture;                 ///< as the library names it; empty if there is none
@@ -41,16 +50,16 @@ struct Material {
   Wrap wrap = Wrap::repeat;            ///< -clamp on
   std::string ignored_options;         ///< those that are not read, separated by commas
 
-  bool has_same_texture(const Material& other) const {
+  bool has_same_texture(const ObjMaterial& other) const {
     return texture_file == other.texture_file && scale == other.scale && offset == other.offset &&
            wrap == other.wrap;
   }
 };
-using Materials = std::map<std::string, Material, std::less<>>;
+using ObjMaterials = std::map<std::string, ObjMaterial, std::less<>>;
 
 /// Adds the materials of an OBJ's library, beside which its textures are. Throws IoError where a colour or an
 /// option of a texture cannot be read.
-void read_mtl(const std::filesystem::path& file, std::string_view text, Materials& materials);
+void read_mtl(const std::filesystem::path& file, std::string_view text, ObjMaterials& materials);
 
 /// Appends a polygon as a fan of triangles about its first corner.
 inline void append_fan(std::span<const std::uint32_t> corners, std::vector<glm::uvec3>& triangles) {

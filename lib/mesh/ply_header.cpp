@@ -16,6 +16,7 @@ namespace {
 
 struct Property {
   std::string name, type, list_count_type;  // the last one is empty but for lists
+  bool is_read = false;
 };
 
 struct Element {
@@ -174,7 +175,14 @@ class PlyHeaderReader {
       }
     }
     header.vertex_colors = prepare_colors(vertex);
-    rename(vertex, {"x", "y", "z"}, header.vertex_colors);
+    // By MeshLab, Blender, Houdini and others.
+    constexpr std::array<std::array<std::string_view, 2>, 4> k_pairs{
+        {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}};
+    for (const auto& names : k_pairs)
+      header.has_texcoords = header.has_texcoords || prepare_floats(vertex, names, k_custom_texcoords);
+    header.has_normals =
+        prepare_floats(vertex, std::array<std::string_view, 3>{"nx", "ny", "nz"}, k_custom_normals);
+    rename(vertex, {"x", "y", "z"});
   }
 
   void prepare_faces(Element& face) {
@@ -184,9 +192,9 @@ class PlyHeaderReader {
       fail("expected the list vertex_indices as the first property of the element face");
     }
     header.face_colors = prepare_colors(face);
-    rename(face, {"vertex_indices", "vertex_index"}, header.face_colors);
-    header.has_custom_properties =
-        has_lists(face) || header.vertex_colors.custom || header.face_colors.custom;
+    rename(face, {"vertex_indices", "vertex_index"});
+    header.has_custom_properties = has_lists(face) || header.vertex_colors.custom ||
+                                   header.face_colors.custom || header.has_texcoords || header.has_normals;
   }
 
   // Lists beside the corners.
@@ -263,9 +271,26 @@ class PlyHeaderReader {
              ": expected uchar, float or double");
       }
       channels[i]->name = type == "uchar" && header.binary ? k_names[i] : k_custom_colors[i];
+      channels[i]->is_read = true;
     }
     const bool in_bytes = channels[0]->type == "uchar", native = in_bytes && header.binary;
     return {!native, native, in_bytes ? 255.0 : 1.0};
+  }
+
+  // Whether the element has all of these in floats; then they get the names under which they pass.
+  template <std::size_t count>
+  static bool prepare_floats(Element& element, const std::array<std::string_view, count>& names,
+                             const std::array<const char*, count>& custom) {
+    std::array<Property*, count> found{};
+    for (std::size_t i = 0; i < count; ++i) {
+      found[i] = find(element, std::string(names[i]));
+      if (!found[i] || !found[i]->list_count_type.empty() || !is_floating(found[i]->type)) return false;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      found[i]->name = custom[i];
+      found[i]->is_read = true;
+    }
+    return true;
   }
 
   static Property* find(Element& element, const std::string& name) {
@@ -275,14 +300,11 @@ class PlyHeaderReader {
     return nullptr;
   }
 
-  static void rename(Element& element, std::initializer_list<std::string_view> kept,
-                     const ColorForm& colors) {
+  static void rename(Element& element, std::initializer_list<std::string_view> kept) {
     for (Property& property : element.properties) {
       const auto is_it = [&](std::string_view name) { return name == property.name; };
-      if (std::any_of(kept.begin(), kept.end(), is_it)) continue;
-      if (colors.custom && std::ranges::any_of(k_custom_colors, is_it)) continue;
-      const bool is_color = property.name == "red" || property.name == "green" || property.name == "blue";
-      if (!(is_color && colors.native)) property.name = "dpr_other_" + property.name;
+      if (!property.is_read && std::none_of(kept.begin(), kept.end(), is_it))
+        property.name = "dpr_other_" + property.name;
     }
   }
 

@@ -27,6 +27,10 @@ namespace dpr {
 /// eight bits.
 inline constexpr std::array<const char*, 3> k_custom_colors{"dpr_red", "dpr_green", "dpr_blue"};
 
+/// The same for texture coordinates and normals of vertices.
+inline constexpr std::array<const char*, 2> k_custom_texcoords{"dpr_u", "dpr_v"};
+inline constexpr std::array<const char*, 3> k_custom_normals{"dpr_nx", "dpr_ny", "dpr_nz"};
+
 /// How the colours of an element arrive.
 struct ColorForm {
   bool custom = false;  ///< as custom properties
@@ -44,6 +48,7 @@ struct PlyHeader {
   bool has_custom_properties = false;
   std::size_t vertices = 0, polygons = 0;
   ColorForm vertex_colors, face_colors;
+  bool has_texcoords = false, has_normals = false;  ///< of vertices, as custom properties
 };
 
 /// Throws IoError where the header is wrong, or the file too short for what it promises.

@@ -1,4 +1,4 @@
-// The reader of OBJ's material libraries: the diffuse colour of each material, its texture and the options of
+// The reader of OBJ's material libraries: how each material reflects light, its texture and the options of
 // that.
 #include <algorithm>
 #include <array>
@@ -11,18 +11,45 @@
 namespace dpr {
 namespace {
 
-/// Kd r g b, or r alone for all three.
-glm::vec3 diffuse_color(const std::filesystem::path& file, std::size_t line,
-                        const std::vector<std::string_view>& words) {
-  glm::vec3 color;
+/// Kd or Ks with r g b, or r alone for all three.
+glm::vec3 rgb(const std::filesystem::path& file, std::size_t line,
+              const std::vector<std::string_view>& words) {
+  glm::vec3 values;
   for (int i = 0; i < 3; ++i) {
     const std::size_t word = words.size() == 2 ? 1 : static_cast<std::size_t>(i) + 1;
     const std::optional<float> value =
         word < words.size() ? scan::parse_coordinate(words[word]) : std::nullopt;
-    if (!value) throw IoError(file, "expected Kd with one or three finite numbers", line);
-    color[i] = *value;
+    if (!value)
+      throw IoError(file, "expected " + std::string(words[0]) + " with one or three finite numbers", line);
+    values[i] = *value;
   }
-  return color;
+  return values;
+}
+
+/// The last word: d may have an option before it.
+float last_number(const std::filesystem::path& file, std::size_t line,
+                  const std::vector<std::string_view>& words) {
+  const std::optional<float> value = words.size() > 1 ? scan::parse_coordinate(words.back()) : std::nullopt;
+  if (!value) throw IoError(file, "expected " + std::string(words[0]) + " with a finite number", line);
+  return *value;
+}
+
+/// Maps of what varies over a surface beside the diffuse colour.
+constexpr std::array<std::string_view, 10> k_unread_maps{"bump",  "decal",  "disp",   "map_bump", "map_Bump",
+                                                         "map_d", "map_Ks", "map_Ns", "norm",     "refl"};
+
+/// A statement of numbers, with the comment behind them left out.
+void read_reflection(const std::filesystem::path& file, std::size_t line,
+                     const std::vector<std::string_view>& words, ObjReflection& reflection) {
+  if (words[0] == "Kd") reflection.diffuse = rgb(file, line, words);
+  if (words[0] == "Ks") reflection.specular = rgb(file, line, words);
+  if (words[0] == "Ns") reflection.shininess = last_number(file, line, words);
+  if (words[0] == "illum") reflection.has_highlights = last_number(file, line, words) >= 2;
+  if (words[0] == "d") reflection.opacity = last_number(file, line, words);
+  if (words[0] == "Tr") reflection.opacity = 1 - last_number(file, line, words);
+  if (std::ranges::find(k_unread_maps, words[0]) == k_unread_maps.end()) return;
+  if (!reflection.unread.empty()) reflection.unread += ", ";
+  reflection.unread += words[0];
 }
 
 /// An option of a texture, and how many words may follow it.
@@ -63,7 +90,7 @@ Words option_words(const std::filesystem::path& file, std::size_t line, const Te
                 line);
 }
 
-void apply_option(const std::filesystem::path& file, std::size_t line, Words words, Material& material) {
+void apply_option(const std::filesystem::path& file, std::size_t line, Words words, ObjMaterial& material) {
   const auto take = [&](glm::vec2& value) {
     for (std::size_t i = 0; i < 2 && i + 1 < words.size(); ++i)
       value[static_cast<int>(i)] = *scan::parse_coordinate(words[i + 1]);
@@ -84,9 +111,9 @@ void apply_option(const std::filesystem::path& file, std::size_t line, Words wor
 
 /// map_Kd [options] name, which may have spaces inside.
 void read_texture_map(const std::filesystem::path& file, const scan::Lines& lines, Words words,
-                      Material& material) {
-  Material plain;
-  plain.diffuse = material.diffuse;
+                      ObjMaterial& material) {
+  ObjMaterial plain;
+  plain.reflection = material.reflection;
   material = plain;
   std::string_view before = words[0];
   words = words.subspan(1);
@@ -106,10 +133,10 @@ void read_texture_map(const std::filesystem::path& file, const scan::Lines& line
 
 }  // namespace
 
-void read_mtl(const std::filesystem::path& file, std::string_view text, Materials& materials) {
+void read_mtl(const std::filesystem::path& file, std::string_view text, ObjMaterials& materials) {
   scan::Lines lines(scan::without_byte_order_mark(text));
   std::vector<std::string_view> words;
-  Material* material = nullptr;
+  ObjMaterial* material = nullptr;
   while (lines.next()) {
     scan::split(lines.line(), words);
     if (words.empty()) continue;
@@ -117,9 +144,8 @@ void read_mtl(const std::filesystem::path& file, std::string_view text, Material
     if (words[0] == "newmtl") material = &(materials[std::string(rest)] = {});
     if (!material) continue;
     if (words[0] == "map_Kd") read_texture_map(file, lines, words, *material);
-    if (words[0] != "Kd") continue;
     scan::split(lines.line().substr(0, lines.line().find('#')), words);
-    material->diffuse = diffuse_color(file, lines.number(), words);
+    if (!words.empty()) read_reflection(file, lines.number(), words, material->reflection);
   }
 }
 

@@ -1,5 +1,4 @@
-// The reader of OBJ: vertices with their colours, texture coordinates, polygons, and the diffuse colours and
-// textures of materials.
+// The reader of OBJ: vertices with their colours, texture coordinates, normals, polygons, and materials.
 //
 // The format: Wavefront's "Object Files", version 3.0. Statements that say nothing of polygons are passed
 // over, with a note where they describe a shape.
@@ -18,6 +17,16 @@ namespace dpr {
 namespace {
 
 using Indices = std::vector<std::uint32_t>;
+
+/// The material as the renderer has it. What the file leaves open is the lights'; Ns may be 0 where there is
+/// no highlight to see.
+Material rendered_material(const ObjReflection& reflection) {
+  Material material;
+  if (reflection.specular) material.specular = *reflection.specular;
+  if (!reflection.has_highlights) material.specular = glm::vec3(0);
+  if (reflection.shininess) material.shininess = std::max(*reflection.shininess, 1.0F);
+  return material;
+}
 
 /// The texture coordinate of a corner that has none.
 constexpr std::uint32_t k_no_texcoord = std::numeric_limits<std::uint32_t>::max();
@@ -40,6 +49,8 @@ class ObjReader {
     require_known(farthest_vertex_, mesh.positions.size(), "vertex");
     finish_colors();
     finish_texcoords();
+    finish_normals();
+    finish_materials();
     for (const auto& [keyword, count] : other_shapes_) {
       notes_.push_back(file_.string() + ": the statement \"" + std::string(keyword) + "\" is not read (" +
                        std::to_string(count) + (count == 1 ? " line)" : " lines)"));
@@ -61,12 +72,13 @@ class ObjReader {
     const std::string_view keyword = words_[0];
     const auto is_text = [](unsigned char c) { return c > 0x20 && c < 0x7f; };
     if (!std::ranges::all_of(keyword, is_text)) fail("the line begins with bytes that are no text");
-    const bool is_read = keyword == "v" || keyword == "vt" || keyword == "f";
+    const bool is_read = keyword == "v" || keyword == "vt" || keyword == "vn" || keyword == "f";
     // A comment may follow numbers, but names may have a # in them.
     if (is_read) scan::split(lines_.line().substr(0, lines_.line().find('#')), words_);
     if (words_.back().back() == '\\') fail("a line continued by a backslash: expected the whole on one line");
     if (keyword == "v") vertex();
     if (keyword == "vt") texture_coordinate();
+    if (keyword == "vn") mesh.normals.emplace_back(number(1), number(2), number(3));
     if (keyword == "f") face();
     if (keyword == "mtllib") material_libraries();
     if (keyword == "usemtl") use_material();
@@ -95,6 +107,7 @@ class ObjReader {
   void face() {
     corners_.clear();
     texcoords_.clear();
+    normals_.clear();
     for (std::size_t i = 1; i < words_.size(); ++i) corner(words_[i]);
     if (corners_.size() < 3) {
       fail("a face with " + std::to_string(corners_.size()) + " corners: expected at least three");
@@ -107,6 +120,9 @@ class ObjReader {
       faces_without_texcoords_ += mesh.faces.size() - first;
     }
     append_fan(texcoords_, mesh.face_texcoords);
+    if (normals_.size() == corners_.size()) append_fan(normals_, mesh.face_normals);
+    if (!material_) material_ = material_number(Material());
+    mesh.face_materials.resize(mesh.faces.size(), *material_);
     if (texture_ != k_no_texture && !has_texcoords) ++textured_without_texcoords_;
     mesh.face_textures.resize(mesh.faces.size(), has_texcoords ? texture_ : k_no_texture);
     if (color_) append_color(*color_, first, mesh.faces.size(), mesh.face_colors);
@@ -123,7 +139,8 @@ class ObjReader {
       texcoords_.push_back(
           index(word, texture, mesh.texcoords.size(), "texture coordinate", farthest_texcoord_));
     }
-    if (!normal.empty() && !scan::parse<std::int64_t>(normal)) fail_corner(word);
+    if (!normal.empty())
+      normals_.push_back(index(word, normal, mesh.normals.size(), "normal", farthest_normal_));
   }
 
   /// An index from zero: the file counts from one, or back from the last of those `known`. It may be one that
@@ -189,6 +206,35 @@ class ObjReader {
       mesh.face_textures.clear();
   }
 
+  /// Normals of every corner or none.
+  void finish_normals() {
+    require_known(farthest_normal_, mesh.normals.size(), "normal");
+    if (mesh.face_normals.size() != mesh.faces.size()) {
+      if (!mesh.face_normals.empty()) {
+        notes_.push_back(file_.string() + ": faces without normals beside others that have some, " +
+                         std::to_string(mesh.faces.size() - mesh.face_normals.size()) +
+                         ": all normals are computed");
+      }
+      mesh.face_normals.clear();
+    }
+    if (mesh.face_normals.empty()) mesh.normals.clear();
+  }
+
+  /// Those that change nothing are left out.
+  void finish_materials() {
+    if (mesh.materials.size() == 1) {
+      mesh.face_materials.clear();
+      if (mesh.materials[0] == Material()) mesh.materials.clear();
+    }
+  }
+
+  std::uint32_t material_number(const Material& material) {
+    const auto known = std::ranges::find(mesh.materials, material);
+    const auto number = static_cast<std::uint32_t>(known - mesh.materials.begin());
+    if (known == mesh.materials.end()) mesh.materials.push_back(material);
+    return number;
+  }
+
   void add_missing_texcoords() {
     const auto last = static_cast<std::uint32_t>(mesh.texcoords.size());
     mesh.texcoords.emplace_back(0, 0);
@@ -199,7 +245,7 @@ class ObjReader {
 
   /// Coordinates that a texture scales or shifts are of its own.
   void transform_texcoords(std::uint32_t texture) {
-    const Material& map = maps_[texture];
+    const ObjMaterial& map = maps_[texture];
     if (map.scale == glm::vec2(1) && map.offset == glm::vec2(0)) return;
     std::map<std::uint32_t, std::uint32_t> transformed;
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -237,26 +283,34 @@ class ObjReader {
   void use_material() {
     const std::string_view name = scan::behind(lines_.line(), words_[0]);
     const auto found = materials_.find(name);
-    color_ = found == materials_.end() ? std::nullopt : found->second.diffuse;
+    const ObjReflection reflection = found == materials_.end() ? ObjReflection() : found->second.reflection;
+    color_ = reflection.diffuse;
+    material_ = material_number(rendered_material(reflection));
     texture_ = found == materials_.end() ? k_no_texture : texture_of(name, found->second);
     if (!used_.insert(std::string(name)).second) return;
     if (found == materials_.end() && !lacks_library_) {
       notes_.push_back(file_.string() + ": the material " + scan::quoted(name) +
                        " is in no material library: its faces have no colour of it");
     }
-    if (found != materials_.end()) note_options(name, found->second);
+    if (found != materials_.end()) note_unread(name, found->second);
   }
 
-  void note_options(std::string_view name, const Material& material) {
-    if (material.ignored_options.empty()) return;
-    notes_.push_back(file_.string() + ": of the texture of the material " + scan::quoted(name) +
-                     " (map_Kd) these options are not read: " + material.ignored_options);
+  void note_unread(std::string_view name, const ObjMaterial& material) {
+    const std::string which = "the material " + scan::quoted(name);
+    if (!material.ignored_options.empty()) {
+      notes_.push_back(file_.string() + ": of the texture of " + which +
+                       " (map_Kd) these options are not read: " + material.ignored_options);
+    }
+    if (!material.reflection.unread.empty())
+      notes_.push_back(file_.string() + ": " + which + ": not read: " + material.reflection.unread);
+    if (material.reflection.opacity < 1)
+      notes_.push_back(file_.string() + ": " + which + " is transparent (d or Tr): it is rendered opaque");
   }
 
   /// The number of a material's texture, which is read where it is met first.
-  std::uint32_t texture_of(std::string_view name, const Material& material) {
+  std::uint32_t texture_of(std::string_view name, const ObjMaterial& material) {
     if (material.texture.empty()) return k_no_texture;
-    const auto same = [&](const Material& other) { return other.has_same_texture(material); };
+    const auto same = [&](const ObjMaterial& other) { return other.has_same_texture(material); };
     const auto known = std::ranges::find_if(maps_, same);
     if (known != maps_.end()) return static_cast<std::uint32_t>(known - maps_.begin());
     std::error_code error;
@@ -276,14 +330,15 @@ class ObjReader {
   const std::filesystem::path& file_;
   scan::Lines lines_;
   std::vector<std::string_view> words_;
-  Indices corners_, texcoords_;  // of a face
-  Reference farthest_vertex_, farthest_texcoord_;
+  Indices corners_, texcoords_, normals_;  // of a face
+  Reference farthest_vertex_, farthest_texcoord_, farthest_normal_;
   std::set<std::filesystem::path> libraries_;
-  Materials materials_;
-  std::set<std::string> used_;            // names of materials
-  std::optional<glm::vec3> color_;        // of the material in use
-  std::uint32_t texture_ = k_no_texture;  // the same
-  std::vector<Material> maps_;            // [texture] that uses it
+  ObjMaterials materials_;
+  std::set<std::string> used_;             // names of materials
+  std::optional<glm::vec3> color_;         // of the material in use
+  std::uint32_t texture_ = k_no_texture;   // the same
+  std::optional<std::uint32_t> material_;  // the same, in the mesh
+  std::vector<ObjMaterial> maps_;          // [texture] that uses it
   std::set<std::filesystem::path> missing_textures_;
   std::size_t faces_without_texcoords_ = 0;               // triangles
   std::size_t textured_without_texcoords_ = 0;            // polygons

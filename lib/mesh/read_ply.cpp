@@ -62,24 +62,26 @@ void check_end(const std::filesystem::path& file, const PlyHeader& header, bool 
 }
 
 template <typename Number, typename Handle>
-void take_channel(PlyImporter& importer, const ColorForm& form, int channel, std::vector<glm::vec3>& colors) {
+void take_channel(PlyImporter& importer, const char* name, double one, int channel,
+                  std::vector<glm::vec3>& vectors) {
   Handle handle;
-  if (!importer.kernel()->get_property_handle(handle, k_custom_colors[static_cast<std::size_t>(channel)]))
-    return;
+  if (!importer.kernel()->get_property_handle(handle, name)) return;
   const std::vector<Number>& values = importer.kernel()->property(handle).data_vector();
-  for (std::size_t i = 0; i < colors.size(); ++i)
-    colors[i][channel] = static_cast<float>(static_cast<double>(values[i]) / form.one);
+  for (std::size_t i = 0; i < vectors.size(); ++i)
+    vectors[i][channel] = static_cast<float>(static_cast<double>(values[i]) / one);
 }
 
 void take_custom_colors(const std::filesystem::path& file, const PlyHeader& header, PlyImporter& importer) {
   const ColorForm &of_vertices = header.vertex_colors, &of_faces = header.face_colors;
   if (of_vertices.custom) importer.vertex_colors.resize(header.vertices, glm::vec3(1));
   if (of_faces.custom) importer.polygon_colors.resize(header.polygons, glm::vec3(1));
+  std::vector<glm::vec3>&vertices = importer.vertex_colors, &polygons = importer.polygon_colors;
   for (int c = 0; c < 3; ++c) {
-    take_channel<float, OpenMesh::VPropHandleT<float>>(importer, of_vertices, c, importer.vertex_colors);
-    take_channel<double, OpenMesh::VPropHandleT<double>>(importer, of_vertices, c, importer.vertex_colors);
-    take_channel<float, OpenMesh::FPropHandleT<float>>(importer, of_faces, c, importer.polygon_colors);
-    take_channel<double, OpenMesh::FPropHandleT<double>>(importer, of_faces, c, importer.polygon_colors);
+    const char* const name = k_custom_colors[static_cast<std::size_t>(c)];
+    take_channel<float, OpenMesh::VPropHandleT<float>>(importer, name, of_vertices.one, c, vertices);
+    take_channel<double, OpenMesh::VPropHandleT<double>>(importer, name, of_vertices.one, c, vertices);
+    take_channel<float, OpenMesh::FPropHandleT<float>>(importer, name, of_faces.one, c, polygons);
+    take_channel<double, OpenMesh::FPropHandleT<double>>(importer, name, of_faces.one, c, polygons);
   }
   const auto require_bytes = [&](const ColorForm& form, const std::vector<glm::vec3>& colors) {
     for (const glm::vec3& color : colors) {
@@ -89,6 +91,17 @@ void take_custom_colors(const std::filesystem::path& file, const PlyHeader& head
   };
   require_bytes(of_vertices, importer.vertex_colors);
   require_bytes(of_faces, importer.polygon_colors);
+}
+
+/// Vectors of vertices that arrive as custom properties.
+template <std::size_t count>
+std::vector<glm::vec3> custom_vectors(PlyImporter& importer, const std::array<const char*, count>& names) {
+  std::vector<glm::vec3> vectors(importer.positions.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    take_channel<float, OpenMesh::VPropHandleT<float>>(importer, names[i], 1, static_cast<int>(i), vectors);
+    take_channel<double, OpenMesh::VPropHandleT<double>>(importer, names[i], 1, static_cast<int>(i), vectors);
+  }
+  return vectors;
 }
 
 /// Colours of polygons for each of their triangles.
@@ -117,6 +130,14 @@ Mesh read_ply(const std::filesystem::path& file, std::string bytes) {
   Mesh mesh;
   mesh.vertex_colors = std::move(importer.vertex_colors);
   if (mesh.vertex_colors.empty()) mesh.face_colors = triangle_colors(importer);
+  if (header.has_texcoords) {
+    for (const glm::vec3& uv : custom_vectors(importer, k_custom_texcoords)) mesh.texcoords.emplace_back(uv);
+    mesh.face_texcoords = importer.triangles;
+  }
+  if (header.has_normals) {
+    mesh.normals = custom_vectors(importer, k_custom_normals);
+    mesh.face_normals = importer.triangles;
+  }
   mesh.positions = std::move(importer.positions);
   mesh.faces = std::move(importer.triangles);
   return mesh;

@@ -18,7 +18,7 @@ Range sums_of(const SumList& list, std::size_t channel, const GradientRow& row, 
               const GradientSums& all, std::size_t meshes) {
   const std::size_t first = list.first + channel * list.segments;
   if (&list == &all.eye) return {first + index.view, 1};
-  if (&list != &all.poses) return {first, list.segments};
+  if (&list != &all.poses && &list != &all.normals) return {first, list.segments};
   const std::size_t of_view = first + index.view * meshes;
   return row.of == GradientOf::mesh_in_view ? Range(of_view + index.item, 1) : Range(of_view, meshes);
 }

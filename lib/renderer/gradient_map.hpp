@@ -19,13 +19,17 @@ struct SumList {
   std::size_t count() const { return channels * segments; }
 };
 
-/// Those of pixels; of sigma; of poses, by view and mesh; of the eye, by view; of lights; and of the scale of
-/// the pixel's noise.
+/// Those of pixels; of sigma; of poses, by view and mesh; of the eye, by view; of lights; of the rotations
+/// of normals that meshes give, by view and mesh; of materials; and of the scale of the pixel's noise.
 struct GradientSums {
-  SumList pixels, sigma, poses, eye, lights, scale;
+  SumList pixels, sigma, poses, eye, lights, normals, materials, scale;
 
-  std::array<SumList*, 6> all() { return {&pixels, &sigma, &poses, &eye, &lights, &scale}; }
-  std::array<const SumList*, 6> all() const { return {&pixels, &sigma, &poses, &eye, &lights, &scale}; }
+  std::array<SumList*, 8> all() {
+    return {&pixels, &sigma, &poses, &eye, &lights, &normals, &materials, &scale};
+  }
+  std::array<const SumList*, 8> all() const {
+    return {&pixels, &sigma, &poses, &eye, &lights, &normals, &materials, &scale};
+  }
   std::size_t count() const {
     std::size_t count = 0;
     for (const SumList* list : all()) count += list->count();

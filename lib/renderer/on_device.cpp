@@ -216,6 +216,8 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
     if (!colors_of(m.scene.meshes[mesh].mesh).empty())
       return view_of(m.grad_colors, range.first_color, range.colors, k_vector);
   }
+  if (row.wanted == &GradientRequest::normals && m.wants_normals() && range.normals > 0)
+    return view_of(m.shade.grad_given_normals, range.first_normal, range.normals, k_vector);
   if (row.wanted == &GradientRequest::texcoords && range.texcoords > 0)
     return view_of(m.grad_texcoords, range.first_texcoord, range.texcoords, k_pair);
   return std::nullopt;

@@ -13,7 +13,7 @@ namespace {
 
 /// Gradients that come by way of the vertices.
 bool is_geometric(const GradientRequest& wanted) {
-  return wanted.positions || wanted.transform || wanted.camera || wanted.distortion;
+  return wanted.positions || wanted.transform || wanted.camera || wanted.distortion || wanted.normals;
 }
 
 /// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
@@ -275,6 +275,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (pixel_noise)
       pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc, clip.grad);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
+    if (shade.lit()) shade.backward_given_normals(shade_inputs());
     transform.backward(frame, device_views, shade.lit(), grad_ndc, clip.grad, grad_world);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
@@ -292,7 +293,7 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
     occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
   }
   const bool textured = !geometry->textures.empty();
-  if (geometric || wanted.colors || (textured && (wanted.texture || wanted.texcoords))) {
+  if (geometric || wanted.colors || wanted.materials || (textured && (wanted.texture || wanted.texcoords))) {
     shade.backward(shade_inputs(), aggregate.grad_color);
   }
   if (textured && wanted.texture) {
@@ -324,8 +325,8 @@ std::size_t Renderer::Impl::bytes() const {
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
          grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() +
-         grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
-         (gradient_map ? gradient_map->bytes() : 0);
+         material_channels.capacity_bytes() + grad_numbers.capacity_bytes() +
+         gradient_sums_.capacity_bytes() + (gradient_map ? gradient_map->bytes() : 0);
 }
 
 }  // namespace dpr

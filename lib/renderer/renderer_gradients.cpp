@@ -36,6 +36,14 @@ bool Renderer::Impl::wants_texcoords() const {
   return scene.gradients.texcoords && !geometry->textures.empty();
 }
 
+bool Renderer::Impl::wants_normals() const {
+  return scene.gradients.normals && shade.lit() && !geometry->given_normals.empty();
+}
+
+bool Renderer::Impl::wants_materials() const {
+  return scene.gradients.materials && shade.lit() && has_materials(scene);
+}
+
 void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
@@ -50,6 +58,8 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
     gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
                       shade.surface->grad_corner_texcoords, grad_texcoords);
   }
+  if (wants_materials())
+    gather.over_views(frame, bin, geometry->materials, shade.grad_materials, material_channels);
 }
 
 void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
@@ -70,6 +80,9 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
     if (wants_texcoords()) {
       for (const glm::vec3& uv : read_range(grad_texcoords, range.first_texcoord, range.texcoords))
         gradient.meshes[m].texcoords.emplace_back(uv);
+    }
+    if (wants_normals()) {
+      gradient.meshes[m].normals = read_range(shade.grad_given_normals, range.first_normal, range.normals);
     }
     if (!scene.gradients.texture) continue;
     for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
@@ -133,6 +146,28 @@ void add_pose_gradients(std::span<const float> sums, const Scene& scene, std::sp
   }
 }
 
+/// What turning the normals adds to the gradients of rotations, from sums by [3][view][mesh].
+void add_normal_gradients(std::span<const float> sums, SceneGradient& gradient) {
+  const std::size_t meshes = gradient.meshes.size(), segments = gradient.views.size() * meshes;
+  for (std::size_t i = 0; i < segments; ++i) {
+    gradient.views[i / meshes].transforms[i % meshes].rotation +=
+        dvec3(sums[i], sums[segments + i], sums[2 * segments + i]);
+  }
+}
+
+/// From sums by [DPR_MATERIAL_CHANNELS][material]. Meshes without materials have no gradients of them.
+void read_material_gradients(std::span<const float> sums, const Geometry& geometry, const Scene& scene,
+                             SceneGradient& gradient) {
+  const std::size_t count = geometry.materials.count;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const std::size_t first = geometry.meshes[m].first_material;
+    for (std::size_t i = first; i < first + scene.meshes[m].mesh.materials.size(); ++i) {
+      gradient.meshes[m].specular.emplace_back(sums[i], sums[count + i], sums[2 * count + i]);
+      gradient.meshes[m].shininess.push_back(sums[3 * count + i]);
+    }
+  }
+}
+
 /// Highlights move with the camera's centre c = -A^-1 t: dc = A^-1 (r x t) for a rotation, -A^-1 dt for a
 /// translation. One infinitely far away lies in the direction A^-1 z, which is as if t were -z and fixed.
 /// From sums by [3][view].
@@ -164,11 +199,12 @@ void Renderer::Impl::sum_gradients() {
   const GradientRequest& wanted = scene.gradients;
   const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
-  const std::size_t faces = std::size_t{frame.views} * frame.faces;
+  const std::size_t faces_of_view = frame.faces, faces = frame.views * faces_of_view;
   // Every kept face has a tile, and every tile some face: so many pairs, whatever room there is for them.
   const std::size_t pairs = faces + std::size_t{frame.views} * frame.tiles_x * frame.tiles_y;
   const bool poses = wanted.transform || wanted.camera || wanted.distortion;
   const bool eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
+  const bool normals = wanted.transform && shade.lit() && !geometry->given_normals.empty();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
   const bool scale = wanted.smoothing && pixel_noise != nullptr;
@@ -187,7 +223,11 @@ void Renderer::Impl::sum_gradients() {
        transform.slots},
       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs},
       {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
-       shade.light_channels, pairs}};
+       shade.light_channels, pairs},
+      {views.size() * geometry->given_normals.count, channels(normals, 3), views.size() * scene.meshes.size(),
+       1, view_normal_starts, shade.normal_channels},
+      {faces_of_view, channels(wants_materials(), DPR_MATERIAL_CHANNELS), geometry->materials.count, 1,
+       geometry->materials.starts, material_channels}};
   if (scale)
     all.push_back(
         {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->grad_scale()});
@@ -227,6 +267,9 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
   }
   if (summed_.poses.channels > 0) add_pose_gradients(list(summed_.poses), scene, views, gradient);
   if (summed_.eye.channels > 0) add_eye_gradients(list(summed_.eye), views, gradient);
+  if (summed_.normals.channels > 0) add_normal_gradients(list(summed_.normals), gradient);
+  if (summed_.materials.channels > 0)
+    read_material_gradients(list(summed_.materials), *geometry, scene, gradient);
   if (summed_.lights.channels > 0) read_light_gradients(*scene.lights, list(summed_.lights), gradient);
   return gradient;
 }

@@ -37,6 +37,7 @@ struct OnDevice {
 struct ViewSet {
   std::vector<View> views;
   DeviceViews device_views;
+  Buffer<cl_uint> view_normal_starts;  // [view * mesh + 1] runs of [view][given normal]
   shared::FrameParams frame{};
   bool has_device_poses = false, has_device_cameras = false;  // which the host does not know
 
@@ -152,6 +153,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
   Buffer<cl_float4> grad_texcoords;                     // [texcoord]
+  Buffer<float> material_channels;                      // [channel][face] in the order of the materials
   Buffer<float> grad_numbers;                           // as GradientMap has them
   std::uint64_t device_gradient_frame = 0;              // the frame of backward_on_device()
   std::optional<GradientMap> gradient_map;              // of the scene and views as they are
@@ -161,6 +163,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   SceneGradient empty_gradient() const;
   bool wants_colors() const;
   bool wants_texcoords() const;
+  bool wants_normals() const;
+  bool wants_materials() const;
 
  private:
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,

@@ -89,6 +89,7 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.perspective_correct = scene.perspective_correct && p.orthographic == 0 ? 1 : 0;
   p.sharp = is_sharp(scene.smoothing) ? 1 : 0;
   p.culled = culled_orientation(scene.cull);
+  p.normals = static_cast<cl_uint>(geometry.normals());
   return p;
 }
 
@@ -132,7 +133,7 @@ Smoothing without_distance_noise(Smoothing smoothing) {
 
 std::size_t ViewSet::bytes() const {
   return device_views.cameras.capacity_bytes() + device_views.models.capacity_bytes() +
-         device_views.vertex_starts.capacity_bytes();
+         device_views.vertex_starts.capacity_bytes() + view_normal_starts.capacity_bytes();
 }
 
 void Renderer::Impl::set_scene(const Scene& wanted) {
@@ -185,12 +186,13 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
                           std::span<const View> its_views, std::size_t first_view) const {
   std::vector<shared::ViewParams> cameras;
   std::vector<cl_float4> models;
-  std::vector<cl_uint> starts{0};
+  std::vector<cl_uint> starts{0}, normal_starts{0};
   for (const View& view : its_views) {
     cameras.push_back(view_params(view.camera, of.width, of.height));
     for (std::size_t m = 0; m < view.transforms.size(); ++m) {
       for (int row = 0; row < 3; ++row) models.push_back(matrix_row(view.transforms[m], row));
       starts.push_back(starts.back() + static_cast<cl_uint>(its.meshes[m].vertices));
+      normal_starts.push_back(normal_starts.back() + static_cast<cl_uint>(its.meshes[m].normals));
     }
   }
   prepared.frame = frame_params(of, its, its_views, first_view, raster);
@@ -199,6 +201,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
   prepared.device_views.cameras.upload(device.impl(), cameras);
   prepared.device_views.models.upload(device.impl(), models);
   prepared.device_views.vertex_starts.upload(device.impl(), starts);
+  prepared.view_normal_starts.upload(device.impl(), normal_starts);
 }
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {

@@ -19,7 +19,8 @@ constexpr std::array k_names{
     GradientName{"transform", &Request::transform},   GradientName{"camera", &Request::camera},
     GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
     GradientName{"background", &Request::background}, GradientName{"texture", &Request::texture},
-    GradientName{"texcoords", &Request::texcoords},   GradientName{"distortion", &Request::distortion}};
+    GradientName{"texcoords", &Request::texcoords},   GradientName{"distortion", &Request::distortion},
+    GradientName{"normals", &Request::normals},       GradientName{"materials", &Request::materials}};
 
 bool has_field_of_view(const Scene& scene) {
   return !scene.camera.intrinsics && !scene.camera.orthographic_height;
@@ -67,6 +68,12 @@ std::vector<GradientRow> make_rows() {
                   [](G& g, I i) -> GradientArray { return &g.meshes[i.item].texcoords; }},
       GradientRow{&Request::texture, Of::mesh, "meshes[].textures",
                   [](G& g, I i) -> GradientArray { return &g.meshes[i.item].textures; }},
+      GradientRow{&Request::normals, Of::mesh, "meshes[].normals",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].normals; }},
+      GradientRow{&Request::materials, Of::mesh, "meshes[].specular",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].specular; }},
+      GradientRow{&Request::materials, Of::mesh, "meshes[].shininess",
+                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].shininess; }},
       GradientRow{&Request::positions, Of::all_views, "shapes.positions",
                   [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
       GradientRow{&Request::colors, Of::all_views, "shapes.colors",

@@ -39,10 +39,10 @@ struct GradientIndex {
   std::size_t view = 0, item = 0;
 };
 
-/// A number, a vector, one vector for each vertex, colour, texture coordinate or coefficient, or a list of
-/// texels for each texture.
+/// A number, a vector, one vector for each vertex, colour, texture coordinate, normal, material or
+/// coefficient, one number for each material, or a list of texels for each texture.
 using GradientArray = std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*, std::vector<glm::vec2>*,
-                                   std::vector<std::vector<glm::vec3>>*>;
+                                   std::vector<double>*, std::vector<std::vector<glm::vec3>>*>;
 
 struct GradientRow {
   bool GradientRequest::*wanted;

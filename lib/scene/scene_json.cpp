@@ -109,9 +109,29 @@ void take_texture(const JsonNode& node, const std::filesystem::path& folder, Mes
   take_word(*texture, "filter", mesh.textures[0].filter, k_filter_names);
 }
 
+/// Normals beside a file take the place of the file's; two empty lists are none.
+void take_normals(const JsonNode& node, Mesh& mesh) {
+  if (node.find("normals").has_value() != node.find("face_normals").has_value())
+    node.fail("one of normals and face_normals", "both or none");
+  take(node, "normals", mesh.normals, vec3_list);
+  take(node, "face_normals", mesh.face_normals, parse_faces);
+}
+
+/// A material beside a file takes the place of all of the file's.
+void take_material(const JsonNode& node, Mesh& mesh) {
+  const auto given = node.find("material");
+  if (!given) return;
+  given->require_keys({"specular", "shininess"});
+  Material material;
+  take_vec3(*given, "specular", material.specular);
+  take(*given, "shininess", material.shininess, [](const JsonNode& n) { return n.number(); });
+  mesh.materials = {material};
+  mesh.face_materials.clear();
+}
+
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors", "texcoords",
-                     "face_texcoords", "texture"});
+                     "face_texcoords", "texture", "normals", "face_normals", "material"});
   Instance instance;
   const auto file = node.find("file");
   if (file && (node.find("positions") || node.find("faces"))) {
@@ -127,6 +147,8 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
   }
   take_colors(node, instance.mesh);
   take_texture(node, folder, instance.mesh);
+  take_normals(node, instance.mesh);
+  take_material(node, instance.mesh);
   take(node, "transform", instance.transform, [](const JsonNode& n) { return n.mat4(); });
   return instance;
 }

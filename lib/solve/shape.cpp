@@ -300,6 +300,10 @@ Mesh make_start(const ShapeViews& views) {
     mesh.face_texcoords.clear();
     mesh.textures.clear();
     mesh.face_textures.clear();
+    mesh.normals.clear();  // they would stay while the shape moves
+    mesh.face_normals.clear();
+    mesh.materials.clear();
+    mesh.face_materials.clear();
     return mesh;
   }
   Mesh sphere = make_icosphere(k_subdivisions, static_cast<float>(common.radius));

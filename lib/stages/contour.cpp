@@ -27,6 +27,14 @@ bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
   return periods == glm::round(periods);
 }
 
+/// Which corner of a face is where a vertex is.
+int corner_at(const Mesh& mesh, std::span<const glm::vec3> positions, std::uint32_t face,
+              std::uint32_t vertex) {
+  int corner = 0;
+  while (corner < 2 && positions[mesh.faces[face][corner]] != positions[vertex]) ++corner;
+  return corner;
+}
+
 /// Whether the texture jumps at the edge between two faces.
 bool is_seam(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge) {
   if (mesh.textures.empty()) return false;
@@ -34,12 +42,22 @@ bool is_seam(const Mesh& mesh, std::span<const glm::vec3> positions, const Welde
   if (texture != texture_of(mesh, other)) return true;
   if (texture == k_no_texture) return false;
   const auto coordinate = [&](std::uint32_t face, std::uint32_t vertex) {
-    int corner = 0;
-    while (corner < 2 && positions[mesh.faces[face][corner]] != positions[vertex]) ++corner;
-    return mesh.texcoords[mesh.face_texcoords[face][corner]];
+    return mesh.texcoords[mesh.face_texcoords[face][corner_at(mesh, positions, face, vertex)]];
   };
   return std::ranges::any_of(std::array{edge.first, edge.second}, [&](std::uint32_t end) {
     return !is_same_place(coordinate(own, end), coordinate(other, end), mesh.textures[texture].wrap);
+  });
+}
+
+/// Whether what the mesh says of how it is lit jumps at the edge between two faces: their materials, or the
+/// normals that it gives.
+bool light_may_jump(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge) {
+  const std::uint32_t own = edge.face, other = *edge.other;
+  if (material_of(mesh, own) != material_of(mesh, other)) return true;
+  if (mesh.face_normals.empty()) return false;
+  return std::ranges::any_of(std::array{edge.first, edge.second}, [&](std::uint32_t end) {
+    return mesh.normals[mesh.face_normals[own][corner_at(mesh, positions, own, end)]] !=
+           mesh.normals[mesh.face_normals[other][corner_at(mesh, positions, other, end)]];
   });
 }
 
@@ -51,6 +69,7 @@ cl_uint4 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const We
   row.s[3] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
   if (may_jump(mesh, edge)) row.s[2] |= DPR_EDGE_FLAG;
   if (is_seam(mesh, positions, edge)) row.s[2] |= DPR_EDGE_SEAM;
+  if (light_may_jump(mesh, positions, edge)) row.s[3] |= DPR_EDGE_SEAM;
   return row;
 }
 

@@ -17,12 +17,17 @@ class Gather {
   /// grad[target], the views added up.
   void over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
                   const Incidence& incidence, const Buffer<float>& partial, Buffer<cl_float4>& grad);
+  /// channels[DPR_MATERIAL_CHANNELS][face], the faces in the order of `materials`, from
+  /// partial[pair][channel].
+  void over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
+                  const Buffer<float>& partial, Buffer<float>& channels);
 
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
          Out<cl_float4>>
       corners_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> faces_;
 };
 
 }  // namespace dpr

@@ -32,14 +32,17 @@ std::vector<glm::vec3> mesh_colors(const Mesh& mesh) {
   return {glm::vec3(1.0F)};
 }
 
-cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_color) {
-  const cl_uint base = to_uint(first_color);
+std::size_t material_count(const Mesh& mesh) { return std::max<std::size_t>(mesh.materials.size(), 1); }
+
+cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_color,
+                       std::size_t first_material) {
+  const cl_uint base = to_uint(first_color), material = to_uint(first_material + material_of(mesh, face));
   if (!mesh.vertex_colors.empty()) {
     const glm::uvec3& f = mesh.faces[face];
-    return {{base + f.x, base + f.y, base + f.z, 0}};
+    return {{base + f.x, base + f.y, base + f.z, material}};
   }
   const cl_uint color = mesh.face_colors.empty() ? base : to_uint(first_color + face);
-  return {{color, color, color, 0}};
+  return {{color, color, color, material}};
 }
 
 cl_uint4 corner_texcoords(const Mesh& mesh, std::size_t face, cl_uint first_texcoord, cl_uint first_texture) {
@@ -78,6 +81,18 @@ bool is_textured(const Scene& scene) {
   return std::ranges::any_of(scene.meshes, [](const Instance& i) { return !i.mesh.textures.empty(); });
 }
 
+std::size_t material_of(const Mesh& mesh, std::size_t face) {
+  return mesh.face_materials.empty() ? 0 : mesh.face_materials[face];
+}
+
+bool gives_normals(const Scene& scene) {
+  return std::ranges::any_of(scene.meshes, [](const Instance& i) { return !i.mesh.face_normals.empty(); });
+}
+
+bool has_materials(const Scene& scene) {
+  return std::ranges::any_of(scene.meshes, [](const Instance& i) { return !i.mesh.materials.empty(); });
+}
+
 cl_float4 to_cl(const glm::vec3& v) { return {{v.x, v.y, v.z, 0.0F}}; }
 
 void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
@@ -96,7 +111,11 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;
     const cl_uint base = to_uint(all_positions.size());
-    meshes.push_back({.first_vertex = all_positions.size(), .vertices = mesh.positions.size()});
+    meshes.push_back({.first_vertex = all_positions.size(),
+                      .vertices = mesh.positions.size(),
+                      .first_material = materials.count,
+                      .materials = material_count(mesh)});
+    materials.count += meshes[m].materials;
     for (const glm::uvec3& f : mesh.faces)
       all_faces.push_back({{base + f.x, base + f.y, base + f.z, to_uint(m)}});
     for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
@@ -113,20 +132,24 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   vertex_corners = make_incidence(device, all_faces, vertices);
   add_colors(device, scene);
   if (is_textured(scene)) add_textures(device, scene);
+  if (gives_normals(scene)) add_normals(device, scene);
+  add_materials(device, scene);
 }
 
 void Geometry::add_colors(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> all_colors;
   std::vector<cl_uint4> all_faces;
-  colors_by_vertex_ =
-      std::ranges::all_of(scene.meshes, [](const Instance& i) { return !i.mesh.vertex_colors.empty(); });
+  // With a material a mesh, the number of the mesh is that of its material.
+  colors_by_vertex_ = std::ranges::all_of(scene.meshes, [](const Instance& i) {
+    return !i.mesh.vertex_colors.empty() && material_count(i.mesh) == 1;
+  });
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m].mesh;
     const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
     meshes[m].first_color = all_colors.size();
     meshes[m].colors = mesh_color.size();
     for (std::size_t face = 0; face < mesh.faces.size() && !colors_by_vertex_; ++face)
-      all_faces.push_back(corner_colors(mesh, face, all_colors.size()));
+      all_faces.push_back(corner_colors(mesh, face, all_colors.size(), meshes[m].first_material));
     for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
   }
   colors = all_colors.size();
@@ -170,6 +193,65 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
   textures.texcoord_corners = make_incidence(device, all_faces, textures.texcoords);
 }
 
+/// Vertices of meshes that give normals have some of their own all the same, which no corner looks at.
+void Geometry::add_normals(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_float4> all_normals;
+  std::vector<cl_uint> all_mesh;
+  std::vector<cl_uint4> all_faces;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = scene.meshes[m].mesh;
+    const bool gives = !mesh.face_normals.empty();
+    const cl_uint base = to_uint(gives ? vertices + all_normals.size() : meshes[m].first_vertex);
+    for (const glm::uvec3& f : gives ? mesh.face_normals : mesh.faces)
+      all_faces.push_back({{base + f.x, base + f.y, base + f.z, 0}});
+    if (!gives) continue;
+    meshes[m].first_normal = all_normals.size();
+    meshes[m].normals = mesh.normals.size();
+    for (const glm::vec3& normal : mesh.normals) all_normals.push_back(to_cl(normal));
+    all_mesh.resize(all_normals.size(), to_uint(m));
+  }
+  given_normals.count = all_normals.size();
+  given_normals.values.upload(device, all_normals);
+  given_normals.mesh.upload(device, all_mesh);
+  given_normals.face_normals.upload(device, all_faces);
+  given_normals.corners = make_incidence(device, all_faces, normals());
+}
+
+void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_float4> values;
+  for (const Instance& instance : scene.meshes) {
+    for (const Material& material : instance.mesh.materials) {
+      values.push_back(to_cl(material.specular));
+      values.back().s[3] = material.shininess.value_or(0.0F);
+    }
+    if (instance.mesh.materials.empty()) values.push_back(to_cl(glm::vec3(1)));
+  }
+  materials.values.upload(device, values);
+  if (!has_materials(scene)) return;
+  std::vector<std::vector<cl_uint>> by_material(materials.count);
+  for (std::size_t m = 0, face = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = scene.meshes[m].mesh;
+    for (std::size_t i = 0; i < mesh.faces.size(); ++i)
+      by_material[meshes[m].first_material + material_of(mesh, i)].push_back(to_uint(face++));
+  }
+  std::vector<cl_uint> ordered, starts{0};
+  for (const std::vector<cl_uint>& of_one : by_material) {
+    ordered.insert(ordered.end(), of_one.begin(), of_one.end());
+    starts.push_back(to_uint(ordered.size()));
+  }
+  materials.faces.upload(device, ordered);
+  materials.starts.upload(device, starts);
+}
+
+std::size_t GivenNormals::bytes() const {
+  return values.capacity_bytes() + mesh.capacity_bytes() + face_normals.capacity_bytes() +
+         corners.starts.capacity_bytes() + corners.corners.capacity_bytes();
+}
+
+std::size_t SurfaceMaterials::bytes() const {
+  return values.capacity_bytes() + faces.capacity_bytes() + starts.capacity_bytes();
+}
+
 std::size_t Textures::bytes() const {
   return face_texcoords.capacity_bytes() + texcoord_values.capacity_bytes() + textures.capacity_bytes() +
          texel_values.capacity_bytes() + texcoord_corners.starts.capacity_bytes() +
@@ -177,10 +259,10 @@ std::size_t Textures::bytes() const {
 }
 
 std::size_t Geometry::bytes() const {
-  std::size_t bytes = positions.capacity_bytes() + vertex_mesh.capacity_bytes() +
-                      face_vertices.capacity_bytes() + face_colors_.capacity_bytes() +
-                      color_values.capacity_bytes() + view_positions.capacity_bytes() +
-                      view_colors.capacity_bytes() + textures.bytes();
+  std::size_t bytes =
+      positions.capacity_bytes() + vertex_mesh.capacity_bytes() + face_vertices.capacity_bytes() +
+      face_colors_.capacity_bytes() + color_values.capacity_bytes() + view_positions.capacity_bytes() +
+      view_colors.capacity_bytes() + textures.bytes() + given_normals.bytes() + materials.bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

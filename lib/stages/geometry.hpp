@@ -23,6 +23,8 @@ struct MeshRange {
   std::size_t first_vertex = 0, vertices = 0, first_color = 0, colors = 0;
   std::size_t first_texcoord = 0, texcoords = 0;  // of textured meshes
   std::size_t first_texture = 0;
+  std::size_t first_normal = 0, normals = 0;  // of meshes that give some
+  std::size_t first_material = 0, materials = 1;
 };
 
 /// The textures of all meshes, and where faces look into them. Empty where no mesh has any.
@@ -45,6 +47,30 @@ struct Textures {
   std::size_t bytes() const;
 };
 
+/// The normals that meshes give, and where corners look: into those of the vertices, then these. Empty where
+/// no mesh gives any.
+struct GivenNormals {
+  std::size_t count = 0;
+  Buffer<cl_float4> values;  ///< [given] object space
+  Buffer<cl_uint> mesh;      ///< [given]
+  Buffer<cl_uint4>
+      face_normals;   ///< [face] of each corner: a vertex, or the number of vertices + a given one
+  Incidence corners;  ///< by vertex, then by given normal
+
+  bool empty() const { return count == 0; }
+  std::size_t bytes() const;
+};
+
+/// The materials of all meshes, at least one of each.
+struct SurfaceMaterials {
+  std::size_t count = 0;
+  Buffer<cl_float4> values;  ///< [material] RGB of the specular coefficient; w = shininess, or 0
+  Buffer<cl_uint> faces;     ///< [face] in the order of their materials
+  Buffer<cl_uint> starts;    ///< [material + 1] of `faces`
+
+  std::size_t bytes() const;
+};
+
 struct Geometry {
   Geometry(Device::Impl& device, const Scene& scene);
 
@@ -58,7 +84,17 @@ struct Geometry {
   Buffer<cl_float4> view_positions, view_colors;  ///< [view][vertex], [view][color]: of views' own shapes
   Incidence vertex_corners;
   Textures textures;
+  GivenNormals given_normals;
+  SurfaceMaterials materials;
 
+  /// Where corners look for their normals, those of vertices among them.
+  const Buffer<cl_uint4>& face_normals() const {
+    return given_normals.empty() ? face_vertices : given_normals.face_normals;
+  }
+  const Incidence& normal_corners() const {
+    return given_normals.empty() ? vertex_corners : given_normals.corners;
+  }
+  std::size_t normals() const { return vertices + given_normals.count; }
   /// What the kernels read with the frame's strides.
   const Buffer<cl_float4>& positions_of(const shared::FrameParams& p) const {
     return p.position_stride != 0 ? view_positions : positions;
@@ -77,6 +113,8 @@ struct Geometry {
  private:
   void add_colors(Device::Impl& device, const Scene& scene);
   void add_textures(Device::Impl& device, const Scene& scene);
+  void add_normals(Device::Impl& device, const Scene& scene);
+  void add_materials(Device::Impl& device, const Scene& scene);
 
   bool colors_by_vertex_ = false;
   Buffer<cl_uint4> face_colors_;  // where they are not
@@ -85,6 +123,15 @@ struct Geometry {
 
 /// Whether a mesh of the scene has textures.
 bool is_textured(const Scene& scene);
+
+/// Among the mesh's materials; 0 where it has none.
+std::size_t material_of(const Mesh& mesh, std::size_t face);
+
+/// Whether a mesh of the scene gives normals.
+bool gives_normals(const Scene& scene);
+
+/// Whether a mesh of the scene has materials of its own.
+bool has_materials(const Scene& scene);
 
 /// A vector of three in the first components; w = 0.
 cl_float4 to_cl(const glm::vec3& v);

@@ -18,6 +18,8 @@ LitShading::LitShading(Device::Impl& device, const ShadingModel& of)
       normals_forward(device, "normals.cl", "normals_forward"),
       normals_backward_normalize(device, "normals.cl", "normals_backward_normalize"),
       normals_backward(device, "normals.cl", "normals_backward"),
+      normals_given_forward(device, "normals.cl", "normals_given_forward"),
+      normals_given_backward(device, "normals.cl", "normals_given_backward"),
       forward(device, "shade_lit.cl", "shade_lit_forward", shading_options(of)),
       backward(device, "shade_lit.cl", "shade_lit_backward", shading_options(of)),
       backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_options(of)) {}
@@ -69,18 +71,25 @@ void Shade::forward(const ShadeInputs& in) {
   }
 }
 
+void Shade::find_normals(const ShadeInputs& in) {
+  const GivenNormals& given = in.geometry.given_normals;
+  normals_.resize(device_, std::size_t{in.p.views} * in.p.normals);
+  if (is_flat()) return;
+  now_.kernels->normals_forward(std::size_t{in.p.views} * in.p.vertices, in.p, in.geometry.face_vertices,
+                                in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
+                                in.transform.world, normals_);
+  if (given.empty()) return;
+  now_.kernels->normals_given_forward(in.p.views * given.count, in.p, in.views.models, given.values,
+                                      given.mesh, normals_);
+}
+
 void Shade::light(const ShadeInputs& in) {
   const Range pairs = in.rasterize.pairs(in.bin);
-  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
-  normals_.resize(device_, vertices);
-  if (now_.kernels->model.shading != Shading::flat) {
-    now_.kernels->normals_forward(vertices, in.p, in.geometry.face_vertices,
-                                  in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
-                                  in.transform.world, normals_);
-  }
+  find_normals(in);
   now_.kernels->forward(pairs, in.p, now_.params, pairs.last(), in.views.cameras, now_.lights,
                         in.geometry.face_vertices, in.geometry.face_colors(), in.geometry.colors_of(in.p),
-                        in.transform.world, normals_, in.bin.pair_face, in.rasterize.fragment_starts,
+                        in.transform.world, in.geometry.face_normals(), normals_,
+                        in.geometry.materials.values, in.bin.pair_face, in.rasterize.fragment_starts,
                         in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green, base_.blue, color.red,
                         color.green, color.blue);
 }
@@ -105,27 +114,43 @@ void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
   if (now_.kernels->model.is_textured) grad_base_.resize(device_, in.rasterize.fragments);
   grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
+  grad_materials.resize(device_, std::size_t{DPR_MATERIAL_CHANNELS} * in.bin.pairs);
   grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
   now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
                          in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
-                         in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
+                         in.geometry.colors_of(in.p), in.transform.world, in.geometry.face_normals(),
+                         normals_, in.geometry.materials.values, in.bin.pair_face,
                          in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red,
                          base_.green, base_.blue, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
                          grad_base_.red, grad_base_.green, grad_base_.blue, grad_corner_colors,
-                         grad_corner_positions_, grad_corner_normals_, grad_eye);
+                         grad_corner_positions_, grad_corner_normals_, grad_materials, grad_eye);
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
-  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_,
                   grad_world);
-  if (now_.kernels->model.shading == Shading::flat) return;
-  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_normals_,
+  if (is_flat()) return;
+  gather.per_view(in.p, in.p.normals, in.bin, in.geometry.normal_corners(), grad_corner_normals_,
                   grad_normals_);
-  now_.kernels->normals_backward_normalize(vertices, in.p, normals_, grad_normals_);
-  now_.kernels->normals_backward(vertices, in.p, in.geometry.face_vertices, in.geometry.vertex_corners.starts,
-                                 in.geometry.vertex_corners.corners, in.transform.world, grad_normals_,
-                                 grad_world);
+  now_.kernels->normals_backward_normalize(std::size_t{in.p.views} * in.p.normals, in.p, normals_,
+                                           grad_normals_);
+  now_.kernels->normals_backward(std::size_t{in.p.views} * in.p.vertices, in.p, in.geometry.face_vertices,
+                                 in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
+                                 in.transform.world, grad_normals_, grad_world);
+}
+
+void Shade::backward_given_normals(const ShadeInputs& in) {
+  const GivenNormals& given = in.geometry.given_normals;
+  if (given.empty()) return;
+  grad_given_normals.resize(device_, given.count);
+  normal_channels.resize(device_, std::size_t{3} * in.p.views * given.count);
+  if (is_flat()) {
+    grad_given_normals.fill(cl_float4{});
+    normal_channels.fill(0.0F);
+    return;
+  }
+  now_.kernels->normals_given_backward(given.count, in.p, in.views.models, given.values, given.mesh,
+                                       grad_normals_, grad_given_normals, normal_channels);
 }
 
 void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {
@@ -134,17 +159,19 @@ void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::
   now_.kernels->backward_lights(
       pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
       in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
-      in.geometry.colors_of(in.p), in.transform.world, normals_, in.bin.pair_face,
-      in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green,
-      base_.blue, grad.red, grad.green, grad.blue, light_channels);
+      in.geometry.colors_of(in.p), in.transform.world, in.geometry.face_normals(), normals_,
+      in.geometry.materials.values, in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1,
+      in.rasterize.bary2, base_.red, base_.green, base_.blue, grad.red, grad.green, grad.blue,
+      light_channels);
 }
 
 std::size_t Shade::bytes() const {
   std::size_t bytes = now_.lights.capacity_bytes() + normals_.capacity_bytes() +
-                      grad_normals_.capacity_bytes() + (surface ? surface->bytes() : 0) + color.bytes() +
-                      base_.bytes() + grad_base_.bytes();
-  for (const Buffer<float>* buffer : {&grad_bary1, &grad_bary2, &grad_corner_colors, &grad_eye,
-                                      &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
+                      grad_normals_.capacity_bytes() + grad_given_normals.capacity_bytes() +
+                      (surface ? surface->bytes() : 0) + color.bytes() + base_.bytes() + grad_base_.bytes();
+  for (const Buffer<float>* buffer :
+       {&grad_bary1, &grad_bary2, &grad_corner_colors, &grad_materials, &normal_channels, &grad_eye,
+        &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

@@ -36,20 +36,26 @@ class LitShading {
   Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
          Out<cl_float4>>
       normals_backward;
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, Out<cl_float4>>
+      normals_given_forward;
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>,
+         Out<float>>
+      normals_given_backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
-         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>,
-         In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
+         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
+         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
+         Out<float>, Out<float>>
       forward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
-         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, In<float>,
-         In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>>
+         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>,
+         In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>,
+         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
       backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, cl_uint, In<shared::ViewParams>,
-         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, In<float>,
-         In<float>, In<float>, Out<float>>
+         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>,
+         In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
+         In<float>, In<float>, In<float>, In<float>, Out<float>>
       backward_lights;
 };
 
@@ -94,13 +100,16 @@ class Shade {
   /// Says how many fragments there are, where forward() could not know.
   void settle(std::size_t fragments);
   /// Fills the gradients of barycentrics and corner colours, if textured of texture coordinates, and, if lit,
-  /// of corner positions, normals and the eye.
+  /// of corner positions, normals, materials and the eye.
   void backward(const ShadeInputs& in, const ColorPlanes& grad);
   /// The base colours' gradients after backward(), of a textured scene.
   const ColorPlanes& grad_base(const ColorPlanes& grad) const { return lit() ? grad_base_ : grad; }
   /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
+  /// The gradients of normals that meshes give, and what those add to the models' rotations. After
+  /// backward_world(). Only if lit.
+  void backward_given_normals(const ShadeInputs& in);
   /// The gradients of one light, with the first those of the environment, per pair.
   void backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light);
 
@@ -112,6 +121,9 @@ class Shade {
   ColorPlanes color;                     ///< [fragment]
   Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
   Buffer<float> grad_corner_colors;      ///< [pair][9]
+  Buffer<float> grad_materials;          ///< [pair][DPR_MATERIAL_CHANNELS]
+  Buffer<cl_float4> grad_given_normals;  ///< [given]
+  Buffer<float> normal_channels;         ///< [3][view][given] of models' rotation vectors
   Buffer<float> grad_eye;                ///< [3][pair]
   Buffer<float> light_channels;          ///< [light_channel_count()][pair], of the environment, then by light
 
@@ -125,13 +137,15 @@ class Shade {
   Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
          In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
       backward_;
+  bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
+  void find_normals(const ShadeInputs& in);
   void light(const ShadeInputs& in);
   void light_backward(const ShadeInputs& in, const ColorPlanes& grad);
 
   Lighting now_;
   // [fragment] of lit textured scenes; in others the kernels get null pointers, which they do not read.
   ColorPlanes base_, grad_base_;
-  Buffer<cl_float4> normals_, grad_normals_;                   // [view][vertex]
+  Buffer<cl_float4> normals_, grad_normals_;                   // [view][normal]
   Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
 };
 

@@ -51,6 +51,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(FrameParams, clips),
           DPR_FIELD(FrameParams, orthographic),
           DPR_FIELD(FrameParams, distorts),
+          DPR_FIELD(FrameParams, normals),
           DPR_SIZE(ViewParams),
           DPR_FIELD(ViewParams, row),
           DPR_FIELD(ViewParams, projection),

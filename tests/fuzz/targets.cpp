@@ -40,7 +40,7 @@ void read_mesh_bytes(std::string_view content) {
 constexpr char k_obj[] = "mesh.obj", k_ply[] = "mesh.ply", k_off[] = "mesh.off", k_stl[] = "mesh.stl";
 
 void read_materials(std::string_view content) {
-  Materials materials;
+  ObjMaterials materials;
   read_mtl(folder() / "mesh.mtl", content, materials);
 }
 

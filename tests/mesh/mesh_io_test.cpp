@@ -128,7 +128,8 @@ TEST_SUITE("unit") {
     CHECK(again.texcoords == mesh.texcoords);
     CHECK(again.face_texcoords == mesh.face_texcoords);
     CHECK(again.faces == mesh.faces);
-    const Mesh without = read_mesh(folder.write("mesh.obj", k_obj_square + corners + "f 1//1 2/1 3/1\n"));
+    const Mesh without =
+        read_mesh(folder.write("mesh.obj", k_obj_square + "vn 0 0 1\n" + corners + "f 1//1 2/1 3/1\n"));
     CHECK(without.texcoords.empty());
     CHECK(without.face_texcoords.empty());
     CHECK(without.faces.size() == 4);

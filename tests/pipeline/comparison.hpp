@@ -112,6 +112,14 @@ inline void add_textures(const Mesh& mesh, reference::Mesh& result) {
     result.face_textures.push_back(texture == k_no_texture ? -1 : static_cast<int>(texture));
 }
 
+inline void add_looks(const Mesh& mesh, reference::Mesh& result) {
+  result.normals = to_reference(mesh.normals);
+  for (const glm::uvec3& face : mesh.face_normals) result.face_normals.push_back({face.x, face.y, face.z});
+  for (const Material& m : mesh.materials)
+    result.materials.push_back({to_reference(m.specular), m.shininess.value_or(0.0F)});
+  result.face_materials.assign(mesh.face_materials.begin(), mesh.face_materials.end());
+}
+
 inline reference::Scene to_reference(const Scene& scene) {
   reference::Scene result;
   result.width = scene.width;
@@ -129,6 +137,7 @@ inline reference::Scene to_reference(const Scene& scene) {
                          {},
                          {}};
     add_textures(instance.mesh, mesh);
+    add_looks(instance.mesh, mesh);
     for (const glm::uvec3& face : instance.mesh.faces) mesh.faces.push_back({face.x, face.y, face.z});
     result.meshes.push_back(mesh);
   }

@@ -4,13 +4,13 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "dpr/dpr.hpp"
 #include "pipeline/comparison.hpp"
+#include "pipeline/directions.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
@@ -69,20 +69,6 @@ std::vector<Scene> tilted_squares(int size) {
   return scenes;
 }
 
-/// A block of parameters of the reference's scene: moving along a random direction, and the derivative found.
-struct Direction {
-  std::string name;
-  std::vector<double> found;
-  std::function<void(reference::Scene&, const std::vector<double>&)> move;
-};
-
-double weighted(const reference::Image& image, const Image& weights) {
-  double sum = 0;
-  for (std::size_t i = 0; i < image.rgba.size(); ++i)
-    sum += image.rgba[i] * static_cast<double>(weights.pixels[i / 4][static_cast<int>(i % 4)]);
-  return sum;
-}
-
 std::vector<Direction> directions(const SceneGradient& g) {
   const PoseGradient& pose = g.views[0].transforms[0];
   return {{"positions", flat(g.meshes[0].positions),
@@ -109,29 +95,6 @@ std::vector<Direction> directions(const SceneGradient& g) {
              s.camera.fov_y_degrees += 100 * d[0];
              if (s.camera.orthographic_height) *s.camera.orthographic_height += d[1];
            }}};
-}
-
-/// The error along a random direction, relative to the gradient's norm times the part of the direction
-/// along it.
-double error_along(const Scene& scene, const Direction& block, const Image& weights, unsigned seed) {
-  constexpr double k_step = 1e-6;
-  Random random(seed);
-  std::vector<double> way, back;
-  double found = 0, squares = 0;
-  for (const double g : block.found) {
-    way.push_back(k_step * static_cast<double>(random(-1, 1)));
-    back.push_back(-way.back());
-    found += g * way.back() / k_step;
-    squares += way.back() * way.back() / (k_step * k_step);
-  }
-  reference::Scene above = to_reference(scene), below = above;
-  block.move(above, way);
-  block.move(below, back);
-  const double expected =
-      (weighted(reference::render(above), weights) - weighted(reference::render(below), weights)) /
-      (2 * k_step);
-  return std::abs(found - expected) /
-         (norm(block.found) * std::sqrt(squares / static_cast<double>(way.size())));
 }
 
 }  // namespace

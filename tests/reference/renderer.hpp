@@ -137,6 +137,38 @@ inline bool is_perspective_correct(const Scene& scene) {
   return scene.perspective_correct && !scene.camera.orthographic_height;
 }
 
+/// A normal as a transform turns the plane that it is normal to, of length one.
+inline Vec3d transformed_normal(const Mat4d& m, const Vec3d& normal) {
+  const auto linear = [&](const Vec3d& v) {
+    return Vec3d{m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z, m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+                 m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+  };
+  const Vec3d other = std::fabs(normal.x) < 0.5 * std::sqrt(dot(normal, normal)) ? Vec3d{1.0, 0.0, 0.0}
+                                                                                 : Vec3d{0.0, 1.0, 0.0};
+  const Vec3d u = cross(normal, other), v = cross(normal, u);
+  const Vec3d turned = cross(linear(u), linear(v));
+  return unit(dot(turned, linear(normal)) < 0.0 ? -turned : turned);
+}
+
+/// Empty where no mesh has materials or normals of its own.
+inline std::vector<FaceLook> face_looks(const Scene& scene) {
+  std::vector<FaceLook> looks;
+  bool is_plain = true;
+  for (const Mesh& mesh : scene.meshes) {
+    is_plain = is_plain && mesh.materials.empty() && mesh.face_normals.empty();
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      FaceLook& look = looks.emplace_back();
+      if (!mesh.materials.empty())
+        look.material = mesh.materials[mesh.face_materials.empty() ? 0 : mesh.face_materials[f]];
+      if (mesh.face_normals.empty()) continue;
+      look.normals.emplace();
+      for (std::size_t i = 0; i < 3; ++i)
+        (*look.normals)[i] = transformed_normal(mesh.transform, mesh.normals[mesh.face_normals[f][i]]);
+    }
+  }
+  return is_plain ? std::vector<FaceLook>() : looks;
+}
+
 inline PreparedScene prepare(const Scene& scene) {
   PreparedScene prepared;
   const ImageSize size{scene.width, scene.height};
@@ -160,6 +192,7 @@ inline PreparedScene prepare(const Scene& scene) {
   }
   prepared.shade =
       shade_prepare(std::move(world), std::move(faces), scene.lights, camera_center(scene.camera));
+  prepared.shade.looks = face_looks(scene);
   const Smoothing& s = scene.smoothing;
   prepared.rasterize = {s.blur_radius, s.distance,         is_perspective_correct(scene),
                         true,          scene.camera.znear, scene.camera.zfar};

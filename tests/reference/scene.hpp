@@ -22,6 +22,10 @@ struct Mesh {
   std::vector<Face> face_texcoords;  ///< indices into texcoords, or empty
   std::vector<Texture> textures;     ///< or empty
   std::vector<int> face_textures;    ///< one per face, -1 for none; empty: all faces have the first
+  std::vector<Vec3d> normals{};      ///< object space, or empty: those of vertices are computed
+  std::vector<Face> face_normals{};  ///< indices into normals, or empty
+  std::vector<Material> materials{};
+  std::vector<std::size_t> face_materials{};  ///< one per face; empty: all faces have the first
 };
 
 struct Smoothing {

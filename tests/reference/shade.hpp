@@ -26,6 +26,19 @@ struct ShadeGradient {
   Lights lights = zero_like({});  ///< every number but shininess
 };
 
+/// What highlights are multiplied by, and their exponent where it is above 0.
+struct Material {
+  Vec3d specular{1.0, 1.0, 1.0};
+  double shininess = 0.0;
+};
+
+/// What a face has of its own: a material, and the world-space normals of its corners, of length one, where
+/// the mesh gives some. Its gradients are not here: they are compared with finite differences.
+struct FaceLook {
+  Material material;
+  std::optional<std::array<Vec3d, 3>> normals;
+};
+
 /// World-space geometry and what the lighting prepares once for all pixels. Without lights only colours are
 /// interpolated.
 struct ShadeScene {
@@ -36,6 +49,7 @@ struct ShadeScene {
   std::vector<Vec3d> face_areas;         ///< cross(v1 - v0, v2 - v0)
   std::vector<Vec3d> vertex_areas;       ///< sums of face_areas over the faces of a vertex
   std::vector<LightTerms> vertex_light;  ///< gouraud
+  std::vector<FaceLook> looks{};         ///< of every face; empty: none has anything of its own
 };
 
 inline ShadeScene shade_prepare(std::vector<Vec3d> world, std::vector<Face> faces,
@@ -88,20 +102,49 @@ inline Vec3d fragment_position(const ShadeScene& scene, const Face& face, const 
   return interpolate(c, [&](std::size_t i) { return scene.world[face[i]]; });
 }
 
-/// Sum of the unit vertex normals weighted with c_i, before normalisation.
-inline Vec3d fragment_normal_sum(const ShadeScene& scene, const Face& face, const Vec3d& c) {
-  return interpolate(c, [&](std::size_t i) { return unit(scene.vertex_areas[face[i]]); });
+inline Vec3d corner_normal(const ShadeScene& scene, std::size_t face, std::size_t i) {
+  if (!scene.looks.empty() && scene.looks[face].normals) return (*scene.looks[face].normals)[i];
+  return unit(scene.vertex_areas[scene.faces[face][i]]);
+}
+
+/// Sum of the unit normals of the corners weighted with c_i, before normalisation.
+inline Vec3d fragment_normal_sum(const ShadeScene& scene, std::size_t face, const Vec3d& c) {
+  return interpolate(c, [&](std::size_t i) { return corner_normal(scene, face, i); });
+}
+
+/// The lights as a face's material shows them.
+inline Lights face_lights(const ShadeScene& scene, std::size_t face) {
+  Lights lights = *scene.lights;
+  if (scene.looks.empty()) return lights;
+  const Material& material = scene.looks[face].material;
+  const auto apply = [&](auto& list) {
+    for (auto& light : list) light.specular = light.specular * material.specular;
+  };
+  apply(lights.point);
+  apply(lights.directional);
+  apply(lights.spot);
+  if (material.shininess > 0.0) lights.shininess = material.shininess;
+  return lights;
+}
+
+/// gouraud
+inline LightTerms corner_light(const ShadeScene& scene, std::size_t face, std::size_t i) {
+  const std::size_t vertex = scene.faces[face][i];
+  if (scene.looks.empty()) return scene.vertex_light[vertex];
+  return light_terms(face_lights(scene, face), scene.camera, scene.world[vertex],
+                     corner_normal(scene, face, i));
 }
 
 inline LightTerms fragment_light(const ShadeScene& scene, std::size_t face_index, const Vec3d& c) {
   const Face& face = scene.faces[face_index];
   if (scene.lights->shading == Shading::gouraud) {
-    return {interpolate(c, [&](std::size_t i) { return scene.vertex_light[face[i]].factor; }),
-            interpolate(c, [&](std::size_t i) { return scene.vertex_light[face[i]].specular; })};
+    return {interpolate(c, [&](std::size_t i) { return corner_light(scene, face_index, i).factor; }),
+            interpolate(c, [&](std::size_t i) { return corner_light(scene, face_index, i).specular; })};
   }
-  const Vec3d normal = scene.lights->shading == Shading::flat ? unit(scene.face_areas[face_index])
-                                                              : unit(fragment_normal_sum(scene, face, c));
-  return light_terms(*scene.lights, scene.camera, fragment_position(scene, face, c), normal);
+  const Vec3d normal = scene.lights->shading == Shading::flat
+                           ? unit(scene.face_areas[face_index])
+                           : unit(fragment_normal_sum(scene, face_index, c));
+  return light_terms(face_lights(scene, face_index), scene.camera, fragment_position(scene, face, c), normal);
 }
 
 /// Texture coordinates at a point of the screen, also outside of the triangle.
@@ -175,7 +218,7 @@ inline Vec3d fragment_light_backward(const ShadeScene& scene, std::size_t face_i
     return grad_c;
   }
   const bool flat = scene.lights->shading == Shading::flat;
-  const Vec3d normal_sum = flat ? scene.face_areas[face_index] : fragment_normal_sum(scene, face, c);
+  const Vec3d normal_sum = flat ? scene.face_areas[face_index] : fragment_normal_sum(scene, face_index, c);
   const SurfaceGradient surface =
       light_terms_backward(*scene.lights, scene.camera, fragment_position(scene, face, c), unit(normal_sum),
                            grad_light, total.lights);

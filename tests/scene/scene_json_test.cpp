@@ -196,6 +196,32 @@ TEST_SUITE("unit") {
           "expected nearest, bilinear or trilinear");
   }
 
+  TEST_CASE("normals and materials, in place of the file's") {
+    const TempDir folder;
+    folder.write("m.mtl", "newmtl a\nKs 0.5 0.5 0.5\n");
+    folder.write("mesh.obj",
+                 "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//1 3//1\n");
+    const auto mesh_with = [&](const std::string& members) {
+      return read(folder, with_mesh(R"("file": "mesh.obj")" + members)).meshes[0].mesh;
+    };
+    CHECK(mesh_with("").materials == std::vector<Material>{{glm::vec3(0.5F), std::nullopt}});
+    CHECK(mesh_with("").face_normals == std::vector<glm::uvec3>{{0, 0, 0}});
+    CHECK(mesh_with(R"(, "normals": [], "face_normals": [])").face_normals.empty());
+    const Mesh mesh = mesh_with(R"(, "normals": [[0,0,2],[0,1,1]], "face_normals": [[0,1,1]],
+                                   "material": {"specular": [1,0.5,0.25], "shininess": 8})");
+    CHECK(mesh.normals == std::vector<glm::vec3>{{0, 0, 2}, {0, 1, 1}});
+    CHECK(mesh.face_normals == std::vector<glm::uvec3>{{0, 1, 1}});
+    CHECK(mesh.materials == std::vector<Material>{{{1, 0.5F, 0.25F}, 8.0F}});
+    CHECK(mesh_with(R"(, "material": {})").materials == std::vector<Material>(1));
+    const auto fails = [&](const std::string& members, const std::string& message) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, mesh_with(members), message);
+    };
+    fails(R"(, "normals": [[0,0,1]])", "one of normals and face_normals");
+    fails(R"(, "normals": [[0,0,1]], "face_normals": [[0,0,1]])", "normal 1");
+    fails(R"(, "material": {"shininess": 0.5})", "shininess of materials[0]");
+    fails(R"(, "material": {"diffuse": [1,1,1]})", "diffuse");
+  }
+
   TEST_CASE("presets and estimators") {
     const TempDir folder;
     Smoothing smoothing = read(folder, with(R"("smoothing": {"preset": "softras"})")).smoothing;

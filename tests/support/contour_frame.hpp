@@ -23,6 +23,7 @@ class ContourFrame {
         antialias(device_impl()) {
     p.views = p.meshes = 1;
     p.vertices = static_cast<cl_uint>(geometry.vertices);
+    p.normals = p.vertices;
     p.faces = static_cast<cl_uint>(geometry.faces);
     p.width = static_cast<cl_uint>(width);
     p.height = static_cast<cl_uint>(height);

@@ -69,6 +69,7 @@ class NdcStages {
     params.views = static_cast<cl_uint>(frame.views);
     params.meshes = 1;
     params.vertices = static_cast<cl_uint>(geometry_.vertices);
+    params.normals = params.vertices;
     params.faces = static_cast<cl_uint>(geometry_.faces);
     params.width = static_cast<cl_uint>(frame.width);
     params.height = static_cast<cl_uint>(frame.height);
