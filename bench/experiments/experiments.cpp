@@ -17,6 +17,7 @@ void run_devices(const Settings& settings);
 void run_shapes(const Settings& settings);
 void run_lights(const Settings& settings);
 void run_textures(const Settings& settings);
+void run_photograph(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -30,7 +31,8 @@ std::span<const Experiment> experiments() {
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
        run_shapes},
       {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights},
-      {"textures", "A texture found from 24 lit views of a known shape, from grey", run_textures}};
+      {"textures", "A texture found from 24 lit views of a known shape, from grey", run_textures},
+      {"photograph", "A face's template bent to a photograph: camera, light, then shape", run_photograph}};
   return k_experiments;
 }
 

@@ -12,6 +12,7 @@
 #include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
+#include "dpr/light.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/mesh_loss.hpp"
 #include "dpr/smoothing.hpp"
@@ -19,12 +20,17 @@
 
 namespace dpr {
 
+/// What is known of the camera that took an image: all; a camera that it is near; or nothing. The shape
+/// solver wants all: find_camera() (dpr/photographs.hpp) finds it.
+enum class CameraKnowledge { known, near, unknown };
+
 /// An image of the object and the camera that took it.
 struct ShapeView {
   Image image;
   Camera camera;
   bool has_alpha = true;  ///< false: the image has no silhouette and is compared in colour alone
   Image mask = {};  ///< its first channel is how much each pixel counts, at least 0; empty: all the same
+  CameraKnowledge knowledge = CameraKnowledge::known;
 };
 
 /// What a shape is found from.
@@ -34,6 +40,7 @@ struct ShapeViews {
   std::vector<ShapeView> views;
   std::optional<Mesh> initial;         ///< grey without vertex colours; none: an icosphere in the common view
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
+  std::optional<Lights> lights = {};   ///< of all images, world space; none: colours are as they show
 };
 
 /// Reads the views format of lib/cli/README.md; images and the initial mesh are relative to the file. Throws
@@ -69,9 +76,13 @@ struct ShapeOptions {
   double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the sphere in the common view
   double learning_rate_end =
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
-  double color_learning_rate = 0.05;  ///< > 0
+  double color_learning_rate = 0.05;  ///< >= 0; 0: the colours stay
   LossWeights loss{.l1 = 4, .silhouette = 1};
-  MeshLossWeights regularizers;       ///< as if that sphere had a radius of 1; edge_target too
+  MeshLossWeights regularizers;  ///< as if that sphere had a radius of 1; edge_target too
+  /// >= 0: weight of the mean squared strain against the start, as rigid as possible (Sorkine & Alexa 2007):
+  /// of how every vertex' edges differ from those of the start in the rotation that suits them best, over the
+  /// start's squared lengths. Its faces have to stay: remesh_interval is 0 then.
+  float rigidity = 0;
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
 };
 

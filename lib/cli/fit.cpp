@@ -1,4 +1,6 @@
-// dpr fit: a mesh with vertex colours from several images with known cameras.
+// dpr fit: a mesh with vertex colours from several images with known cameras, or a template bent to
+// photographs whose cameras are found first.
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -13,6 +15,7 @@
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "dpr/photographs.hpp"
 #include "solve/resample.hpp"
 #include "solve/shape_views.hpp"
 
@@ -23,7 +26,7 @@ const char* const k_solver_group = "Solver";
 const char* const k_loss_group = "Loss (weights)";
 
 struct FitCommandOptions {
-  std::string views, output, report, checkpoint, steps = "large", schedule = "anneal";
+  std::string views, initial, output, report, checkpoint, steps = "large", schedule = "anneal", light;
   ShapeOptions solver;
 };
 
@@ -40,6 +43,7 @@ void resize(ShapeViews& views, glm::ivec2 size) {
         "the proportions of the views, " + checks::size(views.width, views.height) + ", which are resampled");
   }
   for (ShapeView& view : views.views) {
+    if (!view.mask.pixels.empty()) view.mask = resample(view.mask, size.x, size.y);
     view.camera = resample(view.camera, views.width, views.height, size.x, size.y);
     view.image = resample(view.image, size.x, size.y);
   }
@@ -53,8 +57,9 @@ ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
                       const CommonOptions& common) {
   Notes notes;
   ViewsFile file = parse_views_file(options.views, read_file(options.views), notes, common.encoding());
-  print_notes(notes, common);
   ShapeViews& views = file.views;
+  if (!options.initial.empty()) views.initial = read_mesh(options.initial, notes);
+  print_notes(notes, common);
   if (common.size) resize(views, parse_size(*common.size));
   const SmoothingOptions flags = smoothing_options(common);
   if (file.smoothing) {
@@ -77,12 +82,63 @@ void check_outputs(const FitCommandOptions& options) {
   if (!options.checkpoint.empty()) require_writable(options.checkpoint);
 }
 
+/// Of the views whose cameras are not known. What looks unlikely is told.
+void find_cameras(const Device& device, ShapeViews& views, bool robust, const CommonOptions& common) {
+  PoseOptions options;
+  options.solve_focal = true;
+  std::get<LeastSquares>(options.method).robust = robust;
+  for (std::size_t i = 0; i < views.views.size(); ++i) {
+    if (views.views[i].knowledge == CameraKnowledge::known) continue;
+    if (!common.quiet) std::printf("image %zu: looking for its camera\n", i);
+    const PoseResult found = find_camera(device, views, i, options);
+    if (common.quiet) continue;
+    std::printf("image %zu: loss %.4g, %.1f s%s\n", i, found.loss, found.seconds,
+                found.explained ? "" : "; much is left unexplained, look at the result");
+  }
+}
+
+/// Whether to look for a light; colours are what shows where cameras were known.
+bool finds_light(const std::string& word, bool is_photographed) {
+  if (word.empty()) return is_photographed;
+  if (word != "harmonics" && word != "fixed")
+    throw InvalidArgument("--light (command line)", "\"" + word + "\"", "harmonics or fixed");
+  return word == "harmonics";
+}
+
+/// Of what the command line leaves open, what suits a template: it keeps its faces, its colours and much of
+/// its shape.
+void bend_template(const CLI::App& command, FitCommandOptions& options) {
+  const ShapeOptions bending = template_shape_options();
+  const auto take = [&](const char* name, auto ShapeOptions::*member) {
+    if (command.count(name) == 0) options.solver.*member = bending.*member;
+  };
+  take("--remesh-interval", &ShapeOptions::remesh_interval);
+  take("--rigidity", &ShapeOptions::rigidity);
+  take("--color-learning-rate", &ShapeOptions::color_learning_rate);
+  take("--learning-rate", &ShapeOptions::learning_rate);
+  take("--lambda", &ShapeOptions::lambda);
+  if (command.count("--ssim") == 0) options.solver.loss.ssim = bending.loss.ssim;
+}
+
+/// Finds what photographs lack: cameras, then the light.
+void complete_photographs(const CLI::App& command, FitCommandOptions& options, const Device& device,
+                          ShapeViews& views, const CommonOptions& common) {
+  const bool is_photographed = !std::ranges::all_of(
+      views.views, [](const ShapeView& view) { return view.knowledge == CameraKnowledge::known; });
+  const bool is_light_unknown = finds_light(options.light, is_photographed);
+  if (is_photographed) bend_template(command, options);
+  const LossWeights& loss = options.solver.loss;
+  find_cameras(device, views, loss.robust > 0, common);
+  if (is_light_unknown) views.lights = find_light(device, views, loss.robust > 0 ? loss.robust_scale : 0);
+}
+
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
-  const ShapeViews views = read_views(command, options, common);
+  ShapeViews views = read_views(command, options, common);
   const std::vector<Device> devices = open_devices(common);
+  complete_photographs(command, options, devices.front(), views, common);
   const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},
                                                [&] { return ShapeSolver(devices, views, options.solver); });
   std::optional<FitReport> report;
@@ -143,6 +199,8 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   add("--learning-rate-end", solver.learning_rate_end,
       "Of all steps, at a level's end, of those at its beginning", "FLOAT");
   add("--color-learning-rate", solver.color_learning_rate, "Size of the steps of colours", "FLOAT");
+  add("--rigidity", solver.rigidity,
+      "Weight of the mean squared strain against the start; with --remesh-interval 0", "FLOAT");
   add("--checkpoint-interval", solver.checkpoint_interval, "Steps between two checkpoints", "N");
 }
 
@@ -176,6 +234,17 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
       application.add_subcommand("fit", "Finds a mesh with colours from several images with known cameras");
   const auto options = std::make_shared<FitCommandOptions>();
   command->add_option("--views", options->views, "Images and their cameras")->required()->type_name("V.json");
+  command
+      ->add_option("--initial", options->initial,
+                   "Mesh to begin with, in the place of the views file's; bent to the images where their "
+                   "cameras are not known")
+      ->type_name("MESH.obj");
+  command
+      ->add_option(
+          "--light", options->light,
+          "harmonics: look for one distant light in which the initial mesh explains the images; fixed: "
+          "colours are as they show. By default harmonics where a camera is not known")
+      ->type_name("harmonics|fixed");
   command->add_option("-o,--output", options->output, "Mesh to write, OBJ or PLY")
       ->required()
       ->type_name("MESH.obj");

@@ -71,6 +71,17 @@ bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIter
                {"Vertices of the mesh", "vertices", false, {vertices}}});
 }
 
+/// As scenes and views have them.
+Json cameras_to_json(const ShapeViews& views) {
+  Json list = Json::array();
+  for (const ShapeView& view : views.views) {
+    Json camera{{"view", rows_to_json(glm::dmat4(view.camera.view))}};
+    camera.update(camera_to_json(view.camera));
+    list.push_back(camera);
+  }
+  return list;
+}
+
 Json shape_to_json(const ShapeResult& result) {
   Json history = Json::array();
   for (const ShapeIteration& step : result.history) {
@@ -130,13 +141,15 @@ ShapeSolver::Callback FitObserver::callback() {
 }
 
 std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const std::vector<Camera>& cameras,
-                                  int width, int height, glm::vec3 background) {
+                                  int width, int height, glm::vec3 background,
+                                  const std::optional<Lights>& lights) {
   Scene scene;
   scene.width = width;
   scene.height = height;
   scene.background = background;
   scene.camera = cameras.front();
   scene.meshes.push_back({mesh});
+  scene.lights = lights;
   scene.smoothing = rigid_smoothing();
   std::vector<View> views;
   for (const Camera& camera : cameras) views.push_back({camera, {glm::mat4(1.0F)}});
@@ -161,7 +174,8 @@ void FitReport::keep(unsigned iteration, const Mesh& mesh) const {
 
 std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>& cameras) const {
   const auto on = [&](const Device& device) {
-    return render_rigidly(device, mesh, cameras, views_.width, views_.height, views_.background);
+    return render_rigidly(device, mesh, cameras, views_.width, views_.height, views_.background,
+                          views_.lights);
   };
   for (std::size_t d = 0; d + 1 < devices_.size(); ++d) {
     try {
@@ -225,7 +239,10 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
       write_strip(folder_ / "turntable.png", render(result.mesh, around), sides);
   const bool is_plotted = !result.history.empty() && plot_history(folder_ / "plot.png", result.history);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
-  write_json(folder_ / "fit.json", shape_to_json(result));
+  Json numbers = shape_to_json(result);
+  numbers["cameras"] = cameras_to_json(views_);
+  if (views_.lights) numbers["harmonics"] = to_json(views_.lights->harmonics);
+  write_json(folder_ / "fit.json", numbers);
 
   Page page(source);
   page.add_heading("Images, and the shape from there");

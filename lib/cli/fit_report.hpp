@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "cli/json.hpp"
@@ -25,9 +26,10 @@ class FitObserver {
   ShapeSolver::Callback keep_;
 };
 
-/// A mesh as the rigid renderer shows it.
+/// A mesh as the rigid renderer shows it; without lights, its colours as they are.
 std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const std::vector<Camera>& cameras,
-                                  int width, int height, glm::vec3 background = glm::vec3(0));
+                                  int width, int height, glm::vec3 background = glm::vec3(0),
+                                  const std::optional<Lights>& lights = {});
 
 /// The report's folder. The pictures of iterations are written while the solver works: an interrupted run
 /// leaves them, and a run that goes on from its checkpoint shows them too.

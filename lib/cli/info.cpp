@@ -109,23 +109,6 @@ void add_clipping_notes(const Scene& scene, const Instance& instance, Json& note
   if (far > 0) notes.push_back(counted(far, "triangle") + " beyond zfar: dropped when rendered");
 }
 
-Json camera_to_json(const Camera& camera) {
-  Json json{{"znear", number(camera.znear)}, {"zfar", number(camera.zfar)}};
-  if (const auto& k = camera.intrinsics) {
-    json["intrinsics"] = {
-        {"fx", number(k->fx)}, {"fy", number(k->fy)}, {"cx", number(k->cx)}, {"cy", number(k->cy)}};
-  } else if (camera.orthographic_height) {
-    json["projection"] = "orthographic";
-    json["orthographic_height"] = number(*camera.orthographic_height);
-  } else {
-    json["fov_y_degrees"] = number(camera.fov_y_degrees);
-  }
-  if (const auto& d = camera.distortion) {
-    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
-  }
-  return json;
-}
-
 Json smoothing_to_json(const Smoothing& s) {
   return {{"noise", to_string(s.noise)},
           {"occupancy_prior", to_string(s.occupancy_prior)},

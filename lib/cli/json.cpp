@@ -80,6 +80,23 @@ Json rows_to_json(const glm::dmat4& matrix) {
   return rows;
 }
 
+Json camera_to_json(const Camera& camera) {
+  Json json{{"znear", number(camera.znear)}, {"zfar", number(camera.zfar)}};
+  if (const auto& k = camera.intrinsics) {
+    json["intrinsics"] = {
+        {"fx", number(k->fx)}, {"fy", number(k->fy)}, {"cx", number(k->cx)}, {"cy", number(k->cy)}};
+  } else if (camera.orthographic_height) {
+    json["projection"] = "orthographic";
+    json["orthographic_height"] = number(*camera.orthographic_height);
+  } else {
+    json["fov_y_degrees"] = number(camera.fov_y_degrees);
+  }
+  if (const auto& d = camera.distortion) {
+    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  }
+  return json;
+}
+
 std::string to_text(const Json& json) {
   std::string text;
   append(text, json, 0);

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "dpr/camera.hpp"
+
 namespace dpr::cli {
 
 /// Keys in the order in which they were added.
@@ -22,6 +24,9 @@ Json to_json(const std::vector<std::vector<glm::vec3>>& lists);
 /// A list of rows.
 Json rows_to_json(const glm::dmat3& matrix);
 Json rows_to_json(const glm::dmat4& matrix);
+
+/// As scenes have it, without its view.
+Json camera_to_json(const Camera& camera);
 
 /// Objects and lists of lists over several lines, lists of numbers on one.
 std::string to_text(const Json& json);

@@ -1,4 +1,5 @@
 // What a checkpoint must have been made of: views, start and options.
+#include "scene/light_table.hpp"
 #include "solve/hash.hpp"
 #include "solve/shape_state.hpp"
 
@@ -44,6 +45,15 @@ void add(Hash& hash, const Smoothing& s) {
   hash.add(s.seed);
 }
 
+void add(Hash& hash, const Lights& lights) {
+  hash.add(lights.harmonics.size());
+  for_each_light_kind([&](auto kind) { hash.add((lights.*kind.lights).size()); });
+  Lights numbers = lights;
+  for_each_light_number(numbers, [&](std::string_view, float number) { hash.add(number); });
+  hash.add(lights.shininess);
+  hash.add(static_cast<int>(lights.shading));
+}
+
 void add(Hash& hash, const ShapeOptions& o) {
   for (const unsigned value : {o.levels, o.iterations, o.batch, o.remesh_interval,
                                static_cast<unsigned>(o.steps), static_cast<unsigned>(o.schedule)})
@@ -51,7 +61,7 @@ void add(Hash& hash, const ShapeOptions& o) {
   for (const float value :
        {o.edge_pixels, o.blur, o.blur_end, o.lambda, o.loss.mse, o.loss.l1, o.loss.silhouette, o.loss.robust,
         o.loss.robust_scale, o.loss.ssim, o.regularizers.laplacian, o.regularizers.edge_length,
-        o.regularizers.normal_consistency, o.regularizers.flatness, o.regularizers.edge_target}) {
+        o.regularizers.normal_consistency, o.regularizers.flatness, o.regularizers.edge_target, o.rigidity}) {
     hash.add(value);
   }
   hash.add(o.learning_rate);
@@ -75,6 +85,7 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
     hash.add(static_cast<int>(view.has_alpha));
   }
   if (views.smoothing) add(hash, *views.smoothing);
+  if (views.lights) add(hash, *views.lights);
   add(hash, start);
   add(hash, options);
   return hash.value();

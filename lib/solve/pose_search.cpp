@@ -136,11 +136,13 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
   return std::nullopt;
 }
 
-/// What was found elsewhere, and the best after half a turn, as far as there is hope: many an object looks
-/// much the same so, and where the light is unknown coarse images don't tell one from the other.
+/// What was found elsewhere, and, where other rotations than the initial ones are tried at all, the best
+/// after half a turn, as far as there is hope: many an object looks much the same so, and where the light is
+/// unknown coarse images don't tell one from the other.
 void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
   const std::size_t own = candidates_.size();
-  for (std::size_t i = 0; i < std::min(own, k_turned); ++i) {
+  const std::size_t count = method_.rotations > 0 ? std::min(own, k_turned) : 0;
+  for (std::size_t i = 0; i < count; ++i) {
     for (const glm::dmat3& turn : half_turns_) {
       Candidate turned = candidates_[i];
       turned.hypothesis.pose.rotation *= turn;

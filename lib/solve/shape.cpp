@@ -18,6 +18,7 @@
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
+#include "solve/rigidity.hpp"
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
@@ -56,19 +57,22 @@ OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) 
 /// One run of the solver.
 class Run {
  public:
-  Run(const std::vector<Device>& devices, const ShapeViews& views, const ShapeOptions& options,
-      ShapeState state)
+  Run(const std::vector<Device>& devices, const ShapeViews& views, const Mesh& start,
+      const ShapeOptions& options, ShapeState state)
       : views_(views),
         options_(options),
         common_(common_view(views)),
         finest_(finest_smoothing(views, options)),
         renderer_(devices),
         position_optimizer_(position_optimizer(options, common_.radius)),
-        color_optimizer_({.learning_rate = options.color_learning_rate}),
         state_(std::move(state)) {
     position_optimizer_.set_state(state_.position_steps);
-    color_optimizer_.set_state(state_.color_steps);
+    if (options.color_learning_rate > 0) {
+      color_optimizer_.emplace(OptimizerOptions{.learning_rate = options.color_learning_rate});
+      color_optimizer_->set_state(state_.color_steps);
+    }
     renderer_.set_chunk(options.chunk > 0 || devices.size() > 1 ? options.chunk : options.batch);
+    if (options.rigidity > 0) rigidity_.emplace(start, static_cast<double>(options.rigidity));
   }
 
   /// One iteration; what it evaluated is the history's last.
@@ -87,7 +91,7 @@ class Run {
     }
     const double rate = std::pow(options_.learning_rate_end, progress(in_level));
     position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
-    color_optimizer_.set_learning_rate(rate * options_.color_learning_rate);
+    if (color_optimizer_) color_optimizer_->set_learning_rate(rate * options_.color_learning_rate);
     const SceneGradient gradient = evaluate(level, in_level);
     descend(gradient);
     if (is_adaptive()) adapt(level, in_level, gradient.gamma);
@@ -97,7 +101,7 @@ class Run {
   /// With the optimizers' memories.
   const ShapeState& state() {
     state_.position_steps = position_optimizer_.state();
-    state_.color_steps = color_optimizer_.state();
+    if (color_optimizer_) state_.color_steps = color_optimizer_->state();
     return state_;
   }
 
@@ -111,7 +115,7 @@ class Run {
     state_.positions = flat(mesh->positions);
     state_.colors = flat(mesh->vertex_colors);
     position_optimizer_.restart();
-    color_optimizer_.restart();
+    if (color_optimizer_) color_optimizer_->restart();
   }
 
   MeshLossWeights scaled_regularizers() const {
@@ -133,10 +137,11 @@ class Run {
     scene.background = views_.background;
     scene.camera = level_->views.front().camera;
     scene.meshes.push_back({mesh});
+    scene.lights = views_.lights;
     scene.smoothing = finest_;
     scene.gradients = no_gradients();
     scene.gradients.positions = true;
-    scene.gradients.colors = true;
+    scene.gradients.colors = color_optimizer_.has_value();
     scene.gradients.smoothing = is_adaptive();
     renderer_.set_scene(scene);
     renderer_.set_views(level_->views);
@@ -199,6 +204,7 @@ class Run {
     MultiDeviceRenderer::Evaluation found = renderer_.evaluate(first, count);
     step.image_loss = found.loss;
     step.mesh_loss = found.mesh_loss;
+    if (rigidity_) step.mesh_loss += rigidity_->evaluate(state_.positions, rigidity_gradient_);
     step.loss = step.image_loss + step.mesh_loss;
     const std::string where = "loss (shape, iteration " + std::to_string(step.iteration) + ")";
     require(std::isfinite(step.loss), where.c_str(), step.loss, "a finite number");
@@ -213,7 +219,8 @@ class Run {
 
   void descend(const SceneGradient& gradient) {
     const MeshGradient& grad = gradient.meshes.front();
-    const std::vector<double> grad_positions = flat(grad.positions);
+    std::vector<double> grad_positions = flat(grad.positions);
+    if (rigidity_) add(grad_positions, rigidity_gradient_);
     if (options_.steps == ShapeSteps::large_steps) {
       // v = (I + lambda L)^-1 u: the gradient for u, and what a step of u does to v.
       const auto step = position_optimizer_.step(steps_->solve(grad_positions));
@@ -221,7 +228,7 @@ class Run {
     } else {
       add(state_.positions, position_optimizer_.step(grad_positions));
     }
-    add(state_.colors, color_optimizer_.step(flat(grad.colors)));
+    if (color_optimizer_) add(state_.colors, color_optimizer_->step(flat(grad.colors)));
   }
 
   const ShapeViews& views_;
@@ -229,9 +236,12 @@ class Run {
   CommonView common_;
   Smoothing finest_;
   MultiDeviceRenderer renderer_;
-  Optimizer position_optimizer_, color_optimizer_;
+  Optimizer position_optimizer_;
+  std::optional<Optimizer> color_optimizer_;  // none: the colours stay
   std::optional<ShapeLevel> level_;
   std::optional<LargeSteps> steps_;  // of the current mesh
+  std::optional<Rigidity> rigidity_;
+  std::vector<double> rigidity_gradient_;  // at the last positions
   ShapeState state_;
 };
 
@@ -241,7 +251,7 @@ void check(const ShapeViews& views) {
     throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
   }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
-    const auto& [image, camera, has_alpha, mask] = views.views[i];
+    const auto& [image, camera, has_alpha, mask, knowledge] = views.views[i];
     const std::string name = checks::element("views", i);
     if (image.width != views.width || image.height != views.height) {
       throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
@@ -251,8 +261,10 @@ void check(const ShapeViews& views) {
     if (!mask.pixels.empty()) require_mask(mask, image, checks::in("mask of " + name, "shape"));
     validate(camera, name + ".camera");
   }
+  require_known_cameras(views, "shape");
   checks::require_finite(views.background, "background (shape)");
   if (views.initial) validate(*views.initial, "initial (shape)");
+  if (views.lights) validate(*views.lights);
   if (views.smoothing) validate(*views.smoothing);
 }
 
@@ -264,6 +276,7 @@ bool compares_colors(const LossWeights& weights) {
 
 void check(const ShapeOptions& o, const ShapeViews& views) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+  const auto not_negative = [](double x) { return x >= 0 && std::isfinite(x); };
   const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
   require(o.levels > 0 && o.levels <= most, "levels (shape)", o.levels,
           "at least 1, and a pixel a side at the coarsest");
@@ -279,33 +292,22 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
     throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
                           "one of colours too");
   }
-  require(o.lambda >= 0 && std::isfinite(o.lambda), "lambda (shape)", o.lambda,
-          "a finite number, at least 0");
+  require(not_negative(o.lambda), "lambda (shape)", o.lambda, "a finite number, at least 0");
   require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");
   require(positive(o.learning_rate_end), "learning_rate_end (shape)", o.learning_rate_end,
           "a finite number above 0");
-  require(positive(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
-          "a finite number above 0");
+  require(not_negative(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
+          "a finite number, at least 0");
+  require(not_negative(o.rigidity), "rigidity (shape)", o.rigidity, "a finite number, at least 0");
+  require(o.rigidity == 0 || o.remesh_interval == 0, "remesh_interval (shape)", o.remesh_interval,
+          "0 beside a rigidity: it compares with the start, whose faces have to stay");
 }
 
 /// The mesh to begin with; colours that are not known are grey.
 Mesh make_start(const ShapeViews& views) {
   constexpr unsigned k_subdivisions = 3;
   const CommonView common = common_view(views);
-  if (views.initial) {
-    Mesh mesh = *views.initial;
-    if (mesh.vertex_colors.empty()) mesh.vertex_colors.assign(mesh.positions.size(), glm::vec3(0.5F));
-    mesh.face_colors.clear();
-    mesh.texcoords.clear();
-    mesh.face_texcoords.clear();
-    mesh.textures.clear();
-    mesh.face_textures.clear();
-    mesh.normals.clear();  // they would stay while the shape moves
-    mesh.face_normals.clear();
-    mesh.materials.clear();
-    mesh.face_materials.clear();
-    return mesh;
-  }
+  if (views.initial) return with_vertex_colors(*views.initial);
   Mesh sphere = make_icosphere(k_subdivisions, static_cast<float>(common.radius));
   for (glm::vec3& p : sphere.positions) p += glm::vec3(common.centre);
   sphere.vertex_colors.assign(sphere.positions.size(), glm::vec3(0.5F));
@@ -352,7 +354,7 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
   if (!checkpoint.empty() && (std::filesystem::exists(checkpoint, unknown) || unknown))
     state = read_checkpoint(checkpoint, mark, finest_smoothing(views_, options_));
 
-  Run run(devices_, views_, options_, std::move(state));
+  Run run(devices_, views_, start_, options_, std::move(state));
   bool goes_on = true;
   while (goes_on && run.state().iteration < most_iterations()) {
     run.iterate();

@@ -5,16 +5,18 @@
 #include <string>
 
 #include "base/checks.hpp"
+#include "mesh/bounding_box.hpp"
 
 namespace dpr {
 namespace {
 
 /// The point with the least sum of squared distances to the cameras' axes. Axes that are parallel, or one
-/// alone, leave it open; then it is the nearest to the origin.
+/// alone, leave it open; then it is the nearest to the middle of the initial mesh, or to the origin.
 glm::dvec3 meeting_point(const ShapeViews& views) {
-  constexpr double k_towards_origin = 1e-9;
-  glm::dmat3 sum(k_towards_origin);
+  constexpr double k_towards_middle = 1e-9;
+  glm::dmat3 sum(k_towards_middle);
   glm::dvec3 right(0.0);
+  if (views.initial) right = k_towards_middle * glm::dvec3(center(bounding_box(views.initial->positions)));
   for (const ShapeView& view : views.views) {
     const Projection p = projection(view.camera, views.width, views.height);
     const glm::dmat4 to_world = glm::inverse(glm::dmat4(view.camera.view));
@@ -30,6 +32,28 @@ glm::dvec3 meeting_point(const ShapeViews& views) {
 }
 
 }  // namespace
+
+Mesh with_vertex_colors(Mesh mesh) {
+  if (mesh.vertex_colors.empty()) mesh.vertex_colors.assign(mesh.positions.size(), glm::vec3(0.5F));
+  mesh.face_colors.clear();
+  mesh.texcoords.clear();
+  mesh.face_texcoords.clear();
+  mesh.textures.clear();
+  mesh.face_textures.clear();
+  mesh.normals.clear();  // they would stay while the shape moves
+  mesh.face_normals.clear();
+  mesh.materials.clear();
+  mesh.face_materials.clear();
+  return mesh;
+}
+
+void require_known_cameras(const ShapeViews& views, const std::string& where) {
+  for (std::size_t i = 0; i < views.views.size(); ++i) {
+    if (views.views[i].knowledge == CameraKnowledge::known) continue;
+    throw InvalidArgument(checks::in(checks::element("views", i) + ".camera", where), "one that is not known",
+                          "one that is: find_camera() finds it");
+  }
+}
 
 CommonView common_view(const ShapeViews& views) {
   constexpr double k_part_of_view = 0.5, k_part_of_depth = 0.9;

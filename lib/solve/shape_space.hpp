@@ -1,9 +1,18 @@
 // Where the cameras look, and how large things are there.
 #pragma once
 
+#include <string>
+
 #include "dpr/shape.hpp"
 
 namespace dpr {
+
+/// What the shape solver makes of an initial mesh: grey without vertex colours, and nothing else of its
+/// surface stays.
+Mesh with_vertex_colors(Mesh mesh);
+
+/// Throws InvalidArgument where a camera is to be found first; `where` is in its message.
+void require_known_cameras(const ShapeViews& views, const std::string& where);
 
 /// What all cameras see.
 struct CommonView {

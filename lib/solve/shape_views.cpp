@@ -1,5 +1,6 @@
 // The views format: images with their cameras.
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,10 +26,64 @@ bool shows_silhouette(const Image& image) {
   return std::ranges::any_of(image.pixels, [](const glm::vec4& pixel) { return pixel.a < 1; });
 }
 
+/// Lays the picture on the views' background where the silhouette, an image's first channel, says so.
+void cut_out(Image& picture, const Image& silhouette, const glm::vec3& background) {
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
+    const float alpha = silhouette.pixels[i].x;
+    picture.pixels[i] = glm::vec4(glm::mix(background, glm::vec3(picture.pixels[i]), alpha), alpha);
+  }
+}
+
+/// What differs from a picture of the background alone is the object.
+Image difference_silhouette(const Image& picture, const Image& background) {
+  constexpr float k_same = 0.02F, k_other = 0.08F;  // of linear colours, in the channel that differs most
+  Image silhouette(picture.width, picture.height);
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
+    const glm::vec3 d = glm::abs(glm::vec3(picture.pixels[i]) - glm::vec3(background.pixels[i]));
+    silhouette.pixels[i] = glm::vec4(glm::smoothstep(k_same, k_other, std::max({d.x, d.y, d.z})));
+  }
+  return silhouette;
+}
+
+Image read_beside(const JsonNode& node, const std::filesystem::path& folder, const Image& picture,
+                  Encoding encoding) {
+  const std::filesystem::path file = node.file_in(folder);
+  Image image = read_image(file, nullptr, encoding);
+  if (image.width != picture.width || image.height != picture.height) {
+    throw InvalidArgument("size (" + file.string() + ")", checks::size(image.width, image.height),
+                          checks::size(picture.width, picture.height) + ", the view's");
+  }
+  return image;
+}
+
+/// What the file says of where the object is in the picture, if it says something.
+std::optional<Image> parse_silhouette(const JsonNode& node, const std::filesystem::path& folder,
+                                      const Image& picture, Encoding encoding) {
+  const auto silhouette = node.find("silhouette"), background = node.find("background");
+  if (silhouette && background) background->fail("one beside a silhouette", "one of the two");
+  if (background) return difference_silhouette(picture, read_beside(*background, folder, picture, encoding));
+  if (!silhouette) return std::nullopt;
+  Image image = read_beside(*silhouette, folder, picture, Encoding::linear);
+  for (const glm::vec4& pixel : image.pixels) {
+    if (!(pixel.x >= 0 && pixel.x <= 1)) silhouette->fail(checks::text(pixel.x), "pixels in [0, 1]");
+  }
+  return image;
+}
+
+/// The camera of a view, and what is known of it.
+void parse_view_camera(const JsonNode& node, ShapeView& view, const std::string& name) {
+  const auto camera = node.find("camera"), near = node.find("initial_camera");
+  if (camera && near) near->fail("one beside a camera", "one of the two");
+  view.knowledge = camera ? CameraKnowledge::known : near ? CameraKnowledge::near : CameraKnowledge::unknown;
+  if (!camera && !near) return;
+  view.camera = parse_camera(camera ? *camera : *near);
+  validate(view.camera, name + (camera ? ".camera" : ".initial_camera"));
+}
+
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
                      Encoding encoding) {
-  node.require_keys({"image", "camera", "mask"});
+  node.require_keys({"image", "camera", "initial_camera", "silhouette", "background", "mask"});
   ShapeView view;
   const std::filesystem::path file = node.at("image").file_in(folder);
   view.image = read_image(file, &view.has_alpha, encoding);
@@ -37,12 +92,15 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
     throw InvalidArgument("size (" + file.string() + ")", checks::size(view.image.width, view.image.height),
                           checks::size(views.width, views.height) + ", the views'");
   }
+  if (const auto silhouette = parse_silhouette(node, folder, view.image, encoding)) {
+    cut_out(view.image, *silhouette, views.background);
+    view.has_alpha = true;
+  }
   if (const auto mask = node.find("mask")) {
     view.mask = read_image(mask->file_in(folder), nullptr, Encoding::linear);
     require_mask(view.mask, view.image, "mask (" + mask->file_in(folder).string() + ")");
   }
-  view.camera = parse_camera(node.at("camera"));
-  validate(view.camera, checks::element("views", views.views.size()) + ".camera");
+  parse_view_camera(node, view, checks::element("views", views.views.size()));
   return view;
 }
 

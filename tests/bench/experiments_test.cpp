@@ -57,6 +57,15 @@ TEST_SUITE("bench-smoke") {
     }
   }
 
+  TEST_CASE("photograph: a few steps bring the template nearer to the features that were marked") {
+    const TempDir folder;
+    const Json data = run(folder, "photograph");
+    if (data.is_null()) return;
+    CHECK(data["landmarks"] == 10);
+    CHECK(data["landmark_error_pixels"].get<double>() < data["start_landmark_error_pixels"].get<double>());
+    CHECK(data["psnr"].get<double>() > data["start_psnr"].get<double>());
+  }
+
   TEST_CASE("lights: every kind has its errors") {
     const TempDir folder;
     const Json data = run(folder, "lights");

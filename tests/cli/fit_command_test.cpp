@@ -1,6 +1,7 @@
 // dpr fit as a user runs it: mesh, report and checkpoint; and one line for whatever is wrong.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -209,5 +210,30 @@ TEST_SUITE("robustness") {
       CHECK(contains(outcome.err, name + ": cannot be written: No space left on device"));
       std::filesystem::remove(folder / name);
     }
+  }
+
+  TEST_CASE("dpr fit finds the cameras and the light of photographs, and keeps the template's faces") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    const json known = views["views"][0]["camera"];
+    views["views"] = json::array({{{"image", "view0.exr"}, {"initial_camera", known}}});
+    folder.write("views.json", views.dump());
+    const auto arguments = with(k_short, {"--initial", "cube.ply", "--ssim", "0", "--report", "report"});
+    const auto outcome = run_command(folder, arguments);
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    CHECK(contains(outcome.out, "image 0: looking for its camera"));
+    CHECK(dpr::read_mesh(folder / "mesh.obj").faces == dpr::make_cube().faces);
+    const json data = json::parse(folder.read("report/fit.json"));
+    CHECK(data["harmonics"].size() == 9);
+    REQUIRE(data["cameras"].size() == 1);
+    CHECK(std::abs(data["cameras"][0]["fov_y_degrees"].get<double>() - 50) < 5);
+    const auto refused = run_command(folder, with(arguments, {"--light", "gain"}));
+    CHECK(refused.status == 1);
+    CHECK(contains(refused.err, "--light"));
+    const auto templateless = run_command(folder, k_short);
+    CHECK(templateless.status == 1);
+    CHECK(contains(templateless.err, "initial"));
   }
 }

@@ -5,6 +5,7 @@
 
 #include "dpr/dpr.hpp"
 #include "dpr/notes.hpp"
+#include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
 namespace {
@@ -36,5 +37,60 @@ TEST_SUITE("unit") {
       CHECK_FALSE(shows_silhouette(opaque, name));
     }
     CHECK_FALSE(shows_silhouette(cut_out, "view.jpg"));  // which has no alpha
+  }
+
+  TEST_CASE("views: a silhouette cuts the picture out, a picture of the background does where they differ") {
+    const TempDir folder;
+    Image picture(3, 1, glm::vec4(0.2F, 0.4F, 0.6F, 1)), empty = picture;
+    picture.pixels[1] = glm::vec4(0.9F, 0.4F, 0.6F, 1);
+    dpr::write_image(folder / "picture.exr", picture);
+    dpr::write_image(folder / "empty.exr", empty);
+    Image silhouette(3, 1, glm::vec4(0, 0, 0, 1));
+    silhouette.pixels[1] = glm::vec4(1);
+    silhouette.pixels[2] = glm::vec4(0.5F, 0, 0, 1);
+    dpr::write_image(folder / "silhouette.exr", silhouette);
+    const auto read = [&](const std::string& more) {
+      folder.write("views.json", R"({"width": 3, "height": 1, "background": [1, 1, 1], "views": [
+          {"image": "picture.exr", )" +
+                                     more + "}]}");
+      return dpr::read_views(folder / "views.json").views.at(0);
+    };
+    const dpr::ShapeView cut = read(R"("silhouette": "silhouette.exr")");
+    CHECK(cut.has_alpha);
+    CHECK(cut.image.pixels[0] == glm::vec4(1, 1, 1, 0));
+    CHECK(cut.image.pixels[1] == picture.pixels[1]);
+    CHECK(glm::distance(cut.image.pixels[2], glm::vec4(0.6F, 0.7F, 0.8F, 0.5F)) < 1e-6F);
+    const dpr::ShapeView seen = read(R"("background": "empty.exr")");
+    CHECK(seen.has_alpha);
+    CHECK(seen.image.pixels[0] == glm::vec4(1, 1, 1, 0));
+    CHECK(seen.image.pixels[1] == picture.pixels[1]);
+    CHECK(seen.image.pixels[2] == glm::vec4(1, 1, 1, 0));
+    const auto refuse = [&](const std::string& more, const char* part) {
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read(more), part);
+    };
+    refuse(R"("silhouette": "silhouette.exr", "background": "empty.exr")", "one of the two");
+    dpr::write_image(folder / "large.exr", Image(4, 1));
+    refuse(R"("silhouette": "large.exr")", "large.exr");
+    dpr::write_image(folder / "bright.exr", Image(3, 1, glm::vec4(2)));
+    refuse(R"("silhouette": "bright.exr")", "[0, 1]");
+  }
+
+  TEST_CASE("views: a camera is known, near another, or unknown") {
+    const TempDir folder;
+    dpr::write_image(folder / "view.exr", Image(2, 1));
+    const auto read = [&](const std::string& more) {
+      folder.write("views.json",
+                   R"({"width": 2, "height": 1, "views": [{"image": "view.exr")" + more + "}]}");
+      return dpr::read_views(folder / "views.json").views.at(0);
+    };
+    const std::string camera = R"({"fov_y_degrees": 33, "znear": 1, "zfar": 10})";
+    CHECK(read(R"(, "camera": )" + camera).knowledge == dpr::CameraKnowledge::known);
+    CHECK(read("").knowledge == dpr::CameraKnowledge::unknown);
+    const dpr::ShapeView near = read(R"(, "initial_camera": )" + camera);
+    CHECK(near.knowledge == dpr::CameraKnowledge::near);
+    CHECK(near.camera.fov_y_degrees == 33);
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument,
+                          read(R"(, "camera": )" + camera + R"(, "initial_camera": )" + camera),
+                          "one of the two");
   }
 }
