@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/estimates.hpp"
 #include "support/reduced.hpp"
