@@ -12,7 +12,7 @@
 #define DPR_LANES 8
 #endif
 #if DPR_LANES == 1
-#define DPR_WIDTH 1
+#define DPR_WIDTH 4 /* nodes of a work-item, which adds to its slots' sums in memory once for them */
 #else
 #define DPR_WIDTH 16 /* lanes are quadrature nodes */
 #endif

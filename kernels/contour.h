@@ -80,11 +80,14 @@ typedef struct {
 
 /// The edge on the near plane that a face has got there, in the direction in which the face winds.
 static inline ViewEdge edge_of_cut(const EdgeScene s, uint face) {
-  ViewEdge e = {(uint4)(0, 0, face, DPR_NO_FACE), {0.0f, 0.0f}, 0, face, {0, 1}};
-  if (s.clipped[face].corners == 0) return e;
-  e.is_there = 1;
-  e.end[0] = s.clipped[face].cut[0].xyz;
-  e.end[1] = s.clipped[face].cut[1].xyz;
+  const int is_there = s.clipped[face].corners != 0;
+  const float3 none = 0.0f;  // zeros in the initializer itself crash Mesa 22.3's compiler
+  const ViewEdge e = {
+      (uint4)(0, 0, face, DPR_NO_FACE),
+      {is_there ? s.clipped[face].cut[0].xyz : none, is_there ? s.clipped[face].cut[1].xyz : none},
+      is_there,
+      face,
+      {0, 1}};
   return e;
 }
 

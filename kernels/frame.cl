@@ -6,6 +6,7 @@
 #include "sort.cl"
 #include "rasterize.cl"
 #include "shade.cl"
+#include "normals.cl"
 #include "gather.cl"
 #include "reduce.cl"
 #include "image_loss.cl"

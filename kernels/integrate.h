@@ -35,7 +35,11 @@ typedef struct {
 /// So many slots' terms are kept from the backward pass' first round to its second, those beyond are computed
 /// again.
 #ifndef DPR_KEPT_SLOTS
+#if DPR_LANES == 1
+#define DPR_KEPT_SLOTS 0 /* a GPU's registers have no index: an array is memory, slower than the terms */
+#else
 #define DPR_KEPT_SLOTS 24
+#endif
 #endif
 
 /// The smallest T divided by: a product of a few of them is still a number, and 1 / T finite.
@@ -80,6 +84,8 @@ static inline float4 integrate_colors(const Slots run, const Fragments f, float3
   realn red = 0.0f, green = 0.0f, blue = 0.0f, mass = 0.0f;
   Stretch stretch = first_stretch(run);
   do {
+    // Many stretches of few lanes would be a long sum of small numbers: each has one of its own.
+    realn stretch_red = 0.0f, stretch_green = 0.0f, stretch_blue = 0.0f, stretch_mass = 0.0f;
     for (uint block = 0; block < stretch.blocks; ++block) {
       realn t, product, r = 0.0f, g = 0.0f, b = 0.0f, sum = 0.0f;
       stretch_nodes(stretch, block, &t, &product);
@@ -94,11 +100,15 @@ static inline float4 integrate_colors(const Slots run, const Fragments f, float3
         b = mad(ratio, color.z, b);
         sum += ratio;
       }
-      red = mad(product, r, red);
-      green = mad(product, g, green);
-      blue = mad(product, b, blue);
-      mass = mad(product, sum, mass);
+      stretch_red = mad(product, r, stretch_red);
+      stretch_green = mad(product, g, stretch_green);
+      stretch_blue = mad(product, b, stretch_blue);
+      stretch_mass = mad(product, sum, stretch_mass);
     }
+    red += stretch_red;
+    green += stretch_green;
+    blue += stretch_blue;
+    mass += stretch_mass;
   } while (next_stretch(run, &stretch));
   return sum_lanes_of_4(red, green, blue, mass);
 }
@@ -132,7 +142,7 @@ static inline float2 integrate_gradients(const Slots run, SlotGradients* out) {
   do {
     for (uint block = 0; block < stretch.blocks; ++block) {
       realn t, product, ratio_sum = 0.0f, grad_sum = 0.0f;
-      Terms kept[DPR_KEPT_SLOTS];
+      Terms kept[DPR_KEPT_SLOTS + 1];
       stretch_nodes(stretch, block, &t, &product);
       for (uint i = 0; i < run.count; ++i) {
         const Slot s = run.slot[i];

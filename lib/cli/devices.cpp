@@ -1,10 +1,15 @@
-// dpr devices: what there is to run on.
+// dpr devices: what there is to run on, and whether it computes right.
+#include <CL/cl.h>
+
 #include <cstdio>
 #include <memory>
 
 #include "cli/commands.hpp"
+#include "cli/device_check.hpp"
 #include "cli/json.hpp"
+#include "device/choose_device.hpp"
 #include "dpr/device.hpp"
+#include "dpr/error.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -38,28 +43,66 @@ void print(const DeviceInfo& info) {
   if (info.is_default) std::printf("   default        %s\n", info.default_reason.c_str());
 }
 
-void run(bool as_json) {
+struct DevicesOptions {
+  bool as_json = false, checks = false;
+};
+
+/// All, or those that --device names.
+std::vector<DeviceInfo> chosen_devices(const std::string& selectors) {
   const std::vector<DeviceInfo> devices = list_devices();
-  if (as_json) {
-    Json list = Json::array();
-    for (const DeviceInfo& info : devices) list.push_back(device_to_json(info));
-    std::printf("%s", to_text(list).c_str());
-    return;
+  if (selectors.empty()) return devices;
+  std::vector<DeviceInfo> chosen;
+  for (const DeviceChoice& choice : choose_devices(devices, selectors, "--device"))
+    chosen.push_back(devices[choice.position]);
+  return chosen;
+}
+
+/// Throws DeviceError where a device failed its test.
+void require_passed(const std::string& failed) {
+  if (!failed.empty())
+    throw DeviceError(CL_INVALID_KERNEL, "the self-test, with results beyond their bounds on " + failed);
+}
+
+void run(const DevicesOptions& options, const std::string& selectors) {
+  Json list = Json::array();
+  std::string failed;
+  const std::vector<DeviceInfo> devices = chosen_devices(selectors);
+  for (const DeviceInfo& info : devices) {
+    if (!options.as_json) print(info);
+    list.push_back(device_to_json(info));
+    if (!options.checks) continue;
+    const DeviceCheck check = check_device(info, !options.as_json);
+    if (check.failed > 0) failed += (failed.empty() ? "" : ", ") + info.name;
+    list.back()["check"] = {{"comparisons", check.comparisons},
+                            {"failed", check.failed},
+                            {"seconds", check.seconds},
+                            {"rows", check.rows}};
   }
-  for (const DeviceInfo& info : devices) print(info);
-  if (devices.empty()) std::printf("No OpenCL device. On Debian, pocl-opencl-icd makes the CPU one.\n");
+  if (options.as_json) {
+    std::printf("%s", to_text(list).c_str());
+  } else if (devices.empty()) {
+    std::printf("No OpenCL device. On Debian, pocl-opencl-icd makes the CPU one.\n");
+  }
+  require_passed(failed);
 }
 
 }  // namespace
 
 void add_devices_command(CLI::App& application, CommonOptions& common) {
-  CLI::App* command =
-      application.add_subcommand("devices", "Lists every OpenCL device, and which is the default");
-  const auto as_json = std::make_shared<bool>(false);
-  command->add_flag("--json", *as_json, "Print JSON");
+  CLI::App* command = application.add_subcommand(
+      "devices", "Lists every OpenCL device, and which is the default; tests them");
+  const auto options = std::make_shared<DevicesOptions>();
+  command->add_flag("--json", options->as_json, "Print JSON");
+  command->add_flag("--check", options->checks,
+                    "Compare every stage with a reference in double precision, in some seconds a device");
+  command->add_option("--device", common.device, "These alone, a list (default: all)")
+      ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST");
   add_output_options(*command, common);
-  command->footer("Example: dpr devices --json");
-  command->callback([as_json] { run(*as_json); });
+  command->footer(
+      "--check exits with status 2 where a difference is beyond its bound. The first time, the kernels are "
+      "compiled too.\n"
+      "Example: dpr devices --check --device gpu");
+  command->callback([options, &common] { run(*options, common.device); });
 }
 
 }  // namespace dpr::cli

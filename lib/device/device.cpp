@@ -37,8 +37,23 @@ std::string type_name(cl_device_type type) {
   return type & CL_DEVICE_TYPE_GPU ? "gpu" : "accelerator";
 }
 
+/// The widths that kernels are written and tested for.
+constexpr std::array k_lanes{1U, 8U, 16U};
+
+/// What the environment wants in place of the width that suits the device: for tests and measurements.
+std::optional<unsigned> lanes_of_environment() {
+  const char* const text = std::getenv("DPR_LANES");
+  if (text == nullptr) return std::nullopt;
+  const auto wanted =
+      std::ranges::find_if(k_lanes, [&](unsigned lanes) { return std::to_string(lanes) == text; });
+  if (wanted == k_lanes.end())
+    throw InvalidArgument("DPR_LANES (environment)", "'" + std::string(text) + "'", "1, 8 or 16");
+  return *wanted;
+}
+
 /// Vectors as wide as the device's registers pay on CPUs; a GPU's lanes are its work-items.
 unsigned choose_lanes(const DeviceInfo& info, const cl::Device& device) {
+  if (const auto lanes = lanes_of_environment()) return *lanes;
   if (info.type != "cpu") return 1;
   return device_info<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>(device) >= 16 ? 16 : 8;
 }

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "device/context.hpp"
 #include "dpr/dpr.hpp"
 #include "faults/opencl_faults.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"

@@ -209,6 +209,15 @@ Result call(Function& function, Result (*real)(Args...), Args... args) {
   return result;
 }
 
+/// Whether the environment wants that the kernel is not run.
+bool is_skipped(cl_kernel kernel) {
+  static const char* const skipped = std::getenv("DPR_SKIPPED_KERNEL");
+  if (skipped == nullptr) return false;
+  char name[128] = {};
+  clGetKernelInfo(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name - 1, name, nullptr);
+  return std::string_view(name) == skipped;
+}
+
 std::size_t index_of(std::string_view name) {
   std::size_t i = 0;
   while (k_functions[i].name != name) ++i;
@@ -344,12 +353,6 @@ DPR_FAULTY(cl_int, clGetKernelArgInfo,
 DPR_FAULTY(cl_int, clSetKernelArg,
            (cl_kernel kernel, cl_uint arg_index, size_t arg_size, const void* arg_value), kernel, arg_index,
            arg_size, arg_value)
-DPR_FAULTY(cl_int, clEnqueueNDRangeKernel,
-           (cl_command_queue command_queue, cl_kernel kernel, cl_uint work_dim,
-            const size_t* global_work_offset, const size_t* global_work_size, const size_t* local_work_size,
-            cl_uint num_events_in_wait_list, const cl_event* event_wait_list, cl_event* event),
-           command_queue, kernel, work_dim, global_work_offset, global_work_size, local_work_size,
-           num_events_in_wait_list, event_wait_list, event)
 DPR_FAULTY(cl_int, clEnqueueReadBuffer,
            (cl_command_queue command_queue, cl_mem buffer, cl_bool blocking_read, size_t offset, size_t size,
             void* ptr, cl_uint num_events_in_wait_list, const cl_event* event_wait_list, cl_event* event),
@@ -429,3 +432,17 @@ DPR_KNOWN(clRetainEvent, cl_event)
 DPR_KNOWN(clReleaseEvent, cl_event)
 DPR_KNOWN(clRetainDevice, cl_device_id)
 DPR_KNOWN(clReleaseDevice, cl_device_id)
+
+extern "C" cl_int CL_API_CALL clEnqueueNDRangeKernel(cl_command_queue command_queue, cl_kernel kernel,
+                                                     cl_uint work_dim, const size_t* global_work_offset,
+                                                     const size_t* global_work_size,
+                                                     const size_t* local_work_size,
+                                                     cl_uint num_events_in_wait_list,
+                                                     const cl_event* event_wait_list, cl_event* event) {
+  static auto* const real = next<decltype(clEnqueueNDRangeKernel)>("clEnqueueNDRangeKernel");
+  static Function& function = k_functions[index_of("clEnqueueNDRangeKernel")];
+  if (depth == 0 && is_skipped(kernel))
+    return clEnqueueMarkerWithWaitList(command_queue, num_events_in_wait_list, event_wait_list, event);
+  return call(function, real, command_queue, kernel, work_dim, global_work_offset, global_work_size,
+              local_work_size, num_events_in_wait_list, event_wait_list, event);
+}

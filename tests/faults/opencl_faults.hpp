@@ -7,6 +7,7 @@
 //                      failed " failed"
 //   DPR_LOST_QUEUE=Q:N the N-th call on the Q-th command queue that is made (from 0) fails, and all after
 //                      it, as if its device had vanished
+//   DPR_SKIPPED_KERNEL=NAME  launches of that kernel do nothing, and nothing says so
 //   DPR_SLOW_QUEUE=Q:T every call on the Q-th that waits takes T microseconds longer, as over a network
 #pragma once
 

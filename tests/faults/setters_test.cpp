@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "device/context.hpp"
 #include "dpr/dpr.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "faults/sweep.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 

@@ -9,8 +9,8 @@
 #include <limits>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "renderer/renderer_impl.hpp"

@@ -9,14 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/aov.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -221,7 +220,7 @@ namespace {
 
 /// A cube of eight vertices, no two faces in one plane, blurred by pixels.
 Scene blurred_cube(int size) {
-  Scene scene = scene_of(test::welded_cube(), size, size - 3);
+  Scene scene = scene_of(welded_cube(), size, size - 3);
   Random random(41);
   for (glm::vec3& p : scene.meshes[0].mesh.positions) p += random.vector(-0.1F, 0.1F);
   scene.smoothing = smoothing_preset("pixel");

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"

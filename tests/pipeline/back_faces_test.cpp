@@ -6,7 +6,6 @@
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/reduced.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -86,7 +85,7 @@ void check_same(const Seen& a, const Seen& b) {
 TEST_SUITE("pipeline") {
   TEST_CASE("back faces: solids look the same without theirs, inside out and mirrored too") {
     const glm::mat4 mirror = glm::scale(glm::mat4(1.0F), glm::vec3(-1, 1, 1));
-    for (const Mesh& mesh : {test::welded_cube(), make_cube(), make_icosphere(reduced(3, 1))}) {
+    for (const Mesh& mesh : {welded_cube(), make_cube(), make_icosphere(reduced(3, 1))}) {
       for (const bool turned : {false, true}) {
         for (const bool mirrored : {false, true}) {
           Scene scene = scene_with(turned ? inside_out(mesh) : mesh);

@@ -11,7 +11,6 @@
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -101,7 +100,7 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("clip: from within a closed mesh every pixel is covered, with both noises") {
-    for (const Mesh& mesh : {test::welded_cube(), make_icosphere(2, 1.4F)}) {
+    for (const Mesh& mesh : {welded_cube(), make_icosphere(2, 1.4F)}) {
       const Scene scene = scene_within(mesh, reduced(40, 12), reduced(32, 10));
       Scene rigid = scene;
       rigid.smoothing = smoothing_preset("rigid");
@@ -131,7 +130,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("clip: bands, views and repeats give the same bits") {
     for (Scene scene : {scene_within(make_icosphere(2, 1.4F), reduced(48, 12), reduced(40, 10)),
-                        pixel_noise(scene_cut_open(test::welded_cube(), reduced(40, 24), reduced(32, 20)))}) {
+                        pixel_noise(scene_cut_open(welded_cube(), reduced(40, 24), reduced(32, 20)))}) {
       Renderer renderer(open_device());
       renderer.set_scene(scene);
       const Result first = render(renderer), again = render(renderer);

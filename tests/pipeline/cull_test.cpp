@@ -6,7 +6,6 @@
 
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -58,9 +57,8 @@ float largest_difference(const Image& a, const Image& b) {
 /// Whole, mirrored, and cut open by the near plane.
 std::vector<Scene> scenes() {
   const int width = reduced(36, 11), height = reduced(30, 10);
-  std::vector<Scene> list{scene_of(test::welded_cube(), width, height),
-                          scene_of(test::welded_cube(), width, height),
-                          scene_cut_open(test::welded_cube(), width, height)};
+  std::vector<Scene> list{scene_of(welded_cube(), width, height), scene_of(welded_cube(), width, height),
+                          scene_cut_open(welded_cube(), width, height)};
   list[1].meshes[0].transform =
       list[1].meshes[0].transform * glm::scale(glm::mat4(1.0F), glm::vec3(-1, 1, 1));
   return list;

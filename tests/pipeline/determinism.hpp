@@ -4,7 +4,7 @@
 #include <cstring>
 #include <vector>
 
-#include "pipeline/comparison.hpp"
+#include "check/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 

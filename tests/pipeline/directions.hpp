@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/comparison.hpp"
+#include "check/comparison.hpp"
 #include "pipeline/scenes.hpp"
 
 namespace dpr::test::pipeline {

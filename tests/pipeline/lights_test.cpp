@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/determinism.hpp"
 #include "pipeline/scenes.hpp"
 #include "scene/gradient_table.hpp"

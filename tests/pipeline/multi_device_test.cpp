@@ -8,8 +8,8 @@
 #include <numeric>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/setter_checks.hpp"
 #include "support/messages.hpp"

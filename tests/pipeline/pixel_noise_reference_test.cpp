@@ -8,12 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/pixel_noise.hpp"
 #include "support/reduced.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -34,10 +33,10 @@ Scene blurred(Scene scene, double pixels, float gamma) {
   return scene;
 }
 
-Scene whole_cube() { return scene_of(test::welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
+Scene whole_cube() { return scene_of(welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
 /// The near plane cuts it open, in sight.
-Scene cut_cube() { return scene_cut_open(test::welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
+Scene cut_cube() { return scene_cut_open(welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
 /// A triangle in the camera's space, whose near plane is at 1.
 Scene cut_triangle(const std::vector<glm::vec3>& corners) {

@@ -13,7 +13,6 @@
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
-#include "support/welded_cube.hpp"
 #include "support/worst.hpp"
 
 using namespace dpr;
@@ -127,7 +126,7 @@ double area_by_radius(Renderer& renderer) {
 }
 
 Scene cube_of_eight(int size) {
-  Scene scene = scene_of(test::welded_cube(), size, size - 3);
+  Scene scene = scene_of(welded_cube(), size, size - 3);
   scene.smoothing = smoothing_preset("pixel");
   scene.smoothing.sigma = sigma_of_pixels(1.5, size);
   return scene;

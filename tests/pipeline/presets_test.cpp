@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "check/fragments.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/fragments.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "reference/occupancy.hpp"

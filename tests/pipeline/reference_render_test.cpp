@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 

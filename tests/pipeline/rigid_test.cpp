@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "check/fragments.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/fragments.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/integer_rasterizer.hpp"
 #include "support/reduced.hpp"

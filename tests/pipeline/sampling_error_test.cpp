@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"

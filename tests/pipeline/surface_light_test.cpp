@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/directions.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/renderer_impl.hpp"

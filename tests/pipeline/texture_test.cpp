@@ -8,14 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
-#include "pipeline/comparison.hpp"
 #include "pipeline/directions.hpp"
 #include "pipeline/scenes.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
-#include "support/welded_cube.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -207,7 +206,7 @@ TEST_SUITE("pipeline") {
       renderer.image();
       return renderer.impl().pixel_noise->contour.pairs;
     };
-    Mesh mesh = test::welded_cube();
+    Mesh mesh = welded_cube();
     mesh.face_colors.clear();
     const std::size_t silhouette = contours(mesh);
     Mesh same = mesh, shifted = mesh, apart = mesh;
@@ -257,7 +256,7 @@ TEST_SUITE("gradient") {
   TEST_CASE("pixel noise: gradients of texels and coordinates are differences of the image") {
     const int size = reduced(24, 8);
     Scene scene =
-        textured_scene(test::welded_cube(), random_texture(2, 2, Wrap::clamp, Filter::bilinear), size, size);
+        textured_scene(welded_cube(), random_texture(2, 2, Wrap::clamp, Filter::bilinear), size, size);
     // Between the four texels' centres, so that nothing kinks.
     for (glm::vec2& uv : scene.meshes[0].mesh.texcoords) uv = 0.13F * uv + 0.44F;
     scene.smoothing = smoothing_preset("pixel", size, size);

@@ -1,6 +1,6 @@
 /// The reference for noise on the pixel against closed forms: a half-plane, areas and their derivatives;
 /// against a dense sum; and where it must not depend on the tessellation.
-#include "pixel_noise.hpp"
+#include "reference/pixel_noise.hpp"
 #include "test_support.hpp"
 
 #include <doctest/doctest.h>

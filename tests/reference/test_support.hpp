@@ -2,8 +2,8 @@
 /// matrices.
 #pragma once
 
-#include "finite_difference.hpp"
-#include "renderer.hpp"
+#include "reference/finite_difference.hpp"
+#include "reference/renderer.hpp"
 
 #include <doctest/doctest.h>
 

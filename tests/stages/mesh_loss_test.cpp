@@ -11,13 +11,13 @@
 #include <random>
 #include <set>
 
+#include "check/comparison.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "loss/mesh_loss_impl.hpp"
 #include "mesh/adjacency.hpp"
 #include "reference/finite_difference.hpp"
-#include "reference/mesh_loss.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
@@ -43,23 +43,6 @@ Mesh soup() {
                     {0.6F, 0.2F, 1}, {9, 9, 9},    {2, 1, 0}};
   mesh.faces = {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}, {1, 6, 2}, {2, 2, 6}};
   return mesh;
-}
-
-std::vector<dpr::reference::Face> faces_of(const Mesh& mesh) {
-  std::vector<dpr::reference::Face> faces;
-  for (const glm::uvec3& f : mesh.faces) faces.push_back({f.x, f.y, f.z});
-  return faces;
-}
-
-double reference_loss(const Mesh& mesh, const MeshLossWeights& w, const std::vector<double>& flat) {
-  std::vector<dpr::reference::Vec3d> positions;
-  for (std::size_t i = 0; i < flat.size(); i += 3) positions.push_back({flat[i], flat[i + 1], flat[i + 2]});
-  const auto terms =
-      dpr::reference::mesh_terms(positions, faces_of(mesh), static_cast<double>(w.edge_target));
-  return static_cast<double>(w.laplacian) * terms.laplacian +
-         static_cast<double>(w.edge_length) * terms.edge_length +
-         static_cast<double>(w.normal_consistency) * terms.normal_consistency +
-         static_cast<double>(w.flatness) * terms.flatness;
 }
 
 struct Evaluation {
@@ -111,7 +94,9 @@ TEST_SUITE("gradient") {
   TEST_CASE("mesh losses and their gradients are the reference's, on spheres and on soup") {
     for (const Mesh& mesh : {rough_sphere(dpr::test::is_reduced() ? 0 : 1), soup(), dpr::make_cube()}) {
       for (const MeshLossWeights& weights : k_each) {
-        const auto f = [&](const std::vector<double>& at) { return reference_loss(mesh, weights, at); };
+        const auto f = [&](const std::vector<double>& at) {
+          return dpr::check::reference_loss(mesh, weights, at);
+        };
         const Evaluation found = evaluate(mesh, weights);
         CHECK(found.loss == doctest::Approx(f(flat(mesh))).epsilon(2e-6));
         const auto check = dpr::reference::check_gradient(f, flat(mesh), found.gradient, 1e-5, 2e-5, 3e-7);
@@ -126,7 +111,9 @@ TEST_SUITE("gradient") {
     const Mesh mesh = rough_sphere(0);
     Evaluation found = evaluate(mesh, k_each[4]);
     found.gradient[5] *= 1.001;
-    const auto f = [&](const std::vector<double>& at) { return reference_loss(mesh, k_each[4], at); };
+    const auto f = [&](const std::vector<double>& at) {
+      return dpr::check::reference_loss(mesh, k_each[4], at);
+    };
     CHECK_FALSE(dpr::reference::check_gradient(f, flat(mesh), found.gradient, 1e-5, 2e-5, 3e-7).passed);
   }
 

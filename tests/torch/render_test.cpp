@@ -7,7 +7,7 @@
 #include <functional>
 #include <map>
 
-#include "pipeline/comparison.hpp"
+#include "check/comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/finite_difference.hpp"
 #include "reference/renderer.hpp"

@@ -1,7 +1,8 @@
-// What the rasterizer and the shading say of a frame's fragments, pixel by pixel, in double precision: what
+// What the rasterizer and the shading say of a frame's fragments, pixel by pixel, as double precision: what
 // independent evaluations of a member of the family start from.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <vector>
@@ -9,12 +10,14 @@
 #include "dpr/renderer.hpp"
 #include "renderer/renderer_impl.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::check {
 
 struct Fragment {
   std::size_t index = 0;           ///< in the stages' buffers
   double distance = 0, depth = 0;  ///< signed, in the unit of sigma; view space
   glm::dvec3 color{0.0};
+  std::array<double, 2> barycentric{};  ///< of the corners 1 and 2
+  double occupancy = 0;                 ///< 0 where no stage of its own computes it
 };
 
 using Pixel = std::vector<Fragment>;
@@ -25,16 +28,21 @@ inline std::vector<Pixel> pixels_of(const Renderer& renderer) {
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
   const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
                            red = m.shade.color.red.download(), green = m.shade.color.green.download(),
-                           blue = m.shade.color.blue.download();
+                           blue = m.shade.color.blue.download(), bary1 = m.rasterize.bary1.download(),
+                           bary2 = m.rasterize.bary2.download(), occupancy = m.occupancy.occupancy.download();
+  const auto number = [](const std::vector<float>& values, cl_uint k) {
+    return k < values.size() ? static_cast<double>(values[k]) : 0.0;
+  };
   std::vector<Pixel> pixels(starts.size() - 1);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     for (cl_uint at = starts[i]; at < starts[i + 1]; ++at) {
-      const cl_uint k = list[at];
-      pixels[i].push_back(
-          {k,
-           static_cast<double>(distance[k]),
-           static_cast<double>(depth[k]),
-           {static_cast<double>(red[k]), static_cast<double>(green[k]), static_cast<double>(blue[k])}});
+      const cl_uint k = list.at(at);
+      pixels[i].push_back({k,
+                           number(distance, k),
+                           number(depth, k),
+                           {number(red, k), number(green, k), number(blue, k)},
+                           {number(bary1, k), number(bary2, k)},
+                           number(occupancy, k)});
     }
   }
   return pixels;
@@ -46,4 +54,4 @@ inline double zeta(const Scene& scene, double depth) {
   return (zfar - depth) / (zfar - znear);
 }
 
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::check

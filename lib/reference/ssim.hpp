@@ -11,10 +11,14 @@ struct SsimWindow {
   static constexpr int radius = 5;
   static constexpr double deviation = 1.5, c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
 
+  static double density(int squared) { return std::exp(-squared / (2.0 * deviation * deviation)); }
   static double weight(int dx, int dy) {
-    double sum = 0.0;
-    for (int k = -radius; k <= radius; ++k) sum += std::exp(-k * k / (2.0 * deviation * deviation));
-    return std::exp(-(dx * dx + dy * dy) / (2.0 * deviation * deviation)) / (sum * sum);
+    static const double sum = [] {
+      double of_row = 0.0;
+      for (int k = -radius; k <= radius; ++k) of_row += density(k * k);
+      return of_row * of_row;
+    }();
+    return density(dx * dx + dy * dy) / sum;
   }
 };
 

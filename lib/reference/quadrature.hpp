@@ -1,4 +1,4 @@
-/// Nodes for the integrals of the exact aggregation over the whole line (tests/reference/aggregate.hpp).
+/// Nodes for the integrals of the exact aggregation over the whole line (aggregate.hpp).
 ///
 /// Composite Gauss-Legendre on panels that follow every slot: all mass of slot k lies at beta_k + [lower,
 /// upper]. Cauchy panels grow with the distance to the nearest slot, so that tails of any length cost a

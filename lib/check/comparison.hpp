@@ -8,11 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
+#include "reference/mesh_loss.hpp"
 #include "reference/renderer.hpp"
 #include "scene/light_table.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::check {
 
 inline reference::Vec3d to_reference(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -145,6 +147,19 @@ inline reference::Scene to_reference(const Scene& scene) {
   result.smoothing = to_reference(scene.smoothing);
   result.perspective_correct = scene.perspective_correct;
   return result;
+}
+
+/// The reference's loss of a mesh with other positions, [vertex][3].
+inline double reference_loss(const Mesh& mesh, const MeshLossWeights& w, const std::vector<double>& flat) {
+  std::vector<reference::Vec3d> positions;
+  for (std::size_t i = 0; i < flat.size(); i += 3) positions.push_back({flat[i], flat[i + 1], flat[i + 2]});
+  std::vector<reference::Face> faces;
+  for (const glm::uvec3& f : mesh.faces) faces.push_back({f.x, f.y, f.z});
+  const auto terms = reference::mesh_terms(positions, faces, static_cast<double>(w.edge_target));
+  return static_cast<double>(w.laplacian) * terms.laplacian +
+         static_cast<double>(w.edge_length) * terms.edge_length +
+         static_cast<double>(w.normal_consistency) * terms.normal_consistency +
+         static_cast<double>(w.flatness) * terms.flatness;
 }
 
 inline void append(std::vector<double>& list, double v) { list.push_back(v); }
@@ -330,4 +345,4 @@ inline Delicate delicate_pixels(const reference::Scene& scene, double margin = 2
   return delicate;
 }
 
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::check

@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# Tries the kernels on the OpenCL implementations for CPUs, in several widths of their vectors: tests, self-test and two
+# rows of the benchmark. Writes build/devices/ROW/..., then bench/results/devices.csv, and prints the same as a table.
+#
+#   cmake/devices.sh [ROW...]     IMPLEMENTATION-LANES, as below; all if left out
+#
+# Needs the release build. An implementation that is missing is left out with a note:
+#   pocl      Debian's pocl-opencl-icd
+#   intel     a virtual environment, named by DPR_INTEL, with pip install intel-opencl-rt intel-cmplr-lib-rt
+#   rusticl   Mesa's OpenCL: apt-get install mesa-opencl-icd, which cannot be installed beside the libclc-19 of the
+#             tests; DPR_RUSTICL names a folder with libRusticlOpenCL.so.1 elsewhere
+#
+# The tests are those of the kernels: tests/stages, and the pipeline against the reference. Tests of files and commands
+# say nothing of a device. rusticl's compiler takes minutes for the kernels of a frame: there the self-test stands alone.
+# Under oclgrind, a simulator, all tests run: cmake/test.sh oclgrind.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+bin=$PWD/build/release/bin
+out=$PWD/build/devices
+icds=$out/icd
+sources="*/stages/*,*/reference_render_test.cpp,*/pixel_noise_reference_test.cpp"
+test_limit=3600 # seconds for the tests of a row
+
+# The libraries, each in a folder of its own that the ICD loader is pointed to.
+intel=${DPR_INTEL:-}/lib/libintelocl.so
+rusticl=${DPR_RUSTICL:-/usr/lib/x86_64-linux-gnu}/libRusticlOpenCL.so.1
+mkdir -p "$icds"/{pocl,intel,rusticl}
+cp /etc/OpenCL/vendors/pocl.icd "$icds/pocl/"
+echo "$intel" >"$icds/intel/intel.icd"
+echo "$rusticl" >"$icds/rusticl/rusticl.icd"
+
+# on ROW COMMAND...: runs it with the row's implementation, and in its width.
+on() {
+  local row=$1
+  shift
+  local environment=("DPR_LANES=${row##*-}")
+  case ${row%-*} in
+    pocl) environment+=("OCL_ICD_VENDORS=$icds/pocl/") ;;
+    intel) environment+=("OCL_ICD_VENDORS=$icds/intel/" "LD_LIBRARY_PATH=$(dirname "$intel")") ;;
+    rusticl)
+      environment+=("OCL_ICD_VENDORS=$icds/rusticl/" "LD_LIBRARY_PATH=$(dirname "$rusticl")" RUSTICL_ENABLE=llvmpipe)
+      ;;
+  esac
+  env "${environment[@]}" "$@"
+}
+
+is_there() {
+  case ${1%-*} in
+    pocl) [[ -e /etc/OpenCL/vendors/pocl.icd ]] ;;
+    intel) [[ -e $intel ]] ;;
+    rusticl) [[ -e $rusticl ]] ;;
+    *) false ;;
+  esac
+}
+
+rows=("$@")
+if ((${#rows[@]} == 0)); then rows=(pocl-1 pocl-8 pocl-16 intel-1 intel-16 rusticl-1 rusticl-8); fi
+for row in "${rows[@]}"; do
+  if ! is_there "$row"; then
+    echo "$row: not here (see the head of $0)"
+    continue
+  fi
+  echo "== $row"
+  rm -rf "${out:?}/$row"
+  mkdir -p "$out/$row"
+  on "$row" "$bin/dpr" devices --json --check >"$out/$row/check.json" || echo "$row: the self-test failed"
+  if [[ $row == rusticl-* ]]; then continue; fi
+  on "$row" timeout "$test_limit" "$bin/dpr_tests" --source-file="$sources" --reporters=junit \
+    >"$out/$row/tests.xml" 2>"$out/$row/tests.log" || echo "$row: tests failed"
+  on "$row" "$bin/dpr-bench" --workload sphere256 --workload cube128 --quiet -o "$out/$row/bench.json" ||
+    echo "$row: the benchmark failed"
+done
+python3 bench/report/device_table.py "$out" bench/results/devices.csv

@@ -1,0 +1,74 @@
+// The self-test of devices notices what computes wrong: with a kernel that is not run, and nothing that says
+// so, its stage fails; with an OpenCL call that fails, a row says which.
+#include <doctest/doctest.h>
+
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/command.hpp"
+
+using namespace dpr::test;
+
+namespace {
+
+/// A kernel whose results are numbers that index nothing, and a stage whose row has to fail without it.
+struct SkippedKernel {
+  std::string kernel, stage;
+};
+
+const std::vector<SkippedKernel> k_kernels{
+    {"transform_forward", "transform "},
+    {"shade_lit_forward", "surface, shade "},
+    {"occupancy_forward", "occupancy "},
+    {"gather_corners", "rasterize, gather, backward "},
+    {"transform_backward", "transform, backward "},
+    {"antialias_forward", "contour, antialias, blur "},
+    {"image_loss_backward", "image_loss, backward "},
+    {"mesh_loss_gather", "mesh_loss, backward "},
+};
+
+Outcome check_with(const std::string& fault) {
+  const TempDir folder;
+  return run_program("env", folder,
+                     {std::string("LD_PRELOAD=") + std::getenv("DPR_OPENCL_FAULTS"), fault,
+                      program_path("DPR_CLI"), "devices", "--check", "--device", "cpu"});
+}
+
+/// Whether a line that begins with the stage says FAIL.
+bool fails(const std::string& out, const std::string& stage) {
+  std::istringstream lines(out);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t text = line.find_first_not_of(' ');
+    if (text != std::string::npos && line.compare(text, stage.size(), stage) == 0 &&
+        line.find(" FAIL ") != std::string::npos)
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+TEST_SUITE("robustness") {
+  TEST_CASE("faults: the self-test of a device fails where a kernel is not run") {
+    if (is_skipped() || is_skipped("DPR_OPENCL_FAULTS")) return;
+    for (const SkippedKernel& skipped : k_kernels) {
+      CAPTURE(skipped.kernel);
+      const Outcome outcome = check_with("DPR_SKIPPED_KERNEL=" + skipped.kernel);
+      CAPTURE(outcome.out);
+      CHECK(outcome.status == 2);
+      CHECK(is_error_line(outcome.err));
+      CHECK(fails(outcome.out, skipped.stage));
+    }
+  }
+
+  TEST_CASE("faults: the self-test of a device that fails says which call, and tries the next stages") {
+    if (is_skipped() || is_skipped("DPR_OPENCL_FAULTS")) return;
+    const Outcome outcome = check_with("DPR_FAULT=clEnqueueNDRangeKernel:20");
+    CAPTURE(outcome.out);
+    CHECK(outcome.status == 2);
+    CHECK(outcome.out.find("CL_OUT_OF_RESOURCES") != std::string::npos);
+    CHECK(outcome.out.find("1 failed") != std::string::npos);
+  }
+}
