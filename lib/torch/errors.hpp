@@ -45,7 +45,7 @@ inline std::string shape_text(const at::Tensor& tensor) {
 
 /// The tensor itself, if it is contiguous. -1 stands for any size.
 inline at::Tensor checked(const at::Tensor& tensor, const std::string& name,
-                          std::initializer_list<std::int64_t> shape, const char* expected) {
+                          std::initializer_list<std::int64_t> shape, const std::string& expected) {
   if (tensor.scalar_type() != at::kFloat || !tensor.device().is_cpu()) {
     throw InvalidArgument(name + " (dpr::render)", tensor.toString(), "a float32 tensor on the CPU");
   }
