@@ -70,7 +70,8 @@ static inline int stands_for_both(uint4 edge, global const uint* facing) {
 static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
   if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
   const uint4 record = s.edges.edges[edge];
-  if (!has_other_face(record) || (record.z & (DPR_EDGE_FLAG | DPR_EDGE_SEAM))) return 0;
+  if (!has_other_face(record) || (record.z & (DPR_EDGE_FLAG | DPR_EDGE_SEAM)) || (record.w & DPR_EDGE_SEAM))
+    return 0;
   const EdgeSides sides = edge_sides(record, s.facing);
   return sides.own == -sides.other;
 }

@@ -95,6 +95,7 @@ static inline VertexGradient vertex_gradient(const FrameParams p, global const V
 ///                     without its distortion: what it does to cuts is left out of its own gradients. Read
 ///                     where p.clips is set
 /// in      lit         0: nothing was lit, grad_world is only written
+/// in      slots       of a segment
 /// in out  grad_world  float4[view][vertex]   in: what shading adds; out: the whole d loss / d world position
 /// out     partial     float[DPR_POSE_CHANNELS][view][mesh][2][slot]  sums, and their compensations;
 ///                     DPR_LENS_CHANNELS where p.distorts is set

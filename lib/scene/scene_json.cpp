@@ -6,7 +6,6 @@
 #include <limits>
 #include <string>
 
-#include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
@@ -34,8 +33,8 @@ void take_vec3(const JsonNode& node, std::string_view key, glm::vec3& value) {
 }
 
 void take_size(const JsonNode& node, std::string_view key, int& value) {
-  take(node, key, value,
-       [](const JsonNode& n) { return static_cast<int>(n.whole_number(checks::k_largest_side)); });
+  constexpr std::uint64_t k_most = std::numeric_limits<int>::max();
+  take(node, key, value, [](const JsonNode& n) { return static_cast<int>(n.whole_number(k_most)); });
 }
 
 std::vector<glm::vec3> vec3_list(const JsonNode& node) {

@@ -70,9 +70,11 @@ TEST_SUITE("pipeline") {
   TEST_CASE("cull: images and gradients are those of the scene without the faces") {
     const Device device = open_device();
     for (const bool of_pixel : {false, true}) {
-      for (Scene scene : scenes()) {
-        scene = with_noise(scene, of_pixel);
+      for (std::size_t s = 0; s < scenes().size(); ++s) {
+        Scene scene = with_noise(scenes()[s], of_pixel);
+        CAPTURE(s);
         for (const Cull cull : {Cull::back, Cull::front}) {
+          CAPTURE(cull == Cull::front);
           scene.cull = cull;
           const Scene rest = without_culled(scene);
           CHECK(rest.meshes[0].mesh.faces.size() < scene.meshes[0].mesh.faces.size());
