@@ -56,8 +56,20 @@ static inline uint find_reference(const FrameParams p, uint view, uint contour, 
   return DPR_NO_CROSSING;
 }
 
+static inline int have_face_in_common(uint4 a, uint4 b) {
+  const uint own = own_face(b);
+  if (own_face(a) == own || (has_other_face(a) && other_face(a) == own)) return 1;
+  if (!has_other_face(b)) return 0;
+  const uint other = other_face(b);
+  return own_face(a) == other || (has_other_face(a) && other_face(a) == other);
+}
+
+/// Edges meet at a vertex. The cut of a face, which has none, meets the face's edges, and lies on one plane
+/// with all other cuts.
 static inline int have_end_in_common(uint4 a, uint4 b) {
-  return a.x == b.x || a.x == b.y || a.y == b.x || a.y == b.y || own_face(a) == own_face(b);
+  const int a_is_cut = a.x == a.y, b_is_cut = b.x == b.y;
+  if (a_is_cut != b_is_cut) return have_face_in_common(a, b);
+  return a_is_cut || a.x == b.x || a.x == b.y || a.y == b.x || a.y == b.y;
 }
 
 /// Whether something hides a contour at a step that another has won. Of the two samples only the one on its
