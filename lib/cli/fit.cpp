@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <memory>
 #include <optional>
 
@@ -59,6 +60,12 @@ ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
   ViewsFile file = parse_views_file(options.views, read_file(options.views), notes, common.encoding());
   ShapeViews& views = file.views;
   if (!options.initial.empty()) views.initial = read_mesh(options.initial, notes);
+  if (std::ranges::none_of(views.views, &ShapeView::has_alpha)) {
+    notes.push_back(
+        "no image says where the object is, so colours alone are compared and thin parts may be lost: images "
+        "with "
+        "alpha, or \"silhouette\" in the views file, find them");
+  }
   print_notes(notes, common);
   if (common.size) resize(views, parse_size(*common.size));
   const SmoothingOptions flags = smoothing_options(common);
@@ -143,8 +150,13 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
                                                [&] { return ShapeSolver(devices, views, options.solver); });
   std::optional<FitReport> report;
   if (!options.report.empty()) report.emplace(options.report, devices, views);
+  std::exception_ptr report_failed;  // told once there is a mesh
   const auto keep = [&](const ShapeIteration& step, const Mesh& mesh) {
-    if (report) report->keep(step.iteration, mesh);
+    try {
+      if (report && !report_failed) report->keep(step.iteration, mesh);
+    } catch (const IoError&) {
+      report_failed = std::current_exception();
+    }
     return true;
   };
   FitObserver observer(solver.most_iterations(), common.quiet, keep);
@@ -154,6 +166,7 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   };
   const ShapeResult result = solver.solve(watch, options.checkpoint);
   write_mesh(options.output, result.mesh);
+  if (report_failed) std::rethrow_exception(report_failed);
   if (report) {
     const std::string views_file = std::filesystem::path(options.views).filename().string();
     report->write(page_source("The shape in " + views_file, common, devices), result, common.quiet);

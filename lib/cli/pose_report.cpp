@@ -204,14 +204,15 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
   const Image start = camera.render_start(result);
   const Image end = camera.render(result, rigid_smoothing());
   const Differences difference = differences({end}, {target});
-  PosePictures pictures{
-      write_picture(folder / "target.png", target, "target"),
-      write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
-      write_picture(folder / "end.png", end,
-                    format("end, after %u iterations", result.iterations) + angle_text(result.pose, truth)),
-      write_picture(folder / "difference.png", difference.images.front(),
-                    difference.caption() + ": end and target"),
-      write_frames(folder / "iterations.png", camera, result, truth)};
+  const char* const other_light = result.light == PoseLight::harmonics ? "; not in the target's light" : "";
+  PosePictures pictures{write_picture(folder / "target.png", target, "target"),
+                        write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
+                        write_picture(folder / "end.png", end,
+                                      format("end, after %u iterations", result.iterations) +
+                                          angle_text(result.pose, truth) + other_light),
+                        write_picture(folder / "difference.png", difference.images.front(),
+                                      difference.caption() + ": end and target" + other_light),
+                        write_frames(folder / "iterations.png", camera, result, truth)};
   pictures.has_plot = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
   if (!pictures.has_plot && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   write_pose_page(folder / "index.html", source, result, pictures, truth);

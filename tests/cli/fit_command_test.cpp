@@ -24,14 +24,14 @@ json camera(const char* view) {
 }
 
 /// views.json and its images: the cube from three sides.
-json write_inputs(const TempDir& folder) {
+json write_inputs(const TempDir& folder, const std::string& extension = ".exr") {
   const char* const sides[] = {"[[1,0,0,0],[0,0.8,-0.6,0],[0,0.6,0.8,-5],[0,0,0,1]]",
                                "[[0,0,1,0],[0,1,0,0],[-1,0,0,-5],[0,0,0,1]]",
                                "[[-0.8,0,-0.6,0],[0,1,0,0],[0.6,0,-0.8,-5],[0,0,0,1]]"};
   dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
   json views = {{"width", 24}, {"height", 24}, {"views", json::array()}};
   for (int i = 0; i < 3; ++i) {
-    const std::string image = "view" + std::to_string(i) + ".exr";
+    const std::string image = "view" + std::to_string(i) + extension;
     const json scene = {
         {"width", 24}, {"height", 24}, {"camera", camera(sides[i])}, {"meshes", {{{"file", "cube.ply"}}}}};
     folder.write("scene.json", scene.dump());
@@ -55,6 +55,30 @@ std::vector<std::string> with(std::vector<std::string> arguments, const std::vec
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("dpr fit: a report that cannot be written does not cost the mesh") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    std::filesystem::create_directories(folder / "report/iterations/00002.png");
+    const auto outcome = run_command(folder, with(k_short, {"--report", "report"}));
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 1);
+    CHECK(contains(outcome.err, "00002.png"));
+    CHECK_FALSE(dpr::read_mesh(folder / "mesh.obj").faces.empty());
+  }
+
+  TEST_CASE("dpr fit says that opaque images do not tell where the object is") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    for (const char* const extension : {".png", ".exr"}) {
+      write_inputs(folder, extension);
+      const auto outcome = run_command(folder, k_short);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      CHECK(contains(outcome.err, "colours alone") == (extension == std::string(".png")));
+    }
+  }
+
   TEST_CASE("dpr fit leaves a coloured mesh, a report that opens without a network, and a checkpoint") {
     if (is_skipped()) return;
     const TempDir folder;
