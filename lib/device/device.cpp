@@ -203,8 +203,8 @@ Device open_device(const std::string& selector) {
       device.impl().info.passed_over.push_back(std::string("a device does not answer: ") + failure->what());
     return device;
   }
-  const auto chosen =
-      std::ranges::find_if(found, [&](const FoundDevice& entry) { return matches(entry.info, wanted); });
+  const auto chosen = std::ranges::find_if(
+      found, [&name = wanted](const FoundDevice& entry) { return matches(entry.info, name); });
   if (chosen != found.end()) return open_found(*chosen);
   if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
   if (found.empty())

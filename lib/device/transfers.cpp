@@ -23,7 +23,8 @@ void Device::Impl::write(const cl::Buffer& buffer, std::size_t first, std::span<
   }
   const std::scoped_lock lock(writes_mutex_);
   std::erase_if(writes_, [](const PendingWrite& write) { return write.has_run(); });
-  PendingWrite& write = writes_.emplace_back(std::vector(bytes.begin(), bytes.end()), cl::Event());
+  writes_.push_back({std::vector(bytes.begin(), bytes.end()), cl::Event()});
+  PendingWrite& write = writes_.back();
   const int error = queue.enqueueWriteBuffer(buffer, CL_FALSE, first, bytes.size(), write.bytes.data(),
                                              nullptr, &write.finished);
   if (error != CL_SUCCESS) writes_.pop_back();
