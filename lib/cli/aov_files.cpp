@@ -73,12 +73,13 @@ void AovFiles::write(Renderer& renderer) const {
     const AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
     for (const Aov aov : aovs_) write_image(file_name(to_string(aov)), aov_image(outputs, aov));
   }
+  if (gradient_standard_error_ && sampling_error(renderer).pixel_gradients.empty()) {
+    throw InvalidArgument("gradient_standard_error (--aov)",
+                          "noise of the pixel, or a frame in bands of the memory budget",
+                          "noise of the triangles, and an image whose fragments fit the device's memory");
+  }
   if (standard_error_) write_image(file_name(k_standard_error), sampling_error(renderer).images.front());
   if (gradient_standard_error_) {
-    if (sampling_error(renderer).pixel_gradients.empty()) {
-      throw InvalidArgument("gradient_standard_error (--aov)", "a frame in bands of the memory budget",
-                            "an image whose fragments fit the device's memory");
-    }
     write_image(file_name(k_gradient_standard_error),
                 grey(sampling_error(renderer).pixel_gradients.front(), renderer.scene()));
   }

@@ -19,8 +19,10 @@ glm::vec3 rgb(const std::filesystem::path& file, std::size_t line,
     const std::size_t word = words.size() == 2 ? 1 : static_cast<std::size_t>(i) + 1;
     const std::optional<float> value =
         word < words.size() ? scan::parse_coordinate(words[word]) : std::nullopt;
-    if (!value)
-      throw IoError(file, "expected " + std::string(words[0]) + " with one or three finite numbers", line);
+    if (!value || *value < 0) {
+      throw IoError(
+          file, "expected " + std::string(words[0]) + " with one or three finite numbers, at least 0", line);
+    }
     values[i] = *value;
   }
   return values;
@@ -43,7 +45,10 @@ void read_reflection(const std::filesystem::path& file, std::size_t line,
                      const std::vector<std::string_view>& words, ObjReflection& reflection) {
   if (words[0] == "Kd") reflection.diffuse = rgb(file, line, words);
   if (words[0] == "Ks") reflection.specular = rgb(file, line, words);
-  if (words[0] == "Ns") reflection.shininess = last_number(file, line, words);
+  if (words[0] == "Ns") {
+    reflection.shininess = last_number(file, line, words);
+    if (*reflection.shininess < 0) throw IoError(file, "expected Ns with a number, at least 0", line);
+  }
   if (words[0] == "illum") reflection.has_highlights = last_number(file, line, words) >= 2;
   if (words[0] == "d") reflection.opacity = last_number(file, line, words);
   if (words[0] == "Tr") reflection.opacity = 1 - last_number(file, line, words);

@@ -86,6 +86,8 @@ TEST_SUITE("unit") {
       DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(file), expected);
     };
     check("Ks 1 2", "m.mtl:2: expected Ks with one or three finite numbers");
+    check("Ks 1 -1 0", "m.mtl:2: expected Ks with one or three finite numbers, at least 0");
+    check("Ns -3", "m.mtl:2: expected Ns with a number, at least 0");
     check("Ns shiny", "m.mtl:2: expected Ns with a finite number");
     check("Ns", "m.mtl:2: expected Ns with a finite number");
     check("d nan", "m.mtl:2: expected d with a finite number");
