@@ -14,10 +14,12 @@
 #include "renderer/setter_checks.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
+#include "support/several_devices.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
+using dpr::test::several_devices;
 
 namespace {
 
@@ -100,14 +102,6 @@ std::vector<Device> halves() {
   }
 }
 
-/// The default device so many times; once in a simulator that cannot be used from several threads.
-std::vector<Device> devices(std::size_t count) {
-  const Device first = open_device();
-  std::vector<Device> list{first};
-  while (list.size() < count && first.info().platform != "Oclgrind") list.push_back(open_device());
-  return list;
-}
-
 Scene sampled(Scene scene) {
   scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
   return scene;
@@ -122,7 +116,7 @@ TEST_SUITE("pipeline") {
       const Result one = render({open_device()}, scene, views);
       REQUIRE(one.values.size() > views);
       CHECK(same_bits(one, render({open_device()}, scene, views)));
-      const Result three = render(devices(3), scene, views);
+      const Result three = render(several_devices(3), scene, views);
       CHECK(same_bits(one, three));
       CHECK(total(three.views_rendered) == 3 * views);
       Scene other = scene;
@@ -154,7 +148,7 @@ TEST_SUITE("pipeline") {
       const Device device = open_device();
       const std::vector<Image> targets = random_images(scene, views);
       const LossWeights weights{.mse = 1.0F, .l1 = 0.3F, .silhouette = 0.5F};
-      MultiDeviceRenderer several(devices(2));
+      MultiDeviceRenderer several(several_devices(2));
       several.set_scene(scene);
       several.set_views(ring(scene, views));
       several.set_loss(weights, targets);
@@ -202,7 +196,7 @@ TEST_SUITE("pipeline") {
                               .has_alpha = has_alpha,
                               .masks = masks,
                               .levels = 2};
-    MultiDeviceRenderer several(devices(2));
+    MultiDeviceRenderer several(several_devices(2));
     several.set_scene(scene);
     several.set_views(ring(scene, views));
     several.set_loss(options, targets);
@@ -267,7 +261,7 @@ TEST_SUITE("pipeline") {
     alone.forward();
     for (const bool has_rendered : {false, true}) {
       CAPTURE(has_rendered);
-      MultiDeviceRenderer renderer(devices(2));
+      MultiDeviceRenderer renderer(several_devices(2));
       renderer.set_scene(scene);
       renderer.set_chunk(2);
       if (has_rendered) CHECK(renderer.render().size() == 1);
@@ -280,7 +274,7 @@ TEST_SUITE("pipeline") {
       for (std::size_t v = 0; v < far.size(); ++v) CHECK(images[v].pixels == alone.image(v).pixels);
     }
     scene.smoothing = smoothing;
-    MultiDeviceRenderer renderer(devices(1));
+    MultiDeviceRenderer renderer(several_devices(1));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "gamma (smoothing)");
   }
 }
@@ -325,7 +319,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, split_device(open_device(), 100000), "compute_units");
 
     const Scene scene = small_scene();
-    MultiDeviceRenderer renderer(devices(2));
+    MultiDeviceRenderer renderer(several_devices(2));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.render(), "set_scene");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_views(ring(scene, 2)), "set_scene");
     renderer.set_scene(scene);
@@ -337,7 +331,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_mesh_loss({.laplacian = -1}), "weight (mesh loss)");
     Scene fixed = scene;
     fixed.gradients.positions = false;
-    MultiDeviceRenderer other(devices(1));
+    MultiDeviceRenderer other(several_devices(1));
     other.set_scene(fixed);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, other.set_mesh_loss({}), "gradients of positions");
     renderer.set_loss(LossWeights::only(LossKind::l1), random_images(scene, 3));

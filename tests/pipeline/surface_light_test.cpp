@@ -15,6 +15,7 @@
 #include "scene/gradient_table.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
+#include "support/several_devices.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -193,7 +194,7 @@ TEST_SUITE("pipeline") {
           doctest::Approx(3 * all.meshes[0].shininess[0]).epsilon(1e-4));
     for (const ViewGradient& view : three_times.views)
       CHECK(view.transforms[0].rotation == three_times.views[0].transforms[0].rotation);
-    MultiDeviceRenderer several({open_device(), open_device()});
+    MultiDeviceRenderer several(dpr::test::several_devices(2));
     several.set_scene(scene);
     several.set_views(views);
     const SceneGradient of_several = several.gradient(of_views);
