@@ -180,9 +180,22 @@ static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
   return tile_of_sample(p, line / p.height, sample % p.width, line % p.height) == tile;
 }
 
-/// The columns or rows [x, y] of tiles that touch one.
-static inline uint2 tiles_around(uint at, uint count) {
-  return (uint2)(at > 0 ? at - 1 : 0, min(at + 1, count - 1));
+/// The tiles that touch one, itself among them: a rectangle, row by row.
+typedef struct {
+  uint first, columns, count;
+} NearTiles;
+
+static inline NearTiles near_tiles(const FrameParams p, uint tile) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
+             row = in_view / p.tiles_x;
+  const uint left = column > 0, above = row > 0;
+  const uint columns = 1 + left + (column + 1 < p.tiles_x), rows = 1 + above + (row + 1 < p.tiles_y);
+  const NearTiles tiles = {tile - left - above * p.tiles_x, columns, columns * rows};
+  return tiles;
+}
+
+static inline uint near_tile(const FrameParams p, const NearTiles tiles, uint k) {
+  return tiles.first + k / tiles.columns * p.tiles_x + k % tiles.columns;
 }
 
 /// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
@@ -194,21 +207,18 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
                                      global const SecondCrossing* restrict seconds,
                                      global const float* restrict cut, global const float4* restrict raster,
                                      global float4* restrict blended) {
-  const uint tile = (uint)get_global_id(0), in_view = tile % (p.tiles_x * p.tiles_y);
+  const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
-  const uint2 columns = tiles_around(in_view % p.tiles_x, p.tiles_x);
-  const uint2 rows = tiles_around(in_view / p.tiles_x, p.tiles_y);
-  for (uint row = rows.x; row <= rows.y; ++row) {
-    for (uint column = columns.x; column <= columns.y; ++column) {
-      const uint near = tile - in_view + row * p.tiles_x + column;
-      for (uint k = 0; k < counts[near]; ++k) {
-        const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
-        const uint2 ends = ends_of_reference(p, c.reference);
-        const float4 jump = raster[ends.y] - raster[ends.x];
-        const uint of_winner = cut_sample(p, c.step, cut[c.step]), own = cut_sample(p, c.step, c.cut);
-        if (is_in_tile(p, tile, of_winner)) blended[of_winner] += cut[c.step] * jump;
-        if (is_in_tile(p, tile, own)) blended[own] -= c.cut * jump;
-      }
+  const NearTiles tiles = near_tiles(p, tile);
+  for (uint i = 0; i < tiles.count; ++i) {
+    const uint near = near_tile(p, tiles, i);
+    for (uint k = 0; k < counts[near]; ++k) {
+      const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
+      const uint2 ends = ends_of_reference(p, c.reference);
+      const float4 jump = raster[ends.y] - raster[ends.x];
+      const uint of_winner = cut_sample(p, c.step, cut[c.step]), own = cut_sample(p, c.step, c.cut);
+      if (is_in_tile(p, tile, of_winner)) blended[of_winner] += cut[c.step] * jump;
+      if (is_in_tile(p, tile, own)) blended[own] -= c.cut * jump;
     }
   }
 }
@@ -225,27 +235,24 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
                                       global const float4* restrict grad_blended,
                                       global float* restrict grad_cut, global float4* restrict grad_raster,
                                       global float* restrict grad_seconds) {
-  const uint tile = (uint)get_global_id(0), in_view = tile % (p.tiles_x * p.tiles_y);
+  const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
-  const uint2 columns = tiles_around(in_view % p.tiles_x, p.tiles_x);
-  const uint2 rows = tiles_around(in_view / p.tiles_x, p.tiles_y);
-  for (uint row = rows.x; row <= rows.y; ++row) {
-    for (uint column = columns.x; column <= columns.y; ++column) {
-      const uint near = tile - in_view + row * p.tiles_x + column;
-      for (uint k = 0; k < counts[near]; ++k) {
-        const uint place = DPR_SECOND_CROSSINGS * near + k;
-        const SecondCrossing c = seconds[place];
-        const uint2 ends = ends_of_reference(p, c.reference);
-        const float4 grad_of_winner = grad_blended[cut_sample(p, c.step, cut[c.step])];
-        const float4 grad_own = grad_blended[cut_sample(p, c.step, c.cut)];
-        const float4 grad_jump = cut[c.step] * grad_of_winner - c.cut * grad_own;
-        if (is_in_tile(p, tile, ends.x)) grad_raster[ends.x] -= grad_jump;
-        if (is_in_tile(p, tile, ends.y)) grad_raster[ends.y] += grad_jump;
-        if (near != tile) continue;
-        const float4 jump = raster[ends.y] - raster[ends.x];
-        if (cut[c.step] != 0.0f) grad_cut[c.step] += dot(grad_of_winner, jump);
-        grad_seconds[place] = -dot(grad_own, jump);
-      }
+  const NearTiles tiles = near_tiles(p, tile);
+  for (uint i = 0; i < tiles.count; ++i) {
+    const uint near = near_tile(p, tiles, i);
+    for (uint k = 0; k < counts[near]; ++k) {
+      const uint place = DPR_SECOND_CROSSINGS * near + k;
+      const SecondCrossing c = seconds[place];
+      const uint2 ends = ends_of_reference(p, c.reference);
+      const float4 grad_of_winner = grad_blended[cut_sample(p, c.step, cut[c.step])];
+      const float4 grad_own = grad_blended[cut_sample(p, c.step, c.cut)];
+      const float4 grad_jump = cut[c.step] * grad_of_winner - c.cut * grad_own;
+      if (is_in_tile(p, tile, ends.x)) grad_raster[ends.x] -= grad_jump;
+      if (is_in_tile(p, tile, ends.y)) grad_raster[ends.y] += grad_jump;
+      if (near != tile) continue;
+      const float4 jump = raster[ends.y] - raster[ends.x];
+      if (cut[c.step] != 0.0f) grad_cut[c.step] += dot(grad_of_winner, jump);
+      grad_seconds[place] = -dot(grad_own, jump);
     }
   }
 }

@@ -31,6 +31,11 @@ bool is_orthographic(const Scene& scene) { return scene.camera.orthographic_heig
 bool has_lights(const Scene& scene) { return scene.lights.has_value(); }
 bool has_harmonics(const Scene& scene) { return has_lights(scene) && !scene.lights->harmonics.empty(); }
 
+template <auto array>
+GradientArray of_mesh(G& g, I i) {
+  return &(g.meshes[i.item].*array);
+}
+
 template <std::size_t k>
 GradientArray intrinsic(G& g, I i) {
   return &g.views[i.view].camera.intrinsics[k];
@@ -60,20 +65,13 @@ void add_rows(Kind, std::vector<GradientRow>& rows) {
 /// In the order of a gradient file.
 std::vector<GradientRow> make_rows() {
   std::vector<GradientRow> rows{
-      GradientRow{&Request::positions, Of::mesh, "meshes[].positions",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].positions; }},
-      GradientRow{&Request::colors, Of::mesh, "meshes[].colors",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].colors; }},
-      GradientRow{&Request::texcoords, Of::mesh, "meshes[].texcoords",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].texcoords; }},
-      GradientRow{&Request::texture, Of::mesh, "meshes[].textures",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].textures; }},
-      GradientRow{&Request::normals, Of::mesh, "meshes[].normals",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].normals; }},
-      GradientRow{&Request::materials, Of::mesh, "meshes[].specular",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].specular; }},
-      GradientRow{&Request::materials, Of::mesh, "meshes[].shininess",
-                  [](G& g, I i) -> GradientArray { return &g.meshes[i.item].shininess; }},
+      GradientRow{&Request::positions, Of::mesh, "meshes[].positions", of_mesh<&MeshGradient::positions>},
+      GradientRow{&Request::colors, Of::mesh, "meshes[].colors", of_mesh<&MeshGradient::colors>},
+      GradientRow{&Request::texcoords, Of::mesh, "meshes[].texcoords", of_mesh<&MeshGradient::texcoords>},
+      GradientRow{&Request::texture, Of::mesh, "meshes[].textures", of_mesh<&MeshGradient::textures>},
+      GradientRow{&Request::normals, Of::mesh, "meshes[].normals", of_mesh<&MeshGradient::normals>},
+      GradientRow{&Request::materials, Of::mesh, "meshes[].specular", of_mesh<&MeshGradient::specular>},
+      GradientRow{&Request::materials, Of::mesh, "meshes[].shininess", of_mesh<&MeshGradient::shininess>},
       GradientRow{&Request::positions, Of::all_views, "shapes.positions",
                   [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
       GradientRow{&Request::colors, Of::all_views, "shapes.colors",

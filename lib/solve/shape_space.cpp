@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "mesh/bounding_box.hpp"
@@ -34,17 +35,12 @@ glm::dvec3 meeting_point(const ShapeViews& views) {
 }  // namespace
 
 Mesh with_vertex_colors(Mesh mesh) {
-  if (mesh.vertex_colors.empty()) mesh.vertex_colors.assign(mesh.positions.size(), glm::vec3(0.5F));
-  mesh.face_colors.clear();
-  mesh.texcoords.clear();
-  mesh.face_texcoords.clear();
-  mesh.textures.clear();
-  mesh.face_textures.clear();
-  mesh.normals.clear();  // they would stay while the shape moves
-  mesh.face_normals.clear();
-  mesh.materials.clear();
-  mesh.face_materials.clear();
-  return mesh;
+  Mesh shape;
+  shape.positions = std::move(mesh.positions);
+  shape.faces = std::move(mesh.faces);
+  shape.vertex_colors = std::move(mesh.vertex_colors);
+  if (shape.vertex_colors.empty()) shape.vertex_colors.assign(shape.positions.size(), glm::vec3(0.5F));
+  return shape;
 }
 
 void require_known_cameras(const ShapeViews& views, const std::string& where) {
