@@ -5,6 +5,7 @@
 #include "scan.cl"
 #include "sort.cl"
 #include "rasterize.cl"
+#include "rasterize_hide.cl"
 #include "shade.cl"
 #include "normals.cl"
 #include "gather.cl"

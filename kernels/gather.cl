@@ -4,7 +4,7 @@
 
 /// One work-item per (view, target) of `targets`, or per target where the views are summed.
 /// in   pair_starts    uint[view * face + 1]  runs of `face_pairs`
-/// in   face_pairs     uint[...]              pairs of a face of a view
+/// in   face_pairs     uint[...]              pairs of a face of a view, or DPR_NO_PAIR
 /// in   corner_starts  uint[target + 1]
 /// in   corners        uint[corner]           face * 3 + corner, by target
 /// in   partial        float[pair][9]         gradients of the three corners
@@ -23,7 +23,8 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
     for (uint k = corner_starts[target]; k < corner_starts[target + 1]; ++k) {
       const uint face = view * p.faces + corners[k] / 3, corner = corners[k] % 3;
       for (uint place = pair_starts[face]; place < pair_starts[face + 1]; ++place) {
-        sum += vload3(0, partial + 9 * face_pairs[place] + 3 * corner);
+        const uint pair = face_pairs[place];
+        if (pair != DPR_NO_PAIR) sum += vload3(0, partial + 9 * pair + 3 * corner);
       }
     }
   }
@@ -44,8 +45,10 @@ kernel void gather_faces(const FrameParams p, global const uint* restrict pair_s
   float4 sum = (float4)(0.0f);
   for (uint view = 0; view < p.views; ++view) {
     const uint face = view * p.faces + ordered[i];
-    for (uint place = pair_starts[face]; place < pair_starts[face + 1]; ++place)
-      sum += vload4(face_pairs[place], partial);
+    for (uint place = pair_starts[face]; place < pair_starts[face + 1]; ++place) {
+      const uint pair = face_pairs[place];
+      if (pair != DPR_NO_PAIR) sum += vload4(pair, partial);
+    }
   }
   channels[i] = sum.x;
   channels[p.faces + i] = sum.y;

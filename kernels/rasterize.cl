@@ -37,7 +37,6 @@ static inline uint pixel_of(const FrameParams p, const TileShare s, uint bit) {
   return (s.view * p.height + s.row + bit / DPR_TILE) * p.width + s.column + bit % DPR_TILE;
 }
 
-static inline ulong whole_mask(uint2 mask) { return (ulong)mask.y << 32 | mask.x; }
 static inline uint lowest_bit_of(ulong mask) { return 63 - (uint)clz(mask & -mask); }
 
 /// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur

@@ -7,6 +7,8 @@
 
 static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
+static inline ulong whole_mask(uint2 mask) { return (ulong)mask.y << 32 | mask.x; }
+
 /// Lanes of truth as bits.
 static inline uint lane_bits(intn condition) {
 #if DPR_WIDTH == 1

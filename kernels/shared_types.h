@@ -45,6 +45,9 @@ using float4 = cl_float4;
 /// few millionths of a pixel at 4096x4096.
 #define DPR_SLIVER_AREA 1e-12f
 
+/// In place of a pair of which nothing is seen, where faces list theirs.
+#define DPR_NO_PAIR 0xffffffffu
+
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu
 

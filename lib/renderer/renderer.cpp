@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include "dpr/error.hpp"
 #include "renderer/finite.hpp"
@@ -112,6 +113,8 @@ void Renderer::Impl::hide_back_faces() {
 void Renderer::Impl::set_up() {
   frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
+  rasterize.hiding.reset();
+  if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
 }

@@ -128,6 +128,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::optional<FrameCounts> reserved;     // by the caller
   std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
 
+  float hidden_reach = 0;  // normalised depth behind a triangle from where on nothing is seen; or infinite
+
   std::optional<Geometry> geometry;
   std::vector<Band> bands;  // of the last forward()
 

@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
+#include "smoothing/priors.hpp"
 
 namespace dpr {
 namespace {
@@ -55,6 +57,13 @@ float blur_distance(const Smoothing& smoothing) {
   if (is_sharp(smoothing)) return 0;
   const float radius = blur_radius(smoothing);
   return smoothing.distance == DistanceMetric::euclidean ? radius : std::sqrt(radius);
+}
+
+/// Normalised depth behind a triangle from where on nothing is seen. Infinite where distances have noise:
+/// then triangles are not opaque.
+float depth_of_hidden(const Smoothing& smoothing) {
+  if (!is_sharp(smoothing)) return std::numeric_limits<float>::infinity();
+  return smoothing.gamma * static_cast<float>(row_of(smoothing.depth_prior).hidden_behind);
 }
 
 /// NDC are the frame's own: the raster has the same middle, and reaches beyond them.
@@ -244,6 +253,7 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
   frame.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   frame.blur_distance = prepared.blur_distance;
   frame.sharp = is_sharp(scene.smoothing) ? 1 : 0;
+  hidden_reach = depth_of_hidden(scene.smoothing);
   raster = prepared.raster;
   set_raster(frame, scene, raster);
   gradient_map.reset();

@@ -44,6 +44,7 @@ constexpr std::array<PriorRow, 5> k_priors{
       .density = gaussian_density,
       .score = [](double z) { return z; },
       .variance = 1,
+      .hidden_behind = 8.5,
       .pixel_reach = 4.5,
       .spectrum = gaussian_spectrum,
       .pixel_nodes = 2},
@@ -62,6 +63,7 @@ constexpr std::array<PriorRow, 5> k_priors{
       .density = logistic_density,
       .score = [](double z) { return std::tanh(0.5 * z); },
       .variance = std::numbers::pi * std::numbers::pi / 3,
+      .hidden_behind = 24,
       .pixel_reach = 10.5,
       .pixel_taper = 1.2},
      {.prior = Prior::gumbel,
@@ -70,13 +72,15 @@ constexpr std::array<PriorRow, 5> k_priors{
       .density = [](double x) { return std::exp(-x - std::exp(-x)); },
       .score = [](double z) { return -std::expm1(-z); },
       .asymmetric_quantile = [](double u) { return -std::log(-std::log(u)); },
-      .variance = std::numbers::pi * std::numbers::pi / 6},
+      .variance = std::numbers::pi * std::numbers::pi / 6,
+      .hidden_behind = 20.8},
      {.prior = Prior::uniform,
       .name = "uniform",
       .upper_quantile = [](double tail) { return 0.5 - tail; },
       .density = [](double x) { return std::abs(x) < 0.5 ? 1.0 : 0.0; },
       .score = nullptr,
       .variance = 1.0 / 12,
+      .hidden_behind = 1,
       .pixel_reach = 0.5}}};
 
 }  // namespace

@@ -24,6 +24,8 @@ struct PriorRow {
   /// Where the blur radius ends, in sigmas, whatever the occupancy there.
   double longest_reach = std::numeric_limits<double>::infinity();
   double variance = std::numeric_limits<double>::infinity();
+  /// What lies this much further behind, in scales, is the nearer one with a probability below 1e-9.
+  double hidden_behind = std::numeric_limits<double>::infinity();
   /// Noise of a pixel's position: where it ends, in scales, and how far before that its density, there below
   /// 4e-4 of the peak, Cauchy's below 3e-2, starts to fall to zero.
   double pixel_reach = 0, pixel_taper = 0.5;

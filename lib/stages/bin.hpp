@@ -25,8 +25,9 @@ class Bin {
   Buffer<cl_uint> pair_face;    ///< [pair] view * faces + face
   Buffer<cl_uint> pair_tile;    ///< [pair] view * tiles + tile
   Buffer<cl_uint> tile_starts;  ///< [view * tile + 1] runs of pairs
-  Buffer<cl_uint> face_pairs;   ///< the pairs of every face of every view
+  Buffer<cl_uint> face_pairs;   ///< [place] the pairs of every face of every view, or DPR_NO_PAIR
   Buffer<cl_uint> pair_starts;  ///< [view * face + 1] runs of `face_pairs`
+  Buffer<cl_uint> places;       ///< [pair] where its face lists it
 
   std::size_t bytes() const;
 
@@ -40,7 +41,7 @@ class Bin {
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Scan scan_;
   Sort sort_;
-  Buffer<cl_uint> place_face_, places_;  // [pair] before sorting, in face order; and what sorting permutes
+  Buffer<cl_uint> place_face_;  // [place]
 };
 
 }  // namespace dpr

@@ -7,6 +7,7 @@ namespace dpr {
 Rasterize::Rasterize(Device::Impl& device)
     : device_(device),
       cover_(device, "rasterize.cl", "rasterize_cover"),
+      hide_(device, "rasterize_hide.cl", "rasterize_hide"),
       count_(device, "rasterize.cl", "rasterize_count"),
       rows_(device, "rasterize.cl", "rasterize_rows"),
       fit_(device, "rasterize.cl", "rasterize_fit"),
@@ -71,6 +72,10 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
   cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
   if (clip != nullptr) clip->cover(p, triangles, bin, masks, counts_);
+  if (hiding) {
+    hide_(tiles_of(p), p, hiding->reach, hiding->cameras, bin.tile_starts, triangles, bin.pair_face,
+          bin.places, masks, counts_, bin.face_pairs);
+  }
   scan_(length(pairs), counts_, fragment_starts);
   count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, counts_);
   scan_(pixels, counts_, pixel_starts);

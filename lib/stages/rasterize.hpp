@@ -28,6 +28,13 @@ struct ContourCount {
   const Buffer<cl_uint>& starts;
 };
 
+/// What no fragments are made of, where all triangles are opaque: what lies further than `reach`, normalised
+/// depth, behind another.
+struct Hiding {
+  float reach;
+  const Buffer<shared::ViewParams>& cameras;
+};
+
 /// Rows of as many pixels of the frame.
 struct PixelBlock {
   Range row(std::size_t r) const { return {first + r * stride, columns}; }
@@ -104,6 +111,7 @@ class Rasterize {
       3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
 
   Clip* clip = nullptr;                         ///< of frames with faces that cross the near plane
+  std::optional<Hiding> hiding;                 ///< none: everything may be seen
   std::optional<Band> band;                     ///< whose fragments these are
   std::size_t fragments = 0;                    ///< of the band; or the capacity
   std::size_t frame_fragments = 0;              ///< of all bands
@@ -135,6 +143,9 @@ class Rasterize {
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::Triangle>, In<cl_uint>, In<cl_uint>,
          Out<cl_uint2>, Out<cl_uint>>
       cover_;
+  Kernel<shared::FrameParams, float, In<shared::ViewParams>, In<cl_uint>, In<shared::Triangle>, In<cl_uint>,
+         In<cl_uint>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>>
+      hide_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>>
       rows_;

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include "reference/priors.hpp"
+#include "smoothing/priors.hpp"
 #include "support/messages.hpp"
 
 using namespace dpr;
@@ -40,9 +42,32 @@ double reach(Prior prior, float threshold) {
   return static_cast<double>(blur_radius(smoothing));
 }
 
+/// P(Z1 - Z2 > apart), by the trapezoidal rule.
+double probability_of_difference(reference::Prior prior, double apart) {
+  constexpr double k_step = 1e-3, k_end = 60;
+  double sum = 0;
+  for (double x = -k_end; x < k_end; x += k_step)
+    sum += reference::density(prior, x) * std::exp(reference::log_survival(prior, x + apart));
+  return k_step * sum;
+}
+
 }  // namespace
 
 TEST_SUITE("unit") {
+  TEST_CASE("what is hidden is in front once in a billion times") {
+    for (const Prior prior : choices<Prior>()) {
+      const double behind = row_of(prior).hidden_behind;
+      CAPTURE(to_string(prior));
+      if (prior == Prior::cauchy) {
+        CHECK(behind == std::numeric_limits<double>::infinity());
+        continue;
+      }
+      const auto its = static_cast<reference::Prior>(prior);
+      CHECK(probability_of_difference(its, behind) < 1e-9);
+      CHECK(probability_of_difference(its, 0.98 * behind) > (prior == Prior::uniform ? 0 : 1e-9));
+    }
+  }
+
   TEST_CASE("the blur radius is where the occupancy falls to the threshold") {
     for (const Prior prior : choices<Prior>()) {
       for (const float threshold : {0.49F, 0.1F, 4e-3F, 1e-4F, 1e-12F, 1e-38F}) {

@@ -186,6 +186,29 @@ Worst compare_gradients(const NdcFrame& frame, const std::vector<NdcTriangle>& t
   return worst;
 }
 
+/// How many fragments a frame has left out or kept in error: left out is what the nearest corner of its
+/// triangle puts behind the furthest one of another that covers the sample, by more than the reach.
+std::size_t count_wrongly_hidden(const FoundFragments& all, const FoundFragments& seen,
+                                 const std::vector<NdcTriangle>& triangles, std::size_t faces, double reach) {
+  constexpr double k_rounding = 1e-5;
+  const auto corners = [&](const FragmentKey& key) {
+    const NdcTriangle& t = triangles[key.view * faces + key.face];
+    return std::minmax({number(t[0].z), number(t[1].z), number(t[2].z)});
+  };
+  std::map<std::tuple<std::size_t, int, int>, double> ends;
+  for (const auto& [key, fragment] : all.all) {
+    double& end = ends.try_emplace({key.view, key.row, key.column}, INFINITY).first->second;
+    end = std::min(end, corners(key).second + reach);
+  }
+  std::size_t wrong = 0;
+  for (const auto& [key, fragment] : all.all) {
+    const double beyond = corners(key).first - ends.at({key.view, key.row, key.column});
+    if (std::abs(beyond) > k_rounding) wrong += seen.all.contains(key) == (beyond > 0);
+  }
+  for (const auto& [key, fragment] : seen.all) wrong += !all.all.contains(key);
+  return wrong;
+}
+
 /// Measured 1.2e-5.
 constexpr double k_gradient = 2.4e-5;
 
@@ -239,6 +262,37 @@ TEST_SUITE("unit") {
     CHECK(found.unordered == 0);
     CHECK(found.all.size() % 3 == 0);
     CHECK(compare({10, 10}, {t, t, t}, found).passes());
+  }
+
+  TEST_CASE("rasterize: what lies far enough behind another triangle is left out, and nothing else") {
+    const NdcFrame frame{22, 12, 0.0F, false, true, 1, 100, static_cast<std::size_t>(reduced(3, 1))};
+    std::vector<NdcTriangle> triangles =
+        dpr::test::random_triangles(frame.views * static_cast<std::size_t>(reduced(40, 24)), 0.5F, 2);
+    for (NdcTriangle& t : triangles) t[1].z = 0.05F * t[1].z + 0.95F * t[0].z;
+    for (NdcTriangle& t : triangles) t[2].z = 0.05F * t[2].z + 0.95F * t[0].z;
+    for (const float reach : {0.0F, 0.01F, 0.03F}) {
+      NdcStages whole(frame, triangles), s(frame, triangles);
+      whole.forward();
+      s.hide(reach);
+      s.forward();
+      const FoundFragments all = dpr::test::read_fragments(whole), seen = dpr::test::read_fragments(s);
+      CHECK(seen.misplaced == 0);
+      CHECK(seen.all.size() == s.rasterize.fragments);
+      CHECK(seen.all.size() < all.all.size());
+      const auto count = [&](double of) {
+        return count_wrongly_hidden(all, seen, triangles, s.params.faces, of * 99);
+      };
+      CHECK(count(number(reach)) == 0);
+      CHECK(count(number(reach) + 0.1) > 0);
+      const std::vector<cl_uint2> masks = s.rasterize.masks.download();
+      const std::vector<cl_uint> listed = s.bin.face_pairs.download(), places = s.bin.places.download();
+      for (std::size_t pair = 0; pair < s.bin.pairs; ++pair) {
+        const bool is_seen = masks[pair].s[0] != 0 || masks[pair].s[1] != 0;
+        if (is_seen) CHECK(listed[places[pair]] == pair);
+        if (listed[places[pair]] == DPR_NO_PAIR) CHECK_FALSE(is_seen);
+      }
+      CHECK(std::ranges::count(listed, DPR_NO_PAIR) > 0);
+    }
   }
 
   TEST_CASE("rasterize: nothing to rasterize leaves empty lists") {
