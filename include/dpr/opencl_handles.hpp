@@ -71,6 +71,10 @@ DPR_API void set_texels(Renderer& renderer, std::size_t mesh, std::size_t textur
 /// has given.
 DPR_API void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords,
                            const Events& events = {});
+/// [normal] of three floats, object space, of any length. Noise on the pixel goes on with the edges at which
+/// the last normals that the host has given jump.
+DPR_API void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals,
+                         const Events& events = {});
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,

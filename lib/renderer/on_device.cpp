@@ -71,6 +71,14 @@ void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texco
   enqueue(m, events, [&] { m.take_texcoords(mesh, from); });
 }
 
+void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_normals");
+  check_has_normals(m.scene, mesh);
+  const FloatVectors from = source(m, normals, {m.geometry->meshes[mesh].normals, k_vector}, "normals");
+  enqueue(m, events, [&] { m.take_normals(mesh, from); });
+}
+
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
                 const Events& events) {
   Renderer::Impl& m = renderer.impl();

@@ -80,12 +80,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_normals(std::size_t mesh, std::span<const glm::vec3> normals);
+  void set_materials(std::size_t mesh, std::span<const Material> materials);
   void set_lights(const std::optional<Lights>& lights);
   /// The same from the device, in place, for whom the host's copies stay what they were.
   void take_positions(std::size_t mesh, const FloatVectors& from);
   void take_colors(std::size_t mesh, const FloatVectors& from);
   void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
   void take_texcoords(std::size_t mesh, const FloatVectors& from);
+  void take_normals(std::size_t mesh, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
@@ -170,7 +173,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
 
   ShadeInputs shade_inputs() const {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};

@@ -117,6 +117,7 @@ Scene spoiled(Scene scene) {
     for (glm::vec3& p : instance.mesh.positions) p *= 0.9F;
     for (glm::vec3& c : instance.mesh.vertex_colors) c *= 0.5F;
     for (glm::vec3& c : instance.mesh.face_colors) c *= 0.5F;
+    for (glm::vec3& n : instance.mesh.normals) n.x += 0.4F;
     instance.transform[3].x += 0.1F;
   }
   if (!scene.lights) scene.camera.view[3].z -= 0.3F;
@@ -142,6 +143,8 @@ void set_from_buffers(const Caller& caller, Renderer& renderer, const Scene& sce
     }
     if (!mesh.textures.empty())
       set_texcoords(renderer, m, {caller.buffer(packed(std::span(mesh.texcoords)))()});
+    if (!mesh.face_normals.empty())
+      set_normals(renderer, m, {caller.buffer(laid_out(std::span(mesh.normals), 2, 3))(), 2 * sizeof(float)});
     const std::vector<float> rows = rows_of(meshes[m].transform);
     transforms.insert(transforms.end(), rows.begin(), rows.end());
   }
@@ -455,6 +458,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_positions(renderer, 1, {buffer()}), "mesh");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texels(renderer, 0, 0, {buffer()}), "texture");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texcoords(renderer, 0, {buffer()}), "without textures");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_normals(renderer, 0, {buffer()}), "without normals");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward_on_device(renderer, {buffer()}), "forward() first");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, image_view(renderer), "forward() first");
     forward_on_device(renderer);
