@@ -21,6 +21,8 @@ namespace dpr {
 struct View {
   Camera camera;
   std::vector<mat4> transforms;  ///< [mesh] object to world
+
+  bool operator==(const View&) const = default;
 };
 
 /// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r =

@@ -12,6 +12,7 @@
 #include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
+#include "stages/attribute.hpp"
 #include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
 #include "stages/clip.hpp"
@@ -110,8 +111,12 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
   void expect(const FrameCounts& counts);
-  /// Fills `aov` for the last frame, if it does not hold that already.
+  /// Fills `aov` for the last frame, if it does not hold that already, emptied or not.
   void render_aov();
+  /// The device alone knows where the mesh's vertices are.
+  void forget_positions(std::size_t mesh) noexcept;
+  /// Of all meshes; without any where one has none.
+  std::shared_ptr<CornerTexcoords> corner_texcoords_in_force();
 
   /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it. An image is
   /// known to be complete after that: where the last frame's buffers were too small, the frame is rendered
@@ -141,17 +146,19 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Bin bin;
   Rasterize rasterize;
   Shade shade;
+  std::optional<GeometryColors> geometry_colors;  // of views' own shapes, in place of those that are set
   Occupancy occupancy;
   Aggregate aggregate;
   std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
   Reduce reduce;
-  std::optional<Exchange> exchange;             // made when first asked for
-  Raster raster;                                // around the frame
-  std::shared_ptr<PixelNoise> pixel_noise;      // made when first asked for; none: the triangles' noise
-  std::optional<Auxiliary> aov;                 // made when first asked for
-  std::uint64_t aov_frame = 0;                  // the frame it holds
-  Buffer<cl_float4> aov_surface, aov_coverage;  // of noise on the pixel: Auxiliary::weigh(), as pixels
+  std::optional<Exchange> exchange;                   // made when first asked for
+  Raster raster;                                      // around the frame
+  std::shared_ptr<PixelNoise> pixel_noise;            // made when first asked for; none: the triangles' noise
+  std::optional<Auxiliary> aov;                       // made when first asked for
+  std::uint64_t aov_frame = 0;                        // the frame it holds
+  std::shared_ptr<CornerTexcoords> corner_texcoords;  // of the scene, made when first asked for
+  Buffer<cl_float4> aov_surface, aov_coverage;        // of noise on the pixel: Auxiliary::weigh(), as pixels
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]

@@ -159,6 +159,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   last_counts.reset();
   reserved.reset();
   if (pixel_noise) pixel_noise->edges.reset();
+  corner_texcoords.reset();
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
@@ -341,9 +342,13 @@ Exchange& Renderer::Impl::made_exchange() {
 void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) {
   const MeshRange& range = geometry->meshes[mesh];
   made_exchange().take(from, range.vertices, geometry->positions, range.first_vertex);
+  forget_positions(mesh);
+  rendered = false;
+}
+
+void Renderer::Impl::forget_positions(std::size_t mesh) noexcept {
   near_plane.forget(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
-  rendered = false;
 }
 
 void Renderer::Impl::take_colors(std::size_t mesh, const FloatVectors& from) {
