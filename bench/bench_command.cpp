@@ -1,9 +1,12 @@
 // dpr bench: measures the workloads, compares files of results, draws them.
 #include "bench_command.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 
+#include "cli/completion.hpp"
 #include "compare.hpp"
 #include "dpr/error.hpp"
 #include "measure_command.hpp"
@@ -67,10 +70,14 @@ std::string footer() {
 }
 
 void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
-  command
-      .add_option("--workload", options.workloads,
-                  "What to measure, may be repeated; all but sweeps if left out")
-      ->type_name("NAME");
+  CLI::Option* const workload =
+      command
+          .add_option("--workload", options.workloads,
+                      "What to measure, may be repeated; all but sweeps if left out")
+          ->type_name("NAME");
+  std::vector<std::string_view> names = bench::workload_names();
+  std::ranges::copy(bench::sweep_names(), std::back_inserter(names));
+  complete_with(*workload, names);
   command.add_flag("--sweeps", options.sweeps, "Measure the sweeps too");
   command
       .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")

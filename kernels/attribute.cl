@@ -57,3 +57,167 @@ kernel void attribute_residual_backward(const uint pixels, global const float4* 
   const float3 grad = grad_residual[i].xyz;
   grad_images[i] = (float4)(grad, -dot(grad, target[i].xyz));
 }
+
+/// What vertices show of where they are. One work-item per (view, vertex).
+/// in   shows_depth  1: view depth, in all three channels; 0: the world position
+/// in   shown_views  those behind these show 1
+/// in   world        float4[view][vertex]
+/// in   ndc          float4[view][vertex]  z = view depth
+/// out  colors       float4[view][vertex]
+kernel void attribute_vertices_forward(const FrameParams p, const uint shows_depth, const uint shown_views,
+                                       global const float4* restrict world, global const float4* restrict ndc,
+                                       global float4* restrict colors) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const float3 shown = shows_depth ? (float3)(ndc[i].z) : world[i].xyz;
+  colors[i] = (float4)(i < shown_views * p.vertices ? shown : (float3)(1.0f), 0.0f);
+}
+
+/// Its gradient, put where the way of vertices back to positions and poses begins. One work-item per
+/// (view, vertex).
+/// in      shows_depth, shown_views  as attribute_vertices_forward
+/// in      grad_colors  float4[view][vertex]
+/// in out  grad_depth   float4[view][vertex]  whose z is of view depth; not touched unless that is shown
+/// out     grad_world   float4[view][vertex]
+kernel void attribute_vertices_backward(const FrameParams p, const uint shows_depth, const uint shown_views,
+                                        global const float4* restrict grad_colors,
+                                        global float4* restrict grad_depth,
+                                        global float4* restrict grad_world) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const float3 grad = i < shown_views * p.vertices ? grad_colors[i].xyz : (float3)(0.0f);
+  if (shows_depth) grad_depth[i].z += grad.x + grad.y + grad.z;
+  grad_world[i] = (float4)(shows_depth ? (float3)(0.0f) : grad, 0.0f);
+}
+
+/// A face's normal before it is made of length 1, on the side from which it winds counter-clockwise.
+static inline float3 long_normal(global const float4* world, uint4 face) {
+  const float3 a = world[face.x].xyz;
+  return cross(world[face.y].xyz - a, world[face.z].xyz - a);
+}
+
+/// 0: a face without area has no normal.
+static inline float inverse_length(float3 v) {
+  const float size = length(v);
+  return size > 0.0f && isfinite(size) ? 1.0f / size : 0.0f;
+}
+
+static inline float3 corner_at(global const float4* world, uint4 face, uint corner) {
+  return world[corner == 0 ? face.x : corner == 1 ? face.y : face.z].xyz;
+}
+
+/// What faces show of how they lie: their normals, of length 1. One work-item per (view, face).
+/// in   shown_views  those behind these show 1
+/// in   faces        uint4[face]  vertex indices
+/// in   world        float4[view][vertex]
+/// out  colors       float4[view][face]
+kernel void attribute_normals_forward(const FrameParams p, const uint shown_views,
+                                      global const uint4* restrict faces, global const float4* restrict world,
+                                      global float4* restrict colors) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.faces) return;
+  const uint view = i / p.faces;
+  const float3 normal = long_normal(world + view * p.vertices, faces[i % p.faces]);
+  colors[i] = (float4)(view < shown_views ? normal * inverse_length(normal) : (float3)(1.0f), 0.0f);
+}
+
+/// Its gradient at the vertices. One work-item per (view, vertex).
+/// in   shown_views, faces, world  as attribute_normals_forward
+/// in   corner_starts  uint[vertex + 1]    runs of `corners`
+/// in   corners        uint[corner]        the faces around a vertex, as face * 3 + corner
+/// in   grad_colors    float4[view][face]
+/// out  grad_world     float4[view][vertex]
+kernel void attribute_normals_backward(const FrameParams p, const uint shown_views,
+                                       global const uint4* restrict faces,
+                                       global const uint* restrict corner_starts,
+                                       global const uint* restrict corners,
+                                       global const float4* restrict world,
+                                       global const float4* restrict grad_colors,
+                                       global float4* restrict grad_world) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  float3 sum = (float3)(0.0f);
+  const uint last = view < shown_views ? corner_starts[vertex + 1] : corner_starts[vertex];
+  for (uint k = corner_starts[vertex]; k < last; ++k) {
+    const uint face = corners[k] / 3, at = corners[k] % 3;
+    global const float4* of_view = world + view * p.vertices;
+    const float3 normal = long_normal(of_view, faces[face]), grad = grad_colors[view * p.faces + face].xyz;
+    const float scale = inverse_length(normal);
+    const float3 unit = normal * scale, g = scale * (grad - unit * dot(unit, grad));
+    // cross(b - a, c - a) . g has the gradient cross(b - c, g) by a, and so on around the face.
+    sum += cross(
+        corner_at(of_view, faces[face], (at + 1) % 3) - corner_at(of_view, faces[face], (at + 2) % 3), g);
+  }
+  grad_world[i] = (float4)(sum, 0.0f);
+}
+
+/// Rows of numbers as colours of what shows them, three channels a pass; behind the last channel, and in
+/// passes behind all of them, 0 and 1. One work-item per (pass, view, shown). in   passes, views, shown,
+/// channels  in `size` in   row_of  uint[shown] in   values  float[row][channel] out  colors
+/// float4[pass][view][shown]
+kernel void attribute_rows_forward(const uint4 size, global const uint* restrict row_of,
+                                   global const float* restrict values, global float4* restrict colors) {
+  const uint i = (uint)get_global_id(0), shown = size.z, channels = size.w;
+  if (i >= size.x * size.y * shown) return;
+  const uint first = 3 * (i / (size.y * shown));
+  global const float* row = values + (size_t)row_of[i % shown] * channels + first;
+  colors[i] = first >= channels ? (float4)(1.0f, 1.0f, 1.0f, 0.0f)
+                                : (float4)(row[0], first + 1 < channels ? row[1] : 0.0f,
+                                           first + 2 < channels ? row[2] : 0.0f, 0.0f);
+}
+
+/// Its gradient: the views in order, in each all that show the row. One work-item per (row, channel).
+/// in   rows, views, shown, channels  in `size`
+/// in   starts  uint[row + 1]  runs of `shown_by`
+/// in   shown_by     uint[...]
+/// in   grad_colors  float[pass][view][shown][4]
+/// out  grad         float[row][channel]
+kernel void attribute_rows_backward(const uint4 size, global const uint* restrict starts,
+                                    global const uint* restrict shown_by,
+                                    global const float* restrict grad_colors, global float* restrict grad) {
+  const uint i = (uint)get_global_id(0), views = size.y, shown = size.z, channels = size.w;
+  if (i >= size.x * channels) return;
+  const uint row = i / channels, channel = i - row * channels;
+  float sum = 0.0f;
+  for (uint view = 0; view < views; ++view) {
+    global const float* of_view = grad_colors + 4 * (size_t)((channel / 3 * views + view) * shown);
+    for (uint k = starts[row]; k < starts[row + 1]; ++k) sum += of_view[4 * shown_by[k] + channel % 3];
+  }
+  grad[i] = sum;
+}
+
+/// Positions of vertices at what is shown, a whole shape after another: `copies` of `sources` shapes in turn.
+/// One work-item per (copy, shown).
+/// in   copies, sources, shown, vertices  in `size`
+/// in   vertex_of  uint[shown]
+/// in   positions  float4[source][vertex]
+/// out  moved      float4[copy][shown]
+kernel void attribute_positions_forward(const uint4 size, global const uint* restrict vertex_of,
+                                        global const float4* restrict positions,
+                                        global float4* restrict moved) {
+  const uint i = (uint)get_global_id(0), shown = size.z;
+  if (i >= size.x * shown) return;
+  moved[i] = positions[i / shown % size.y * size.w + vertex_of[i % shown]];
+}
+
+/// Its gradient: the copies in order, in each all that show the vertex. One work-item per (source, vertex).
+/// in   copies, sources, shown, vertices  in `size`
+/// in   starts      uint[vertex + 1]  runs of `shown_by`
+/// in   shown_by    uint[...]
+/// in   grad_moved  float4[copy][shown]
+/// out  grad        float4[source][vertex]  w = 0
+kernel void attribute_positions_backward(const uint4 size, global const uint* restrict starts,
+                                         global const uint* restrict shown_by,
+                                         global const float4* restrict grad_moved,
+                                         global float4* restrict grad) {
+  const uint i = (uint)get_global_id(0), vertices = size.w;
+  if (i >= size.y * vertices) return;
+  const uint vertex = i % vertices;
+  float3 sum = (float3)(0.0f);
+  for (uint copy = i / vertices; copy < size.x; copy += size.y) {
+    for (uint k = starts[vertex]; k < starts[vertex + 1]; ++k)
+      sum += grad_moved[copy * size.z + shown_by[k]].xyz;
+  }
+  grad[i] = (float4)(sum, 0.0f);
+}

@@ -87,3 +87,51 @@ kernel void auxiliary_weigh(const FrameParams p, global const float* restrict ou
   coverage[pixel] =
       alpha * (float4)(1.0f, outputs[DPR_AUXILIARY_EFFECTIVE_FACES * pixels + pixel], 0.0f, 0.0f);
 }
+
+/// The samples' outputs as those of pixels: with noise on the pixel the face and where it is seen are those
+/// of the sample at the pixel's centre or, of an even number, behind it, and the rest is the mean over what
+/// covers the pixel. One work-item per pixel of the images. in   image      uint4  width and height of an
+/// image, samples along a pixel's side and around the image in   blurred    1: noise on the pixel; else a
+/// sample is a pixel, and there are no `surface` and `coverage` in   has_uv     1: every corner of a face has
+/// texture coordinates in   outputs    float[DPR_AUXILIARY_CHANNELS][sample],  face_id  uint[sample]  as
+/// auxiliary_forward in   surface, coverage  float4[pixel]  as auxiliary_weigh, blurred in   texcoord_of
+/// uint[face * 3 + corner],  texcoords  float2[...] out  normals    float4[pixel]  the normal; w = depth out
+/// places     float4[pixel]  barycentrics, 0 on the background; w = the effective number of faces out  uvs
+/// float2[pixel]  0 on the background out  faces      uint[pixel]    DPR_NO_FACE on the background
+kernel void auxiliary_finish(const FrameParams p, const uint4 image, const uint blurred, const uint has_uv,
+                             global const float* restrict outputs, global const uint* restrict face_id,
+                             global const float4* restrict surface, global const float4* restrict coverage,
+                             global const uint* restrict texcoord_of, global const float2* restrict texcoords,
+                             global float4* restrict normals, global float4* restrict places,
+                             global float2* restrict uvs, global uint* restrict faces) {
+  const uint i = (uint)get_global_id(0), pixels = image.x * image.y, samples = p.views * p.width * p.height;
+  if (i >= p.views * pixels) return;
+  const uint pixel = i % pixels, row = image.w + pixel / image.x * image.z + image.z / 2,
+             column = image.w + pixel % image.x * image.z + image.z / 2;
+  const uint sample = (i / pixels * p.height + row) * p.width + column, face = face_id[sample];
+  float4 normal = (float4)(outputs[DPR_AUXILIARY_NORMAL * samples + sample],
+                           outputs[(DPR_AUXILIARY_NORMAL + 1) * samples + sample],
+                           outputs[(DPR_AUXILIARY_NORMAL + 2) * samples + sample],
+                           outputs[DPR_AUXILIARY_DEPTH * samples + sample]);
+  float effective_faces = outputs[DPR_AUXILIARY_EFFECTIVE_FACES * samples + sample];
+  if (blurred) {
+    const float scale = coverage[i].x > 0.0f ? 1.0f / coverage[i].x : 0.0f;
+    normal = (float4)(normalized(surface[i].yzw), surface[i].x * scale);
+    effective_faces = coverage[i].y * scale;
+  }
+  float3 place = (float3)(0.0f);
+  float2 uv = (float2)(0.0f, 0.0f);
+  if (face != DPR_NO_FACE) {
+    const float b1 = outputs[DPR_AUXILIARY_BARYCENTRICS * samples + sample],
+                b2 = outputs[(DPR_AUXILIARY_BARYCENTRICS + 1) * samples + sample];
+    place = (float3)(1.0f - b1 - b2, b1, b2);
+    if (has_uv) {
+      uv = place.x * texcoords[texcoord_of[3 * face]] + place.y * texcoords[texcoord_of[3 * face + 1]] +
+           place.z * texcoords[texcoord_of[3 * face + 2]];
+    }
+  }
+  normals[i] = normal;
+  places[i] = (float4)(fmax(place, 0.0f), effective_faces);
+  uvs[i] = uv;
+  faces[i] = face;
+}

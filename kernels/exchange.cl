@@ -2,23 +2,20 @@
 // its channels: what lets a program keep everything on the device.
 #include "shared_types.h"
 
-/// Copies vectors of floats from one layout to another. A layout is the first float, the floats from one
-/// group to the next, the vectors of a group, which follow one another, and the floats of a vector. One
-/// work-item per vector. What the source has not is 0.
-/// in   vectors   how many there are
-/// in   from, to  uint4  the layouts
-/// in   clean     1: numbers that are not finite become 0
-/// in   source    float[...]
-/// out  target    float[...]
+/// Copies vectors of floats, bit by bit, from one layout to another. A layout is the first float, the floats
+/// from one group to the next, the vectors of a group, which follow one another, and the floats of a vector.
+/// One work-item per vector. What the source has not is 0. in   vectors   how many there are in   from, to
+/// uint4  the layouts in   clean     1: numbers that are not finite become 0 in   source    float[...] out
+/// target    float[...]
 kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 to, const uint clean,
-                             global const float* restrict source, global float* restrict target) {
+                             global const uint* restrict source, global uint* restrict target) {
   const uint i = (uint)get_global_id(0);
   if (i >= vectors) return;
-  global const float* in = source + from.x + (size_t)(i / from.z) * from.y + i % from.z * from.w;
-  global float* out = target + to.x + (size_t)(i / to.z) * to.y + i % to.z * to.w;
+  global const uint* in = source + from.x + (size_t)(i / from.z) * from.y + i % from.z * from.w;
+  global uint* out = target + to.x + (size_t)(i / to.z) * to.y + i % to.z * to.w;
   for (uint k = 0; k < to.w; ++k) {
-    const float value = k < from.w ? in[k] : 0.0f;
-    out[k] = clean && !isfinite(value) ? 0.0f : value;
+    const uint bits = k < from.w ? in[k] : 0;
+    out[k] = clean && !isfinite(as_float(bits)) ? 0 : bits;
   }
 }
 

@@ -56,10 +56,8 @@ class DPR_API AttributeImages {
 
   /// Renders what the renderer's last forward() shows: its scene, views, shapes, smoothing and culling as
   /// they are now. Throws InvalidArgument before that, for a renderer of another Device, for values that do
-  /// not fit its vertices, for texcoords of a mesh without, and while positions, transforms or view matrices
-  /// come from a buffer (set_positions(), set_transforms() and set_view_matrices() of
-  /// dpr/opencl_handles.hpp): the host computes what surfaces show. set_shapes() and set_texcoords() from a
-  /// buffer are no hindrance.
+  /// not fit its vertices, and for texcoords of a mesh without. What comes from buffers, as
+  /// dpr/opencl_handles.hpp has it, is followed on the device; that also does all of this without the host.
   void forward(const Renderer& renderer);
 
   std::size_t channels() const;

@@ -12,6 +12,8 @@ namespace dpr {
 /// Pinhole intrinsics in pixels; the origin is the corner of the top-left pixel, x right, y down.
 struct Intrinsics {
   float fx = 0, fy = 0, cx = 0, cy = 0;
+
+  bool operator==(const Intrinsics&) const = default;
 };
 
 /// Radial and tangential distortion, with OpenCV's coefficients in OpenCV's order: with x and y in its axes
@@ -27,6 +29,8 @@ struct Intrinsics {
 /// gradients, nor in those of the intrinsics beside it, but in all others.
 struct Distortion {
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+
+  bool operator==(const Distortion&) const = default;
 };
 
 /// The tangent of the angle from the axis where r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops to rise; infinity
@@ -44,6 +48,8 @@ struct Camera {
   /// Orthographic instead of perspective: > 0, world units from the lower to the upper edge of the image.
   /// Then there are neither intrinsics nor distortion, and fov_y_degrees is ignored.
   std::optional<float> orthographic_height{};
+
+  bool operator==(const Camera&) const = default;
 };
 
 /// NDC of a camera-space point at depth d = -z: (scale.x * x / d + offset.x, scale.y * y / d + offset.y), of

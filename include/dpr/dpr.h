@@ -47,6 +47,8 @@ typedef struct dpr_device dpr_device;
 typedef struct dpr_scene dpr_scene;
 typedef struct dpr_renderer dpr_renderer;
 typedef struct dpr_loss dpr_loss;
+typedef struct dpr_mesh_loss dpr_mesh_loss;
+typedef struct dpr_attribute dpr_attribute;
 typedef struct dpr_gradient dpr_gradient;
 
 /* ---- Device ---- */
@@ -108,6 +110,12 @@ typedef struct dpr_texture {
 /* The texture of a face that has none. */
 #define DPR_TEXTURE_NONE UINT32_MAX
 
+/* What a surface shows of highlights: those of the lights are multiplied by `specular`. */
+typedef struct dpr_material {
+  float specular[3];
+  float shininess; /* >= 1; 0: that of the lights */
+} dpr_material;
+
 /* At most one of the two colour arrays is given; with neither the mesh is white. Textures are multiplied by
  * the colours, and need texcoords and face_texcoords. */
 typedef struct dpr_mesh {
@@ -125,10 +133,19 @@ typedef struct dpr_mesh {
   const dpr_texture* textures;    /* [texture_count], or NULL */
   size_t texture_count;
   const uint32_t* face_textures; /* [face], indices of textures or DPR_TEXTURE_NONE; NULL: all the first */
+  const float* normals;          /* [normal][3], object space, of any length; NULL: those of the faces */
+  size_t normal_count;
+  const uint32_t* face_normals;  /* [face][3], indices of normals, or NULL */
+  const dpr_material* materials; /* [material_count], or NULL */
+  size_t material_count;
+  const uint32_t* face_materials; /* [face], indices of materials; NULL: all the first */
 } dpr_mesh;
 
-#define DPR_MESH_INIT \
-  { sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, 0, NULL }
+#define DPR_MESH_INIT                                                                                        \
+  {                                                                                                          \
+    sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, \
+        0, NULL                                                                                              \
+  }
 
 typedef enum dpr_shading {
   DPR_SHADING_FLAT = 0,
@@ -190,8 +207,8 @@ DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* ke
  * takes the scene. */
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
 /* What backward passes compute: "positions", "colors", "transform", "camera", "lights", "smoothing",
- * "background", "texture" (the texels), "texcoords", "distortion" (of lenses). Without this call all but
- * "lights" and the last three. */
+ * "background", "texture" (the texels), "texcoords", "distortion" (of lenses), "normals", "materials".
+ * Without this call all but "lights" and the last five. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -216,6 +233,24 @@ DPR_API dpr_status dpr_renderer_set_texels(dpr_renderer* renderer, size_t mesh, 
 /* New texture coordinates of a mesh that has textures, [texcoord][2], `count` floats: as many as it has. */
 DPR_API dpr_status dpr_renderer_set_texcoords(dpr_renderer* renderer, size_t mesh, const float* texcoords,
                                               size_t count);
+/* New normals of a mesh that gives some, [normal][3], `count` floats: as many as it has. */
+DPR_API dpr_status dpr_renderer_set_normals(dpr_renderer* renderer, size_t mesh, const float* normals,
+                                            size_t count);
+/* New materials of a mesh that has some, `count` of them: as many as it has. */
+DPR_API dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, size_t mesh,
+                                              const dpr_material* materials, size_t count);
+/* Gives every view a shape of its own: [view][vertex][3] and [view][color][3], each of all meshes one after
+ * the other, so many floats. NULL and 0: the scene's. */
+DPR_API dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions,
+                                           size_t position_count, const float* colors, size_t color_count);
+/* New lights; NULL: none. */
+DPR_API dpr_status dpr_renderer_set_lights(dpr_renderer* renderer, const dpr_lights* lights);
+/* The smoothing that the scene has now, and nothing else of it. */
+DPR_API dpr_status dpr_renderer_set_smoothing(dpr_renderer* renderer, const dpr_scene* scene);
+/* These as those of a scene. */
+DPR_API dpr_status dpr_renderer_set_background(dpr_renderer* renderer, const float color[3]);
+DPR_API dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word);
+DPR_API dpr_status dpr_renderer_set_gradients(dpr_renderer* renderer, const char* const* names, size_t count);
 /* Renders every view; enqueues the work, and seldom waits for it. */
 DPR_API dpr_status dpr_renderer_forward(dpr_renderer* renderer);
 /* The floats of all images: views * height * width * 4. */
@@ -252,10 +287,31 @@ DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weig
 DPR_API dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, double* value);
 DPR_API void dpr_loss_destroy(dpr_loss* loss);
 
+/* A loss of a mesh's shape alone: terms of dpr/mesh_loss.hpp, which has the formulas. */
+typedef struct dpr_mesh_loss_weights {
+  size_t size;
+  float laplacian, edge_length, normal_consistency, flatness;
+  float edge_target; /* >= 0, of edge_length */
+} dpr_mesh_loss_weights;
+
+#define DPR_MESH_LOSS_WEIGHTS_INIT \
+  { sizeof(dpr_mesh_loss_weights), 0, 0, 0, 0, 0 }
+
+/* Of meshes with the faces of this one. */
+DPR_API dpr_status dpr_mesh_loss_create(const dpr_device* device, const dpr_mesh_loss_weights* weights,
+                                        const dpr_mesh* mesh, dpr_mesh_loss** loss);
+/* Of a mesh of the renderer's scene at the last forward pass. Waits for the device. */
+DPR_API dpr_status dpr_mesh_loss_evaluate(dpr_mesh_loss* loss, const dpr_renderer* renderer, size_t mesh,
+                                          double* value);
+DPR_API void dpr_mesh_loss_destroy(dpr_mesh_loss* loss);
+
 /* ---- Gradients ---- */
 
 /* Of a loss that was evaluated on the last forward pass. */
 DPR_API dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_gradient** gradient);
+/* Of the sum of that and a mesh's own, both evaluated on it. */
+DPR_API dpr_status dpr_backward_losses(dpr_renderer* renderer, const dpr_loss* loss,
+                                       const dpr_mesh_loss* mesh_loss, dpr_gradient** gradient);
 /* Of sum <grad, image> over views and pixels: grad is [view][height][width][4], `count` floats. */
 DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad, size_t count,
                                        dpr_gradient** gradient);
@@ -273,6 +329,36 @@ DPR_API dpr_status dpr_gradient_size(const dpr_gradient* gradient, const char* n
 DPR_API dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, double* values,
                                      size_t count);
 DPR_API void dpr_gradient_destroy(dpr_gradient* gradient);
+
+/* ---- What a pixel shows beside its colour ---- */
+
+/* Auxiliary outputs of the last forward pass by name: "depth", "normal" (3 floats), "face_id" (exact up to
+ * 2^24, -1 for the background), "barycentrics" (3), "uv" (2), "effective_faces"; dpr/aov.hpp says what each
+ * is. The floats of one, and its values, [view][height][width] and so on. Waits for the device. */
+DPR_API dpr_status dpr_renderer_aov_size(const dpr_renderer* renderer, const char* name, size_t* count);
+DPR_API dpr_status dpr_renderer_read_aov(dpr_renderer* renderer, const char* name, float* values,
+                                         size_t count);
+
+/* Images of "depth", "position", "normal" or "texcoords", with gradients; dpr/attribute_images.hpp has the
+ * formulas. */
+DPR_API dpr_status dpr_attribute_create(const dpr_device* device, const char* name,
+                                        dpr_attribute** attribute);
+/* Of numbers at the vertices, so many channels, which dpr_attribute_set_values() sets. */
+DPR_API dpr_status dpr_attribute_create_values(const dpr_device* device, size_t channels,
+                                               dpr_attribute** attribute);
+/* [vertex][channel], the vertices of all meshes one after the other. */
+DPR_API dpr_status dpr_attribute_set_values(dpr_attribute* attribute, const float* values, size_t count);
+/* Renders what the renderer's last forward pass shows. */
+DPR_API dpr_status dpr_attribute_forward(dpr_attribute* attribute, const dpr_renderer* renderer);
+/* The floats of the images, and these, [group][view][height][width][4]: three channels a group, and alpha.
+ * Waits for the device. */
+DPR_API dpr_status dpr_attribute_image_size(const dpr_attribute* attribute, size_t* count);
+DPR_API dpr_status dpr_attribute_read_image(const dpr_attribute* attribute, float* pixels, size_t count);
+/* Gradients of sum <grad, image>: of what the renderer's scene asked for of its geometry, poses, cameras and
+ * smoothing; "values", [vertex][channel], are the caller's numbers'. */
+DPR_API dpr_status dpr_attribute_backward_pixels(dpr_attribute* attribute, const float* grad, size_t count,
+                                                 dpr_gradient** gradient);
+DPR_API void dpr_attribute_destroy(dpr_attribute* attribute);
 
 /* ---- Everything on the device ---- */
 
@@ -324,6 +410,14 @@ DPR_API dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, size_t m
                                                 const dpr_buffer* texels, const dpr_events* events);
 DPR_API dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, size_t mesh,
                                                    const dpr_buffer* texcoords, const dpr_events* events);
+DPR_API dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, size_t mesh,
+                                                 const dpr_buffer* normals, const dpr_events* events);
+/* As dpr_renderer_set_shapes(); one that is NULL is the scene's. */
+DPR_API dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
+                                                const dpr_buffer* colors, const dpr_events* events);
+/* World to camera, [view] of twelve floats: the upper three rows of a matrix. */
+DPR_API dpr_status dpr_renderer_set_view_matrices_from(dpr_renderer* renderer, const dpr_buffer* matrices,
+                                                       const dpr_events* events);
 /* Object to world, [view][mesh] of twelve floats: the upper three rows of a matrix. */
 DPR_API dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
                                                     const dpr_events* events);
@@ -346,6 +440,27 @@ DPR_API dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_bu
                                             const dpr_events* events);
 DPR_API dpr_status dpr_renderer_copy_gradient(dpr_renderer* renderer, const char* name,
                                               const dpr_buffer* gradient, const dpr_events* events);
+/* Auxiliary outputs by name, in a buffer of the library's or to the caller's; "face_id" are int32. */
+DPR_API dpr_status dpr_renderer_aov_view(dpr_renderer* renderer, const char* name, dpr_buffer* view,
+                                         const dpr_events* events);
+DPR_API dpr_status dpr_renderer_copy_aov(dpr_renderer* renderer, const char* name, const dpr_buffer* outputs,
+                                         const dpr_events* events);
+/* The same calls for images of attributes. Values are [vertex] of as many floats as channels. */
+DPR_API dpr_status dpr_attribute_set_values_from(dpr_attribute* attribute, const dpr_buffer* values,
+                                                 size_t vertices, const dpr_events* events);
+DPR_API dpr_status dpr_attribute_reserve(dpr_attribute* attribute, const dpr_frame_room* room);
+DPR_API dpr_status dpr_attribute_forward_on_device(dpr_attribute* attribute, const dpr_renderer* renderer,
+                                                   const dpr_events* events);
+DPR_API dpr_status dpr_attribute_frame_history(dpr_attribute* attribute, size_t* emptied,
+                                               dpr_frame_room* largest);
+DPR_API dpr_status dpr_attribute_backward_on_device(dpr_attribute* attribute, const dpr_buffer* grad,
+                                                    const dpr_events* events);
+DPR_API dpr_status dpr_attribute_image_view(dpr_attribute* attribute, dpr_buffer* view);
+DPR_API dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view);
+DPR_API dpr_status dpr_attribute_copy_images(dpr_attribute* attribute, const dpr_buffer* images,
+                                             const dpr_events* events);
+DPR_API dpr_status dpr_attribute_copy_gradient(dpr_attribute* attribute, const char* name,
+                                               const dpr_buffer* gradient, const dpr_events* events);
 
 #ifdef __cplusplus
 }

@@ -26,6 +26,10 @@ struct Material {
   bool operator==(const Material&) const = default;
 };
 
+/// Throws InvalidArgument for a coefficient that is not finite, and a shininess below 1. `name` says in the
+/// message which material it is.
+DPR_API void validate(const Material& material, const std::string& name = "material");
+
 /// An indexed triangle mesh in object space. Any soup will do: shared or unshared vertices, non-manifold
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the
 /// mesh is white. A texture is multiplied by the colours.

@@ -56,6 +56,8 @@ class DPR_API MultiDeviceRenderer {
   void set_colors(std::size_t mesh, std::span<const vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
+  void set_normals(std::size_t mesh, std::span<const vec3> normals);
+  void set_materials(std::size_t mesh, std::span<const Material> materials);
   void set_lights(const std::optional<Lights>& lights);
 
   /// How many views a device renders together; 0, as at the beginning: a twelfth of them. Small chunks keep

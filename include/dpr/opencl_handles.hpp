@@ -9,6 +9,8 @@
 #include <span>
 #include <string>
 
+#include "dpr/aov.hpp"
+#include "dpr/attribute_images.hpp"
 #include "dpr/device.hpp"
 #include "dpr/export.h"
 #include "dpr/renderer.hpp"
@@ -54,9 +56,8 @@ struct Events {
 // The setters of Renderer, from buffers. They enqueue a copy into the renderer, which no later change of the
 // buffer reaches before the next call. Numbers that are not finite count as 0. Renderer::scene() and views()
 // keep the values that the host has given. The host does not know where vertices are then: every frame is
-// prepared for faces that cross the near plane, noise on the pixel keeps the faces that look away in a closed
-// mesh, and AttributeImages::forward() and losses of attributes throw InvalidArgument: until
-// Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
+// prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
+// closed mesh: until Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
 
 /// Of a mesh of the scene: [vertex] of three floats, object space.
 DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
@@ -71,6 +72,10 @@ DPR_API void set_texels(Renderer& renderer, std::size_t mesh, std::size_t textur
 /// has given.
 DPR_API void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords,
                            const Events& events = {});
+/// [normal] of three floats, object space, of any length. Noise on the pixel goes on with the edges at which
+/// the last normals that the host has given jump.
+DPR_API void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals,
+                         const Events& events = {});
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
@@ -145,6 +150,41 @@ DPR_API void copy_images(Renderer& renderer, const BufferSpan& images, const Eve
 DPR_API BufferView gradient_view(Renderer& renderer, const std::string& name);
 /// Copies one.
 DPR_API void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,
+                           const Events& events = {});
+
+/// An auxiliary output of the last frame as it is, [view][height][width] of as many floats as
+/// AuxiliaryOutputs has it, but for face_id, which are int32. Enqueues an aggregation backward pass where
+/// none of the outputs of that frame was asked for before; neither waits nor reads, but for the first of a
+/// scene with texture coordinates, and frames in several bands. Alpha is that of image_view(). Valid until
+/// the next frame whose outputs are asked for. They have no gradients: AttributeImages have. Throws
+/// InvalidArgument for uv of meshes without texture coordinates.
+DPR_API BufferView aov_view(Renderer& renderer, Aov aov, const Events& events = {});
+/// Copies one, face_id as int32 too.
+DPR_API void copy_aov(Renderer& renderer, Aov aov, const BufferSpan& outputs, const Events& events = {});
+
+// Images of attributes without the host: what AttributeImages has, as the functions above have what Renderer
+// has, and with the same rules for frames that exceed their room. The room is that of a frame with one view
+// for each view and three channels, in the barrier composition one more; contours are where numbers jump.
+
+/// AttributeImages::set_values(): [vertex] of `channels` floats, of all meshes one after the other.
+DPR_API void set_values(AttributeImages& images, const BufferSpan& values, std::size_t vertices,
+                        const Events& events = {});
+DPR_API void reserve(AttributeImages& images, const FrameRoom& room);
+/// AttributeImages::forward(), of the renderer's scene as it is now, wherever its parts have come from. The
+/// first, and one after a change of the scene, views, smoothing or request by the host, waits to follow it.
+DPR_API void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events = {});
+DPR_API FrameHistory frame_history(AttributeImages& images);
+/// The images, float4 [group][view][height][width]: RGB, and A. Valid until the next forward pass.
+DPR_API BufferView image_view(const AttributeImages& images);
+DPR_API void copy_images(AttributeImages& images, const BufferSpan& to, const Events& events = {});
+/// @param grad_images  d loss / d image, [group][view][height][width] of four floats
+DPR_API void backward_on_device(AttributeImages& images, const BufferSpan& grad_images,
+                                const Events& events = {});
+/// Those of AttributeImages::backward(), by the names of gradient_view(renderer): "meshes[0].positions",
+/// "meshes[0].texcoords", "shapes.positions", "views[0].meshes[0].rotation", "views[0].camera.translation",
+/// "sigma", ...; and "values", [vertex] of `channels` floats, the caller's.
+DPR_API BufferView gradient_view(AttributeImages& images, const std::string& name);
+DPR_API void copy_gradient(AttributeImages& images, const std::string& name, const BufferSpan& gradient,
                            const Events& events = {});
 
 /// The rendered images, float4 RGBA [view][height][width], as forward() leaves them on the device. Not

@@ -21,6 +21,8 @@ namespace dpr {
 struct View {
   Camera camera;
   std::vector<mat4> transforms;  ///< [mesh] object to world
+
+  bool operator==(const View&) const = default;
 };
 
 /// Derivative for a rotation vector r applied on the left of a matrix' linear part, A <- exp([r]x) A, at r =
@@ -115,6 +117,11 @@ class DPR_API Renderer {
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
   /// New texture coordinates for a mesh of the scene that has textures: [texcoord], as many as it has.
   void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
+  /// New normals, object space, of any length, for a mesh of the scene that gives some: [normal], as many as
+  /// it has.
+  void set_normals(std::size_t mesh, std::span<const vec3> normals);
+  /// New materials for a mesh of the scene that has some: [material], as many as it has.
+  void set_materials(std::size_t mesh, std::span<const Material> materials);
 
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after

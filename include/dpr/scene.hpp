@@ -40,6 +40,8 @@ struct GradientRequest {
   bool distortion = false;  ///< coefficients of lenses
   bool normals = false;     ///< normals that meshes give; 0 without lights
   bool materials = false;   ///< coefficients of the materials that meshes give; 0 without lights
+
+  bool operator==(const GradientRequest&) const = default;
 };
 
 struct Scene {

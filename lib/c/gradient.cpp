@@ -11,9 +11,7 @@ using dpr::c::give;
 using dpr::c::guarded;
 
 namespace dpr::c {
-namespace {
 
-/// The arrays that the scene asked for and has.
 std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradient gradient) {
   std::vector<dpr_gradient::Array> arrays;
   for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
@@ -28,6 +26,8 @@ std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradie
   });
   return arrays;
 }
+
+namespace {
 
 void give_gradient(dpr_gradient** out, const Renderer& renderer, SceneGradient gradient) {
   give(out, arrays_of(renderer, std::move(gradient)));
@@ -51,6 +51,16 @@ dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_g
     deref(gradient, "gradient");
     dpr::Renderer& r = deref(renderer, "renderer").renderer;
     dpr::c::give_gradient(gradient, r, r.backward(deref(loss, "loss").loss));
+  });
+}
+
+dpr_status dpr_backward_losses(dpr_renderer* renderer, const dpr_loss* loss, const dpr_mesh_loss* mesh_loss,
+                               dpr_gradient** gradient) {
+  return guarded([&] {
+    deref(gradient, "gradient");
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    dpr::c::give_gradient(gradient, r,
+                          r.backward(deref(loss, "loss").loss, deref(mesh_loss, "mesh_loss").loss));
   });
 }
 

@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "dpr/attribute_images.hpp"
 #include "dpr/dpr.h"
 #include "dpr/error.hpp"
 #include "dpr/image_loss.hpp"
+#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/smoothing_options.hpp"
 
@@ -30,6 +32,14 @@ struct dpr_renderer {
 
 struct dpr_loss {
   dpr::ImageLoss loss;
+};
+
+struct dpr_mesh_loss {
+  dpr::MeshLoss loss;
+};
+
+struct dpr_attribute {
+  dpr::AttributeImages images;
 };
 
 struct dpr_gradient {
@@ -108,5 +118,21 @@ std::vector<glm::vec2> to_pairs(std::span<const float> values);
 /// Row-major.
 glm::mat4 to_matrix(const float* values);
 Camera to_camera(const dpr_camera* camera, const char* argument);
+glm::vec3 to_vector(const float* values);
+/// NULL: none.
+std::optional<Lights> to_lights(const dpr_lights* given);
+/// A mesh without its transform.
+Mesh to_mesh(const dpr_mesh& given);
+std::vector<Material> to_materials(const dpr_material* given, std::size_t count, const char* argument);
+/// The smoothing that the scene has now.
+Smoothing smoothing_of(const dpr_scene& scene);
+/// Turns on the gradients that the words name.
+GradientRequest to_request(const char* const* names, std::size_t count);
+
+/// The arrays that the renderer's scene asked for and has.
+std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradient gradient);
+
+/// Throws InvalidArgument unless `count` is what is expected of the argument.
+void require_count(std::size_t count, std::size_t expected, const char* argument);
 
 }  // namespace dpr::c

@@ -1,30 +1,48 @@
 // What stays on the device, in the C interface.
-#include "c/handles.hpp"
-#include "dpr/opencl_handles.hpp"
+#include "c/buffers.hpp"
 
 using dpr::c::deref;
+using dpr::c::fill;
 using dpr::c::guarded;
+using dpr::c::to_events;
+using dpr::c::to_span;
 using dpr::c::versioned;
 
-namespace {
+namespace dpr::c {
 
-dpr::BufferSpan to_span(const dpr_buffer* given, const char* argument) {
+BufferSpan to_span(const dpr_buffer* given, const char* argument) {
   const auto buffer = versioned<dpr_buffer>(given, DPR_BUFFER_INIT, argument);
   return {buffer.buffer, buffer.byte_offset, buffer.byte_stride};
 }
 
-dpr::Events to_events(const dpr_events* given) {
+Events to_events(const dpr_events* given) {
   if (!given) return {};
   const auto events = versioned<dpr_events>(given, DPR_EVENTS_INIT, "events");
   if (events.wait_count > 0) deref(events.wait, "events.wait");
   return {{events.wait, events.wait_count}, events.done};
 }
 
-void fill(dpr_buffer* given, const dpr::BufferView& view) {
-  dpr::c::fill(given,
-               {sizeof(dpr_buffer), view.buffer, view.offset, view.stride, view.count, view.components},
-               "view");
+void fill(dpr_buffer* given, const BufferView& view) {
+  fill<dpr_buffer>(given,
+                   {sizeof(dpr_buffer), view.buffer, view.offset, view.stride, view.count, view.components},
+                   "view");
 }
+
+FrameRoom to_room(const dpr_frame_room* given) {
+  const auto room = versioned<dpr_frame_room>(given, DPR_FRAME_ROOM_INIT, "room");
+  return {room.pairs, room.fragments, room.contours};
+}
+
+void fill_history(std::size_t* emptied, dpr_frame_room* largest, const FrameHistory& history) {
+  *emptied = history.emptied;
+  const FrameRoom& room = history.largest;
+  fill<dpr_frame_room>(largest, {sizeof(dpr_frame_room), room.pairs, room.fragments, room.contours},
+                       "largest");
+}
+
+}  // namespace dpr::c
+
+namespace {
 
 dpr::Renderer& renderer_of(dpr_renderer* renderer) { return deref(renderer, "renderer").renderer; }
 
@@ -57,6 +75,30 @@ dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, std::size_t m
   });
 }
 
+dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* normals,
+                                         const dpr_events* events) {
+  return guarded(
+      [&] { dpr::set_normals(renderer_of(renderer), mesh, to_span(normals, "normals"), to_events(events)); });
+}
+
+dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
+                                        const dpr_buffer* colors, const dpr_events* events) {
+  return guarded([&] {
+    const auto optional_span = [](const dpr_buffer* given, const char* argument) {
+      return given ? to_span(given, argument) : dpr::BufferSpan();
+    };
+    dpr::set_shapes(renderer_of(renderer), optional_span(positions, "positions"),
+                    optional_span(colors, "colors"), to_events(events));
+  });
+}
+
+dpr_status dpr_renderer_set_view_matrices_from(dpr_renderer* renderer, const dpr_buffer* matrices,
+                                               const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_view_matrices(renderer_of(renderer), to_span(matrices, "matrices"), to_events(events));
+  });
+}
+
 dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
                                             const dpr_events* events) {
   return guarded([&] {
@@ -66,8 +108,8 @@ dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_bu
 
 dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room) {
   return guarded([&] {
-    const auto wanted = versioned<dpr_frame_room>(room, DPR_FRAME_ROOM_INIT, "room");
-    dpr::reserve(renderer_of(renderer), {wanted.pairs, wanted.fragments, wanted.contours});
+    const dpr::FrameRoom wanted = dpr::c::to_room(room);
+    dpr::reserve(renderer_of(renderer), wanted);
   });
 }
 
@@ -79,10 +121,7 @@ dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, std::size_t* empti
   return guarded([&] {
     deref(emptied, "emptied");
     versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
-    const dpr::FrameHistory history = dpr::frame_history(renderer_of(renderer));
-    *emptied = history.emptied;
-    const dpr::FrameRoom& room = history.largest;
-    dpr::c::fill(largest, {sizeof(dpr_frame_room), room.pairs, room.fragments, room.contours}, "largest");
+    dpr::c::fill_history(emptied, largest, dpr::frame_history(renderer_of(renderer)));
   });
 }
 

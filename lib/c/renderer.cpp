@@ -5,6 +5,7 @@
 #include "base/checks.hpp"
 #include "c/handles.hpp"
 #include "dpr/opencl_handles.hpp"
+#include "scene/cull.hpp"
 
 using dpr::InvalidArgument;
 using dpr::c::deref;
@@ -13,6 +14,13 @@ using dpr::c::guarded;
 using dpr::c::numbers;
 
 namespace dpr::c {
+
+void require_count(std::size_t count, std::size_t expected, const char* argument) {
+  if (count == expected) return;
+  throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count),
+                        std::to_string(expected));
+}
+
 namespace {
 
 constexpr std::size_t k_pixel = 4;    // floats
@@ -63,12 +71,6 @@ std::size_t image_floats(const Renderer& renderer) {
          static_cast<std::size_t>(scene.height) * k_pixel;
 }
 
-void require_count(std::size_t count, std::size_t expected, const char* argument) {
-  if (count == expected) return;
-  throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count),
-                        std::to_string(expected));
-}
-
 /// What a program's version of the struct has. The first was padded to where robust begins.
 LossWeights to_weights(const dpr_loss_weights* given) {
   const auto weights = versioned<dpr_loss_weights>(given, DPR_LOSS_WEIGHTS_INIT, "weights");
@@ -94,8 +96,7 @@ dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene
   return guarded([&] {
     deref(renderer, "renderer");
     dpr::Scene resolved = deref(scene, "scene").scene;
-    resolved.smoothing =
-        dpr::resolve_smoothing(scene->smoothing, resolved.width, resolved.height, scene->of_file);
+    resolved.smoothing = dpr::c::smoothing_of(*scene);
     renderer->renderer.set_scene(resolved);
   });
 }
@@ -145,6 +146,61 @@ dpr_status dpr_renderer_set_texcoords(dpr_renderer* renderer, std::size_t mesh, 
     dpr::Renderer& r = deref(renderer, "renderer").renderer;
     r.set_texcoords(mesh, dpr::c::to_pairs(numbers(texcoords, count, 2, "texcoords")));
   });
+}
+
+dpr_status dpr_renderer_set_normals(dpr_renderer* renderer, std::size_t mesh, const float* normals,
+                                    std::size_t count) {
+  return guarded([&] {
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    r.set_normals(mesh, dpr::c::to_vectors(numbers(normals, count, 3, "normals")));
+  });
+}
+
+dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, std::size_t mesh, const dpr_material* materials,
+                                      std::size_t count) {
+  return guarded([&] {
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    r.set_materials(mesh, dpr::c::to_materials(materials, count, "materials"));
+  });
+}
+
+dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions, std::size_t position_count,
+                                   const float* colors, std::size_t color_count) {
+  return guarded([&] {
+    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    const auto optional_vectors = [](const float* values, std::size_t count, const char* argument) {
+      return values || count > 0 ? dpr::c::to_vectors(numbers(values, count, 3, argument))
+                                 : std::vector<glm::vec3>();
+    };
+    r.set_shapes(optional_vectors(positions, position_count, "positions"),
+                 optional_vectors(colors, color_count, "colors"));
+  });
+}
+
+dpr_status dpr_renderer_set_lights(dpr_renderer* renderer, const dpr_lights* lights) {
+  return guarded([&] { deref(renderer, "renderer").renderer.set_lights(dpr::c::to_lights(lights)); });
+}
+
+dpr_status dpr_renderer_set_smoothing(dpr_renderer* renderer, const dpr_scene* scene) {
+  return guarded([&] {
+    deref(renderer, "renderer").renderer.set_smoothing(dpr::c::smoothing_of(deref(scene, "scene")));
+  });
+}
+
+dpr_status dpr_renderer_set_background(dpr_renderer* renderer, const float color[3]) {
+  return guarded([&] {
+    deref(renderer, "renderer").renderer.set_background(dpr::c::to_vector(&deref(color, "color")));
+  });
+}
+
+dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word) {
+  return guarded(
+      [&] { deref(renderer, "renderer").renderer.set_cull(dpr::parse_cull(&deref(word, "word"), "word")); });
+}
+
+dpr_status dpr_renderer_set_gradients(dpr_renderer* renderer, const char* const* names, std::size_t count) {
+  return guarded(
+      [&] { deref(renderer, "renderer").renderer.set_gradients(dpr::c::to_request(names, count)); });
 }
 
 dpr_status dpr_renderer_forward(dpr_renderer* renderer) {
@@ -205,3 +261,29 @@ dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, doubl
 }
 
 void dpr_loss_destroy(dpr_loss* loss) { delete loss; }
+
+dpr_status dpr_mesh_loss_create(const dpr_device* device, const dpr_mesh_loss_weights* weights,
+                                const dpr_mesh* mesh, dpr_mesh_loss** loss) {
+  return guarded([&] {
+    deref(loss, "loss");
+    const auto w = dpr::c::versioned<dpr_mesh_loss_weights>(weights, DPR_MESH_LOSS_WEIGHTS_INIT, "weights");
+    const dpr::Mesh shape = dpr::c::to_mesh(dpr::c::versioned<dpr_mesh>(mesh, DPR_MESH_INIT, "mesh"));
+    give(loss, dpr::MeshLoss(deref(device, "device").device,
+                             {.laplacian = w.laplacian,
+                              .edge_length = w.edge_length,
+                              .normal_consistency = w.normal_consistency,
+                              .flatness = w.flatness,
+                              .edge_target = w.edge_target},
+                             shape));
+  });
+}
+
+dpr_status dpr_mesh_loss_evaluate(dpr_mesh_loss* loss, const dpr_renderer* renderer, std::size_t mesh,
+                                  double* value) {
+  return guarded([&] {
+    deref(value, "value");
+    *value = deref(loss, "loss").loss.evaluate(deref(renderer, "renderer").renderer, mesh);
+  });
+}
+
+void dpr_mesh_loss_destroy(dpr_mesh_loss* loss) { delete loss; }

@@ -53,9 +53,9 @@ Camera to_camera(const dpr_camera* camera, const char* argument) {
   return converted;
 }
 
-namespace {
-
 glm::vec3 to_vector(const float* values) { return {values[0], values[1], values[2]}; }
+
+namespace {
 
 /// An array of [count][3]; empty for NULL.
 std::vector<glm::vec3> triples(const float* values, std::size_t count) {
@@ -118,20 +118,50 @@ void copy_textures(const dpr_mesh& given, Mesh& mesh) {
     mesh.face_textures.assign(given.face_textures, given.face_textures + given.face_count);
 }
 
-Instance to_instance(const dpr_mesh* given) {
-  const dpr_mesh mesh = versioned<dpr_mesh>(given, DPR_MESH_INIT, "mesh");
+/// Its normals and materials.
+void copy_reflection(const dpr_mesh& given, Mesh& mesh) {
+  if (given.normals) {
+    require_count(given.normal_count, "mesh.normal_count");
+    mesh.normals = triples(given.normals, given.normal_count);
+  }
+  if (given.face_normals) mesh.face_normals = to_indices(given.face_normals, given.face_count);
+  mesh.materials = to_materials(given.materials, given.material_count, "mesh.materials");
+  if (given.face_materials)
+    mesh.face_materials.assign(given.face_materials, given.face_materials + given.face_count);
+}
+
+}  // namespace
+
+std::vector<Material> to_materials(const dpr_material* given, std::size_t count, const char* argument) {
+  std::vector<Material> materials;
+  for (const dpr_material& material : span_of(given, count, argument)) {
+    materials.push_back({to_vector(material.specular), std::nullopt});
+    if (material.shininess != 0) materials.back().shininess = material.shininess;
+  }
+  return materials;
+}
+
+Mesh to_mesh(const dpr_mesh& mesh) {
   deref(mesh.positions, "mesh.positions");
   deref(mesh.faces, "mesh.faces");
   require_count(mesh.vertices, "mesh.vertices");
   require_count(mesh.face_count, "mesh.face_count");
-  Instance instance;
-  Mesh& m = instance.mesh;
+  Mesh m;
   m.positions = triples(mesh.positions, mesh.vertices);
   m.faces = to_indices(mesh.faces, mesh.face_count);
   m.vertex_colors = triples(mesh.vertex_colors, mesh.vertices);
   m.face_colors = triples(mesh.face_colors, mesh.face_count);
   copy_textures(mesh, m);
+  copy_reflection(mesh, m);
   validate(m);
+  return m;
+}
+
+namespace {
+
+Instance to_instance(const dpr_mesh* given) {
+  const dpr_mesh mesh = versioned<dpr_mesh>(given, DPR_MESH_INIT, "mesh");
+  Instance instance{.mesh = to_mesh(mesh)};
   if (mesh.transform) {
     instance.transform = to_matrix(mesh.transform);
     checks::require_affine(instance.transform, "mesh.transform");
@@ -139,7 +169,10 @@ Instance to_instance(const dpr_mesh* given) {
   return instance;
 }
 
-Lights to_lights(const dpr_lights* given) {
+}  // namespace
+
+std::optional<Lights> to_lights(const dpr_lights* given) {
+  if (!given) return std::nullopt;
   const dpr_lights lights = versioned<dpr_lights>(given, DPR_LIGHTS_INIT, "lights");
   const auto shading = static_cast<std::size_t>(lights.shading);
   if (shading >= k_shadings.size())
@@ -167,6 +200,12 @@ Lights to_lights(const dpr_lights* given) {
   return converted;
 }
 
+Smoothing smoothing_of(const dpr_scene& scene) {
+  return resolve_smoothing(scene.smoothing, scene.scene.width, scene.scene.height, scene.of_file);
+}
+
+namespace {
+
 void set_smoothing(dpr_scene* scene, const char* key, const OptionValue& value) {
   SmoothingOptions& options = deref(scene, "scene").smoothing;
   const std::string name = &deref(key, "key");
@@ -190,6 +229,18 @@ void ask_for(GradientRequest& request, std::string_view word) {
 }
 
 }  // namespace
+
+GradientRequest to_request(const char* const* names, std::size_t count) {
+  if (count > 0) deref(names, "names");
+  if (count > gradient_names().size()) {
+    throw InvalidArgument("count (names)", std::to_string(count),
+                          "at most " + std::to_string(gradient_names().size()));
+  }
+  GradientRequest request = no_gradients();
+  for (const char* name : std::span(names, count)) ask_for(request, &deref(name, "names"));
+  return request;
+}
+
 }  // namespace dpr::c
 
 dpr_status dpr_scene_create(int width, int height, dpr_scene** scene) {
@@ -239,14 +290,7 @@ dpr_status dpr_scene_set_cull(dpr_scene* scene, const char* word) {
 }
 
 dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights) {
-  return guarded([&] {
-    deref(scene, "scene");
-    if (lights) {
-      scene->scene.lights = dpr::c::to_lights(lights);
-    } else {
-      scene->scene.lights.reset();
-    }
-  });
+  return guarded([&] { deref(scene, "scene").scene.lights = dpr::c::to_lights(lights); });
 }
 
 dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* key, const char* word) {
@@ -261,17 +305,7 @@ dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, dou
 }
 
 dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, std::size_t count) {
-  return guarded([&] {
-    deref(scene, "scene");
-    if (count > 0) deref(names, "names");
-    if (count > dpr::gradient_names().size()) {
-      throw InvalidArgument("count (names)", std::to_string(count),
-                            "at most " + std::to_string(dpr::gradient_names().size()));
-    }
-    dpr::GradientRequest request = dpr::no_gradients();
-    for (const char* name : std::span(names, count)) dpr::c::ask_for(request, &deref(name, "names"));
-    scene->scene.gradients = request;
-  });
+  return guarded([&] { deref(scene, "scene").scene.gradients = dpr::c::to_request(names, count); });
 }
 
 void dpr_scene_destroy(dpr_scene* scene) { delete scene; }

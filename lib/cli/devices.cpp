@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "cli/commands.hpp"
 #include "cli/device_check.hpp"
@@ -45,6 +46,7 @@ void print(const DeviceInfo& info) {
 
 struct DevicesOptions {
   bool as_json = false, checks = false;
+  std::optional<std::size_t> rows_of;  // print_check_rows()
 };
 
 /// All, or those that --device names.
@@ -64,6 +66,7 @@ void require_passed(const std::string& failed) {
 }
 
 void run(const DevicesOptions& options, const std::string& selectors) {
+  if (options.rows_of) return print_check_rows(*options.rows_of);
   Json list = Json::array();
   std::string failed;
   const std::vector<DeviceInfo> devices = chosen_devices(selectors);
@@ -95,6 +98,7 @@ void add_devices_command(CLI::App& application, CommonOptions& common) {
   command->add_flag("--json", options->as_json, "Print JSON");
   command->add_flag("--check", options->checks,
                     "Compare every stage with a reference in double precision, in some seconds a device");
+  command->add_option("--check-rows", options->rows_of)->group("");  // for --check itself
   command->add_option("--device", common.device, "These alone, a list (default: all)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST");
   add_output_options(*command, common);

@@ -243,8 +243,10 @@ void add_loss_options(CLI::App& command, ShapeOptions& solver) {
 }  // namespace
 
 void add_fit_command(CLI::App& application, CommonOptions& common) {
-  CLI::App* command =
-      application.add_subcommand("fit", "Finds a mesh with colours from several images with known cameras");
+  CLI::App* command = application.add_subcommand(
+      "fit",
+      "Finds a mesh with colours from several images; their cameras are known or, with "
+      "--initial, found too");
   const auto options = std::make_shared<FitCommandOptions>();
   command->add_option("--views", options->views, "Images and their cameras")->required()->type_name("V.json");
   command

@@ -232,6 +232,7 @@ void print_mesh(const Json& mesh) {
   print_line("bounds", list_text(mesh["bounds"]["low"]) + " to " + list_text(mesh["bounds"]["high"]));
   print_line("colours", mesh["colors"].get<std::string>());
   print_line("texture coordinates", mesh["texture_coordinates"].dump());
+  if (mesh["normals"] != 0) print_line("normals", mesh["normals"].dump());
   print_line("textures", textures_text(mesh["textures"]));
   print_line("materials", materials_text(mesh["materials"]));
   print_notes(mesh["notes"]);
@@ -304,7 +305,8 @@ void add_info_command(CLI::App& application, CommonOptions& common) {
       "closed,\n"
       "manifold, non_manifold_edges, non_manifold_vertices, oriented, faces_without_area, bounds {low, "
       "high}, colors\n"
-      "(vertex, face, none), texture_coordinates, textures [{width, height, wrap, filter}], materials "
+      "(vertex, face, none), texture_coordinates, normals, textures [{width, height, wrap, filter}], "
+      "materials "
       "[{name, texture}],\n"
       "notes (sentences). Of a scene: file,\n"
       "kind, width, height, camera, background, lights, smoothing, gradients, meshes, notes.\n"

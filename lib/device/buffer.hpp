@@ -41,6 +41,8 @@ struct Length {
 template <class T>
 class Buffer {
  public:
+  using Element = T;
+
   Buffer() = default;
   Buffer(Device::Impl& device, std::size_t count) { resize(device, count); }
   Buffer(Device::Impl& device, std::span<const T> values) { upload(device, values); }
@@ -91,11 +93,12 @@ class Buffer {
     check_cl(device_->queue.enqueueFillBuffer(buffer_, value, 0, size() * sizeof(T)), "clEnqueueFillBuffer");
   }
 
-  /// Copies everything on the device; `other` must be as large.
-  void copy_to(Buffer& other) const {
+  /// Copies everything on the device, to where `other` has room for it from element `first` on.
+  void copy_to(Buffer& other, std::size_t first = 0) const {
     if (size() == 0) return;
-    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, 0, size() * sizeof(T)),
-             "clEnqueueCopyBuffer");
+    check_cl(
+        device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, first * sizeof(T), size() * sizeof(T)),
+        "clEnqueueCopyBuffer");
   }
 
   /// Throws std::logic_error where only the device knows.

@@ -99,8 +99,10 @@ std::vector<DeviceChoice> choose_devices(std::span<const DeviceInfo> devices, co
     while (position < devices.size() && (is_taken(position) || !matches(devices[position], wanted)))
       ++position;
     if (position == devices.size()) {
+      const std::string names = device_names(devices);
       throw InvalidArgument(where, "'" + item + "' in '" + selectors + "'",
-                            "one more device, of " + device_names(devices));
+                            names_one(devices, wanted) ? "no more such devices than there are: " + names
+                                                       : "devices that are there: " + names);
     }
     const unsigned units = devices[position].compute_units;
     if (parts && (parts->count < 1 || parts->count > units)) {

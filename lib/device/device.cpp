@@ -213,7 +213,7 @@ Device open_device(const std::string& selector) {
   const bool is_list = names_several(infos, wanted);
   throw InvalidArgument(
       where, "'" + wanted + "'",
-      (is_list ? "one device, not a list of them or parts: " : "one of ") + device_names(infos));
+      (is_list ? "one device, not a list of them or parts: " : "one that is there: ") + device_names(infos));
 }
 
 std::vector<Device> open_devices(const std::string& selectors) {

@@ -9,6 +9,7 @@
 
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
+#include "cli/completion.hpp"
 #include "cli/folder.hpp"
 #include "cli/json.hpp"
 #include "cli/plot.hpp"
@@ -33,11 +34,15 @@ struct DataOptions {
 };
 
 void add_classes(CLI::App& command, std::vector<std::string>& classes) {
-  command
-      .add_option("--classes", classes,
-                  "Classes by name or synset, separated by commas (default: all thirteen)")
-      ->delimiter(',')
-      ->type_name("NAME,...");
+  CLI::Option* const option =
+      command
+          .add_option("--classes", classes,
+                      "Classes by name or synset, separated by commas (default: all thirteen)")
+          ->delimiter(',')
+          ->type_name("NAME,...");
+  std::vector<std::string_view> names;
+  for (const learn::ObjectClass& object_class : learn::object_classes()) names.push_back(object_class.name);
+  cli::complete_with(*option, names);
 }
 
 void add_data(CLI::App& command, DataOptions& options) {

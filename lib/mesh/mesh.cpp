@@ -86,15 +86,8 @@ void validate_normals(const Mesh& mesh, const std::string& name) {
 }
 
 void validate_materials(const Mesh& mesh, const std::string& name) {
-  for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
-    const Material& material = mesh.materials[i];
-    const std::string which = checks::in(checks::element("materials", i), name);
-    if (!checks::is_finite(material.specular))
-      throw InvalidArgument("specular of " + which, checks::text(material.specular), "finite numbers");
-    const float shininess = material.shininess.value_or(1);
-    if (!(shininess >= 1 && std::isfinite(shininess)))
-      throw InvalidArgument("shininess of " + which, checks::text(shininess), "a finite number >= 1");
-  }
+  for (std::size_t i = 0; i < mesh.materials.size(); ++i)
+    validate(mesh.materials[i], checks::in(checks::element("materials", i), name));
   if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.faces.size()) {
     throw InvalidArgument(checks::in("face_materials", name), std::to_string(mesh.face_materials.size()),
                           std::to_string(mesh.faces.size()) + ", one for each of the faces, or none");
@@ -120,6 +113,14 @@ void validate_faces(const Mesh& mesh, const std::string& name) {
 }
 
 }  // namespace
+
+void validate(const Material& material, const std::string& name) {
+  if (!checks::is_finite(material.specular))
+    throw InvalidArgument("specular of " + name, checks::text(material.specular), "finite numbers");
+  const float shininess = material.shininess.value_or(1);
+  if (!(shininess >= 1 && std::isfinite(shininess)))
+    throw InvalidArgument("shininess of " + name, checks::text(shininess), "a finite number >= 1");
+}
 
 void validate(const Mesh& mesh, const std::string& name) {
   if (mesh.faces.empty()) throw InvalidArgument(checks::in("faces", name), "none", "at least one");

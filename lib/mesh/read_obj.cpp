@@ -268,8 +268,14 @@ class ObjReader {
       if (words_.size() > 2 && material_library(words_[i])) continue;
       lacks_library_ = true;
       notes_.push_back(file_.string() + ": the material library " + scan::quoted(words_[i]) +
-                       " is no regular file: faces have no colours of it");
+                       what_is_wrong(file_.parent_path() / words_[i]) + ": faces have no colours of it");
     }
+  }
+
+  /// Of a file that is not read.
+  static std::string what_is_wrong(const std::filesystem::path& file) {
+    std::error_code error;
+    return std::filesystem::exists(file, error) ? " is no regular file" : " is not there";
   }
 
   bool material_library(std::string_view name) {
@@ -317,8 +323,8 @@ class ObjReader {
     if (!std::filesystem::is_regular_file(material.texture_file, error)) {
       if (!missing_textures_.insert(material.texture_file).second) return k_no_texture;
       notes_.push_back(file_.string() + ": the texture " + scan::quoted(material.texture) +
-                       " of the material " + scan::quoted(name) +
-                       " (map_Kd) is no regular file: its faces have the colour Kd alone");
+                       " of the material " + scan::quoted(name) + " (map_Kd)" +
+                       what_is_wrong(material.texture_file) + ": its faces have the colour Kd alone");
       return k_no_texture;
     }
     maps_.push_back(material);

@@ -7,9 +7,9 @@
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
-#include "renderer/finite.hpp"
 #include "multi_device/gradient_sum.hpp"
 #include "multi_device/multi_device_impl.hpp"
+#include "renderer/finite.hpp"
 #include "renderer/setter_checks.hpp"
 
 namespace dpr {
@@ -84,6 +84,20 @@ void MultiDeviceRenderer::set_texcoords(std::size_t mesh, std::span<const glm::v
   check_texcoords(impl_->scene, mesh, texcoords);
   std::ranges::copy(texcoords, impl_->scene.meshes[mesh].mesh.texcoords.begin());
   ++impl_->now.texcoords[mesh];
+}
+
+void MultiDeviceRenderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
+  impl_->require_views("MultiDeviceRenderer::set_normals");
+  check_normals(impl_->scene, mesh, normals);
+  std::ranges::copy(normals, impl_->scene.meshes[mesh].mesh.normals.begin());
+  ++impl_->now.normals[mesh];
+}
+
+void MultiDeviceRenderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
+  impl_->require_views("MultiDeviceRenderer::set_materials");
+  check_materials(impl_->scene, mesh, materials);
+  std::ranges::copy(materials, impl_->scene.meshes[mesh].mesh.materials.begin());
+  ++impl_->now.materials[mesh];
 }
 
 void MultiDeviceRenderer::set_lights(const std::optional<Lights>& lights) {

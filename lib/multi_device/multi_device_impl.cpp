@@ -65,6 +65,14 @@ void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> i
       renderer.set_texcoords(m, scene.meshes[m].mesh.texcoords);
       worker.has.texcoords[m] = now.texcoords[m];
     }
+    if (worker.has.normals[m] != now.normals[m]) {
+      renderer.set_normals(m, scene.meshes[m].mesh.normals);
+      worker.has.normals[m] = now.normals[m];
+    }
+    if (worker.has.materials[m] != now.materials[m]) {
+      renderer.set_materials(m, scene.meshes[m].mesh.materials);
+      worker.has.materials[m] = now.materials[m];
+    }
     for (std::size_t t = 0; t < now.texels[m].size(); ++t) {
       if (worker.has.texels[m][t] == now.texels[m][t]) continue;
       renderer.set_texels(m, t, scene.meshes[m].mesh.textures[t].texels);

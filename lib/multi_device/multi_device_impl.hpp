@@ -17,11 +17,16 @@ namespace dpr {
 /// How often each part of the scene has been set.
 struct Versions {
   std::uint64_t scene = 0, smoothing = 0, lights = 0;
-  std::vector<std::uint64_t> positions, colors, texcoords;  // [mesh]
-  std::vector<std::vector<std::uint64_t>> texels;           // [mesh][texture]
+  std::vector<std::uint64_t> positions, colors, texcoords, normals, materials;  // [mesh]
+  std::vector<std::vector<std::uint64_t>> texels;                               // [mesh][texture]
 
   explicit Versions(const Scene& of = {}, std::uint64_t number = 0)
-      : scene(number), positions(of.meshes.size()), colors(of.meshes.size()), texcoords(of.meshes.size()) {
+      : scene(number),
+        positions(of.meshes.size()),
+        colors(of.meshes.size()),
+        texcoords(of.meshes.size()),
+        normals(of.meshes.size()),
+        materials(of.meshes.size()) {
     for (const Instance& instance : of.meshes) texels.emplace_back(instance.mesh.textures.size());
   }
 };

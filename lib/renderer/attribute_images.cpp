@@ -1,8 +1,9 @@
-// The attribute as the colours of a renderer of its own: its images, and its gradients on the host.
+// The attribute as the colours of a renderer of its own: its images, and its gradients.
 #include "dpr/attribute_images.hpp"
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <string>
 
 #include "base/checks.hpp"
@@ -10,6 +11,7 @@
 #include "base/require.hpp"
 #include "renderer/attribute_images_impl.hpp"
 #include "renderer/frame.hpp"
+#include "renderer/on_device.hpp"
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 
@@ -18,13 +20,24 @@ namespace {
 
 constexpr std::array<std::string_view, 4> k_attribute_names{"depth", "position", "normal", "texcoords"};
 
-std::vector<glm::vec3> at_corners(std::span<const glm::vec3> positions,
-                                  const std::vector<glm::uvec3>& faces) {
-  std::vector<glm::vec3> values;
-  for (const glm::uvec3& face : faces) {
-    for (int corner = 0; corner < 3; ++corner) values.push_back(positions[face[corner]]);
+/// The mesh with a colour for every number of the domain. Corners become vertices, face after face.
+Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain) {
+  Mesh shown;
+  if (domain != AttributeDomain::corners) {
+    shown.positions = mesh.positions;
+    shown.faces = mesh.faces;
+    const bool of_faces = domain == AttributeDomain::faces;
+    (of_faces ? shown.face_colors : shown.vertex_colors)
+        .resize(of_faces ? mesh.faces.size() : mesh.positions.size());
+    return shown;
   }
-  return values;
+  for (const glm::uvec3& face : mesh.faces) {
+    const auto first = static_cast<unsigned>(shown.positions.size());
+    for (int corner = 0; corner < 3; ++corner) shown.positions.push_back(mesh.positions[face[corner]]);
+    shown.faces.emplace_back(first, first + 1, first + 2);
+  }
+  shown.vertex_colors.resize(shown.positions.size());
+  return shown;
 }
 
 /// The scene's faces in the dark, with a colour for every number of the domain.
@@ -41,14 +54,21 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   return scene;
 }
 
-/// Of views with shapes of their own the device's positions are read.
-void require_known_places(const Renderer::Impl& source) {
-  bool are_known = !source.has_device_poses;
-  for (std::size_t m = 0; source.frame.position_stride == 0 && m < source.scene.meshes.size(); ++m)
-    are_known = are_known && source.near_plane.knows(m);
-  if (are_known) return;
-  throw InvalidArgument("renderer (AttributeImages::forward)", "positions or transforms from a buffer",
-                        "those of Renderer's own setters: the host computes what surfaces show");
+/// Which vertex of the scene each shown one is.
+std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain) {
+  std::vector<cl_uint> vertices;
+  cl_uint first = 0;
+  for (const Instance& instance : scene.meshes) {
+    const cl_uint count = to_uint(instance.mesh.positions.size());
+    if (domain == AttributeDomain::corners) {
+      for (const glm::uvec3& face : instance.mesh.faces)
+        vertices.insert(vertices.end(), {first + face.x, first + face.y, first + face.z});
+    } else {
+      for (cl_uint vertex = 0; vertex < count; ++vertex) vertices.push_back(first + vertex);
+    }
+    first += count;
+  }
+  return vertices;
 }
 
 /// What the renderer's backward pass has to find.
@@ -59,9 +79,7 @@ GradientRequest request_of(const GradientRequest& wanted, std::optional<Attribut
   request.camera = wanted.camera;
   request.distortion = wanted.distortion;
   request.smoothing = wanted.smoothing;
-  request.colors = !attribute || (attribute == Attribute::texcoords
-                                      ? wanted.texcoords
-                                      : wanted.positions || wanted.transform || wanted.camera);
+  request.colors = !attribute || (attribute == Attribute::texcoords && wanted.texcoords);
   return request;
 }
 
@@ -75,145 +93,191 @@ Attribute parse_attribute(std::string_view word, std::string_view where) {
   return static_cast<Attribute>(position_of(word, k_attribute_names, std::string(where)));
 }
 
-void AttributeImages::Impl::require_forward(const char* caller) const {
-  if (views == 0) throw InvalidArgument(caller, "no images of an attribute", "forward() first");
-}
-
 AttributeImages::Impl::Impl(const Device& device, std::optional<Attribute> attribute_, std::size_t channels_)
     : attribute(attribute_),
       channels(channels_),
       renderer(device),
+      rows_(device.impl()),
       weigh_(device.impl(), "attribute.cl", "attribute_weigh_forward"),
-      weigh_backward_(device.impl(), "attribute.cl", "attribute_weigh_backward") {}
+      weigh_backward_(device.impl(), "attribute.cl", "attribute_weigh_backward") {
+  if (!has_rows()) renderer.impl().geometry_colors.emplace(device.impl(), *attribute);
+}
+
+AttributeDomain AttributeImages::Impl::domain() const {
+  if (attribute == Attribute::normal) return AttributeDomain::faces;
+  return attribute == Attribute::texcoords ? AttributeDomain::corners : AttributeDomain::vertices;
+}
+
+void AttributeImages::Impl::require_forward(const char* caller) const {
+  if (views == 0) throw InvalidArgument(caller, "no images of an attribute", "forward() first");
+}
+
+void AttributeImages::Impl::require_values(const Renderer::Impl& source) const {
+  const std::size_t expected = channels * source.geometry->vertices;
+  if (!attribute && value_count_ != expected) {
+    throw InvalidArgument("values (attribute images)", std::to_string(value_count_),
+                          std::to_string(expected) + ", vertices of the scene x channels");
+  }
+  if (attribute == Attribute::texcoords && texcoords_->empty()) {
+    throw InvalidArgument("texcoords (attribute images)", "a mesh that has no texture coordinates",
+                          "texture coordinates on all meshes");
+  }
+}
 
 bool AttributeImages::Impl::shows_faces_of(const Scene& scene) const {
   const Scene& own = renderer.scene();
   return own.width == scene.width && own.height == scene.height &&
          own.perspective_correct == scene.perspective_correct &&
          std::ranges::equal(meshes_, scene.meshes, [](const SourceMesh& mesh, const Instance& instance) {
-           const Mesh& other = instance.mesh;
-           return mesh.vertices == other.positions.size() && mesh.texcoords == other.texcoords.size() &&
-                  mesh.faces == other.faces && mesh.face_texcoords == other.face_texcoords;
+           return mesh.vertices == instance.mesh.positions.size() && mesh.faces == instance.mesh.faces;
          });
 }
 
+void AttributeImages::Impl::show_faces_of(const Scene& scene) {
+  meshes_.clear();
+  fold_.reset();
+  renderer.set_scene(shown_scene(scene, domain()));
+  if (room) renderer.impl().reserve(*room);
+  std::size_t vertices = 0;
+  for (const Instance& instance : scene.meshes) vertices += instance.mesh.positions.size();
+  vertices_ = RowMap(renderer.device().impl(), vertices_shown(scene, domain()), vertices);
+  for (const Instance& instance : scene.meshes)
+    meshes_.push_back({instance.mesh.positions.size(), instance.mesh.faces});
+}
+
 /// Brings the renderer's scene and views up to the source's.
-void AttributeImages::Impl::follow(const Renderer::Impl& source) {
+void AttributeImages::Impl::follow(Renderer::Impl& source) {
   const Scene& scene = source.scene;
-  views = 0;  // until everything is there
-  if (!shows_faces_of(scene)) {
-    meshes_.clear();
-    renderer.set_scene(shown_scene(scene, domain()));
-    for (const Instance& instance : scene.meshes) {
-      const Mesh& mesh = instance.mesh;
-      meshes_.push_back({mesh.positions.size(), mesh.texcoords.size(), mesh.faces, mesh.face_texcoords});
-    }
-  }
-  take_positions(source);
+  if (!shows_faces_of(scene)) show_faces_of(scene);
   if (renderer.scene().cull != scene.cull) renderer.set_cull(scene.cull);
   if (renderer.scene().smoothing != scene.smoothing) renderer.set_smoothing(scene.smoothing);
+  follow_views(source);
+  has_own_shapes_ = source.frame.position_stride != 0;
+  has_own_shapes_ ? follow_shapes(source) : follow_positions(source);
+  wanted_ = scene.gradients;
+  const GradientRequest request = request_of(wanted_, attribute);
+  if (renderer.scene().gradients != request) renderer.set_gradients(request);
+}
+
+void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
+  Renderer::Impl& r = renderer.impl();
   std::vector<View> of_passes;
   for (std::size_t pass = 0; pass < passes(); ++pass)
     of_passes.insert(of_passes.end(), source.views.begin(), source.views.end());
-  renderer.set_views(of_passes);
-  wanted_ = scene.gradients;
-  renderer.set_gradients(request_of(wanted_, attribute));
+  const bool has_left_device = (r.has_device_poses && !source.has_device_poses) ||
+                               (r.has_device_cameras && !source.has_device_cameras);
+  if (of_passes != r.views || has_left_device) {
+    renderer.set_views(of_passes);
+    fold_.reset();
+  }
+  for (std::size_t pass = 0; source.has_device_poses && pass < passes(); ++pass) {
+    const DeviceViews& from = source.device_views;
+    from.models.copy_to(r.device_views.models, pass * from.models.size());
+    from.cameras.copy_to(r.device_views.cameras, pass * from.cameras.size());
+  }
+  r.has_device_poses = source.has_device_poses;
+  r.has_device_cameras = source.has_device_cameras;
 }
 
-void AttributeImages::Impl::take_positions(const Renderer::Impl& source) {
-  positions_.clear();
-  has_own_shapes_ = source.frame.position_stride != 0;
-  const bool by_corner = domain() == AttributeDomain::corners;
-  const auto append = [&](std::span<const glm::vec3> positions, const SourceMesh& mesh) {
-    const std::vector<glm::vec3> corners =
-        by_corner ? at_corners(positions, mesh.faces) : std::vector<glm::vec3>();
-    if (by_corner) positions = corners;
-    positions_.insert(positions_.end(), positions.begin(), positions.end());
-  };
-  if (!has_own_shapes_) {
-    for (std::size_t m = 0; m < meshes_.size(); ++m) {
-      const std::size_t first = positions_.size();
-      append(source.scene.meshes[m].mesh.positions, meshes_[m]);
-      const std::span<const glm::vec3> moved = std::span(positions_).subspan(first);
-      if (!std::ranges::equal(renderer.scene().meshes[m].mesh.positions, moved))
-        renderer.set_positions(m, moved);
-    }
-    return;
-  }
-  std::vector<glm::vec3> shapes;
-  for (const cl_float4& v : source.geometry->view_positions.download())
-    shapes.emplace_back(v.s[0], v.s[1], v.s[2]);
-  std::size_t first = 0;
-  for (std::size_t view = 0; view < source.views.size(); ++view) {
-    for (const SourceMesh& mesh : meshes_) {
-      append(std::span(shapes).subspan(first, mesh.vertices), mesh);
-      first += mesh.vertices;
-    }
-  }
+/// Of the mesh as the host knows it.
+std::vector<glm::vec3> AttributeImages::Impl::shown_positions(const Scene& scene, std::size_t mesh) const {
+  return shown_mesh(scene.meshes[mesh].mesh, domain()).positions;
 }
 
-ShownView AttributeImages::Impl::shown(std::size_t view) const {
-  const std::span<const glm::vec3> all(positions_);
-  const std::size_t source_views = renderer.views().size() / passes();
-  const std::size_t count = has_own_shapes_ ? all.size() / source_views : all.size();
-  return {renderer.scene(), renderer.views()[view], all.subspan(has_own_shapes_ ? view * count : 0, count)};
-}
-
-std::vector<glm::vec3> AttributeImages::Impl::values_of(const Scene& source, std::size_t group,
-                                                        std::size_t view) const {
-  if (attribute) {
-    return attribute == Attribute::texcoords ? texcoord_values(source)
-                                             : attribute_values(*attribute, shown(view));
-  }
-  std::vector<glm::vec3> result(values.size() / channels, glm::vec3(0));
-  for (std::size_t vertex = 0; vertex < result.size(); ++vertex) {
-    for (std::size_t c = 3 * group; c < std::min(channels, 3 * group + 3); ++c)
-      result[vertex][static_cast<int>(c % 3)] = values[vertex * channels + c];
-  }
-  return result;
-}
-
-void AttributeImages::Impl::forward(const Renderer::Impl& source) {
-  require_known_places(source);
-  if (!attribute && values.size() != channels * source.geometry->vertices) {
-    throw InvalidArgument(
-        "values (attribute images)", std::to_string(values.size()),
-        std::to_string(channels * source.geometry->vertices) + ", vertices of the scene x channels");
-  }
-  follow(source);
-  const bool shows_texcoords = attribute == Attribute::texcoords;
-  const Scene texcoords = shows_texcoords ? texcoords_in_force(source) : Scene();
-  const Scene& scene = shows_texcoords ? texcoords : source.scene;
-  std::vector<glm::vec3> colors, positions;
-  for (std::size_t pass = 0; pass < passes(); ++pass) {
-    for (std::size_t view = 0; view < source.views.size(); ++view) {
-      const std::vector<glm::vec3> shown = pass < groups()
-                                               ? values_of(scene, pass, view)
-                                               : std::vector(renderer.impl().geometry->colors, glm::vec3(1));
-      colors.insert(colors.end(), shown.begin(), shown.end());
-    }
-    if (has_own_shapes_) positions.insert(positions.end(), positions_.begin(), positions_.end());
-  }
-  renderer.set_shapes(positions, colors);
-  renderer.forward();
+void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
   Renderer::Impl& r = renderer.impl();
-  r.require_forward("AttributeImages::forward");
+  r.frame.position_stride = 0;
+  r.near_plane.set_boxes_of_views({});
+  bool all_are_known = true;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (!source.near_plane.knows(m)) {
+      r.forget_positions(m);
+      all_are_known = false;
+      continue;
+    }
+    const std::vector<glm::vec3> positions = shown_positions(source.scene, m);
+    if (!r.near_plane.knows(m) || r.scene.meshes[m].mesh.positions != positions)
+      renderer.set_positions(m, positions);
+  }
+  if (!all_are_known) rows_.move(vertices_, 1, source.geometry->positions, 1, r.geometry->positions);
+}
+
+void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
+  Renderer::Impl& r = renderer.impl();
+  rows_.move(vertices_, source.views.size(), source.geometry->view_positions, r.views.size(),
+             r.geometry->view_positions);
+  r.frame.position_stride = r.frame.vertices;
+  std::vector<BoxCorners> boxes;
+  for (std::size_t pass = 0; pass < passes(); ++pass)
+    std::ranges::copy(source.near_plane.boxes_of_views(), std::back_inserter(boxes));
+  r.near_plane.set_boxes_of_views(std::move(boxes));
+  if (!source.near_plane.knows_views()) r.near_plane.forget_views();
+}
+
+void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
+  if (attribute == Attribute::texcoords) texcoords_ = source.corner_texcoords_in_force();
+  require_values(source);
+  views = 0;  // until everything is there
+  follow(source);
+  Renderer::Impl& r = renderer.impl();
+  r.frame.color_stride = to_uint(r.geometry->colors);
+  if (has_rows()) {
+    rows_.forward(row_map(), channels, row_values(), passes(), source.views.size(), r.geometry->view_colors);
+  } else {
+    r.geometry_colors->shown_views = source.views.size();
+  }
+  r.forward(sizes);
+  if (sizes == FrameSizes::read) r.require_forward("AttributeImages::forward");
   if (shows_weights()) {
     const std::size_t pixels = r.image().size() / passes(), count = groups() * pixels;
     weighed_.resize(r.device.impl(), count);
-    weigh_(count, static_cast<cl_uint>(groups()), static_cast<cl_uint>(pixels), r.image(), weighed_);
+    weigh_(count, to_uint(groups()), to_uint(pixels), r.image(), weighed_);
   }
   views = source.views.size();
 }
 
-SceneGradient AttributeImages::Impl::backward(const Buffer<cl_float4>& grad_images) {
+BufferRef<cl_float4> AttributeImages::Impl::grad_of_rendered(const BufferRef<cl_float4>& grad_images) {
+  if (!shows_weights()) return grad_images;
   Renderer::Impl& r = renderer.impl();
-  if (!shows_weights()) return folded(r.backward(grad_images));
   const std::size_t pixels = r.image().size() / passes();
   grad_rendered_.resize(r.device.impl(), r.image().size());
-  weigh_backward_(pixels, static_cast<cl_uint>(groups()), static_cast<cl_uint>(pixels), grad_images,
-                  grad_rendered_);
-  return folded(r.backward(grad_rendered_));
+  weigh_backward_(pixels, to_uint(groups()), to_uint(pixels), grad_images, grad_rendered_);
+  return grad_rendered_;
+}
+
+/// From what the renderer's backward pass left of positions and colours to those of the source's.
+void AttributeImages::Impl::gather() {
+  Renderer::Impl& r = renderer.impl();
+  if (wanted_.positions) {
+    const std::size_t sources = has_own_shapes_ ? views : 1, copies = has_own_shapes_ ? r.views.size() : 1;
+    rows_.move_backward(vertices_, sources, r.transform.grad_positions, copies, grad_positions_);
+  }
+  if (has_rows() && r.wants_colors()) rows_.backward(row_map(), channels, views, r.grad_colors, grad_rows_);
+}
+
+SceneGradient AttributeImages::Impl::backward(const BufferRef<cl_float4>& grad_images) {
+  SceneGradient of_passes = renderer.impl().backward(grad_of_rendered(grad_images));
+  gather();
+  return folded(std::move(of_passes));
+}
+
+void AttributeImages::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images) {
+  Renderer::Impl& r = renderer.impl();
+  r.backward_on_device(grad_of_rendered(grad_images));
+  gather();
+  if (!fold_) {
+    SceneGradient of_passes = r.empty_gradient(), of_views = empty_gradient();
+    fold_ = make_fold(r.device.impl(), of_passes, of_views);
+  }
+  r.made_exchange().map(*fold_, r.grad_numbers, grad_numbers_);
+}
+
+SceneGradient AttributeImages::Impl::empty_gradient() const {
+  SceneGradient gradient;
+  gradient.meshes.resize(meshes_.size());
+  gradient.views.resize(views);
+  for (ViewGradient& view : gradient.views) view.transforms.resize(meshes_.size());
+  return gradient;
 }
 
 namespace {
@@ -227,124 +291,80 @@ void fold_views(SceneGradient& of_passes, SceneGradient& gradient) {
   });
 }
 
-/// The gradients of a mesh's corners, where each was a vertex.
-std::vector<glm::vec3> at_vertices(std::span<const glm::dvec3> of_corners,
-                                   const std::vector<glm::uvec3>& faces, std::size_t vertices) {
-  std::vector<glm::dvec3> sums(vertices, glm::dvec3(0.0));
-  for (std::size_t i = 0; i < of_corners.size(); ++i)
-    sums[faces[i / 3][static_cast<int>(i % 3)]] += of_corners[i];
-  return {sums.begin(), sums.end()};
-}
-
-void add_pose(const PoseGradient& from, PoseGradient& to) {
-  to.rotation += from.rotation;
-  to.translation += from.translation;
-}
-
 }  // namespace
 
 SceneGradient AttributeImages::Impl::folded(SceneGradient&& of_passes) {
-  SceneGradient gradient;
+  SceneGradient gradient = empty_gradient();
   gradient.sigma = of_passes.sigma;
   gradient.gamma = of_passes.gamma;
   gradient.alpha = of_passes.alpha;
-  gradient.meshes.resize(meshes_.size());
-  gradient.views.resize(views);
-  for (ViewGradient& view : gradient.views) view.transforms.resize(meshes_.size());
   fold_views(of_passes, gradient);
-  std::vector<glm::dvec3> positions(positions_.size(), glm::dvec3(0.0));
-  if (wanted_.positions) add_positions(of_passes, positions);
-  const std::vector<glm::vec3>& grad_values_shown = of_passes.shapes.colors;
-  if (!attribute) {
-    sum_grad_values(grad_values_shown);
-  } else if (!grad_values_shown.empty() && attribute == Attribute::texcoords) {
-    set_texcoords(grad_values_shown, gradient);
-  } else if (!grad_values_shown.empty()) {
-    add_by_geometry(grad_values_shown, positions, gradient);
+  if (wanted_.positions) {
+    std::vector<glm::vec3> positions;
+    for (const cl_float4& g : grad_positions_.download()) positions.emplace_back(g.s[0], g.s[1], g.s[2]);
+    auto next = positions.begin();
+    for (std::size_t m = 0; !has_own_shapes_ && m < meshes_.size(); ++m) {
+      const auto first = std::exchange(next, next + static_cast<std::ptrdiff_t>(meshes_[m].vertices));
+      gradient.meshes[m].positions.assign(first, next);
+    }
+    if (has_own_shapes_) gradient.shapes.positions = std::move(positions);
   }
-  if (wanted_.positions) set_positions(positions, gradient);
+  if (!attribute) grad_values = grad_rows_.download();
+  if (attribute == Attribute::texcoords && wanted_.texcoords) {
+    const std::vector<float> uv = grad_rows_.download();
+    for (std::size_t m = 0; m < meshes_.size(); ++m) {
+      for (std::size_t i = texcoords_->first[m]; i < texcoords_->first[m + 1]; ++i)
+        gradient.meshes[m].texcoords.emplace_back(uv[2 * i], uv[2 * i + 1]);
+    }
+  }
   return gradient;
 }
 
-/// Those of the renderer, over its passes.
-void AttributeImages::Impl::add_positions(const SceneGradient& of_passes,
-                                          std::vector<glm::dvec3>& positions) const {
-  if (has_own_shapes_) {
-    const std::vector<glm::vec3>& shapes = of_passes.shapes.positions;
-    for (std::size_t i = 0; i < shapes.size(); ++i) positions[i % positions.size()] += glm::dvec3(shapes[i]);
-    return;
-  }
-  std::size_t next = 0;
-  for (const MeshGradient& mesh : of_passes.meshes) {
-    for (const glm::vec3& g : mesh.positions) positions[next++] = glm::dvec3(g);
-  }
+void AttributeImages::Impl::require_own_values() const {
+  if (!attribute) return;
+  throw InvalidArgument("values (attribute images)", "them for the " + std::string(to_string(*attribute)),
+                        "an attribute of the caller's own: the scene says what this one is");
 }
 
-/// What the values say of the geometry, from their gradients [pass][view][number].
-void AttributeImages::Impl::add_by_geometry(std::span<const glm::vec3> grad,
-                                            std::vector<glm::dvec3>& positions,
-                                            SceneGradient& gradient) const {
-  const std::size_t count = grad.size() / (passes() * views);
-  for (std::size_t view = 0; view < views; ++view) {
-    ViewGradient by_values;
-    by_values.transforms.resize(meshes_.size());
-    const ShownView geometry = shown(view);
-    const std::size_t first = has_own_shapes_ ? view * geometry.positions.size() : 0;
-    add_geometry_gradient(*attribute, geometry, grad.subspan(view * count, count),
-                          {std::span(positions).subspan(first, geometry.positions.size()), by_values});
-    ViewGradient& out = gradient.views[view];
-    if (wanted_.camera) add_pose(by_values.camera.view, out.camera.view);
-    for (std::size_t m = 0; wanted_.transform && m < meshes_.size(); ++m)
-      add_pose(by_values.transforms[m], out.transforms[m]);
-  }
+void AttributeImages::Impl::set_values(std::span<const float> values) {
+  values_.upload(renderer.device().impl(), values);
+  value_count_ = values.size();
 }
 
-void AttributeImages::Impl::sum_grad_values(std::span<const glm::vec3> grad) {
-  const std::size_t vertices = values.size() / channels;
-  std::vector<double> sums(values.size());
-  for (std::size_t group = 0; group < groups(); ++group) {
-    for (std::size_t i = 0; i < views * vertices; ++i) {
-      for (std::size_t c = 3 * group; c < std::min(channels, 3 * group + 3); ++c) {
-        const float g = grad[group * views * vertices + i][static_cast<int>(c % 3)];
-        sums[i % vertices * channels + c] += static_cast<double>(g);
-      }
-    }
-  }
-  grad_values.assign(sums.begin(), sums.end());
+void AttributeImages::Impl::take_values(const FloatVectors& from, std::size_t count) {
+  values_.resize(renderer.device().impl(), count * channels);
+  renderer.impl().made_exchange().take(from, count, values_, channels);
+  value_count_ = count * channels;
 }
 
-void AttributeImages::Impl::set_texcoords(std::span<const glm::vec3> grad, SceneGradient& gradient) const {
-  const std::size_t corners = grad.size() / (passes() * views);
-  std::size_t first = 0;
+BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
+  Renderer::Impl& r = renderer.impl();
+  if (r.device_gradient_frame != r.frame_number)
+    throw InvalidArgument("gradient_view", "no gradient of the last images", "backward_on_device() first");
+  const auto rows = [&](std::size_t first, std::size_t count) {
+    return BufferView{grad_rows_.cl_buffer()(), first * channels * sizeof(float), channels * sizeof(float),
+                      count, channels};
+  };
+  const auto positions = [&](std::size_t first, std::size_t count) {
+    return BufferView{grad_positions_.cl_buffer()(), first * sizeof(cl_float4), sizeof(cl_float4), count, 3};
+  };
+  if (!attribute && name == "values") return rows(0, vertices_.rows);
+  if (wanted_.positions && has_own_shapes_ && name == "shapes.positions")
+    return positions(0, views * vertices_.rows);
+  std::size_t first_vertex = 0;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    const SourceMesh& mesh = meshes_[m];
-    std::vector<glm::dvec2> sums(mesh.texcoords, glm::dvec2(0.0));
-    for (std::size_t i = 0; i < 3 * mesh.face_texcoords.size(); ++i) {
-      glm::dvec2& sum = sums[mesh.face_texcoords[i / 3][static_cast<int>(i % 3)]];
-      for (std::size_t view = 0; view < views; ++view) sum += glm::dvec2(grad[view * corners + first + i]);
-    }
-    gradient.meshes[m].texcoords.assign(sums.begin(), sums.end());
-    first += 3 * mesh.face_texcoords.size();
+    const std::string mesh = checks::element("meshes", m);
+    if (wanted_.positions && !has_own_shapes_ && name == mesh + ".positions")
+      return positions(first_vertex, meshes_[m].vertices);
+    if (attribute == Attribute::texcoords && wanted_.texcoords && name == mesh + ".texcoords")
+      return rows(texcoords_->first[m], texcoords_->first[m + 1] - texcoords_->first[m]);
+    first_vertex += meshes_[m].vertices;
   }
-}
-
-/// From the shown vertices to those of the source's meshes, or of its views' shapes.
-void AttributeImages::Impl::set_positions(std::span<const glm::dvec3> positions,
-                                          SceneGradient& gradient) const {
-  const bool by_corner = domain() == AttributeDomain::corners;
-  for (std::size_t first = 0; first < positions.size();) {
-    for (std::size_t m = 0; m < meshes_.size(); ++m) {
-      const SourceMesh& mesh = meshes_[m];
-      const std::size_t count = by_corner ? 3 * mesh.faces.size() : mesh.vertices;
-      const std::span<const glm::dvec3> own = positions.subspan(first, count);
-      const std::vector<glm::vec3> found = by_corner ? at_vertices(own, mesh.faces, mesh.vertices)
-                                                     : std::vector<glm::vec3>(own.begin(), own.end());
-      std::vector<glm::vec3>& out =
-          has_own_shapes_ ? gradient.shapes.positions : gradient.meshes[m].positions;
-      out.insert(out.end(), found.begin(), found.end());
-      first += count;
-    }
-  }
+  SceneGradient arrays = empty_gradient();
+  if (const auto numbers = summed_view(arrays, r, grad_numbers_, name)) return *numbers;
+  throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",
+                        "a gradient that attribute images have and the scene asks for, such as "
+                        "\"meshes[0].positions\", \"views[0].camera.rotation\", \"sigma\" or \"values\"");
 }
 
 AttributeImages::AttributeImages(const Device& device, Attribute attribute)
@@ -364,21 +384,17 @@ AttributeImages::AttributeImages(AttributeImages&&) noexcept = default;
 AttributeImages& AttributeImages::operator=(AttributeImages&&) noexcept = default;
 
 void AttributeImages::set_values(std::span<const float> values) {
-  if (impl_->attribute) {
-    throw InvalidArgument("values (attribute images)",
-                          "them for the " + std::string(to_string(*impl_->attribute)),
-                          "an attribute of the caller's own: the scene says what this one is");
-  }
+  impl_->require_own_values();
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) checks::require_finite(values[i], checks::element("values", i));
   }
-  impl_->values.assign(values.begin(), values.end());
+  impl_->set_values(values);
 }
 
 void AttributeImages::forward(const Renderer& of) {
   require_same_device(impl_->renderer.device(), of, "AttributeImages::forward");
   of.impl().require_forward("AttributeImages::forward");
-  impl_->forward(of.impl());
+  impl_->forward(of.impl(), FrameSizes::read);
 }
 
 std::size_t AttributeImages::channels() const { return impl_->channels; }

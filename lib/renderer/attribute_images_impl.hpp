@@ -1,18 +1,23 @@
 // What AttributeImages hold: a renderer of their own, whose colours are the attribute.
 #pragma once
 
+#include <memory>
 #include <optional>
 
-#include "renderer/attribute_values.hpp"
+#include "dpr/attribute_images.hpp"
+#include "dpr/opencl_handles.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
 
+/// Where the numbers of an attribute stand.
+enum class AttributeDomain { vertices, faces, corners };
+
 struct AttributeImages::Impl {
   /// Whose faces are shown.
   struct SourceMesh {
-    std::size_t vertices, texcoords;
-    std::vector<glm::uvec3> faces, face_texcoords;
+    std::size_t vertices;
+    std::vector<glm::uvec3> faces;
   };
 
   Impl(const Device& device, std::optional<Attribute> attribute, std::size_t channels);
@@ -25,40 +30,61 @@ struct AttributeImages::Impl {
 
   /// Throws InvalidArgument, which names the caller, unless there are images.
   void require_forward(const char* caller) const;
-  void forward(const Renderer::Impl& source);
+  /// Enqueues the images, and reads of the frame what Renderer::Impl::forward() does.
+  void forward(Renderer::Impl& source, FrameSizes sizes);
   /// [group][view][height][width] RGBA
   const Buffer<cl_float4>& images() const { return shows_weights() ? weighed_ : renderer.impl().image(); }
-  SceneGradient backward(const Buffer<cl_float4>& grad_images);
+  SceneGradient backward(const BufferRef<cl_float4>& grad_images);
+  /// Leaves the gradients on the device: `grad_positions`, `grad_rows` and `numbers`.
+  void backward_on_device(const BufferRef<cl_float4>& grad_images);
+  void require_own_values() const;
+  void set_values(std::span<const float> values);
+  /// From the device: `count` vectors of numbers.
+  void take_values(const FloatVectors& from, std::size_t count);
+  /// A gradient that backward_on_device() left. Throws InvalidArgument for one that there is not.
+  BufferView gradient_view(const std::string& name);
 
   std::optional<Attribute> attribute;  // none: the caller's numbers
   std::size_t channels;
-  std::vector<float> values, grad_values;  // [vertex][channel] of the caller
-  Renderer renderer;                       // of views [pass][view]
-  std::size_t views = 0;                   // of the source; 0: no images
-  Buffer<cl_float4> host_grad_images;      // where gradients that come from the host go
+  std::vector<float> grad_values;      // [vertex][channel] of the caller
+  Renderer renderer;                   // of views [pass][view]
+  std::size_t views = 0;               // of the source; 0: no images
+  Buffer<cl_float4> host_grad_images;  // where gradients that come from the host go
+  std::optional<FrameCounts> room;     // what reserve() asked for
 
  private:
-  AttributeDomain domain() const { return attribute ? domain_of(*attribute) : AttributeDomain::vertices; }
+  AttributeDomain domain() const;
+  bool has_rows() const { return !attribute || attribute == Attribute::texcoords; }
   bool shows_faces_of(const Scene& scene) const;
-  void follow(const Renderer::Impl& source);
-  void take_positions(const Renderer::Impl& source);
-  ShownView shown(std::size_t view) const;
-  std::vector<glm::vec3> values_of(const Scene& source, std::size_t group, std::size_t view) const;
+  void require_values(const Renderer::Impl& source) const;
+  void show_faces_of(const Scene& scene);
+  void follow(Renderer::Impl& source);
+  void follow_views(const Renderer::Impl& source);
+  void follow_positions(const Renderer::Impl& source);
+  void follow_shapes(const Renderer::Impl& source);
+  std::vector<glm::vec3> shown_positions(const Scene& scene, std::size_t mesh) const;
+  const RowMap& row_map() const { return attribute ? texcoords_->map : vertices_; }
+  const Buffer<float>& row_values() const { return attribute ? texcoords_->values : values_; }
 
+  BufferRef<cl_float4> grad_of_rendered(const BufferRef<cl_float4>& grad_images);
+  void gather();
   SceneGradient folded(SceneGradient&& of_passes);
-  void add_positions(const SceneGradient& of_passes, std::vector<glm::dvec3>& positions) const;
-  void add_by_geometry(std::span<const glm::vec3> grad, std::vector<glm::dvec3>& positions,
-                       SceneGradient& gradient) const;
-  void sum_grad_values(std::span<const glm::vec3> grad);
-  void set_texcoords(std::span<const glm::vec3> grad, SceneGradient& gradient) const;
-  void set_positions(std::span<const glm::dvec3> positions, SceneGradient& gradient) const;
+  SceneGradient empty_gradient() const;
 
+  ShownRows rows_;
   Kernel<cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> weigh_, weigh_backward_;
   Buffer<cl_float4> weighed_, grad_rendered_;
-  GradientRequest wanted_;            // of the source's scene
-  std::vector<SourceMesh> meshes_;    // of the source
-  std::vector<glm::vec3> positions_;  // shown: [vertex] or, of views' own shapes, [view][vertex]
+  GradientRequest wanted_;          // of the source's scene
+  std::vector<SourceMesh> meshes_;  // of the source
+  RowMap vertices_;                 // of the source, at those that are shown
   bool has_own_shapes_ = false;
+  std::shared_ptr<CornerTexcoords> texcoords_;  // the source's, where they are shown
+  Buffer<float> values_;                        // the caller's
+  std::size_t value_count_ = 0;
+  Buffer<cl_float4> grad_positions_;  // [vertex] or, of views' own shapes, [view][vertex]
+  Buffer<float> grad_rows_;           // [row][channel]
+  Buffer<float> grad_numbers_;        // of the views, in the order of gradients' sums
+  std::optional<SparseMap> fold_;     // to these, from the renderer's of [pass][view]
 };
 
 }  // namespace dpr

@@ -1,13 +1,13 @@
-// Auxiliary outputs on the host.
+// Auxiliary outputs, on the device and on the host.
 #include "dpr/aov.hpp"
 
 #include <algorithm>
 #include <array>
 #include <string>
+#include <type_traits>
 
 #include "base/name_list.hpp"
-#include "renderer/attribute_values.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/on_device.hpp"
 
 namespace dpr {
 namespace {
@@ -15,17 +15,13 @@ namespace {
 constexpr std::array<std::string_view, 6> k_names{"depth",        "normal", "face_id",
                                                   "barycentrics", "uv",     "effective_faces"};
 
-/// Texture coordinates of the faces' corners, the meshes of the scene joined; empty if one has none.
-std::vector<std::array<glm::vec2, 3>> corner_texcoords(const Scene& scene) {
-  std::vector<std::array<glm::vec2, 3>> corners;
-  for (const Instance& instance : scene.meshes) {
-    const Mesh& mesh = instance.mesh;
-    if (mesh.face_texcoords.empty()) return {};
-    for (const glm::uvec3& f : mesh.face_texcoords) {
-      corners.push_back({mesh.texcoords[f.x], mesh.texcoords[f.y], mesh.texcoords[f.z]});
-    }
-  }
-  return corners;
+bool have_texcoords(const Scene& scene) {
+  return std::ranges::none_of(scene.meshes, [](const Instance& i) { return i.mesh.face_texcoords.empty(); });
+}
+
+InvalidArgument no_texcoords() {
+  return {"uv (auxiliary outputs)", "a mesh without texture coordinates",
+          "texture coordinates on all meshes, as an OBJ file with vt has them"};
 }
 
 }  // namespace
@@ -36,6 +32,12 @@ Aov parse_aov(std::string_view word, std::string_view where) {
   return static_cast<Aov>(position_of(word, k_names, std::string(where)));
 }
 
+std::shared_ptr<CornerTexcoords> Renderer::Impl::corner_texcoords_in_force() {
+  if (!corner_texcoords) corner_texcoords = std::make_shared<CornerTexcoords>(device.impl(), scene);
+  corner_texcoords->update(*geometry, made_exchange());
+  return corner_texcoords;
+}
+
 void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
   if (!aov) aov.emplace(device.impl());
@@ -43,78 +45,18 @@ void Renderer::Impl::render_aov() {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
   }
+  aov_surface.resize(device.impl(), 0);
   if (pixel_noise) {
-    Buffer<cl_float4> surface, coverage;
-    aov->weigh(frame, aggregate, surface, coverage);
-    pixel_noise->smooth(contour_inputs(), surface, image_size(), aov_surface);
-    pixel_noise->smooth(contour_inputs(), coverage, image_size(), aov_coverage);
+    aov->weigh(frame, aggregate);
+    pixel_noise->smooth(contour_inputs(), aov->surface, image_size(), aov_surface);
+    pixel_noise->smooth(contour_inputs(), aov->coverage, image_size(), aov_coverage);
   }
+  aov->finish(frame,
+              {static_cast<std::size_t>(scene.width), static_cast<std::size_t>(scene.height),
+               static_cast<std::size_t>(raster.supersampling), static_cast<std::size_t>(raster.margin)},
+              aov_surface, aov_coverage, *corner_texcoords_in_force());
   aov_frame = frame_number;
 }
-
-namespace {
-
-/// A pixel of the auxiliary outputs, but for its texture coordinates.
-struct AovPixel {
-  float depth, effective_faces;
-  glm::vec3 normal;
-  cl_uint face;
-  float bary1, bary2;
-};
-
-/// What the stage left of the samples of a view.
-std::vector<AovPixel> read_samples(const Renderer::Impl& m, std::size_t view) {
-  const std::size_t count = std::size_t{m.frame.width} * m.frame.height;
-  const auto channel = [&](std::size_t index) {
-    std::vector<float> values(count);
-    m.aov->outputs.download(values, (index * m.views.size() + view) * count);
-    return values;
-  };
-  const std::vector<float> depth = channel(DPR_AUXILIARY_DEPTH),
-                           effective_faces = channel(DPR_AUXILIARY_EFFECTIVE_FACES),
-                           x = channel(DPR_AUXILIARY_NORMAL), y = channel(DPR_AUXILIARY_NORMAL + 1),
-                           z = channel(DPR_AUXILIARY_NORMAL + 2), b1 = channel(DPR_AUXILIARY_BARYCENTRICS),
-                           b2 = channel(DPR_AUXILIARY_BARYCENTRICS + 1);
-  std::vector<cl_uint> faces(count);
-  m.aov->face_id.download(faces, view * count);
-  std::vector<AovPixel> samples;
-  samples.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    samples.push_back({depth[i], effective_faces[i], {x[i], y[i], z[i]}, faces[i], b1[i], b2[i]});
-  }
-  return samples;
-}
-
-/// With noise on the pixel: face and barycentrics are those of the sample at the pixel's centre or, of an
-/// even number, behind it; the rest is the mean over what covers the pixel.
-std::vector<AovPixel> to_pixels(const Renderer::Impl& m, std::size_t view,
-                                const std::vector<AovPixel>& samples) {
-  const auto width = static_cast<std::size_t>(m.scene.width),
-             height = static_cast<std::size_t>(m.scene.height);
-  const auto step = static_cast<std::size_t>(m.raster.supersampling),
-             margin = static_cast<std::size_t>(m.raster.margin);
-  std::vector<cl_float4> surface(width * height), coverage(width * height);
-  m.aov_surface.download(surface, view * width * height);
-  m.aov_coverage.download(coverage, view * width * height);
-  std::vector<AovPixel> pixels;
-  pixels.reserve(width * height);
-  for (std::size_t i = 0; i < width * height; ++i) {
-    const std::size_t row = margin + i / width * step + step / 2,
-                      column = margin + i % width * step + step / 2;
-    AovPixel pixel = samples[row * m.frame.width + column];
-    const cl_float4& s = surface[i];
-    const float covered = coverage[i].s[0], scale = covered > 0 ? 1 / covered : 0;
-    const glm::vec3 normal(s.s[1], s.s[2], s.s[3]);
-    const float length = glm::length(normal);
-    pixel.depth = s.s[0] * scale;
-    pixel.effective_faces = coverage[i].s[1] * scale;
-    pixel.normal = length > 0 ? normal / length : glm::vec3(0);
-    pixels.push_back(pixel);
-  }
-  return pixels;
-}
-
-}  // namespace
 
 AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
   Renderer::Impl& m = renderer.impl();
@@ -126,30 +68,61 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
   AuxiliaryOutputs result;
   result.width = m.scene.width;
   result.height = m.scene.height;
-  std::vector<AovPixel> pixels = read_samples(m, view);
-  if (m.pixel_noise) pixels = to_pixels(m, view, pixels);
-  const std::vector<std::array<glm::vec2, 3>> texcoords = corner_texcoords(texcoords_in_force(m));
-  for (const AovPixel& pixel : pixels) {
-    const bool shows_face = pixel.face != DPR_NO_FACE;
-    result.depth.push_back(pixel.depth);
-    result.effective_faces.push_back(pixel.effective_faces);
-    result.normal.push_back(pixel.normal);
-    result.face_id.push_back(shows_face ? static_cast<std::int32_t>(pixel.face) : -1);
-    const glm::vec3 b =
-        shows_face ? glm::vec3(1 - pixel.bary1 - pixel.bary2, pixel.bary1, pixel.bary2) : glm::vec3(0);
-    result.barycentrics.push_back(glm::max(b, glm::vec3(0)));
-    if (texcoords.empty()) continue;
-    const auto corners = shows_face ? texcoords[pixel.face] : std::array<glm::vec2, 3>{};
-    result.uv.push_back(b.x * corners[0] + b.y * corners[1] + b.z * corners[2]);
+  const std::size_t count = static_cast<std::size_t>(result.width) * static_cast<std::size_t>(result.height);
+  std::vector<cl_float4> normals(count), places(count);
+  std::vector<cl_float2> uvs(m.corner_texcoords->empty() ? 0 : count);
+  std::vector<cl_uint> faces(count);
+  m.aov->normals.download(normals, view * count);
+  m.aov->places.download(places, view * count);
+  m.aov->uvs.download(uvs, view * count);
+  m.aov->faces.download(faces, view * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const cl_float4 &normal = normals[i], &place = places[i];
+    result.normal.emplace_back(normal.s[0], normal.s[1], normal.s[2]);
+    result.depth.push_back(normal.s[3]);
+    result.barycentrics.emplace_back(place.s[0], place.s[1], place.s[2]);
+    result.effective_faces.push_back(place.s[3]);
   }
+  for (const cl_uint face : faces)
+    result.face_id.push_back(face == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(face));
+  for (const cl_float2& uv : uvs) result.uv.emplace_back(uv.s[0], uv.s[1]);
   return result;
 }
 
-Image aov_image(const AuxiliaryOutputs& outputs, Aov aov) {
-  if (aov == Aov::uv && outputs.uv.empty()) {
-    throw InvalidArgument("uv (auxiliary outputs)", "a mesh without texture coordinates",
-                          "texture coordinates on all meshes, as an OBJ file with vt has them");
+BufferView aov_view(Renderer& renderer, Aov aov, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_rendered("aov_view");
+  if (aov == Aov::uv && !have_texcoords(m.scene)) throw no_texcoords();
+  enqueue(m.device.impl(), events, [&] { m.render_aov(); });
+  const std::size_t count = m.image().size();
+  const auto part = [&](const auto& buffer, std::size_t first, std::size_t components) {
+    using Element = typename std::decay_t<decltype(buffer)>::Element;
+    return BufferView{buffer.cl_buffer()(), first * sizeof(float), sizeof(Element), count, components};
+  };
+  switch (aov) {
+    case Aov::depth:
+      return part(m.aov->normals, 3, 1);
+    case Aov::normal:
+      return part(m.aov->normals, 0, 3);
+    case Aov::face_id:
+      return part(m.aov->faces, 0, 1);
+    case Aov::barycentrics:
+      return part(m.aov->places, 0, 3);
+    case Aov::uv:
+      return part(m.aov->uvs, 0, 2);
+    case Aov::effective_faces:
+      return part(m.aov->places, 3, 1);
   }
+  throw InvalidArgument("aov (aov_view)", std::to_string(static_cast<int>(aov)), "an Aov");
+}
+
+void copy_aov(Renderer& renderer, Aov aov, const BufferSpan& outputs, const Events& events) {
+  copy_view(renderer.impl(), aov_view(renderer, aov, {.wait = events.wait}), outputs, {.done = events.done},
+            "outputs");
+}
+
+Image aov_image(const AuxiliaryOutputs& outputs, Aov aov) {
+  if (aov == Aov::uv && outputs.uv.empty()) throw no_texcoords();
   Image image(outputs.width, outputs.height);
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
     const auto value = [&]() -> glm::vec3 {

@@ -1,6 +1,8 @@
 #include "renderer/gradient_map.hpp"
 
 #include <algorithm>
+#include <map>
+#include <tuple>
 #include <vector>
 
 namespace dpr {
@@ -79,6 +81,24 @@ GradientMap make_map(Device::Impl& device, const GradientSums& sums, std::size_t
       std::fill_n(first, list->segments, 0.0F);
     }
   }
+  return upload(device, terms);
+}
+
+SparseMap make_fold(Device::Impl& device, SceneGradient& of_passes, SceneGradient& of_views) {
+  Terms terms;
+  std::map<std::tuple<const GradientRow*, std::size_t, std::size_t>, std::size_t> first;  // number, by array
+  for_each_array(of_views, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    if (!is_summed(row)) return;
+    first[{&row, index.view, index.item}] = terms.size();
+    transform_numbers(array, [&](double value) { return terms.emplace_back(), value; });
+  });
+  std::size_t number = 0;
+  const std::size_t views = of_views.views.size();
+  for_each_array(of_passes, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    if (!is_summed(row)) return;
+    std::size_t to = first.at({&row, index.view % views, index.item});
+    transform_numbers(array, [&](double value) { return terms[to++].push_back({number++, 1.0}), value; });
+  });
   return upload(device, terms);
 }
 

@@ -50,4 +50,7 @@ using GradientMap = SparseMap;
 GradientMap make_map(Device::Impl& device, const GradientSums& sums, std::size_t meshes,
                      const std::function<SceneGradient(std::span<const float>)>& finish);
 
+/// The map from the summed arrays of [pass][view] to those of the views: what is a view's own is added up.
+SparseMap make_fold(Device::Impl& device, SceneGradient& of_passes, SceneGradient& of_views);
+
 }  // namespace dpr

@@ -25,6 +25,8 @@ class NearPlane {
   void forget(std::size_t mesh) noexcept { is_known_[mesh] = false; }
   void forget_views() noexcept { are_views_known_ = false; }
   bool knows(std::size_t mesh) const noexcept { return is_known_[mesh]; }
+  bool knows_views() const noexcept { return are_views_known_; }
+  std::span<const BoxCorners> boxes_of_views() const noexcept { return boxes_of_views_; }
   /// What set_boxes_of_views() takes: of views with shapes of their own, [view][vertex]. O(positions).
   static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions,
                                           std::span<const MeshRange> meshes);

@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "renderer/buffer_span.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/on_device.hpp"
 #include "renderer/setter_checks.hpp"
 
 namespace dpr {
@@ -12,24 +11,9 @@ namespace {
 constexpr std::size_t k_vector = 3, k_pair = 2, k_pixel = 4;  // floats
 constexpr std::size_t k_rows = 3, k_columns = 4;              // of an affine matrix
 
-/// Runs `work` after what it waits for, and before its event.
-template <class Work>
-void enqueue(Renderer::Impl& m, const Events& events, const Work& work) {
-  const Device::Impl& device = m.device.impl();
-  require_events(device, events);
-  begin(device, events);
-  work();
-  end(device, events);
-}
-
 FloatVectors source(const Renderer::Impl& m, const BufferSpan& span, const VectorShape& shape,
                     const char* name) {
   return require_vectors(m.device.impl(), span, shape, Access::read, name);
-}
-
-FloatVectors target(const Renderer::Impl& m, const BufferSpan& span, const VectorShape& shape,
-                    const char* name) {
-  return require_vectors(m.device.impl(), span, shape, Access::write, name);
 }
 
 }  // namespace
@@ -39,7 +23,7 @@ void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& posit
   m.require_scene("set_positions");
   check_mesh(m.scene, mesh);
   const FloatVectors from = source(m, positions, {m.geometry->meshes[mesh].vertices, k_vector}, "positions");
-  enqueue(m, events, [&] { m.take_positions(mesh, from); });
+  enqueue(m.device.impl(), events, [&] { m.take_positions(mesh, from); });
 }
 
 void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors, const Events& events) {
@@ -50,7 +34,7 @@ void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors, 
     throw InvalidArgument("mesh (set_colors)", "a mesh without colours",
                           "one of which vertices or faces have some");
   const FloatVectors from = source(m, colors, {m.geometry->meshes[mesh].colors, k_vector}, "colors");
-  enqueue(m, events, [&] { m.take_colors(mesh, from); });
+  enqueue(m.device.impl(), events, [&] { m.take_colors(mesh, from); });
 }
 
 void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
@@ -60,7 +44,7 @@ void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const
   check_texture(m.scene, mesh, texture);
   const std::size_t count = m.scene.meshes[mesh].mesh.textures[texture].texels.size();
   const FloatVectors from = source(m, texels, {count, k_vector}, "texels");
-  enqueue(m, events, [&] { m.take_texels(mesh, texture, from); });
+  enqueue(m.device.impl(), events, [&] { m.take_texels(mesh, texture, from); });
 }
 
 void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords, const Events& events) {
@@ -68,7 +52,15 @@ void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texco
   m.require_scene("set_texcoords");
   check_has_texcoords(m.scene, mesh);
   const FloatVectors from = source(m, texcoords, {m.geometry->meshes[mesh].texcoords, k_pair}, "texcoords");
-  enqueue(m, events, [&] { m.take_texcoords(mesh, from); });
+  enqueue(m.device.impl(), events, [&] { m.take_texcoords(mesh, from); });
+}
+
+void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_normals");
+  check_has_normals(m.scene, mesh);
+  const FloatVectors from = source(m, normals, {m.geometry->meshes[mesh].normals, k_vector}, "normals");
+  enqueue(m.device.impl(), events, [&] { m.take_normals(mesh, from); });
 }
 
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
@@ -82,7 +74,7 @@ void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpa
   };
   const auto from_positions = optional_source(positions, m.geometry->vertices, "positions");
   const auto from_colors = optional_source(colors, m.geometry->colors, "colors");
-  enqueue(m, events, [&] { m.take_shapes(from_positions, from_colors); });
+  enqueue(m.device.impl(), events, [&] { m.take_shapes(from_positions, from_colors); });
 }
 
 void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events) {
@@ -90,14 +82,14 @@ void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Even
   m.require_scene("set_transforms");
   const VectorShape shape{m.views.size() * m.scene.meshes.size(), k_columns, k_rows};
   const FloatVectors from = source(m, transforms, shape, "transforms");
-  enqueue(m, events, [&] { m.take_transforms(from); });
+  enqueue(m.device.impl(), events, [&] { m.take_transforms(from); });
 }
 
 void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events) {
   Renderer::Impl& m = renderer.impl();
   m.require_scene("set_view_matrices");
   const FloatVectors from = source(m, matrices, {m.views.size(), k_columns, k_rows}, "matrices");
-  enqueue(m, events, [&] { m.take_view_matrices(from); });
+  enqueue(m.device.impl(), events, [&] { m.take_view_matrices(from); });
 }
 
 namespace {
@@ -113,23 +105,25 @@ void require_countable(std::size_t count, const char* name) {
 
 }  // namespace
 
-void reserve(Renderer& renderer, const FrameRoom& room) {
-  renderer.impl().require_scene("reserve");
+FrameCounts counts_of(const FrameRoom& room) {
   require_countable(room.pairs, "pairs");
   require_countable(room.fragments, "fragments");
   require_countable(room.contours, "contours");
-  renderer.impl().reserve({room.pairs, room.fragments, room.contours});
+  return {room.pairs, room.fragments, room.contours};
+}
+
+void reserve(Renderer& renderer, const FrameRoom& room) {
+  renderer.impl().require_scene("reserve");
+  renderer.impl().reserve(counts_of(room));
 }
 
 void forward_on_device(Renderer& renderer, const Events& events) {
   Renderer::Impl& m = renderer.impl();
   m.require_scene("forward_on_device");
-  enqueue(m, events, [&] { m.forward(FrameSizes::kept); });
+  enqueue(m.device.impl(), events, [&] { m.forward(FrameSizes::kept); });
 }
 
-FrameHistory frame_history(Renderer& renderer) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("frame_history");
+FrameHistory history_of(Renderer::Impl& m) {
   const cl_uint4 found = m.rasterize.history().download().front();
   m.rasterize.forget_history();
   const FrameCounts largest{found.s[0], found.s[1], found.s[2]};
@@ -137,13 +131,15 @@ FrameHistory frame_history(Renderer& renderer) {
   return {found.s[3], {largest.pairs, largest.fragments, largest.contours}};
 }
 
+FrameHistory frame_history(Renderer& renderer) {
+  renderer.impl().require_scene("frame_history");
+  return history_of(renderer.impl());
+}
+
 BufferView frame_history_view(Renderer& renderer) {
   return {renderer.impl().rasterize.history().cl_buffer()(), 0, sizeof(cl_uint4), 1, 4};
 }
 
-namespace {
-
-/// The gradient where the kernels can read it as it is, or in a copy of ours.
 BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& from, std::size_t count) {
   const bool is_packed = from.first == 0 && from.stride == k_pixel;
   if (is_packed && !(m.pixel_noise && m.pixel_noise->blur.loads_behind_images()))
@@ -153,14 +149,12 @@ BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& f
   return m.host_grad_images;
 }
 
-}  // namespace
-
 void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events) {
   Renderer::Impl& m = renderer.impl();
   m.require_rendered("backward_on_device");
   const std::size_t count = m.image().size();
   const FloatVectors from = source(m, grad_images, {count, k_pixel}, "grad_images");
-  enqueue(m, events, [&] { m.backward_on_device(gradient_of_images(m, from, count)); });
+  enqueue(m.device.impl(), events, [&] { m.backward_on_device(gradient_of_images(m, from, count)); });
 }
 
 BufferView image_view(Renderer& renderer) {
@@ -169,15 +163,16 @@ BufferView image_view(Renderer& renderer) {
   return {m.image().cl_buffer()(), 0, sizeof(cl_float4), m.image().size(), k_pixel};
 }
 
-namespace {
-
-void copy(Renderer::Impl& m, const BufferView& view, const BufferSpan& span, const Events& events,
-          const char* name) {
-  const FloatVectors to = target(m, span, {view.count, view.components}, name);
+void copy_view(Renderer::Impl& m, const BufferView& view, const BufferSpan& span, const Events& events,
+               const char* name) {
+  const FloatVectors to =
+      require_vectors(m.device.impl(), span, {view.count, view.components}, Access::write, name);
   const FloatVectors from{view.buffer, view.offset / sizeof(float), view.stride / sizeof(float),
                           view.components};
-  enqueue(m, events, [&] { m.made_exchange().give(from, view.count, to); });
+  enqueue(m.device.impl(), events, [&] { m.made_exchange().give(from, view.count, to); });
 }
+
+namespace {
 
 BufferView view_of(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count,
                    std::size_t components) {
@@ -224,17 +219,32 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
 }
 
 /// A number, a vector or a list of vectors among the numbers, from `first` on.
-BufferView numbers_view(const Renderer::Impl& m, const GradientArray& array, std::size_t first,
+BufferView numbers_view(const Buffer<float>& all, const GradientArray& array, std::size_t first,
                         std::size_t numbers) {
   const std::size_t components = std::holds_alternative<double*>(array) ? 1 : k_vector;
-  return {m.grad_numbers.cl_buffer()(), first * sizeof(float), components * sizeof(float),
-          numbers / components, components};
+  return {all.cl_buffer()(), first * sizeof(float), components * sizeof(float), numbers / components,
+          components};
 }
 
 }  // namespace
 
+std::optional<BufferView> summed_view(SceneGradient& arrays, const Renderer::Impl& m,
+                                      const Buffer<float>& all, const std::string& name) {
+  std::optional<BufferView> found;
+  std::size_t first = 0;
+  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    if (!is_summed(row)) return;
+    std::size_t numbers = 0;
+    transform_numbers(array, [&](double value) { return ++numbers, value; });
+    if (m.scene.gradients.*row.wanted && exists(row, index, m.scene, m.views) && name_of(row, index) == name)
+      found = numbers_view(all, array, first, numbers);
+    first += numbers;
+  });
+  return found;
+}
+
 void copy_images(Renderer& renderer, const BufferSpan& images, const Events& events) {
-  copy(renderer.impl(), image_view(renderer), images, events, "images");
+  copy_view(renderer.impl(), image_view(renderer), images, events, "images");
 }
 
 BufferView gradient_view(Renderer& renderer, const std::string& name) {
@@ -243,18 +253,10 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
   if (m.device_gradient_frame != m.frame_number)
     throw InvalidArgument("gradient_view", "no gradient of the last frame", "backward_on_device() first");
   SceneGradient arrays = m.empty_gradient();
-  std::optional<BufferView> found;
-  std::size_t first = 0;
-  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+  std::optional<BufferView> found = summed_view(arrays, m, m.grad_numbers, name);
+  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray&) {
     const bool is_there = m.scene.gradients.*row.wanted && exists(row, index, m.scene, m.views);
-    if (!is_summed(row)) {
-      if (is_there && !found) found = mesh_gradient(m, row, index.item, name);
-      return;
-    }
-    std::size_t numbers = 0;
-    transform_numbers(array, [&](double value) { return ++numbers, value; });
-    if (is_there && name_of(row, index) == name) found = numbers_view(m, array, first, numbers);
-    first += numbers;
+    if (is_there && !is_summed(row) && !found) found = mesh_gradient(m, row, index.item, name);
   });
   if (found) return *found;
   throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",
@@ -264,7 +266,7 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
 
 void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,
                    const Events& events) {
-  copy(renderer.impl(), gradient_view(renderer, name), gradient, events, "gradient");
+  copy_view(renderer.impl(), gradient_view(renderer, name), gradient, events, "gradient");
 }
 
 cl_mem image_handle(const Renderer& renderer) {

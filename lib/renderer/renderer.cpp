@@ -65,6 +65,7 @@ void Renderer::Impl::forward(FrameSizes sizes) {
   rendered = false;
   build_pyramids();
   transform.forward(frame, device_views, *geometry);
+  if (geometry_colors) geometry_colors->forward(frame, *geometry, transform, geometry->view_colors);
   find_edges();
   hide_back_faces();
   set_up();
@@ -220,6 +221,7 @@ void Renderer::Impl::settle() {
   rendered = false;
   forward_measured();
   rendered = true;
+  aov_frame = 0;
 }
 
 void Renderer::Impl::render(const Band& band) {
@@ -279,7 +281,15 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
       pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc, clip.grad);
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
     if (shade.lit()) shade.backward_given_normals(shade_inputs());
-    transform.backward(frame, device_views, shade.lit(), grad_ndc, clip.grad, grad_world);
+    if (geometry_colors) {
+      gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
+                      grad_colors);
+      // Where vertices may lie behind the camera their depth goes the way of homogeneous coordinates.
+      geometry_colors->backward(frame, *geometry, transform, grad_colors,
+                                frame.clips != 0 ? clip.grad : grad_ndc, grad_world);
+    }
+    const bool has_grad_world = shade.lit() || geometry_colors;
+    transform.backward(frame, device_views, has_grad_world, grad_ndc, clip.grad, grad_world);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
   gather_mesh_gradients(add_to_positions);

@@ -60,6 +60,18 @@ void Renderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoo
   impl_->set_texcoords(mesh, texcoords);
 }
 
+void Renderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
+  impl_->require_scene("Renderer::set_normals");
+  check_normals(impl_->scene, mesh, normals);
+  impl_->set_normals(mesh, normals);
+}
+
+void Renderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
+  impl_->require_scene("Renderer::set_materials");
+  check_materials(impl_->scene, mesh, materials);
+  impl_->set_materials(mesh, materials);
+}
+
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   Impl& m = *impl_;
   m.require_scene("Renderer::set_shapes");

@@ -12,6 +12,7 @@
 #include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
+#include "stages/attribute.hpp"
 #include "stages/auxiliary.hpp"
 #include "stages/bin.hpp"
 #include "stages/clip.hpp"
@@ -80,12 +81,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
   void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
   void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_normals(std::size_t mesh, std::span<const glm::vec3> normals);
+  void set_materials(std::size_t mesh, std::span<const Material> materials);
   void set_lights(const std::optional<Lights>& lights);
   /// The same from the device, in place, for whom the host's copies stay what they were.
   void take_positions(std::size_t mesh, const FloatVectors& from);
   void take_colors(std::size_t mesh, const FloatVectors& from);
   void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
   void take_texcoords(std::size_t mesh, const FloatVectors& from);
+  void take_normals(std::size_t mesh, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
@@ -107,8 +111,12 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
   void expect(const FrameCounts& counts);
-  /// Fills `aov` for the last frame, if it does not hold that already.
+  /// Fills `aov` for the last frame, if it does not hold that already, emptied or not.
   void render_aov();
+  /// The device alone knows where the mesh's vertices are.
+  void forget_positions(std::size_t mesh) noexcept;
+  /// Of all meshes; without any where one has none.
+  std::shared_ptr<CornerTexcoords> corner_texcoords_in_force();
 
   /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it. An image is
   /// known to be complete after that: where the last frame's buffers were too small, the frame is rendered
@@ -140,17 +148,19 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Bin bin;
   Rasterize rasterize;
   Shade shade;
+  std::optional<GeometryColors> geometry_colors;  // of views' own shapes, in place of those that are set
   Occupancy occupancy;
   Aggregate aggregate;
   std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
   Reduce reduce;
-  std::optional<Exchange> exchange;             // made when first asked for
-  Raster raster;                                // around the frame
-  std::shared_ptr<PixelNoise> pixel_noise;      // made when first asked for; none: the triangles' noise
-  std::optional<Auxiliary> aov;                 // made when first asked for
-  std::uint64_t aov_frame = 0;                  // the frame it holds
-  Buffer<cl_float4> aov_surface, aov_coverage;  // of noise on the pixel: Auxiliary::weigh(), as pixels
+  std::optional<Exchange> exchange;                   // made when first asked for
+  Raster raster;                                      // around the frame
+  std::shared_ptr<PixelNoise> pixel_noise;            // made when first asked for; none: the triangles' noise
+  std::optional<Auxiliary> aov;                       // made when first asked for
+  std::uint64_t aov_frame = 0;                        // the frame it holds
+  std::shared_ptr<CornerTexcoords> corner_texcoords;  // of the scene, made when first asked for
+  Buffer<cl_float4> aov_surface, aov_coverage;        // of noise on the pixel: Auxiliary::weigh(), as pixels
 
   Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
@@ -172,7 +182,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> values);
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
 
   ShadeInputs shade_inputs() const {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};

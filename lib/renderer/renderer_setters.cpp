@@ -168,6 +168,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   last_counts.reset();
   reserved.reset();
   if (pixel_noise) pixel_noise->edges.reset();
+  corner_texcoords.reset();
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
@@ -271,8 +272,8 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
 void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   spare_view_positions_.resize(device.impl(), positions.size());
   spare_view_colors_.resize(device.impl(), colors.size());
-  write_range(device.impl(), spare_view_positions_, 0, positions);
-  write_range(device.impl(), spare_view_colors_, 0, colors);
+  write_range(device.impl(), spare_view_positions_, 0, to_cl(positions));
+  write_range(device.impl(), spare_view_colors_, 0, to_cl(colors));
   std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, geometry->meshes);
 
   std::swap(geometry->view_positions, spare_view_positions_);
@@ -298,7 +299,7 @@ void Renderer::Impl::set_cull(Cull cull) noexcept {
 }
 
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  replace(geometry->positions, geometry->meshes[mesh].first_vertex, positions);
+  replace(geometry->positions, geometry->meshes[mesh].first_vertex, to_cl(positions));
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
   near_plane.move(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
@@ -306,25 +307,40 @@ void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> 
 }
 
 void Renderer::Impl::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  replace(geometry->color_values, geometry->meshes[mesh].first_color, colors);
+  replace(geometry->color_values, geometry->meshes[mesh].first_color, to_cl(colors));
   std::ranges::copy(colors, colors_of(scene.meshes[mesh].mesh).begin());
   rendered = false;
 }
 
 void Renderer::Impl::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> values) {
   const shared::Texture& on_device = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
-  replace(geometry->textures.texel_values, on_device.first, values);
+  replace(geometry->textures.texel_values, on_device.first, to_cl(values));
   geometry->textures.has_levels = false;
   std::ranges::copy(values, scene.meshes[mesh].mesh.textures[texture].texels.begin());
   rendered = false;
 }
 
 void Renderer::Impl::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  std::vector<glm::vec3> values;
-  for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
+  std::vector<cl_float4> values;
+  for (const glm::vec2& uv : texcoords) values.push_back(to_cl(glm::vec3(uv, 0)));
   replace(geometry->textures.texcoord_values, geometry->meshes[mesh].first_texcoord, values);
   std::ranges::copy(texcoords, scene.meshes[mesh].mesh.texcoords.begin());
   if (pixel_noise) pixel_noise->edges.reset();  // which know the seams
+  rendered = false;
+}
+
+void Renderer::Impl::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
+  replace(geometry->given_normals.values, geometry->meshes[mesh].first_normal, to_cl(normals));
+  std::ranges::copy(normals, scene.meshes[mesh].mesh.normals.begin());
+  if (pixel_noise) pixel_noise->edges.reset();  // which know where they jump
+  rendered = false;
+}
+
+void Renderer::Impl::set_materials(std::size_t mesh, std::span<const Material> materials) {
+  std::vector<cl_float4> values;
+  for (const Material& material : materials) values.push_back(to_cl(material));
+  replace(geometry->materials.values, geometry->meshes[mesh].first_material, values);
+  std::ranges::copy(materials, scene.meshes[mesh].mesh.materials.begin());
   rendered = false;
 }
 
@@ -336,9 +352,13 @@ Exchange& Renderer::Impl::made_exchange() {
 void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) {
   const MeshRange& range = geometry->meshes[mesh];
   made_exchange().take(from, range.vertices, geometry->positions, range.first_vertex);
+  forget_positions(mesh);
+  rendered = false;
+}
+
+void Renderer::Impl::forget_positions(std::size_t mesh) noexcept {
   near_plane.forget(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
-  rendered = false;
 }
 
 void Renderer::Impl::take_colors(std::size_t mesh, const FloatVectors& from) {
@@ -358,6 +378,13 @@ void Renderer::Impl::take_texels(std::size_t mesh, std::size_t texture, const Fl
 void Renderer::Impl::take_texcoords(std::size_t mesh, const FloatVectors& from) {
   const MeshRange& range = geometry->meshes[mesh];
   made_exchange().take(from, range.texcoords, geometry->textures.texcoord_values, range.first_texcoord);
+  rendered = false;
+}
+
+/// The edges keep the jumps that the host knows.
+void Renderer::Impl::take_normals(std::size_t mesh, const FloatVectors& from) {
+  const MeshRange& range = geometry->meshes[mesh];
+  made_exchange().take(from, range.normals, geometry->given_normals.values, range.first_normal);
   rendered = false;
 }
 
@@ -396,7 +423,7 @@ void Renderer::Impl::take_view_matrices(const FloatVectors& from) {
 
 /// A part of a buffer, in a copy that takes its place.
 void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
-                             std::span<const glm::vec3> values) {
+                             std::span<const cl_float4> values) {
   spare_values_.resize(device.impl(), buffer.size());
   if (values.size() < buffer.size()) buffer.copy_to(spare_values_);
   write_range(device.impl(), spare_values_, first, values);

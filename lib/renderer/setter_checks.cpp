@@ -92,6 +92,12 @@ void check_has_texcoords(const Scene& scene, std::size_t mesh) {
     throw InvalidArgument("mesh (set_texcoords)", "a mesh without textures", "one that has some");
 }
 
+void check_has_normals(const Scene& scene, std::size_t mesh) {
+  check_mesh(scene, mesh);
+  if (scene.meshes[mesh].mesh.face_normals.empty())
+    throw InvalidArgument("mesh (set_normals)", "a mesh without normals of its own", "one that gives some");
+}
+
 void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions) {
   check_mesh(scene, mesh);
   check_values("positions", positions, scene.meshes[mesh].mesh.positions.size());
@@ -113,6 +119,23 @@ void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::
   std::vector<glm::vec3> values;
   for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
   check_values("texcoords", values, scene.meshes[mesh].mesh.texcoords.size());
+}
+
+void check_normals(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> normals) {
+  check_has_normals(scene, mesh);
+  check_values("normals", normals, scene.meshes[mesh].mesh.normals.size());
+}
+
+void check_materials(const Scene& scene, std::size_t mesh, std::span<const Material> materials) {
+  check_mesh(scene, mesh);
+  const std::size_t expected = scene.meshes[mesh].mesh.materials.size();
+  if (expected == 0)
+    throw InvalidArgument("mesh (set_materials)", "a mesh without materials", "one that has some");
+  if (materials.size() != expected) {
+    throw InvalidArgument("materials", std::to_string(materials.size()) + " values",
+                          std::to_string(expected));
+  }
+  for (std::size_t i = 0; i < expected; ++i) validate(materials[i], checks::element("materials", i));
 }
 
 std::size_t samples_of_side(int pixels, const Raster& raster) {

@@ -25,10 +25,13 @@ void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec
 void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
                   std::span<const glm::vec3> texels);
 void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords);
+void check_normals(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> normals);
+void check_materials(const Scene& scene, std::size_t mesh, std::span<const Material> materials);
 /// Those of which the values are on the device.
 void check_mesh(const Scene& scene, std::size_t mesh);
 void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture);
 void check_has_texcoords(const Scene& scene, std::size_t mesh);
+void check_has_normals(const Scene& scene, std::size_t mesh);
 void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights);
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);

@@ -5,7 +5,8 @@ namespace dpr {
 Auxiliary::Auxiliary(Device::Impl& device)
     : device_(device),
       forward_(device, "auxiliary.cl", "auxiliary_forward"),
-      weigh_(device, "auxiliary.cl", "auxiliary_weigh") {}
+      weigh_(device, "auxiliary.cl", "auxiliary_weigh"),
+      finish_(device, "auxiliary.cl", "auxiliary_finish") {}
 
 void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                         Aggregate& aggregate) {
@@ -24,12 +25,26 @@ void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, con
   }
 }
 
-void Auxiliary::weigh(const shared::FrameParams& p, const Aggregate& aggregate, Buffer<cl_float4>& surface,
-                      Buffer<cl_float4>& coverage) {
+void Auxiliary::weigh(const shared::FrameParams& p, const Aggregate& aggregate) {
   const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
   surface.resize(device_, pixels);
   coverage.resize(device_, pixels);
   weigh_(pixels, p, outputs, aggregate.image, surface, coverage);
+}
+
+void Auxiliary::finish(const shared::FrameParams& p, const Raster& raster,
+                       const Buffer<cl_float4>& blurred_surface, const Buffer<cl_float4>& blurred_coverage,
+                       const CornerTexcoords& texcoords) {
+  const std::size_t count = p.views * raster.width * raster.height;
+  normals.resize(device_, count);
+  places.resize(device_, count);
+  uvs.resize(device_, count);
+  faces.resize(device_, count);
+  const cl_uint4 image{
+      {to_uint(raster.width), to_uint(raster.height), to_uint(raster.supersampling), to_uint(raster.margin)}};
+  finish_(count, p, image, blurred_surface.size() > 0 ? 1 : 0, texcoords.empty() ? 0 : 1, outputs, face_id,
+          blurred_surface, blurred_coverage, texcoords.map.row_of,
+          BufferRef<cl_float2>(texcoords.values.cl_buffer()()), normals, places, uvs, faces);
 }
 
 }  // namespace dpr

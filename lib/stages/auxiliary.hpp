@@ -3,6 +3,7 @@
 
 #include "device/kernel.hpp"
 #include "stages/aggregate.hpp"
+#include "stages/attribute.hpp"
 #include "stages/geometry.hpp"
 
 namespace dpr {
@@ -18,14 +19,31 @@ class Auxiliary {
 
   /// What noise on the pixel can blend and blur: depth and normal, and 1 and the effective number of faces,
   /// all times the sample's alpha.
-  void weigh(const shared::FrameParams& p, const Aggregate& aggregate, Buffer<cl_float4>& surface,
-             Buffer<cl_float4>& coverage);
+  void weigh(const shared::FrameParams& p, const Aggregate& aggregate);
+
+  /// Of the images: pixels along their sides, samples along a pixel's, and around the image.
+  struct Raster {
+    std::size_t width, height, supersampling, margin;
+  };
+  /// From samples to pixels. What weigh() left, blurred, where there is noise on the pixel, and otherwise
+  /// empty.
+  void finish(const shared::FrameParams& p, const Raster& raster, const Buffer<cl_float4>& blurred_surface,
+              const Buffer<cl_float4>& blurred_coverage, const CornerTexcoords& texcoords);
+
+  Buffer<cl_float4> normals;  ///< [view][pixel] w = depth
+  Buffer<cl_float4> places;   ///< [view][pixel] barycentrics; w = the effective number of faces
+  Buffer<cl_float2> uvs;      ///< [view][pixel]
+  Buffer<cl_uint> faces;      ///< [view][pixel] DPR_NO_FACE for the background
+
+  Buffer<cl_float4> surface, coverage;  ///< [view][sample] of weigh()
 
   Buffer<float> outputs;    ///< [DPR_AUXILIARY_CHANNELS][view][height][width]
   Buffer<cl_uint> face_id;  ///< [view][height][width] DPR_NO_FACE for the background
 
   std::size_t bytes() const {
-    return outputs.capacity_bytes() + face_id.capacity_bytes() + grad_red_.capacity_bytes();
+    return surface.capacity_bytes() + coverage.capacity_bytes() + normals.capacity_bytes() +
+           places.capacity_bytes() + uvs.capacity_bytes() + faces.capacity_bytes() +
+           outputs.capacity_bytes() + face_id.capacity_bytes() + grad_red_.capacity_bytes();
   }
 
  private:
@@ -34,6 +52,10 @@ class Auxiliary {
          In<float>, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
       forward_;
   Kernel<shared::FrameParams, In<float>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>> weigh_;
+  Kernel<shared::FrameParams, cl_uint4, cl_uint, cl_uint, In<float>, In<cl_uint>, In<cl_float4>,
+         In<cl_float4>, In<cl_uint>, In<cl_float2>, Out<cl_float4>, Out<cl_float4>, Out<cl_float2>,
+         Out<cl_uint>>
+      finish_;
   Buffer<cl_float4> grad_red_;  // [view][height][width] 1 in red
 };
 

@@ -21,6 +21,10 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<cl_float
   copy(from, count, vectors_of(to, first, 4), true);
 }
 
+void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<float>& to, std::size_t components) {
+  copy(from, count, vectors_of(to, 0, components), true);
+}
+
 void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                             Buffer<shared::ViewParams>& cameras) {
   cameras_(count, to_uint(count), layout(from), orthographic ? 1 : 0, BufferRef<float>(from.buffer), cameras);
@@ -31,8 +35,8 @@ void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVect
 }
 
 void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
-  vectors_(count, to_uint(count), layout(from), layout(to), clean ? 1 : 0, BufferRef<float>(from.buffer),
-           BufferRef<float>(to.buffer));
+  vectors_(count, to_uint(count), layout(from), layout(to), clean ? 1 : 0, BufferRef<cl_uint>(from.buffer),
+           BufferRef<cl_uint>(to.buffer));
 }
 
 void Exchange::map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers) {

@@ -34,10 +34,12 @@ class Exchange {
   /// From the caller's `count` vectors to elements of `to` from `first` on, 0 behind their components.
   /// Numbers that are not finite become 0: kernels index by what they compute of them.
   void take(const FloatVectors& from, std::size_t count, Buffer<cl_float4>& to, std::size_t first);
+  /// The same to packed vectors of so many floats, from the first element on.
+  void take(const FloatVectors& from, std::size_t count, Buffer<float>& to, std::size_t components);
   /// From `count` world-to-camera matrices, of three rows each, to what cameras have of them.
   void take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                     Buffer<shared::ViewParams>& cameras);
-  /// `count` vectors to the caller.
+  /// `count` vectors to the caller; of integers of 32 bits too.
   void give(const FloatVectors& from, std::size_t count, const FloatVectors& to);
   void map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers);
 
@@ -45,7 +47,7 @@ class Exchange {
   void copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean);
 
   Device::Impl& device_;
-  Kernel<cl_uint, cl_uint4, cl_uint4, cl_uint, In<float>, Out<float>> vectors_;
+  Kernel<cl_uint, cl_uint4, cl_uint4, cl_uint, In<cl_uint>, Out<cl_uint>> vectors_;
   Kernel<cl_uint, cl_uint4, cl_uint, In<float>, Out<shared::ViewParams>> cameras_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<float>> map_;
 };

@@ -95,13 +95,23 @@ bool has_materials(const Scene& scene) {
 
 cl_float4 to_cl(const glm::vec3& v) { return {{v.x, v.y, v.z, 0.0F}}; }
 
-void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
-                 std::span<const glm::vec3> values) {
-  if (values.empty()) return;
+std::vector<cl_float4> to_cl(std::span<const glm::vec3> vectors) {
   std::vector<cl_float4> rows;
-  rows.reserve(values.size());
-  for (const glm::vec3& v : values) rows.push_back(to_cl(v));
-  device.write(buffer.cl_buffer(), first * sizeof(cl_float4), std::as_bytes(std::span(rows)));
+  rows.reserve(vectors.size());
+  for (const glm::vec3& v : vectors) rows.push_back(to_cl(v));
+  return rows;
+}
+
+cl_float4 to_cl(const Material& material) {
+  cl_float4 row = to_cl(material.specular);
+  row.s[3] = material.shininess.value_or(0.0F);
+  return row;
+}
+
+void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
+                 std::span<const cl_float4> values) {
+  if (values.empty()) return;
+  device.write(buffer.cl_buffer(), first * sizeof(cl_float4), std::as_bytes(values));
 }
 
 Geometry::Geometry(Device::Impl& device, const Scene& scene) {
@@ -220,10 +230,7 @@ void Geometry::add_normals(Device::Impl& device, const Scene& scene) {
 void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> values;
   for (const Instance& instance : scene.meshes) {
-    for (const Material& material : instance.mesh.materials) {
-      values.push_back(to_cl(material.specular));
-      values.back().s[3] = material.shininess.value_or(0.0F);
-    }
+    for (const Material& material : instance.mesh.materials) values.push_back(to_cl(material));
     if (instance.mesh.materials.empty()) values.push_back(to_cl(glm::vec3(1)));
   }
   materials.values.upload(device, values);

@@ -135,9 +135,12 @@ bool has_materials(const Scene& scene);
 
 /// A vector of three in the first components; w = 0.
 cl_float4 to_cl(const glm::vec3& v);
+std::vector<cl_float4> to_cl(std::span<const glm::vec3> vectors);
+/// As SurfaceMaterials has it.
+cl_float4 to_cl(const Material& material);
 
 /// Writes a part of a buffer of vectors. Blocks.
 void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::size_t first,
-                 std::span<const glm::vec3> values);
+                 std::span<const cl_float4> values);
 
 }  // namespace dpr

@@ -418,6 +418,108 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   clReleaseMemObject(gradients);
 }
 
+/* Auxiliary outputs and attributes of a frame on the device are those that the host reads. */
+static void test_attributes_on_device(cl_context context, cl_command_queue queue, const dpr_device* device,
+                                      dpr_renderer* renderer) {
+  dpr_buffer view = DPR_BUFFER_INIT, to = DPR_BUFFER_INIT;
+  dpr_frame_room room = DPR_FRAME_ROOM_INIT;
+  float depth[SIDE * SIDE], expected[SIDE * SIDE], image[FLOATS], pixels[FLOATS], gradient[9];
+  double of_host[9];
+  const float values[3] = {1, 2, 4};
+  size_t emptied = 1, i;
+  dpr_attribute *attribute = NULL, *numbers = NULL;
+  dpr_gradient* host = NULL;
+  cl_mem copied = clCreateBuffer(context, CL_MEM_READ_WRITE, sizeof image, NULL, NULL);
+  cl_mem rows = clCreateBuffer(context, CL_MEM_READ_WRITE, sizeof values, NULL, NULL);
+  to.buffer = copied;
+  OK(dpr_renderer_read_aov(renderer, "depth", expected, SIDE * SIDE));
+  OK(dpr_renderer_forward_on_device(renderer, NULL));
+  OK(dpr_renderer_aov_view(renderer, "depth", &view, NULL));
+  EXPECT(view.count == SIDE * SIDE && view.components == 1 && view.byte_stride == 16);
+  OK(dpr_renderer_copy_aov(renderer, "depth", &to, NULL));
+  clEnqueueReadBuffer(queue, copied, CL_TRUE, 0, sizeof depth, depth, 0, NULL, NULL);
+  EXPECT(memcmp(depth, expected, sizeof depth) == 0);
+
+  OK(dpr_attribute_create(device, "depth", &attribute));
+  OK(dpr_attribute_reserve(attribute, &room));
+  OK(dpr_attribute_forward(attribute, renderer));
+  OK(dpr_attribute_read_image(attribute, pixels, FLOATS));
+  OK(dpr_attribute_backward_pixels(attribute, pixels, FLOATS, &host));
+  OK(dpr_gradient_read(host, "meshes[0].positions", of_host, 9));
+  OK(dpr_attribute_forward_on_device(attribute, renderer, NULL));
+  OK(dpr_attribute_copy_images(attribute, &to, NULL));
+  clEnqueueReadBuffer(queue, copied, CL_TRUE, 0, sizeof image, image, 0, NULL, NULL);
+  for (i = 0; i < FLOATS; ++i) EXPECT(fabsf(image[i] - pixels[i]) < 1e-5f);
+  OK(dpr_attribute_image_view(attribute, &view));
+  EXPECT(view.count == SIDE * SIDE && view.components == 4);
+  OK(dpr_attribute_backward_on_device(attribute, &view, NULL));
+  OK(dpr_attribute_copy_gradient(attribute, "meshes[0].positions", &to, NULL));
+  clEnqueueReadBuffer(queue, copied, CL_TRUE, 0, sizeof gradient, gradient, 0, NULL, NULL);
+  for (i = 0; i < 9; ++i) EXPECT(fabs(gradient[i] - of_host[i]) < 1e-3 * (1 + fabs(of_host[i])));
+  OK(dpr_attribute_gradient_view(attribute, "sigma", &view));
+  EXPECT(view.count == 1);
+  OK(dpr_attribute_frame_history(attribute, &emptied, &room));
+  EXPECT(emptied == 0 && room.fragments > 0);
+
+  clEnqueueWriteBuffer(queue, rows, CL_TRUE, 0, sizeof values, values, 0, NULL, NULL);
+  OK(dpr_attribute_create_values(device, 1, &numbers));
+  to.buffer = rows;
+  OK(dpr_attribute_set_values_from(numbers, &to, 3, NULL));
+  OK(dpr_attribute_forward_on_device(numbers, renderer, NULL));
+  OK(dpr_attribute_image_view(numbers, &view));
+  OK(dpr_attribute_backward_on_device(numbers, &view, NULL));
+  OK(dpr_attribute_gradient_view(numbers, "values", &view));
+  EXPECT(view.count == 3 && view.components == 1);
+  REFUSED(dpr_attribute_set_values_from(attribute, &to, 3, NULL), "depth");
+  REFUSED(dpr_attribute_gradient_view(attribute, "values", &view), "values");
+  REFUSED(dpr_attribute_forward_on_device(attribute, NULL, NULL), "renderer");
+  REFUSED(dpr_renderer_copy_aov(renderer, "uv", &to, NULL), "texture coordinates");
+  REFUSED(dpr_renderer_aov_view(renderer, "deep", &view, NULL), "effective_faces");
+  dpr_gradient_destroy(host);
+  dpr_attribute_destroy(attribute);
+  dpr_attribute_destroy(numbers);
+  clReleaseMemObject(copied);
+  clReleaseMemObject(rows);
+}
+
+/* Shapes and view matrices from buffers are those of the host. */
+static void test_shapes_on_device(cl_context context, cl_command_queue queue, dpr_renderer* renderer) {
+  const float closer[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -2};
+  dpr_buffer from = DPR_BUFFER_INIT;
+  dpr_camera camera = three_units_away();
+  float shape[9], host[FLOATS], found[FLOATS];
+  int i;
+  cl_mem vertices = clCreateBuffer(context, CL_MEM_READ_ONLY, sizeof shape, NULL, NULL);
+  cl_mem matrix = clCreateBuffer(context, CL_MEM_READ_ONLY, sizeof closer, NULL, NULL);
+  for (i = 0; i < 9; ++i) shape[i] = 0.7f * positions[i];
+  clEnqueueWriteBuffer(queue, vertices, CL_TRUE, 0, sizeof shape, shape, 0, NULL, NULL);
+  clEnqueueWriteBuffer(queue, matrix, CL_TRUE, 0, sizeof closer, closer, 0, NULL, NULL);
+  camera.view[11] = -2;
+  OK(dpr_renderer_set_views(renderer, &camera, 1, NULL, 0));
+  OK(dpr_renderer_set_shapes(renderer, shape, 9, NULL, 0));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, host, FLOATS));
+  camera = three_units_away();
+  OK(dpr_renderer_set_views(renderer, &camera, 1, NULL, 0));
+  from.buffer = vertices;
+  OK(dpr_renderer_set_shapes_from(renderer, &from, NULL, NULL));
+  from.buffer = matrix;
+  OK(dpr_renderer_set_view_matrices_from(renderer, &from, NULL));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, found, FLOATS));
+  EXPECT(memcmp(host, found, sizeof host) == 0);
+  REFUSED(dpr_renderer_set_shapes(renderer, shape, 6, NULL, 0), "positions: got 2 values, expected 3");
+  REFUSED(dpr_renderer_set_shapes(renderer, NULL, 9, NULL, 0), "positions");
+  from.byte_offset = 48;
+  REFUSED(dpr_renderer_set_shapes_from(renderer, NULL, &from, NULL), "colors");
+  REFUSED(dpr_renderer_set_shapes_from(renderer, &from, NULL, NULL), "positions");
+  REFUSED(dpr_renderer_set_view_matrices_from(renderer, NULL, NULL), "matrices");
+  REFUSED(dpr_renderer_set_normals_from(renderer, 0, &from, NULL), "without normals");
+  OK(dpr_renderer_set_views(renderer, &camera, 1, NULL, 0));
+  clReleaseMemObject(vertices);
+  clReleaseMemObject(matrix);
+}
+
 /* In the caller's context, on the caller's queue: images and gradients as buffers. */
 static void test_own_opencl(const dpr_scene* scene) {
   cl_platform_id platform;
@@ -450,6 +552,8 @@ static void test_own_opencl(const dpr_scene* scene) {
   EXPECT(memcmp(of_buffer, of_pixels, sizeof of_buffer) == 0);
   REFUSED(dpr_backward_buffer(renderer, NULL, &first), "grad");
   test_on_device(context, queue, renderer, read, of_pixels);
+  test_attributes_on_device(context, queue, device, renderer);
+  test_shapes_on_device(context, queue, renderer);
   REFUSED(dpr_device_adopt(NULL, queue, &device), "context");
   REFUSED(dpr_device_adopt(context, NULL, &device), "queue");
   dpr_gradient_destroy(first);
@@ -458,6 +562,193 @@ static void test_own_opencl(const dpr_scene* scene) {
   dpr_device_destroy(device);
   clReleaseCommandQueue(queue);
   clReleaseContext(context);
+}
+
+/* An image of the renderer's last frame that differs from another. */
+static int differs(const dpr_renderer* renderer, const float* image) {
+  float pixels[FLOATS];
+  OK(dpr_renderer_read_image(renderer, pixels, FLOATS));
+  return memcmp(pixels, image, sizeof pixels) != 0;
+}
+
+/* What a renderer takes without a new scene is what a new scene has: normals, materials, lights and the rest.
+ */
+static void test_setters(const dpr_device* device) {
+  const float normals[] = {0, 0, 1}, turned[] = {0.3f, 0.2f, 1}, grey[] = {0.5f, 0.5f, 0.5f};
+  const uint32_t first[] = {0, 0, 0}, beyond[] = {0, 1, 0}, of_face[] = {0};
+  const dpr_material dull[] = {{{0.1f, 0.2f, 0.3f}, 3}}, bright[] = {{{1, 0.9f, 0.8f}, 0}};
+  const char* const wanted[] = {"normals", "materials"};
+  const char* const others[] = {"positions"};
+  const dpr_camera camera = three_units_away();
+  dpr_point_light light = {{1, 2, 4}, {0.6f, 0.6f, 0.6f}, {0.5f, 0.5f, 0.5f}};
+  dpr_lights lights = DPR_LIGHTS_INIT;
+  dpr_mesh mesh = triangle();
+  float image[FLOATS];
+  size_t count = 0;
+  int is_new;
+  dpr_renderer *renderers[2] = {NULL, NULL}, *renderer;
+  dpr_gradient* gradient = NULL;
+  lights.point = &light, lights.point_count = 1;
+  for (is_new = 1; is_new >= 0; --is_new) { /* by a new scene, then by setters */
+    dpr_scene* scene = NULL;
+    mesh.normals = is_new ? turned : normals, mesh.normal_count = 1;
+    mesh.face_normals = first;
+    mesh.materials = is_new ? bright : dull, mesh.material_count = 1;
+    mesh.face_materials = of_face;
+    OK(dpr_scene_create(SIDE, SIDE, &scene));
+    OK(dpr_scene_add_mesh(scene, &mesh));
+    OK(dpr_scene_set_camera(scene, &camera));
+    OK(dpr_scene_set_gradients(scene, wanted, 2));
+    OK(dpr_renderer_create(device, &renderers[is_new]));
+    renderer = renderers[is_new];
+    if (is_new) OK(dpr_scene_set_background(scene, grey));
+    if (is_new) OK(dpr_scene_set_lights(scene, &lights));
+    if (is_new) OK(dpr_scene_set_smoothing_word(scene, "preset", "joint_gaussian"));
+    OK(dpr_renderer_set_scene(renderer, scene));
+    OK(dpr_renderer_forward(renderer));
+    if (is_new) {
+      OK(dpr_renderer_read_image(renderer, image, FLOATS));
+    } else {
+      EXPECT(differs(renderer, image));
+      OK(dpr_scene_set_smoothing_word(scene, "preset", "joint_gaussian"));
+      OK(dpr_renderer_set_smoothing(renderer, scene));
+      OK(dpr_renderer_set_lights(renderer, &lights));
+      OK(dpr_renderer_set_background(renderer, grey));
+      OK(dpr_renderer_set_normals(renderer, 0, turned, 3));
+      OK(dpr_renderer_forward(renderer));
+      EXPECT(differs(renderer, image));
+      OK(dpr_renderer_set_materials(renderer, 0, bright, 1));
+      OK(dpr_renderer_forward(renderer));
+      EXPECT(!differs(renderer, image));
+      OK(dpr_renderer_set_lights(renderer, NULL));
+      OK(dpr_renderer_forward(renderer));
+      EXPECT(differs(renderer, image));
+      OK(dpr_renderer_set_lights(renderer, &lights));
+      OK(dpr_renderer_set_cull(renderer, "front"));
+      OK(dpr_renderer_forward(renderer));
+      EXPECT(differs(renderer, image));
+    }
+    REFUSED(dpr_renderer_set_normals(renderer, 0, turned, 6), "expected 1");
+    REFUSED(dpr_renderer_set_materials(renderer, 0, NULL, 1), "materials");
+    REFUSED(dpr_renderer_set_materials(renderer, 0, bright, 0), "expected 1");
+    REFUSED(dpr_renderer_set_smoothing(renderer, NULL), "scene");
+    REFUSED(dpr_renderer_set_cull(renderer, "some"), "word");
+    REFUSED(dpr_renderer_set_background(renderer, NULL), "color");
+    dpr_scene_destroy(scene);
+  }
+  renderer = renderers[1];
+  OK(dpr_backward_pixels(renderer, image, FLOATS, &gradient));
+  OK(dpr_gradient_size(gradient, "meshes[0].normals", &count));
+  EXPECT(count == 3);
+  OK(dpr_gradient_size(gradient, "meshes[0].specular", &count));
+  dpr_gradient_destroy(gradient);
+  OK(dpr_renderer_set_gradients(renderer, others, 1));
+  OK(dpr_backward_pixels(renderer, image, FLOATS, &gradient));
+  OK(dpr_gradient_count(gradient, &count));
+  EXPECT(count == 1);
+  REFUSED(dpr_renderer_set_gradients(renderer, NULL, 1), "names");
+  dpr_gradient_destroy(gradient);
+  mesh.face_normals = beyond;
+  {
+    dpr_scene* scene = make_scene();
+    REFUSED(dpr_scene_add_mesh(scene, &mesh), "normal 1");
+    mesh.face_normals = first, mesh.face_materials = &beyond[1];
+    REFUSED(dpr_scene_add_mesh(scene, &mesh), "material 1");
+    mesh.materials = NULL;
+    REFUSED(dpr_scene_add_mesh(scene, &mesh), "mesh.materials");
+    dpr_scene_destroy(scene);
+  }
+  dpr_renderer_destroy(renderers[0]);
+  dpr_renderer_destroy(renderers[1]);
+}
+
+/* A mesh's own loss joins that of the images. */
+static void test_mesh_loss(const dpr_device* device, const dpr_scene* scene) {
+  const float target[FLOATS] = {0};
+  dpr_mesh_loss_weights weights = DPR_MESH_LOSS_WEIGHTS_INIT;
+  dpr_mesh mesh = triangle();
+  double value = 0, alone[9], both[9], joined = 0;
+  int i;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient *of_images = NULL, *of_both = NULL;
+  dpr_mesh_loss* shape = NULL;
+  dpr_loss* loss = make_loss(device, target);
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  weights.edge_length = 1;
+  OK(dpr_mesh_loss_create(device, &weights, &mesh, &shape));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  OK(dpr_mesh_loss_evaluate(shape, renderer, 0, &value));
+  EXPECT(fabs(value - 14.0 / 3) < 1e-5); /* of edges as long as 2, sqrt(5) and sqrt(5) */
+  OK(dpr_backward_loss(renderer, loss, &of_images));
+  OK(dpr_backward_losses(renderer, loss, shape, &of_both));
+  OK(dpr_gradient_read(of_images, "meshes[0].positions", alone, 9));
+  OK(dpr_gradient_read(of_both, "meshes[0].positions", both, 9));
+  for (i = 0; i < 9; ++i) joined += fabs(both[i] - alone[i]);
+  EXPECT(joined > 1);
+  weights.flatness = -1;
+  REFUSED(dpr_mesh_loss_create(device, &weights, &mesh, &shape), "weight (mesh loss)");
+  REFUSED(dpr_mesh_loss_create(device, NULL, &mesh, &shape), "weights");
+  REFUSED(dpr_mesh_loss_evaluate(shape, renderer, 1, &value), "mesh");
+  REFUSED(dpr_backward_losses(renderer, loss, NULL, &of_both), "mesh_loss");
+  dpr_gradient_destroy(of_images);
+  dpr_gradient_destroy(of_both);
+  dpr_mesh_loss_destroy(shape);
+  dpr_loss_destroy(loss);
+  dpr_renderer_destroy(renderer);
+}
+
+/* What a pixel shows: by auxiliary outputs, and by images of attributes with their gradients. */
+static void test_attributes(const dpr_device* device, const dpr_scene* scene) {
+  const size_t middle = SIDE * SIDE / 2 + SIDE / 2;
+  const float heat[3] = {1, 1, 1};
+  float depth[SIDE * SIDE], normal[3 * SIDE * SIDE], image[FLOATS];
+  double of_values[3];
+  size_t count = 0;
+  dpr_renderer* renderer = NULL;
+  dpr_attribute *depths = NULL, *heats = NULL, *none = NULL;
+  dpr_gradient* gradient = NULL;
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_attribute_create(device, "depth", &depths));
+  REFUSED(dpr_attribute_forward(depths, renderer), "forward");
+  REFUSED(dpr_attribute_image_size(depths, &count), "forward");
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_aov_size(renderer, "normal", &count));
+  EXPECT(count == 3 * SIDE * SIDE);
+  OK(dpr_renderer_read_aov(renderer, "depth", depth, SIDE * SIDE));
+  OK(dpr_renderer_read_aov(renderer, "normal", normal, 3 * SIDE * SIDE));
+  EXPECT(fabsf(depth[middle] - 3) < 1e-4f && fabsf(normal[3 * middle + 2] - 1) < 1e-4f);
+  OK(dpr_attribute_forward(depths, renderer));
+  OK(dpr_attribute_image_size(depths, &count));
+  EXPECT(count == FLOATS);
+  OK(dpr_attribute_read_image(depths, image, FLOATS));
+  EXPECT(fabsf(image[4 * middle] / image[4 * middle + 3] - depth[middle]) < 1e-4f);
+  OK(dpr_attribute_backward_pixels(depths, image, FLOATS, &gradient));
+  OK(dpr_gradient_size(gradient, "meshes[0].positions", &count));
+  EXPECT(count == 9);
+  dpr_gradient_destroy(gradient);
+  OK(dpr_attribute_create_values(device, 1, &heats));
+  OK(dpr_attribute_set_values(heats, heat, 3));
+  OK(dpr_attribute_forward(heats, renderer));
+  OK(dpr_attribute_read_image(heats, image, FLOATS));
+  EXPECT(fabsf(image[4 * middle] - image[4 * middle + 3]) < 1e-5f);
+  OK(dpr_attribute_backward_pixels(heats, image, FLOATS, &gradient));
+  OK(dpr_gradient_read(gradient, "values", of_values, 3));
+  EXPECT(of_values[0] > 0 && of_values[1] > 0 && of_values[2] > 0);
+  REFUSED(dpr_renderer_read_aov(renderer, "depth", depth, 3), "expected 256");
+  REFUSED(dpr_renderer_read_aov(renderer, "deep", depth, 3), "face_id");
+  REFUSED(dpr_attribute_read_image(depths, image, 3), "expected 1024");
+  REFUSED(dpr_attribute_backward_pixels(depths, image, 3, &gradient), "grad");
+  REFUSED(dpr_attribute_create(device, "heat", &none), "texcoords");
+  REFUSED(dpr_attribute_create_values(device, 0, &none), "channels");
+  REFUSED(dpr_attribute_set_values(depths, heat, 3), "depth");
+  REFUSED(dpr_attribute_set_values(heats, NULL, 3), "values");
+  dpr_gradient_destroy(gradient);
+  dpr_attribute_destroy(depths);
+  dpr_attribute_destroy(heats);
+  dpr_renderer_destroy(renderer);
 }
 
 static void test_wrong_meshes(dpr_scene* scene) {
@@ -680,6 +971,9 @@ int main(void) {
   test_wrap_and_filter(device);
   test_own_opencl(scene);
   test_cameras(device);
+  test_setters(device);
+  test_mesh_loss(device, scene);
+  test_attributes(device, scene);
   test_wrong_scenes();
   test_wrong_renderers(device, scene);
   dpr_scene_destroy(scene);

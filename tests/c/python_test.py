@@ -15,6 +15,16 @@ class Mesh(ctypes.Structure):
                 ("face_textures", c_void_p)]
 
 
+class LitMesh(ctypes.Structure):
+    """With what was added to the struct later."""
+    _fields_ = Mesh._fields_ + [("normals", c_void_p), ("normal_count", c_size_t), ("face_normals", c_void_p),
+                                ("materials", c_void_p), ("material_count", c_size_t), ("face_materials", c_void_p)]
+
+
+class Material(ctypes.Structure):
+    _fields_ = [("specular", c_float * 3), ("shininess", c_float)]
+
+
 class Texture(ctypes.Structure):
     _fields_ = [("width", c_int), ("height", c_int), ("texels", c_void_p), ("wrap", c_int), ("filter", c_int)]
 
@@ -86,6 +96,40 @@ def check_textures(dpr, device, camera, positions, faces):
     dpr.library.dpr_scene_destroy(scene)
 
 
+def check_surface(dpr, device, camera, positions, faces):
+    """A mesh that gives a normal and a material takes new ones; views take shapes; what a pixel shows is read."""
+    normals, first = (c_float * 3)(0, 0, 1), (c_uint32 * 3)(0, 0, 0)
+    material = Material((c_float * 3)(1, 1, 1), 0)
+    mesh = LitMesh(size=ctypes.sizeof(LitMesh), positions=ctypes.addressof(positions), vertices=3,
+                   faces=ctypes.addressof(faces), face_count=1, normals=ctypes.addressof(normals), normal_count=1,
+                   face_normals=ctypes.addressof(first), materials=ctypes.addressof(material), material_count=1)
+    scene, renderer, attribute, gradient = c_void_p(), c_void_p(), c_void_p(), c_void_p()
+    dpr.scene_create(c_int(SIDE), c_int(SIDE), byref(scene))
+    dpr.scene_add_mesh(scene, byref(mesh))
+    dpr.scene_set_camera(scene, byref(camera))
+    dpr.renderer_create(device, byref(renderer))
+    dpr.renderer_set_scene(renderer, scene)
+    dpr.renderer_set_normals(renderer, c_size_t(0), (c_float * 3)(0, 1, 1), c_size_t(3))
+    dpr.renderer_set_materials(renderer, c_size_t(0), byref(Material((c_float * 3)(0, 0, 0), 5)), c_size_t(1))
+    dpr.renderer_set_shapes(renderer, (c_float * 9)(*(x / 2 for x in positions)), c_size_t(9), None, c_size_t(0))
+    dpr.renderer_set_background(renderer, (c_float * 3)(0, 0, 1))
+    dpr.renderer_forward(renderer)
+    depth = (c_float * (SIDE * SIDE))()
+    dpr.renderer_read_aov(renderer, b"depth", depth, c_size_t(len(depth)))
+    assert abs(max(depth) - 3) < 1e-3, max(depth)
+    dpr.attribute_create(device, b"position", byref(attribute))
+    dpr.attribute_forward(attribute, renderer)
+    image = (c_float * (SIDE * SIDE * 4))()
+    dpr.attribute_read_image(attribute, image, c_size_t(len(image)))
+    dpr.attribute_backward_pixels(attribute, image, c_size_t(len(image)), byref(gradient))
+    grad = (c_double * 9)()
+    dpr.gradient_read(gradient, b"shapes.positions", grad, c_size_t(9))
+    assert any(grad), list(grad)
+    assert "expected 1" in refusal(dpr.renderer_set_normals, renderer, c_size_t(0), positions, c_size_t(9))
+    for kind, handle in (("gradient", gradient), ("attribute", attribute), ("renderer", renderer), ("scene", scene)):
+        getattr(dpr.library, f"dpr_{kind}_destroy")(handle)
+
+
 def main():
     dpr = Library(sys.argv[1])
     assert dpr.library.dpr_version().startswith(b"0.")
@@ -128,6 +172,7 @@ def main():
     assert losses[-1] < 0.1 * losses[0], losses
 
     check_textures(dpr, device, camera, positions, faces)
+    check_surface(dpr, device, camera, positions, faces)
     assert "NULL" in refusal(dpr.scene_add_mesh, scene, None)
     assert "multiple of 3" in refusal(dpr.renderer_set_positions, renderer, c_size_t(0), moved, c_size_t(8))
     for kind, handle in (("loss", loss), ("renderer", renderer), ("scene", scene), ("device", device)):

@@ -58,6 +58,12 @@ TEST_SUITE("pipeline") {
     CHECK(offers({"dpr", "pose", "--seed", ""}).empty());
     CHECK(offers({"dpr", "completion", ""}) == Words{"bash"});
     CHECK(offers({"dpr", "nonsense"}).empty());
+    const Words workloads = offers({"dpr", "bench", "--workload", ""});
+    if (!workloads.empty()) CHECK(std::ranges::count(workloads, "sphere256") == 1);  // where it is built
+    if (!offers({"dpr", "learn", ""}).empty()) {
+      CHECK(offers({"dpr", "learn", "data", "--classes", "ch"}) == Words{"chair"});
+      CHECK(offers({"dpr", "learn", "data", "--classes", "chair,s"}) == Words{"chair,sofa", "chair,speaker"});
+    }
     const Words options = offers({"dpr", "fit", "--"});
     for (const char* option : {"--views", "--output", "--report", "--preset", "--help"})
       CHECK(std::ranges::count(options, option) == 1);

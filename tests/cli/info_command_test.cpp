@@ -51,6 +51,9 @@ TEST_SUITE("pipeline") {
     const auto text = run_command(folder, {"info", "cube.ply"});
     CHECK(text.status == 0);
     CHECK(contains(text.out, "closed, manifold, wound in one sense"));
+    CHECK(!contains(text.out, "normals"));
+    folder.write("n.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n");
+    CHECK(contains(run_command(folder, {"info", "n.obj"}).out, "  normals              1\n"));
   }
 
   TEST_CASE("dpr info: holes, faces without area, missing material libraries, textures") {

@@ -115,7 +115,10 @@ TEST_SUITE("unit") {
     const auto refuses = [&](const char* selectors, const char* word) {
       DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, positions(selectors), word);
     };
-    refuses("cpu,cpu", "got 'cpu' in 'cpu,cpu', expected one more device, of 0 (cpu, a CPU), 1");
+    refuses("cpu,cpu",
+            "got 'cpu' in 'cpu,cpu', expected no more such devices than there are: 0 (cpu, a CPU), 1");
+    refuses("accelerator,cpu",
+            "got 'accelerator' in 'accelerator,cpu', expected devices that are there: 0 (cpu");
     refuses("cpu,,gpu", "one is empty");
     refuses("cpu,", "one is empty");
     refuses("cpu/5", "1 to 4 parts");

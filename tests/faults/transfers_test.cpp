@@ -40,8 +40,11 @@ std::size_t calls_to_the_host() {
 
 class Program {
  public:
-  explicit Program(const Scene& scene)
-      : renderer_(adopt_device(caller_.context(), caller_.queue())),
+  explicit Program(const Scene& scene, bool shows_attributes = false)
+      : shows_attributes_(shows_attributes),
+        renderer_(adopt_device(caller_.context(), caller_.queue())),
+        depths_(renderer_.device(), Attribute::depth),
+        normals_(renderer_.device(), Attribute::normal),
         loss_(caller_.kernel(k_source, "loss")),
         step_(caller_.kernel(k_source, "descend")) {
     renderer_.set_scene(scene);
@@ -52,6 +55,7 @@ class Program {
     pixels_ = static_cast<std::size_t>(scene.width * scene.height);
     target_ = caller_.buffer(std::vector<glm::vec4>(pixels_, glm::vec4(0.4F)));
     grad_ = caller_.buffer(std::vector<glm::vec4>(pixels_));
+    outputs_ = caller_.buffer(std::vector<glm::vec3>(pixels_));
   }
 
   void step() {
@@ -64,10 +68,25 @@ class Program {
     run(step_, numbers_, gradient_of("meshes[0].positions"), 1e-7F, positions_);
     run(step_, numbers_, gradient_of("meshes[0].colors"), 1e-2F, colors_);
     clReleaseEvent(rendered);
+    if (!shows_attributes_) return;
+    copy_aov(renderer_, Aov::normal, {outputs_()});
+    aov_view(renderer_, Aov::face_id);
+    for (AttributeImages* const images : {&depths_, &normals_}) {
+      forward_on_device(*images, renderer_);
+      run(loss_, pixels_, cl::Buffer(image_view(*images).buffer, true), target_, grad_);
+      backward_on_device(*images, {grad_()});
+      gradient_view(*images, "sigma");
+      const BufferView gradient = gradient_view(*images, "meshes[0].positions");
+      run(step_, numbers_, cl::Buffer(gradient.buffer, true), 1e-7F, positions_);
+    }
   }
 
   std::vector<float> colors() const { return caller_.read(colors_); }
-  FrameHistory history() { return frame_history(renderer_); }
+  std::size_t emptied() {
+    std::size_t frames = frame_history(renderer_).emptied;
+    if (shows_attributes_) frames += frame_history(depths_).emptied + frame_history(normals_).emptied;
+    return frames;
+  }
 
  private:
   cl::Buffer gradient_of(const char* name) { return cl::Buffer(gradient_view(renderer_, name).buffer, true); }
@@ -80,15 +99,17 @@ class Program {
   }
 
   Caller caller_;
+  bool shows_attributes_;
   Renderer renderer_;
+  AttributeImages depths_, normals_;
   cl::Kernel loss_, step_;
-  cl::Buffer positions_, colors_, target_, grad_;
+  cl::Buffer positions_, colors_, target_, grad_, outputs_;
   std::size_t numbers_ = 0, pixels_ = 0;
 };
 
 /// Counts in steps after the second: the first measures, and both make buffers and kernels.
-void check_step(const Scene& scene) {
-  Program program(scene);
+void check_step(const Scene& scene, bool shows_attributes = false) {
+  Program program(scene, shows_attributes);
   program.step();
   program.step();
   const std::vector<float> before = program.colors();
@@ -97,7 +118,7 @@ void check_step(const Scene& scene) {
   CHECK(calls_to_the_host() == 0);
   CHECK(dpr_opencl_calls("clEnqueueNDRangeKernel") > 100);
   CHECK(program.colors() != before);
-  CHECK(program.history().emptied == 0);
+  CHECK(program.emptied() == 0);
   CHECK(calls_to_the_host() > 0);  // which shows that they are counted
 }
 
@@ -124,6 +145,13 @@ TEST_SUITE("pipeline") {
         textured(texture.meshes[0].mesh, random_texture(5, 3, Wrap::mirror, Filter::trilinear));
     texture.gradients.texture = texture.gradients.texcoords = true;
     check_step(texture);
+  }
+
+  TEST_CASE("transfers: a step with auxiliary outputs and attributes has none either") {
+    for (const char* preset : {"gaussian", "joint_gaussian", "pixel"}) {
+      CAPTURE(std::string(preset));
+      check_step(scene_with_gradients(preset), true);
+    }
   }
 
   TEST_CASE("transfers: the ordinary path has some") {

@@ -234,13 +234,17 @@ TEST_SUITE("unit") {
         k_obj_square + "usemtl oak\nf 1 2 3\nusemtl elm\nf 1 2 3\nusemtl oak\nf 1 2 3\n";
     CHECK(read_mesh(folder.write("a.obj", "mtllib m.mtl\n" + faces), notes).face_colors.size() == 3);
     REQUIRE(notes.size() == 2);  // of what the faces use, once
-    CHECK(notes[0].find("the texture \"oak bark.png\" of the material \"oak\" (map_Kd) is no regular file") !=
+    CHECK(notes[0].find("the texture \"oak bark.png\" of the material \"oak\" (map_Kd) is not there") !=
           std::string::npos);
     CHECK(notes[1].find("the material \"elm\" is in no material library") != std::string::npos);
     notes.clear();
     CHECK(read_mesh(folder.write("b.obj", "mtllib no.mtl\n" + faces), notes).faces.size() == 3);
     REQUIRE(notes.size() == 1);
-    CHECK(notes[0].find("b.obj: the material library \"no.mtl\" is no regular file") != std::string::npos);
+    CHECK(notes[0].find("b.obj: the material library \"no.mtl\" is not there") != std::string::npos);
+    notes.clear();
+    std::filesystem::create_directory(folder / "folder.mtl");
+    CHECK(read_mesh(folder.write("d.obj", "mtllib folder.mtl\n" + faces), notes).faces.size() == 3);
+    CHECK(notes[0].find("\"folder.mtl\" is no regular file") != std::string::npos);
     notes.clear();
     const std::string surface = "cstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nparm u 0 1\nparm v 0 1\nend\n";
     const std::string line = "l 1 2\n";

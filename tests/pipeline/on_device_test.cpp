@@ -12,6 +12,7 @@
 #include "dpr/dpr.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "pipeline/determinism.hpp"
+#include "pipeline/device_buffers.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/gradient_table.hpp"
 #include "support/caller.hpp"
@@ -24,58 +25,12 @@ using dpr::test::reduced;
 
 namespace {
 
-/// The floats of vectors, `stride` floats apart from `first` on, between numbers that nobody may read.
-template <class Vector>
-std::vector<float> laid_out(std::span<const Vector> vectors, std::size_t first, std::size_t stride) {
-  std::vector<float> floats(first + vectors.size() * stride, std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t i = 0; i < vectors.size(); ++i)
-    std::memcpy(&floats[first + i * stride], &vectors[i], sizeof(Vector));
-  return floats;
-}
-
-template <class Vector>
-std::vector<float> packed(std::span<const Vector> vectors) {
-  return laid_out(vectors, 0, sizeof(Vector) / sizeof(float));
-}
-
-/// Rows of an affine matrix.
-std::vector<float> rows_of(const glm::mat4& m) {
-  std::vector<float> rows;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) rows.push_back(m[column][row]);
-  }
-  return rows;
-}
-
-std::vector<float> read_view(const Caller& caller, const BufferView& view) {
-  const cl::Buffer whole(view.buffer, true);
-  const std::vector<float> all = caller.read(whole);
-  std::vector<float> values;
-  for (std::size_t i = 0; i < view.count; ++i) {
-    const std::size_t first = (view.offset + i * view.stride) / sizeof(float);
-    values.insert(values.end(), &all[first], &all[first] + view.components);
-  }
-  return values;
-}
-
 Image read_image(const Caller& caller, Renderer& renderer) {
   const std::vector<float> values = read_view(caller, image_view(renderer));
   Image image(renderer.scene().width, renderer.scene().height);
   REQUIRE(values.size() == 4 * image.pixels.size());
   std::memcpy(image.pixels.data(), values.data(), values.size() * sizeof(float));
   return image;
-}
-
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
-}
-
-/// Numbers that the device adds up of several sums are rounded once there, and twice on the host.
-bool is_near(const std::vector<float>& a, const std::vector<float>& b) {
-  bool near = a.size() == b.size();
-  for (std::size_t i = 0; near && i < a.size(); ++i)
-    near = std::abs(a[i] - b[i]) <= 2 * std::numeric_limits<float>::epsilon() * std::abs(b[i]);
-  return near;
 }
 
 /// The texels of one texture, or the numbers of any other array.
@@ -117,6 +72,7 @@ Scene spoiled(Scene scene) {
     for (glm::vec3& p : instance.mesh.positions) p *= 0.9F;
     for (glm::vec3& c : instance.mesh.vertex_colors) c *= 0.5F;
     for (glm::vec3& c : instance.mesh.face_colors) c *= 0.5F;
+    for (glm::vec3& n : instance.mesh.normals) n.x += 0.4F;
     instance.transform[3].x += 0.1F;
   }
   if (!scene.lights) scene.camera.view[3].z -= 0.3F;
@@ -142,6 +98,8 @@ void set_from_buffers(const Caller& caller, Renderer& renderer, const Scene& sce
     }
     if (!mesh.textures.empty())
       set_texcoords(renderer, m, {caller.buffer(packed(std::span(mesh.texcoords)))()});
+    if (!mesh.face_normals.empty())
+      set_normals(renderer, m, {caller.buffer(laid_out(std::span(mesh.normals), 2, 3))(), 2 * sizeof(float)});
     const std::vector<float> rows = rows_of(meshes[m].transform);
     transforms.insert(transforms.end(), rows.begin(), rows.end());
   }
@@ -455,6 +413,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_positions(renderer, 1, {buffer()}), "mesh");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texels(renderer, 0, 0, {buffer()}), "texture");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texcoords(renderer, 0, {buffer()}), "without textures");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_normals(renderer, 0, {buffer()}), "without normals");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward_on_device(renderer, {buffer()}), "forward() first");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, image_view(renderer), "forward() first");
     forward_on_device(renderer);
@@ -519,48 +478,5 @@ TEST_SUITE("robustness") {
     fresh.forward();
     forward_on_device(renderer);
     CHECK(dpr::test::pipeline::same_bits(read_image(caller, renderer), fresh.image()));
-  }
-
-  TEST_CASE("on device: attributes of places that only the device knows are refused") {
-    const Caller caller;
-    const Scene scene = cube_scene(12, 10);
-    const std::vector<glm::vec3>& positions = scene.meshes[0].mesh.positions;
-    const Device device = adopt_device(caller.context(), caller.queue());
-    Renderer renderer(device);
-    renderer.set_scene(scene);
-    const View view = renderer.views()[0];
-    AttributeImages depth(device, Attribute::depth);
-    const cl::Buffer places = caller.buffer(packed(std::span(positions))),
-                     transforms = caller.buffer(rows_of(view.transforms[0])),
-                     matrices = caller.buffer(rows_of(view.camera.view));
-    const auto is_refused = [&] {
-      renderer.forward();
-      DPR_CHECK_MESSAGE_HAS(InvalidArgument, depth.forward(renderer),
-                            "got positions or transforms from a buffer");
-    };
-    const auto is_accepted = [&] {
-      renderer.forward();
-      depth.forward(renderer);
-    };
-    set_positions(renderer, 0, {places()});
-    is_refused();
-    set_shapes(renderer, {places()}, {});  // which are read
-    is_accepted();
-    set_shapes(renderer, {}, {});
-    is_refused();
-    renderer.set_positions(0, positions);
-    is_accepted();
-    set_transforms(renderer, {transforms()});
-    is_refused();
-    renderer.set_views(std::span(&view, 1));
-    is_accepted();
-    set_view_matrices(renderer, {matrices()});
-    is_refused();
-    const Image target = random_image(scene.width, scene.height, 0.0F, 1.0F);
-    const AttributeTarget of_depth{.weights = {.mse = 1}, .targets = std::span(&target, 1)};
-    ImageLoss loss(device, {.attributes = std::span(&of_depth, 1)}, std::span(&target, 1));
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, loss.evaluate(renderer), "from a buffer");
-    renderer.set_scene(scene);
-    is_accepted();
   }
 }

@@ -203,6 +203,45 @@ TEST_SUITE("pipeline") {
   }
 
   /// A square of two triangles whose diagonal moves: what jumps at it is seen by noise of the pixel.
+  TEST_CASE("materials and given normals: new ones are those of a new scene") {
+    const int size = reduced(24, 7);
+    Scene scene = surface_scene(Shading::phong, size);
+    const Image weights = random_image(size, size, -1, 1);
+    Renderer renderer(open_device());
+    MultiDeviceRenderer several(dpr::test::several_devices(2));
+    renderer.set_scene(scene);
+    several.set_scene(scene);
+    renderer.forward();
+    several.render();
+    const Image before = renderer.image();
+    Mesh& mesh = scene.meshes[0].mesh;
+    for (glm::vec3& normal : mesh.normals) normal = 1.5F * normal + glm::vec3(0.3F, -0.2F, 0.1F);
+    renderer.set_normals(0, mesh.normals);
+    several.set_normals(0, mesh.normals);
+    renderer.forward();
+    const Image turned = renderer.image();
+    CHECK(turned.pixels != before.pixels);
+    CHECK(turned.pixels == rendered(scene).pixels);
+    CHECK(several.render()[0].pixels == turned.pixels);
+    for (Material& material : mesh.materials) {
+      material.specular = 0.4F * material.specular + glm::vec3(0.1F, 0.3F, 0.2F);
+      material.shininess = material.shininess ? std::nullopt : std::optional(3.5F);
+    }
+    renderer.set_materials(0, mesh.materials);
+    several.set_materials(0, mesh.materials);
+    renderer.forward();
+    CHECK(renderer.image().pixels != turned.pixels);
+    CHECK(renderer.image().pixels == rendered(scene).pixels);
+    CHECK(several.render()[0].pixels == renderer.image().pixels);
+    CHECK(renderer.scene().meshes[0].mesh.normals == mesh.normals);
+    CHECK(renderer.scene().meshes[0].mesh.materials == mesh.materials);
+    const MeshGradient found = renderer.backward(std::span(&weights, 1)).meshes[0],
+                       expected = gradient_of(scene, weights).meshes[0];
+    CHECK(found.normals == expected.normals);
+    CHECK(found.specular == expected.specular);
+    CHECK(found.shininess == expected.shininess);
+  }
+
   TEST_CASE("materials and given normals: where they jump an edge is a crease") {
     const int size = reduced(48, 9);
     Mesh square;
@@ -234,6 +273,13 @@ TEST_SUITE("pipeline") {
     CHECK(contours(two) > smooth);
     CHECK(contours(turned) > smooth);
     CHECK(contours(same) == smooth);
+    Renderer flattened(open_device());
+    flattened.set_scene(turned);
+    flattened.forward();
+    flattened.set_normals(0, same.meshes[0].mesh.normals);
+    flattened.forward();
+    flattened.impl().require_forward("test");
+    CHECK(flattened.impl().pixel_noise->contour.pairs == smooth);
     two.lights.reset();
     CHECK(contours(two) == smooth);
     if (dpr::test::is_reduced()) return;
@@ -269,5 +315,23 @@ TEST_SUITE("pipeline") {
     message_with([](Mesh& m) { m.materials[0].specular.y = INFINITY; }, "specular of materials[0]");
     message_with([](Mesh& m) { m.face_materials[3] = 3; }, "material 3");
     message_with([](Mesh& m) { m.face_materials.pop_back(); }, "face_materials");
+    Renderer renderer(open_device());
+    const Mesh& mesh = good.meshes[0].mesh;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(0, mesh.normals), "no scene");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(0, mesh.materials), "no scene");
+    renderer.set_scene(good);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(2, mesh.normals), "below 2");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(1, mesh.normals), "without normals");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(1, mesh.materials), "without materials");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(0, std::span(mesh.normals).first(2)),
+                          "normals: got 2 values");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(0, std::span(mesh.materials).first(1)),
+                          "materials: got 1 values");
+    std::vector<glm::vec3> normals = mesh.normals;
+    normals[1].z = NAN;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(0, normals), "normals[1]");
+    std::vector<Material> materials = mesh.materials;
+    materials[1].shininess = 0.5F;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(0, materials), "shininess of materials[1]");
   }
 }

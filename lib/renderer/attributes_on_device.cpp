@@ -1,0 +1,73 @@
+// Images of attributes for programs that keep everything on the device: dpr/opencl_handles.hpp.
+#include "base/require.hpp"
+#include "dpr/error.hpp"
+#include "renderer/attribute_images_impl.hpp"
+#include "renderer/on_device.hpp"
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_pixel = 4;  // floats
+
+Device::Impl& device_of(const AttributeImages& images) { return images.impl().renderer.device().impl(); }
+
+}  // namespace
+
+void set_values(AttributeImages& images, const BufferSpan& values, std::size_t vertices,
+                const Events& events) {
+  AttributeImages::Impl& m = images.impl();
+  m.require_own_values();
+  const FloatVectors from =
+      require_vectors(device_of(images), values, {vertices, m.channels}, Access::read, "values");
+  enqueue(device_of(images), events, [&] { m.take_values(from, vertices); });
+}
+
+void reserve(AttributeImages& images, const FrameRoom& room) {
+  AttributeImages::Impl& m = images.impl();
+  m.room = counts_of(room);
+  if (m.views > 0) m.renderer.impl().reserve(*m.room);
+}
+
+void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
+  AttributeImages::Impl& m = images.impl();
+  require_same_device(m.renderer.device(), renderer, "forward_on_device");
+  renderer.impl().require_rendered("forward_on_device");
+  enqueue(device_of(images), events, [&] { m.forward(renderer.impl(), FrameSizes::kept); });
+}
+
+FrameHistory frame_history(AttributeImages& images) {
+  images.impl().require_forward("frame_history");
+  return history_of(images.impl().renderer.impl());
+}
+
+void backward_on_device(AttributeImages& images, const BufferSpan& grad_images, const Events& events) {
+  AttributeImages::Impl& m = images.impl();
+  m.require_forward("backward_on_device");
+  const std::size_t count = m.images().size();
+  const FloatVectors from =
+      require_vectors(device_of(images), grad_images, {count, k_pixel}, Access::read, "grad_images");
+  enqueue(device_of(images), events,
+          [&] { m.backward_on_device(gradient_of_images(m.renderer.impl(), from, count)); });
+}
+
+BufferView image_view(const AttributeImages& images) {
+  const AttributeImages::Impl& m = images.impl();
+  m.require_forward("image_view");
+  return {m.images().cl_buffer()(), 0, sizeof(cl_float4), m.images().size(), k_pixel};
+}
+
+void copy_images(AttributeImages& images, const BufferSpan& to, const Events& events) {
+  copy_view(images.impl().renderer.impl(), image_view(images), to, events, "images");
+}
+
+BufferView gradient_view(AttributeImages& images, const std::string& name) {
+  images.impl().require_forward("gradient_view");
+  return images.impl().gradient_view(name);
+}
+
+void copy_gradient(AttributeImages& images, const std::string& name, const BufferSpan& gradient,
+                   const Events& events) {
+  copy_view(images.impl().renderer.impl(), gradient_view(images, name), gradient, events, "gradient");
+}
+
+}  // namespace dpr

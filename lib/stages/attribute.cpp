@@ -1,0 +1,121 @@
+#include "stages/attribute.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace dpr {
+
+GeometryColors::GeometryColors(Device::Impl& device, Attribute attribute)
+    : attribute_(attribute),
+      device_(device),
+      vertices_(device, "attribute.cl", "attribute_vertices_forward"),
+      vertices_backward_(device, "attribute.cl", "attribute_vertices_backward"),
+      normals_(device, "attribute.cl", "attribute_normals_forward"),
+      normals_backward_(device, "attribute.cl", "attribute_normals_backward") {}
+
+void GeometryColors::forward(const shared::FrameParams& p, const Geometry& geometry,
+                             const Transform& transform, Buffer<cl_float4>& colors) {
+  const std::size_t count = std::size_t{p.views} * (is_of_faces() ? p.faces : p.vertices);
+  colors.resize(device_, count);
+  if (is_of_faces()) {
+    normals_(count, p, to_uint(shown_views), geometry.face_vertices, transform.world, colors);
+  } else {
+    vertices_(count, p, shows_depth(), to_uint(shown_views), transform.world, transform.ndc, colors);
+  }
+}
+
+void GeometryColors::backward(const shared::FrameParams& p, const Geometry& geometry,
+                              const Transform& transform, const Buffer<cl_float4>& grad_colors,
+                              Buffer<cl_float4>& grad_depth, Buffer<cl_float4>& grad_world) {
+  const std::size_t count = std::size_t{p.views} * p.vertices;
+  grad_world.resize(device_, count);
+  if (is_of_faces()) {
+    normals_backward_(count, p, to_uint(shown_views), geometry.face_vertices, geometry.vertex_corners.starts,
+                      geometry.vertex_corners.corners, transform.world, grad_colors, grad_world);
+  } else {
+    vertices_backward_(count, p, shows_depth(), to_uint(shown_views), grad_colors, grad_depth, grad_world);
+  }
+}
+
+RowMap::RowMap(Device::Impl& device, std::span<const cl_uint> row_of_shown, std::size_t row_count)
+    : rows(row_count), shown(row_of_shown.size()) {
+  std::vector<cl_uint> run_starts(rows + 1, 0), in_order(shown);
+  for (const cl_uint row : row_of_shown) ++run_starts[row + 1];
+  for (std::size_t row = 0; row < rows; ++row) run_starts[row + 1] += run_starts[row];
+  std::vector<cl_uint> next(run_starts.begin(), run_starts.end() - 1);
+  for (std::size_t i = 0; i < shown; ++i) in_order[next[row_of_shown[i]]++] = to_uint(i);
+  row_of.upload(device, row_of_shown);
+  starts.upload(device, run_starts);
+  shown_by.upload(device, in_order);
+}
+
+ShownRows::ShownRows(Device::Impl& device)
+    : device_(device),
+      rows_(device, "attribute.cl", "attribute_rows_forward"),
+      rows_backward_(device, "attribute.cl", "attribute_rows_backward"),
+      positions_(device, "attribute.cl", "attribute_positions_forward"),
+      positions_backward_(device, "attribute.cl", "attribute_positions_backward") {}
+
+namespace {
+
+cl_uint4 sizes(std::size_t x, std::size_t y, std::size_t z, std::size_t w) {
+  return {{to_uint(x), to_uint(y), to_uint(z), to_uint(w)}};
+}
+
+}  // namespace
+
+void ShownRows::forward(const RowMap& map, std::size_t channels, const Buffer<float>& values,
+                        std::size_t passes, std::size_t views, Buffer<cl_float4>& colors) {
+  const std::size_t count = passes * views * map.shown;
+  colors.resize(device_, count);
+  rows_(count, sizes(passes, views, map.shown, channels), map.row_of, values, colors);
+}
+
+void ShownRows::backward(const RowMap& map, std::size_t channels, std::size_t views,
+                         const Buffer<cl_float4>& grad_colors, Buffer<float>& grad) {
+  grad.resize(device_, map.rows * channels);
+  rows_backward_(map.rows * channels, sizes(map.rows, views, map.shown, channels), map.starts, map.shown_by,
+                 BufferRef<float>(grad_colors.cl_buffer()()), grad);
+}
+
+void ShownRows::move(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& positions,
+                     std::size_t copies, Buffer<cl_float4>& moved) {
+  moved.resize(device_, copies * map.shown);
+  positions_(copies * map.shown, sizes(copies, sources, map.shown, map.rows), map.row_of, positions, moved);
+}
+
+void ShownRows::move_backward(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& grad_moved,
+                              std::size_t copies, Buffer<cl_float4>& grad) {
+  grad.resize(device_, sources * map.rows);
+  positions_backward_(sources * map.rows, sizes(copies, sources, map.shown, map.rows), map.starts,
+                      map.shown_by, grad_moved, grad);
+}
+
+CornerTexcoords::CornerTexcoords(Device::Impl& device, const Scene& scene) {
+  std::vector<cl_uint> row_of_corner;
+  std::vector<float> numbers;
+  first = {0};
+  for (const Instance& instance : scene.meshes) {
+    const Mesh& mesh = instance.mesh;
+    if (mesh.face_texcoords.empty()) return;
+    for (const glm::uvec3& face : mesh.face_texcoords) {
+      for (int corner = 0; corner < 3; ++corner)
+        row_of_corner.push_back(to_uint(first.back() + face[corner]));
+    }
+    for (const glm::vec2& uv : mesh.texcoords) numbers.insert(numbers.end(), {uv.x, uv.y});
+    first.push_back(first.back() + mesh.texcoords.size());
+  }
+  values.upload(device, numbers);
+  map = RowMap(device, row_of_corner, first.back());
+}
+
+void CornerTexcoords::update(const Geometry& geometry, Exchange& exchange) {
+  for (std::size_t m = 0; !empty() && m < geometry.meshes.size(); ++m) {
+    const MeshRange& range = geometry.meshes[m];
+    if (range.texcoords == 0) continue;  // without textures they are what the scene began with
+    exchange.give(vectors_of(geometry.textures.texcoord_values, range.first_texcoord, k_channels),
+                  range.texcoords, vectors_of(values, k_channels * first[m], k_channels));
+  }
+}
+
+}  // namespace dpr
