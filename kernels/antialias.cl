@@ -1,25 +1,28 @@
 // Samples blended across the contours between them. Where a contour crosses the step between two neighbouring
-// samples, the sample whose cell it cuts takes the other's colour for the part of the cell beyond: the image
-// follows the contour, and its derivative by what is cut is the jump across it. What crosses, and how much it
-// cuts, antialias_cross.cl finds.
+// samples, each takes a part of the other's colour (crossing.h): the image follows the contour, and its
+// derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl
+// finds.
 //
 // Few steps are crossed: a work-item takes a row of a tile, and copies it where no contour is near.
-#include "contour.h"
+#include "crossing.h"
 
-/// The steps that cut a sample's cell: to the right, down, from the left, from above; and the same step as
-/// the sample at its other end counts it.
+/// The steps from a sample: to the right, down, from the left, from above; and the same step as the sample at
+/// its other end counts it.
 #define DPR_STEPS 4
 #define DPR_OPPOSITE(step) ((step) ^ 2)
 
+/// Which end of a step a sample is: see part_taken().
+static inline float turn_of(int step) { return step < 2 ? -1.0f : 1.0f; }
+
 typedef struct {
   uint step[DPR_STEPS], other[DPR_STEPS];  // the step, and the sample at its other end
-  float weight[DPR_STEPS];                 // of that sample; 0 where the contour, if any, cuts the other cell
-  float turn[DPR_STEPS];                   // d weight / d cut
-  int cuts_other[DPR_STEPS];               // whether a contour cuts the other cell
-  float total;                             // of the weights, or 1 if that is less
+  int is_crossed[DPR_STEPS];
+  Cut cut[DPR_STEPS];     // of those that are
+  float part[DPR_STEPS];  // that is taken of the other sample's colour
+  float total;            // of the parts, or 1 if that is less
 } Cell;
 
-/// Whether anything crosses a step of the cell of a sample, in column and row `at` of its view.
+/// Whether anything crosses a step from a sample, in column and row `at` of its view.
 static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pixels,
                              global const uint* restrict winner) {
   const uint left = at.x > 0 ? winner[pixel - 1] : DPR_NO_CROSSING;
@@ -28,7 +31,7 @@ static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pix
 }
 
 static inline Cell load_cell(const FrameParams p, uint pixel, uint2 at, uint pixels,
-                             global const uint* restrict winner, global const float* restrict cut) {
+                             global const uint* restrict winner, global const float2* restrict cut) {
   const int has[DPR_STEPS] = {1, 1, at.x > 0, at.y > 0};
   const uint first[DPR_STEPS] = {pixel, pixels + pixel, pixel - 1, pixels + pixel - p.width};
   const uint other[DPR_STEPS] = {pixel + 1, pixel + p.width, pixel - 1, pixel - p.width};
@@ -38,14 +41,10 @@ static inline Cell load_cell(const FrameParams p, uint pixel, uint2 at, uint pix
   for (int k = 0; k < DPR_STEPS; ++k) {
     c.step[k] = first[k];
     c.other[k] = other[k];
-    c.turn[k] = k < 2 ? -1.0f : 1.0f;
-    c.weight[k] = 0.0f;
-    c.cuts_other[k] = 0;
-    if (!has[k] || winner[first[k]] == DPR_NO_CROSSING) continue;
-    const float own_cut = cut[first[k]] * c.turn[k];
-    c.weight[k] = fmax(own_cut, 0.0f);
-    c.cuts_other[k] = own_cut < 0.0f;
-    sum += c.weight[k];
+    c.is_crossed[k] = has[k] && winner[first[k]] != DPR_NO_CROSSING;
+    c.cut[k] = c.is_crossed[k] ? cut[first[k]] : (Cut)(0.0f);
+    c.part[k] = part_taken(c.cut[k], turn_of(k));
+    sum += c.part[k];
   }
   c.total = fmax(sum, 1.0f);
   return c;
@@ -80,24 +79,24 @@ static inline void copy_row(TileRow r, global const float4* restrict from, globa
   for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
-/// A cell's colour. `own` is its sample's.
+/// What becomes of a sample's colour `own`.
 static inline float4 mixed_cell(const Cell c, float4 own, global const float4* restrict raster) {
   float4 sum = own;
 #pragma unroll
   for (int k = 0; k < DPR_STEPS; ++k) {
-    if (c.weight[k] > 0.0f) sum += c.weight[k] / c.total * (raster[c.other[k]] - own);
+    if (c.is_crossed[k]) sum += c.part[k] / c.total * (raster[c.other[k]] - own);
   }
   return sum;
 }
 
-/// Blends the samples. What crosses a cell on all sides may leave nothing of it: then the others share it.
+/// Blends the samples. Contours on all sides of a sample may leave nothing of it: then the others share it.
 /// One work-item per row of a tile. Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   winner, cut  as antialias_cross leaves them
 /// in   raster       float4[pixel]  the samples
 /// out  blended      float4[pixel]
 kernel void antialias_forward(const FrameParams p, global const uint* restrict tile_starts,
-                              global const uint* restrict winner, global const float* restrict cut,
+                              global const uint* restrict winner, global const float2* restrict cut,
                               global const float4* restrict raster, global float4* restrict blended) {
   const TileRow r = tile_row(p, (uint)get_global_id(0));
   if (r.count == 0) return;
@@ -115,16 +114,22 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
   }
 }
 
-/// The gradients of the cuts, and those of the samples: what each has kept of its own cell, and given to its
-/// neighbours'. One work-item per row of a tile; each step cuts one cell, so no two write the same place.
-/// Deterministic. Inputs as antialias_forward, and
-/// in   grad_blended   float4[pixel]
-/// out  grad_cut       float[2][pixel]  not written where nothing crosses
-/// out  grad_raster    float4[pixel]
+/// What the end of step k of a sample gives the step's cut. Where the parts are scaled to add up to 1, so is
+/// what one of them changes.
+static inline Cut gradient_at_end(const Cell c, int k, uint pixel, global const float4* restrict raster,
+                                  float4 grad) {
+  const float4 own = raster[pixel], from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
+  return dot(grad, raster[c.other[k]] - from) / c.total * part_taken_gradient(c.cut[k], turn_of(k));
+}
+
+/// The gradients of the cuts, and those of the samples: what each has kept of its own colour, and given to
+/// its neighbours. One work-item per row of a tile; a step's cut is its first sample's to write.
+/// Deterministic. Inputs as antialias_forward, and in   grad_blended   float4[pixel] out  grad_cut
+/// Cut[2][pixel]  not written where nothing crosses out  grad_raster    float4[pixel]
 kernel void antialias_backward(const FrameParams p, global const uint* restrict tile_starts,
-                               global const uint* restrict winner, global const float* restrict cut,
+                               global const uint* restrict winner, global const float2* restrict cut,
                                global const float4* restrict raster,
-                               global const float4* restrict grad_blended, global float* restrict grad_cut,
+                               global const float4* restrict grad_blended, global float2* restrict grad_cut,
                                global float4* restrict grad_raster) {
   const TileRow r = tile_row(p, (uint)get_global_id(0));
   if (r.count == 0) return;
@@ -136,26 +141,26 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
   for (uint i = 0; i < r.count; ++i) {
     const uint pixel = r.first + i;
     const uint2 at = r.at + (uint2)(i, 0u);
-    const float4 own = raster[pixel], grad = grad_blended[pixel];
+    const float4 grad = grad_blended[pixel];
     if (!is_crossed(p, pixel, at, pixels, winner)) {
       grad_raster[pixel] = grad;
       continue;
     }
     const Cell c = load_cell(p, pixel, at, pixels, winner, cut);
-    // Where the weights are scaled to add up to 1, so is what one of them changes.
-    const float4 from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
     const uint2 beside[DPR_STEPS] = {at + (uint2)(1u, 0u), at + (uint2)(0u, 1u), at - (uint2)(1u, 0u),
                                      at - (uint2)(0u, 1u)};
     float kept = 1.0f;
     float4 given = 0.0f;
+#pragma unroll
     for (int k = 0; k < DPR_STEPS; ++k) {
-      if (c.weight[k] > 0.0f) {
-        kept -= c.weight[k] / c.total;
-        grad_cut[c.step[k]] = c.turn[k] * dot(grad, raster[c.other[k]] - from) / c.total;
-      }
-      if (c.cuts_other[k]) {
-        const Cell other = load_cell(p, c.other[k], beside[k], pixels, winner, cut);
-        given += other.weight[DPR_OPPOSITE(k)] / other.total * grad_blended[c.other[k]];
+      if (!c.is_crossed[k]) continue;
+      const Cell other = load_cell(p, c.other[k], beside[k], pixels, winner, cut);
+      const float4 grad_other = grad_blended[c.other[k]];
+      kept -= c.part[k] / c.total;
+      given += other.part[DPR_OPPOSITE(k)] / other.total * grad_other;
+      if (k < 2) {
+        grad_cut[c.step[k]] = gradient_at_end(c, k, pixel, raster, grad) +
+                              gradient_at_end(other, DPR_OPPOSITE(k), c.other[k], raster, grad_other);
       }
     }
     grad_raster[pixel] = given + kept * grad;

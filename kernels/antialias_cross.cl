@@ -1,6 +1,6 @@
 // Contours between samples. Where a contour crosses the step between two neighbouring samples, at the
-// fraction t of the way, the sample whose cell it cuts takes the other's colour for the part of the cell
-// beyond: the image follows the contour, and dI/dt is the jump across it (Reynolds' transport theorem; Li,
+// fraction t of the way, each takes a part of the other's colour (crossing.h): the image follows the contour,
+// and dI/dt is the jump across it (Reynolds' transport theorem; Li,
 // Aittala, Durand & Lehtinen, "Differentiable Monte Carlo ray tracing through edge sampling", 2018, eq. (5);
 // on a raster Laine et al., "Modular primitives for high-performance differentiable rendering", 2020, section
 // 3.6). Here every contour walks its own crossings, so that none is missed however small its triangles are.
@@ -50,8 +50,7 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
 /// in   front         float[pixel]
 /// out  winner        uint[2][pixel]        the contour that crosses a step, or DPR_NO_CROSSING. Not written
 ///                                          in tiles that are not near a contour: is_near_contour()
-/// out  cut           float[2][pixel]       what it takes of a cell: of the first sample's where negative,
-///                                          else of the second's. Not written where nothing crosses
+/// out  cut           Cut[2][pixel]         what it cuts. Not written where nothing crosses
 /// out  crowded       uint[tile][4]         see bit_in_tile(): steps that several contours cross. Not
 ///                                          written where the winners are not
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
@@ -60,7 +59,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
                             global const float4* restrict ndc, global const ClippedFace* restrict clipped,
                             global const uint* restrict tile_starts, global const uint* restrict pair_contour,
                             global const float* restrict front, global uint* restrict winner,
-                            global float* restrict cut, global uint* restrict crowded) {
+                            global float2* restrict cut, global uint* restrict crowded) {
   const uint tile = (uint)get_global_id(0);
   const uint tiles = p.tiles_x * p.tiles_y, view = tile / tiles;
   if (view >= p.views || !is_near_contour(p, tile, tile_starts)) return;
@@ -79,8 +78,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
     const uint contour = pair_contour[pair];
     const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
-      const float weight = by_rows ? c.by_rows : 1.0f - c.by_rows;
-      if (weight == 0.0f) continue;
+      if (c.by_rows == (by_rows ? 0.0f : 1.0f)) continue;
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
       const int2 lines = lines_of_edge(p, e, s);
       for (int line = lines.x; line < lines.y; ++line) {
@@ -94,7 +92,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
         }
         if (is_hidden(p, v, c, e, x, (int)(contour & DPR_CONTOUR_CREASE), depth)) continue;
         winner[step] = contour;
-        cut[step] = weight * line_cut(p, c, e, x);
+        cut[step] = cut_of(p, c, e, x);
         nearest[bit] = depth;
       }
     }
@@ -103,26 +101,26 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
 }
 
 /// The gradient of what a contour cuts at a step of a tile, as its winner or as a second.
-static inline float gradient_of_cut(uint contour, uint step, uint tile, global const uint* restrict winner,
-                                    global const float* restrict cut, global const float* restrict grad_cut,
-                                    global const uint* restrict second_counts,
-                                    global const SecondCrossing* restrict seconds,
-                                    global const float* restrict grad_seconds) {
-  if (winner[step] == contour) return cut[step] != 0.0f ? grad_cut[step] : 0.0f;
+static inline Cut gradient_of_cut(uint contour, uint step, uint tile, global const uint* restrict winner,
+                                  global const float2* restrict grad_cut,
+                                  global const uint* restrict second_counts,
+                                  global const SecondCrossing* restrict seconds,
+                                  global const float2* restrict grad_seconds) {
+  if (winner[step] == contour) return grad_cut[step];
   const uint first = DPR_SECOND_CROSSINGS * tile, last = first + second_counts[tile];
   for (uint k = first; k < last; ++k) {
     if (seconds[k].step == step && seconds[k].contour == contour) return grad_seconds[k];
   }
-  return 0.0f;
+  return (Cut)(0.0f);
 }
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps
 /// that it won, or crosses as a second. One work-item per pair. Deterministic.
-/// in   edges, faces, facing, ndc, clipped, winner, cut  as antialias_cross
+/// in   edges, faces, facing, ndc, clipped, winner  as antialias_cross
 /// in   pairs          uint[1]          how many there are
 /// in   pair_contour   uint[pair]
 /// in   pair_tile      uint[pair]       view * tiles + tile
-/// in   grad_cut       float[2][pixel]
+/// in   grad_cut       Cut[2][pixel]
 /// in   second_counts, seconds, grad_seconds  as antialias_second.cl leaves them
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
 kernel void antialias_cross_backward(
@@ -131,9 +129,9 @@ kernel void antialias_cross_backward(
     global const uint* restrict facing, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,
-    global const float* restrict cut, global const float* restrict grad_cut,
-    global const uint* restrict second_counts, global const SecondCrossing* restrict seconds,
-    global const float* restrict grad_seconds, global float4* restrict grad_ends) {
+    global const float2* restrict grad_cut, global const uint* restrict second_counts,
+    global const SecondCrossing* restrict seconds, global const float2* restrict grad_seconds,
+    global float4* restrict grad_ends) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs[0]) return;
   const uint contour = pair_contour[pair];
@@ -142,16 +140,17 @@ kernel void antialias_cross_backward(
   float2 grad_a = 0.0f, grad_b = 0.0f;
   float grad_weight = 0.0f;  // of what counts by rows
   for (int by_rows = 0; by_rows < 2; ++by_rows) {
-    const float weight = by_rows ? c.by_rows : 1.0f - c.by_rows;
-    if (weight == 0.0f) continue;
+    if (c.by_rows == (by_rows ? 0.0f : 1.0f)) continue;
     const RasterEdge e = raster_edge(c.a, c.b, by_rows);
     const int2 lines = lines_of_edge(p, e, s);
     float at_a = 0.0f, at_b = 0.0f, across_a = 0.0f, across_b = 0.0f, of_weight = 0.0f;
     for (int line = lines.x; line < lines.y; ++line) {
       const Crossing x = cross_line(p, e, line);
       if (!is_step_of(p, e, x, s)) continue;
-      const float grad = gradient_of_cut(contour, step_of(p, c.view, e, x), pair_tile[pair], winner, cut,
-                                         grad_cut, second_counts, seconds, grad_seconds);
+      const Cut grad_of = gradient_of_cut(contour, step_of(p, c.view, e, x), pair_tile[pair], winner,
+                                          grad_cut, second_counts, seconds, grad_seconds);
+      const float grad = grad_of.x;
+      of_weight += grad_of.y;
       if (grad == 0.0f) continue;
       const CornerArea first = corner_of(p, c, e, x, 0), second = corner_of(p, c, e, x, 1);
       at_a += grad *
@@ -159,11 +158,10 @@ kernel void antialias_cross_backward(
       at_b += grad * (x.along + first.height * first.along + second.height * second.along);
       across_a += grad * first.width;
       across_b += grad * second.width;
-      of_weight += grad * (x.t - 0.5f + first.area + second.area);
     }
     // Rows count downwards. A crossing stays on its line: where an end moves along the edge, it does not
     // move.
-    const float scale = (by_rows ? 1.0f : -1.0f) * weight / p.pixel_size;
+    const float scale = (by_rows ? 1.0f : -1.0f) / p.pixel_size;
     const float2 direction = by_rows ? (float2)(1.0f, -e.slope) : (float2)(-e.slope, 1.0f);
     const float2 across = by_rows ? (float2)(0.0f, -1.0f) : (float2)(-1.0f, 0.0f);
     grad_a += scale * (at_a * direction + across_a * across);

@@ -2,8 +2,8 @@
 // (antialias_cross.cl) takes the whole jump from one sample to the other for its own, and what lies between
 // the two has a colour that neither sample shows: without more, gradients lack about a sample's length at
 // every corner. The second contour knows its own jump J from the nearest step along it that it has for
-// itself. With w and c what the winner and the second cut, the winner's cell gets w J back, and c J is the
-// second's. So each jump counts where it is.
+// itself: both samples get back what J has added to the winner's parts of them, and the second adds its own.
+// So each jump counts where it is.
 //
 // Such steps are few: a tile lists its own, and adds those of the tiles around it to its samples.
 #include "visibility.h"
@@ -134,7 +134,6 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
     const uint contour = pair_contour[pair];
     const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
-      const float weight = by_rows ? c.by_rows : 1.0f - c.by_rows;
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
       const int2 lines = lines_of_edge(p, e, s);
       for (int line = lines.x; line < lines.y && count < DPR_SECOND_CROSSINGS; ++line) {
@@ -149,7 +148,8 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
         if (is_second_hidden(p, v, other, c, e, x, depth)) continue;
         const uint reference = find_reference(p, view, contour, c, e, x, winner, crowded);
         if (reference == DPR_NO_CROSSING) continue;
-        const SecondCrossing second = {step, contour, reference, weight * line_cut(p, c, e, x)};
+        const Cut cut = cut_of(p, c, e, x);
+        const SecondCrossing second = {step, contour, reference, cut.x, cut.y};
         seconds[DPR_SECOND_CROSSINGS * tile + count++] = second;
       }
     }
@@ -167,12 +167,6 @@ static inline uint2 ends_of_step(const FrameParams p, uint step) {
 static inline uint2 ends_of_reference(const FrameParams p, uint reference) {
   const uint2 ends = ends_of_step(p, reference & ~DPR_TURNED);
   return reference & DPR_TURNED ? ends.yx : ends;
-}
-
-/// The sample whose cell is cut.
-static inline uint cut_sample(const FrameParams p, uint step, float cut) {
-  const uint2 ends = ends_of_step(p, step);
-  return cut < 0.0f ? ends.x : ends.y;
 }
 
 static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
@@ -198,14 +192,27 @@ static inline uint near_tile(const FrameParams p, const NearTiles tiles, uint k)
   return tiles.first + k / tiles.columns * p.tiles_x + k % tiles.columns;
 }
 
+static inline Cut own_cut(const SecondCrossing c) { return (Cut)(c.cut, c.weight); }
+
+/// The parts of a second's jump that the two samples of its step gain: its own, less the winner's.
+static inline float2 parts_gained(const SecondCrossing c, Cut winner) {
+  return (float2)(part_taken(own_cut(c), -1.0f) - part_taken(winner, -1.0f),
+                  part_taken(winner, 1.0f) - part_taken(own_cut(c), 1.0f));
+}
+
+/// The gradient of a cut, with those of the parts that it takes of the jump at both samples.
+static inline Cut gradient_by_parts(Cut cut, float of_first, float of_second) {
+  return of_first * part_taken_gradient(cut, -1.0f) - of_second * part_taken_gradient(cut, 1.0f);
+}
+
 /// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
 /// in      counts, seconds  as antialias_second_find leaves them
-/// in      cut              float[2][pixel]  of the winners
+/// in      cut              Cut[2][pixel]    of the winners
 /// in      raster           float4[pixel]    the samples
 /// in out  blended          float4[pixel]
 kernel void antialias_second_forward(const FrameParams p, global const uint* restrict counts,
                                      global const SecondCrossing* restrict seconds,
-                                     global const float* restrict cut, global const float4* restrict raster,
+                                     global const float2* restrict cut, global const float4* restrict raster,
                                      global float4* restrict blended) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
@@ -216,9 +223,10 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
       const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
       const uint2 ends = ends_of_reference(p, c.reference);
       const float4 jump = raster[ends.y] - raster[ends.x];
-      const uint of_winner = cut_sample(p, c.step, cut[c.step]), own = cut_sample(p, c.step, c.cut);
-      if (is_in_tile(p, tile, of_winner)) blended[of_winner] += cut[c.step] * jump;
-      if (is_in_tile(p, tile, own)) blended[own] -= c.cut * jump;
+      const uint2 samples = ends_of_step(p, c.step);
+      const float2 parts = parts_gained(c, cut[c.step]);
+      if (is_in_tile(p, tile, samples.x)) blended[samples.x] += parts.x * jump;
+      if (is_in_tile(p, tile, samples.y)) blended[samples.y] += parts.y * jump;
     }
   }
 }
@@ -226,15 +234,15 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
 /// The gradients of what winners and seconds cut, and of the samples at the references. One work-item per
 /// tile. Deterministic. Inputs as antialias_second_forward, and
 /// in      grad_blended  float4[pixel]
-/// in out  grad_cut      float[2][pixel]
+/// in out  grad_cut      Cut[2][pixel]
 /// in out  grad_raster   float4[pixel]
-/// out     grad_seconds  float[tile][DPR_SECOND_CROSSINGS]
+/// out     grad_seconds  Cut[tile][DPR_SECOND_CROSSINGS]
 kernel void antialias_second_backward(const FrameParams p, global const uint* restrict counts,
                                       global const SecondCrossing* restrict seconds,
-                                      global const float* restrict cut, global const float4* restrict raster,
+                                      global const float2* restrict cut, global const float4* restrict raster,
                                       global const float4* restrict grad_blended,
-                                      global float* restrict grad_cut, global float4* restrict grad_raster,
-                                      global float* restrict grad_seconds) {
+                                      global float2* restrict grad_cut, global float4* restrict grad_raster,
+                                      global float2* restrict grad_seconds) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
   const NearTiles tiles = near_tiles(p, tile);
@@ -244,15 +252,17 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
       const uint place = DPR_SECOND_CROSSINGS * near + k;
       const SecondCrossing c = seconds[place];
       const uint2 ends = ends_of_reference(p, c.reference);
-      const float4 grad_of_winner = grad_blended[cut_sample(p, c.step, cut[c.step])];
-      const float4 grad_own = grad_blended[cut_sample(p, c.step, c.cut)];
-      const float4 grad_jump = cut[c.step] * grad_of_winner - c.cut * grad_own;
+      const uint2 samples = ends_of_step(p, c.step);
+      const float4 first = grad_blended[samples.x], second = grad_blended[samples.y];
+      const float2 parts = parts_gained(c, cut[c.step]);
+      const float4 grad_jump = parts.x * first + parts.y * second;
       if (is_in_tile(p, tile, ends.x)) grad_raster[ends.x] -= grad_jump;
       if (is_in_tile(p, tile, ends.y)) grad_raster[ends.y] += grad_jump;
       if (near != tile) continue;
       const float4 jump = raster[ends.y] - raster[ends.x];
-      if (cut[c.step] != 0.0f) grad_cut[c.step] += dot(grad_of_winner, jump);
-      grad_seconds[place] = -dot(grad_own, jump);
+      const float of_first = dot(first, jump), of_second = dot(second, jump);
+      grad_cut[c.step] -= gradient_by_parts(cut[c.step], of_first, of_second);
+      grad_seconds[place] = gradient_by_parts(own_cut(c), of_first, of_second);
     }
   }
 }

@@ -99,7 +99,8 @@ static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
     e->cut_face = other_face(e->record);
     if (s.clipped[e->cut_face].corners == 0) return;
   }
-  const ClippedFace c = s.clipped[e->cut_face];
+  global const ClippedFace* clipped = s.clipped + e->cut_face;
+  const ClippedFace c = *clipped;
   const uint4 face = s.faces[e->cut_face];
   const uint first = corner_of_vertex(face, e->record.x), second = corner_of_vertex(face, e->record.y);
   // Vertices that only coincide with the face's: its own edge there stands for both.
@@ -107,13 +108,13 @@ static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
   const int loses_first = is_lost(c, first), loses_second = is_lost(c, second);
   e->is_there = !(loses_first && loses_second);
   if (loses_first == loses_second) return;
-  // Written out: an index that varies would put the edge into memory.
+  // Written out, and the cut read where it lies: an index that varies would put edge and face into memory.
   if (loses_first) {
     e->cut[0] = cut_between(c, second, first);
-    e->end[0] = c.cut[e->cut[0]].xyz;
+    e->end[0] = clipped->cut[e->cut[0]].xyz;
   } else {
     e->cut[1] = cut_between(c, first, second);
-    e->end[1] = c.cut[e->cut[1]].xyz;
+    e->end[1] = clipped->cut[e->cut[1]].xyz;
   }
 }
 

@@ -1,5 +1,11 @@
 // Crossings of contours with the lines of samples: where a mesh edge passes between two neighbouring samples,
-// and what it takes of their cells.
+// and what each of these takes of the other's colour.
+//
+// Samples stand for what lies around them by a tent, 1 at the sample and 0 at its neighbours: so the blur
+// sees a contour where it is, by the line between its weights at the two samples, and not at one of them. A
+// jump at the fraction t of the step gives the first sample (1 - t)^2 / 2 of the second's colour, and the
+// second t^2 / 2 of the first's. The difference, 1/2 - t, is the area between the edge and the border of the
+// cells.
 //
 // What an edge takes is the area between it and the staircase of the rigid samples' cells. A line adds the
 // piece of that area in its row or column of cells, by the edge's place on the line. An edge's ends lie
@@ -143,6 +149,24 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
   c.width = half_step * length;
   c.area = c.height * length;
   return c;
+}
+
+/// What a crossing cuts: x is the area between the edge and the cells' border, negative where it is the first
+/// sample's cell that is cut, in [-1/2, 1/2] but for what the edge's ends add; y how much the crossing
+/// counts.
+typedef float2 Cut;
+
+/// The part that a sample takes of the colour at the other end of the step. `turn` is -1 for the step's first
+/// sample, 1 for its second.
+static inline float part_taken(Cut cut, float turn) {
+  const float way = 0.5f + turn * cut.x;
+  return 0.5f * cut.y * way * way;
+}
+
+/// Its gradient by the cut.
+static inline Cut part_taken_gradient(Cut cut, float turn) {
+  const float way = 0.5f + turn * cut.x;
+  return (Cut)(turn * cut.y * way, 0.5f * way * way);
 }
 
 /// The lines [x, y) of a tile that an edge may cross.

@@ -1,10 +1,52 @@
 // Exclusive prefix sums of counts, in chunks, level by level. Sums saturate, so that a total that does not
-// fit is seen as the largest number instead of wrapping around.
-#include "shared_types.h"
+// fit is seen as the largest number instead of wrapping around. A chunk is a work-item's on CPUs, a
+// work-group's on GPUs.
+#include "group.h"
 
-/// Sums of chunks. One work-item per chunk of DPR_SCAN_CHUNK elements.
+#ifndef DPR_LANES
+#define DPR_LANES 8
+#endif
+
+#if DPR_LANES == 1
+
+/// Sums of chunks. One work-group per chunk of DPR_SCAN_CHUNK elements.
 /// in   values  uint[count]
 /// out  sums    uint[chunk]
+DPR_GROUP_KERNEL kernel void scan_sum(const uint count, global const uint* restrict values,
+                                      global uint* restrict sums) {
+  local uint group_sums[DPR_GROUP];
+  const uint chunk = (uint)get_group_id(0), item = (uint)get_local_id(0);
+  const uint first = chunk * DPR_SCAN_CHUNK, last = min(count, first + DPR_SCAN_CHUNK);
+  uint sum = 0;
+  for (uint i = first + item; i < last; i += DPR_GROUP) sum = add_sat(sum, values[i]);
+  group_scan(sum, group_sums);
+  if (item == 0) sums[chunk] = group_sums[DPR_GROUP - 1];
+}
+
+/// The scan itself, given the scan of the chunks' sums. One work-group per chunk; one where there is nothing
+/// to scan.
+/// in   size     elements of a chunk, at most DPR_SCAN_CHUNK
+/// in   values   uint[count]
+/// in   bases    uint[chunk]      exclusive scan of the chunks' sums
+/// out  offsets  uint[count + 1]  exclusive scan; the last is the total
+DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, global const uint* restrict values,
+                                        global const uint* restrict bases, global uint* restrict offsets) {
+  const uint each = DPR_EACH(DPR_SCAN_CHUNK);
+  local uint places[DPR_LOCAL_PLACES(DPR_SCAN_CHUNK)], group_sums[DPR_GROUP];
+  const uint chunk = (uint)get_group_id(0), item = (uint)get_local_id(0);
+  const uint first = chunk * size, here = min(count - first, size), base = bases[chunk];
+  for (uint i = item; i < DPR_SCAN_CHUNK; i += DPR_GROUP)
+    places[local_place(i, each)] = i < here ? values[first + i] : 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  group_scan_chunk(places, each, group_sums);
+  for (uint i = item; i < here; i += DPR_GROUP)
+    offsets[first + i] = add_sat(base, places[local_place(i, each)]);
+  if (item == 0 && first + here == count) offsets[count] = add_sat(base, group_sums[DPR_GROUP - 1]);
+}
+
+#else
+
+/// As above. One work-item per chunk.
 kernel void scan_sum(const uint count, global const uint* restrict values, global uint* restrict sums) {
   const uint chunk = (uint)get_global_id(0);
   const uint first = chunk * DPR_SCAN_CHUNK;
@@ -15,12 +57,7 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
   sums[chunk] = sum;
 }
 
-/// The scan itself, given the scan of the chunks' sums. One work-item per chunk; one where there is nothing
-/// to scan.
-/// in   size     elements of a chunk: DPR_SCAN_CHUNK, or of the only one all
-/// in   values   uint[count]
-/// in   bases    uint[chunk]      exclusive scan of the chunks' sums
-/// out  offsets  uint[count + 1]  exclusive scan; the last is the total
+/// As above, but the only chunk may have any size. One work-item per chunk.
 kernel void scan_apply(const uint count, const uint size, global const uint* restrict values,
                        global const uint* restrict bases, global uint* restrict offsets) {
   const uint chunk = (uint)get_global_id(0);
@@ -34,3 +71,5 @@ kernel void scan_apply(const uint count, const uint size, global const uint* res
   }
   if (last == count) offsets[count] = sum;
 }
+
+#endif

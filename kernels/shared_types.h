@@ -21,13 +21,19 @@ using float4 = cl_float4;
 /// Tiles are 8x8 pixels: a tile's coverage by a triangle is one 64-bit mask.
 #define DPR_TILE 8
 
-/// Counts that a work-item of a prefix sum adds in order, and elements that one of a sort handles.
+/// Work-items of a group that works together (group.h).
+#define DPR_GROUP 64
+
+/// Counts of a prefix sum, and elements of a sort, that one work-item handles in order, or one group.
 #ifndef DPR_SCAN_CHUNK
-#define DPR_SCAN_CHUNK 256
+#define DPR_SCAN_CHUNK 1024
 #endif
 #ifndef DPR_SORT_BLOCK
 #define DPR_SORT_BLOCK 1024
 #endif
+
+/// By which a pass of a sort orders, on devices of so many lanes.
+#define DPR_SORT_BITS(lanes) ((lanes) == 1 ? 4 : 8)
 
 /// Pairs that a work-item handles in order, on devices whose lanes are vector registers (tile_lanes.h).
 #define DPR_PAIR_GROUP 8
@@ -303,7 +309,7 @@ typedef struct SecondCrossing {
   DPR_SHARED_NAME(SecondCrossing)
   uint step, contour;
   uint reference; /* the nearest step that the contour has won: it shows the jump across it */
-  float cut;      /* of the contour: as that of the winner */
+  float cut, weight; /* of the contour: Cut of crossing.h */
 } SecondCrossing;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its

@@ -48,9 +48,10 @@ static inline CornerArea corner_of(const FrameParams p, const TileContour c, con
   return c.flags & flag ? corner_area(p, e, x, is_second ? e.b : e.a) : none;
 }
 
-/// What a crossing takes of a cell, if its lines are all that count.
-static inline float line_cut(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
-  return x.t - 0.5f + corner_of(p, c, e, x, 0).area + corner_of(p, c, e, x, 1).area;
+/// What a crossing cuts.
+static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
+  const float area = x.t - 0.5f + corner_of(p, c, e, x, 0).area + corner_of(p, c, e, x, 1).area;
+  return (Cut)(area, e.is_by_rows ? c.by_rows : 1.0f - c.by_rows);
 }
 
 /// Whether the first sample of a step is on the contour's inner side.

@@ -41,7 +41,7 @@ enum class PoseLight {
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with Jacobians from differences of images rendered in the same
 /// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
-/// composition with a blur that follows the pixels; the scene's is not used. Levels whose pixels are
+/// composition with a blur that follows the pixels; of the scene's nothing is used. Levels whose pixels are
 /// larger than the mesh's triangles work on a coarser mesh.
 struct LeastSquares {
   /// Rotations tried at the coarsest level, spread evenly over all; 0: only the poses that solve() is given.
@@ -51,6 +51,9 @@ struct LeastSquares {
   unsigned iterations = 10;  ///< > 0: at most, a level; four times as many while the best still falls
   float blur = 0.25F;        ///< > 0: of the edges, in pixels of the level
   float blur_end = 0.1F;     ///< > 0: the same at the very end
+  /// What the blur is of. Noise of the pixel takes less time, and finds fewer poses of objects of many small
+  /// parts.
+  Noise noise = Noise::triangle;
   /// For clutter and occlusion: r^2 / (1 + (r / scale)^2) of a pixel's colour difference r instead of r^2
   /// (Geman & McClure 1985), so that what differs by more than the scale hardly counts, and more hypotheses
   /// on the way.

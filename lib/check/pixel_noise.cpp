@@ -14,7 +14,7 @@ namespace {
 /// What is left of the samples' cells, of a blur of two pixels and 4x4 samples in each.
 constexpr double k_blurred_image = 1.5e-3;
 /// Of the derivative along a direction, relative.
-constexpr double k_blurred_gradient = 1.5e-2;
+constexpr double k_blurred_gradient = 3e-3;
 
 Scene blurred_cube() {
   Scene scene = scene_of(welded_cube(), 20, 16);

@@ -108,23 +108,37 @@ class Kernel {
   /// Enqueues a range of work-items, rounded up to whole work-groups: kernels guard their range. Nothing for
   /// an empty one.
   void operator()(const Range& range, const typename detail::Argument<Args>::Value&... args) {
+    const std::size_t local = device_->local_size();
+    enqueue({range.first, (range.count + local - 1) / local * local}, local, args...);
+  }
+
+  /// For kernels that are written twice: on GPUs a work-group of DPR_GROUP does what on CPUs one work-item
+  /// does.
+  void in_groups(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
+    if (device_->info.lanes == 1) {
+      enqueue(count * DPR_GROUP, DPR_GROUP, args...);
+    } else {
+      (*this)(count, args...);
+    }
+  }
+
+ private:
+  /// Whole groups of `local` work-items.
+  void enqueue(const Range& range, std::size_t local, const typename detail::Argument<Args>::Value&... args) {
     if (range.count == 0) return;
     unsigned index = 0;
     (check_argument(detail::Argument<Args>::set(kernel_, index++, args)), ...);
-    const std::size_t local = device_->local_size();
-    const std::size_t global = (range.count + local - 1) / local * local;
     cl::Event finished;
-    const int error = device_->queue.enqueueNDRangeKernel(kernel_, cl::NDRange(range.first),
-                                                          cl::NDRange(global), cl::NDRange(local), nullptr,
-                                                          device_->profile != nullptr ? &finished : nullptr);
+    const int error = device_->queue.enqueueNDRangeKernel(
+        kernel_, cl::NDRange(range.first), cl::NDRange(range.count), cl::NDRange(local), nullptr,
+        device_->profile != nullptr ? &finished : nullptr);
     if (error != CL_SUCCESS) {
-      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(global) +
+      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(range.count) +
                                    " work-items in groups of " + std::to_string(local));
     }
     if (device_->profile != nullptr) device_->profile->record(file_, name_, finished);
   }
 
- private:
   void check_argument(int error) const {
     if (error != CL_SUCCESS) throw DeviceError(error, "clSetKernelArg " + name_);
   }

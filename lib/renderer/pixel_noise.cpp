@@ -5,11 +5,27 @@
 #include "smoothing/priors.hpp"
 
 namespace dpr {
+namespace {
+
+/// The raster sees contours by a tent (kernels/crossing.h), whose variance exceeds that of a sample's cell by
+/// a twelfth: so much less is the blur's, if the density has a variance. Below that the blur vanishes
+/// smoothly.
+PixelScale beside_tent(const PixelScale& noise, const Smoothing& smoothing) {
+  const double variance = row_of(smoothing.occupancy_prior).variance;
+  if (!std::isfinite(variance)) return noise;
+  const double samples = smoothing.supersampling;
+  const double excess = 1 / (12 * variance * samples * samples), squared = noise.value * noise.value;
+  const double whole = squared + excess, root = std::sqrt(whole);
+  return {squared / root, noise.by_sigma * noise.value * (whole + excess) / (whole * root)};
+}
+
+}  // namespace
 
 PixelScale pixel_scale(const Smoothing& smoothing, int short_side) {
   const double pixels = short_side / 2.0, sigma = static_cast<double>(smoothing.sigma);
-  if (smoothing.distance == DistanceMetric::euclidean) return {pixels * sigma, pixels};
-  return {pixels * std::sqrt(sigma), pixels * 0.5 / std::sqrt(sigma)};
+  if (smoothing.distance == DistanceMetric::euclidean)
+    return beside_tent({pixels * sigma, pixels}, smoothing);
+  return beside_tent({pixels * std::sqrt(sigma), pixels * 0.5 / std::sqrt(sigma)}, smoothing);
 }
 
 float depth_reach(const Smoothing& smoothing) {

@@ -18,8 +18,8 @@ struct Raster {
   int margin = 0;         ///< samples around the frame
 };
 
-/// The scale of the pixel's noise, in pixels of a frame whose shorter side is that long; and its derivative
-/// by sigma.
+/// What is left to the blur of the scale of the pixel's noise, in pixels of a frame whose shorter side is
+/// that long; and its derivative by sigma.
 struct PixelScale {
   double value, by_sigma;
 };

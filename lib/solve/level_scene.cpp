@@ -47,8 +47,8 @@ void simplify(Scene& scene, const PoseSpace& space) {
 }
 
 /// The solver's own member of the family: the expected rigid image, edges blurred by a part of a pixel,
-/// depths by the same length in the world. Triangles have noise of their own, so those smaller than the blur
-/// would fade: it is no more than a part of their side.
+/// depths by the same length in the world. Where triangles have noise of their own, those smaller than the
+/// blur would fade: it is no more than a part of their side.
 Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const LeastSquares& options,
                           float blur) {
   constexpr double k_of_side = 0.25;
@@ -58,11 +58,13 @@ Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const Leas
   const double world_per_ndc = space.radius() / space.radius_ndc();
   const double side_pixels = mean_side(scene.meshes.front().mesh) / pixel_at_object(scene, space);
   const double least = static_cast<double>(std::min(blur, options.blur_end));
-  const double blur_ndc = std::clamp(k_of_side * side_pixels, least, static_cast<double>(blur)) * pixel_ndc;
-  Smoothing smoothing = smoothing_preset("joint_gaussian");
+  const bool of_pixel = options.noise == Noise::pixel;
+  const double most = of_pixel ? static_cast<double>(blur) : k_of_side * side_pixels;
+  const double blur_ndc = std::clamp(most, least, static_cast<double>(blur)) * pixel_ndc;
+  Smoothing smoothing = smoothing_preset(of_pixel ? "pixel" : "joint_gaussian");
   smoothing.distance = DistanceMetric::euclidean;
   smoothing.sigma = static_cast<float>(blur_ndc);
-  if (!options.robust) smoothing.occupancy_threshold = k_least_occupancy;
+  if (!options.robust && !of_pixel) smoothing.occupancy_threshold = k_least_occupancy;
   smoothing.gamma = static_cast<float>(blur_ndc * world_per_ndc) / (scene.camera.zfar - scene.camera.znear);
   return smoothing;
 }

@@ -72,14 +72,13 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                    grad_raster, grad_seconds_);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
-                  contour.pair_tile, winner, cut, grad_cut_, second_counts, seconds, grad_seconds_,
-                  grad_ends);
+                  contour.pair_tile, winner, grad_cut_, second_counts, seconds, grad_seconds_, grad_ends);
 }
 
 std::size_t Antialias::bytes() const {
   std::size_t bytes = winner.capacity_bytes() + crowded_.capacity_bytes() + second_counts.capacity_bytes() +
-                      seconds.capacity_bytes() + grad_ends.capacity_bytes();
-  for (const Buffer<float>* buffer : {&front, &cut, &grad_cut_, &grad_seconds_})
+                      seconds.capacity_bytes() + grad_ends.capacity_bytes() + front.capacity_bytes();
+  for (const Buffer<cl_float2>* buffer : {&cut, &grad_cut_, &grad_seconds_})
     bytes += buffer->capacity_bytes();
   return bytes;
 }

@@ -23,11 +23,11 @@ class Antialias {
   void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
                 const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster);
 
-  Buffer<float> front;     ///< [view][height][width] view depth, infinite where nothing is
-  Buffer<cl_uint> winner;  ///< [2][view][height][width] what crosses the steps to the right, and down;
-                           ///< only near contours
-  Buffer<float> cut;       ///< [2][view][height][width] of a cell: of the first sample's where negative
-  Buffer<cl_uint> second_counts;           ///< [tile] of `seconds`
+  Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is
+  Buffer<cl_uint> winner;         ///< [2][view][height][width] what crosses the steps to the right, and down;
+                                  ///< only near contours
+  Buffer<cl_float2> cut;          ///< [2][view][height][width] what it cuts: Cut of kernels/crossing.h
+  Buffer<cl_uint> second_counts;  ///< [tile] of `seconds`
   Buffer<shared::SecondCrossing> seconds;  ///< [tile][DPR_SECOND_CROSSINGS] beside the winners
   Buffer<cl_float4> grad_ends;             ///< [pair] of the contour's two ends, NDC
 
@@ -38,29 +38,30 @@ class Antialias {
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
          In<cl_uint>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
-         Out<cl_uint>, Out<float>, Out<cl_uint>>
+         Out<cl_uint>, Out<cl_float2>, Out<cl_uint>>
       cross_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
          In<cl_uint>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
       second_find_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, Out<cl_float4>> forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>,
-         Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>>
+      forward_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
+         Out<cl_float2>, Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<float>, In<cl_float4>,
+  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, In<cl_float4>,
          Out<cl_float4>>
       second_forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<float>, In<cl_float4>,
-         In<cl_float4>, Out<float>, Out<cl_float4>, Out<float>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, In<cl_float4>,
+         In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
       second_backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
-         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-         In<cl_uint>, In<shared::SecondCrossing>, In<float>, Out<cl_float4>>
+         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
+         In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, Out<cl_float4>>
       cross_backward_;
-  Buffer<cl_uint> crowded_;     // [tile] of four words
-  Buffer<float> grad_cut_;      // [2][view][height][width]
-  Buffer<float> grad_seconds_;  // [tile][DPR_SECOND_CROSSINGS]
+  Buffer<cl_uint> crowded_;         // [tile] of four words
+  Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
+  Buffer<cl_float2> grad_seconds_;  // [tile][DPR_SECOND_CROSSINGS]
 };
 
 }  // namespace dpr

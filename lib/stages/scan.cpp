@@ -6,14 +6,15 @@ namespace dpr {
 
 std::size_t serial_elements(const Device::Impl& device) {
   constexpr std::size_t k_of_a_cpu = 16384;  // 20 microseconds; a launch takes 5 to 10
-  return device.info.lanes == 1 ? DPR_SCAN_CHUNK : k_of_a_cpu;
+  constexpr std::size_t k_of_a_gpu = 256;    // whose work-items are slow by themselves
+  return device.info.lanes == 1 ? k_of_a_gpu : k_of_a_cpu;
 }
 
 Scan::Scan(Device::Impl& device)
     : device_(device), sum_(device, "scan.cl", "scan_sum"), apply_(device, "scan.cl", "scan_apply") {
   const cl_uint zero = 0;
   zero_.upload(device, std::span(&zero, 1));
-  levels_.resize(4);  // 256^4 = 2^32 counts
+  levels_.resize(4);  // 1024^4 > 2^32 counts
 }
 
 void Scan::operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets) {
@@ -24,17 +25,18 @@ void Scan::operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uin
 void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
                       std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
-  if (count <= serial_elements(device_)) {
-    apply_(1, n, n, values, zero_, offsets);
+  const std::size_t at_once = device_.info.lanes == 1 ? DPR_SCAN_CHUNK : serial_elements(device_);
+  if (count <= at_once) {
+    apply_.in_groups(1, n, n, values, zero_, offsets);
     return;
   }
   const std::size_t chunks = (count + DPR_SCAN_CHUNK - 1) / DPR_SCAN_CHUNK;
   Level& next = levels_[level];
   next.sums.resize(device_, chunks);
   next.bases.resize(device_, chunks + 1);
-  sum_(chunks, n, values, next.sums);
+  sum_.in_groups(chunks, n, values, next.sums);
   scan_level(chunks, next.sums, next.bases, level + 1);
-  apply_(chunks, n, DPR_SCAN_CHUNK, values, next.bases, offsets);
+  apply_.in_groups(chunks, n, DPR_SCAN_CHUNK, values, next.bases, offsets);
 }
 
 std::size_t Scan::bytes() const {

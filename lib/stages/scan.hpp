@@ -7,8 +7,8 @@
 
 namespace dpr {
 
-/// So many elements one work-item scans or sorts sooner than the many that share them can be launched. On
-/// GPUs, whose work-items are slow by themselves, a chunk of a scan.
+/// So many elements one work-item sorts, and one of a CPU scans, sooner than the many that share them can be
+/// launched.
 std::size_t serial_elements(const Device::Impl& device);
 
 class Scan {

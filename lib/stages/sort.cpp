@@ -3,13 +3,6 @@
 #include <utility>
 
 namespace dpr {
-namespace {
-
-constexpr unsigned k_digit_bits = 8;
-constexpr std::size_t k_digits = std::size_t{1} << k_digit_bits;
-
-}  // namespace
-
 Sort::Sort(Device::Impl& device)
     : device_(device),
       scan_(device),
@@ -34,7 +27,7 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     return;
   }
   for (unsigned shift = 0; capacity > 0 && shift < 32 && (key_count - 1) >> shift != 0;
-       shift += k_digit_bits) {
+       shift += DPR_SORT_BITS(device_.info.lanes)) {
     pass(capacity, shift, count, keys, values);
     exchange();
   }
@@ -45,10 +38,11 @@ void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& cou
                 const Buffer<cl_uint>& keys, const Buffer<cl_uint>& values) {
   const std::size_t blocks = (capacity + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
   const auto n = static_cast<cl_uint>(capacity);
-  counts_.resize(device_, k_digits * blocks);
-  histogram_(blocks, n, shift, count, keys, counts_);
-  scan_(k_digits * blocks, counts_, offsets_);
-  scatter_(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
+  const std::size_t digits = std::size_t{1} << DPR_SORT_BITS(device_.info.lanes);
+  counts_.resize(device_, digits * blocks);
+  histogram_.in_groups(blocks, n, shift, count, keys, counts_);
+  scan_(digits * blocks, counts_, offsets_);
+  scatter_.in_groups(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
 }
 
 std::size_t Sort::bytes() const {

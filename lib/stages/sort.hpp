@@ -18,7 +18,7 @@ class Sort {
   std::size_t bytes() const;
 
  private:
-  /// A stable pass by eight bits.
+  /// A stable pass by DPR_SORT_BITS.
   void pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count, const Buffer<cl_uint>& keys,
             const Buffer<cl_uint>& values);
 

@@ -171,7 +171,8 @@ std::vector<Entry> entries() {
           DPR_FIELD(SecondCrossing, step),
           DPR_FIELD(SecondCrossing, contour),
           DPR_FIELD(SecondCrossing, reference),
-          DPR_FIELD(SecondCrossing, cut)};
+          DPR_FIELD(SecondCrossing, cut),
+          DPR_FIELD(SecondCrossing, weight)};
 }
 
 /// What the device says of every entry.

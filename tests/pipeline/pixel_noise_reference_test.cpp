@@ -149,16 +149,17 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
   return list;
 }
 
-/// At a corner the contours that meet there take more or less than their share of the cells around it: of the
-/// geometry's gradients a share that falls as the resolution grows, more where corners are sharp, and most
-/// where the near plane cuts surfaces open that hide parts of each other.
+/// Where contours meet, what they take of the samples around has an error of second order in the samples'
+/// distance: of the geometry's gradients a share that falls as the resolution grows, more where corners are
+/// sharp, and most where the near plane cuts surfaces open that hide parts of each other.
 struct Tolerance {
-  double geometry, others;  // times the width
+  double geometry, others;  // times the squared width
 };
-constexpr Tolerance k_silhouette{0.2, 0.1}, k_triangle{0.4, 0.1}, k_creases{0.4, 0.1}, k_cut{1.8, 0.2};
+constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0.4}, k_cut{20, 0.4};
 
 double tolerance_of(const Direction& d, const Tolerance& t) {
-  return (d.name == "sigma" || d.name == "background" ? t.others : t.geometry) / reduced(k_width, 8);
+  const double width = reduced(k_width, 8);
+  return (d.name == "sigma" || d.name == "background" ? t.others : t.geometry) / (width * width);
 }
 
 /// At the reduced size the blur is as wide as the corners that the near plane cuts off.

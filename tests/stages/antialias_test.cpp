@@ -149,14 +149,18 @@ Mesh sphere_of_edges() {
 }  // namespace
 
 TEST_SUITE("unit") {
-  TEST_CASE("antialias: an edge takes of a cell what lies beyond it") {
+  TEST_CASE("antialias: an edge takes of a sample's tent what lies beyond it") {
     const float left = -0.71F, right = 0.33F, top = 0.62F, bottom = -0.55F;
     const Mesh mesh = fan({{left, bottom}, {right, bottom}, {right, top}, {left, top}}, 5);
     ContourFrame frame(mesh, 16, 16);
     const std::vector<cl_float4> image = blend(frame, rigid_samples(frame, mesh));
-    const auto covered = [&](int pixel, float low, float high) {  // of a pixel's extent along an axis
-      const float start = static_cast<float>(pixel) / 8 - 1;
-      return std::clamp((high - start) * 8, 0.0F, 1.0F) - std::clamp((low - start) * 8, 0.0F, 1.0F);
+    // The tent's integral from a sample's left neighbour on, along an axis.
+    const auto before = [](int sample, float end) {
+      const float way = std::clamp((end + 1) * 8 - 0.5F - static_cast<float>(sample), -1.0F, 1.0F);
+      return way < 0 ? (1 + way) * (1 + way) / 2 : 1 - (1 - way) * (1 - way) / 2;
+    };
+    const auto covered = [&](int sample, float low, float high) {
+      return before(sample, high) - before(sample, low);
     };
     for (int i = 0; i < 16; ++i) {
       CAPTURE(i);

@@ -54,11 +54,11 @@ std::vector<cl_uint> serial_scan(const std::vector<cl_uint>& values) {
   return offsets;
 }
 
-/// Around a chunk of 256, its square, what one work-item takes, and more; under a simulator few of them.
+/// Around a chunk of 1024, its square, what one work-item takes, and more; under a simulator few of them.
 std::vector<std::size_t> sizes() {
   const std::size_t serial = dpr::serial_elements(device_impl());
-  if (dpr::test::is_reduced()) return {0, 1, 257, serial + 1};
-  return {0, 1, 2, 255, 256, 257, 511, serial, serial + 1, 65535, 65536, 65537, 5000000};
+  if (dpr::test::is_reduced()) return {0, 1, 1025, serial + 1};
+  return {0, 1, 2, 63, 256, 1023, 1024, 1025, 2047, serial, serial + 1, 1U << 20, (1U << 20) + 1, 5000000};
 }
 
 struct Sorted {

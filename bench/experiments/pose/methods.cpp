@@ -17,10 +17,11 @@ using Solve = PoseResult (*)(const PoseMethod& method, const Device& device, con
                              const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
                              bool smoke);
 
-PoseResult solve_by_default(const PoseMethod&, const Device& device, const Scene& scene,
-                            const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
-                            bool) {
+PoseResult solve_by_least_squares(const PoseMethod& name, const Device& device, const Scene& scene,
+                                  const PoseProblemSet& set, const PoseProblem& problem, const Image& target,
+                                  bool) {
   LeastSquares method;
+  if (name.name == "default_pixel") method.noise = Noise::pixel;
   method.robust = set.clutter || set.occluded > 0;
   const PoseSolver solver(device, scene, target,
                           {.method = method, .solve_translation = set.translation_error > 0});
@@ -45,6 +46,13 @@ Smoothing member(std::string_view name) {
   Smoothing smoothing = smoothing_preset("gaussian");
   if (name == "exact" || name == "perturbed_pose") return smoothing;
   if (name == "paper_gaussian_minus_one") return smoothing_preset("paper_gaussian");
+  if (name == "pixel") {
+    const Smoothing published = smoothing;
+    smoothing = smoothing_preset("pixel");
+    smoothing.sigma = published.sigma;
+    smoothing.gamma = published.gamma;
+    return smoothing;
+  }
   if (!name.starts_with("joint")) return smoothing_preset(name);
   smoothing = smoothing_preset("joint_gaussian");
   if (name == "joint_logistic") smoothing.occupancy_prior = smoothing.depth_prior = Prior::logistic;
@@ -91,7 +99,8 @@ constexpr std::array k_methods{
     Known{{"default",
            "what users get: least squares, robust where the set hides or clutters something; it "
            "searches where the initial rotation is uniform"},
-          solve_by_default},
+          solve_by_least_squares},
+    Known{{"default_pixel", "the same with noise of the pixel"}, solve_by_least_squares},
     Known{{"softras", "the published protocol with this preset"}, solve_as_published},
     Known{{"paper_gaussian", "the same"}, solve_as_published},
     Known{{"paper_cauchy", "the same"}, solve_as_published},
@@ -99,7 +108,8 @@ constexpr std::array k_methods{
           solve_as_published},
     Known{{"exact", "the protocol with the exact Gaussian estimator"}, solve_as_published},
     Known{{"joint", "the protocol with the exact joint composition"}, solve_as_published},
-    Known{{"joint_logistic", "the same with logistic noise"}, solve_as_published},
+    Known{{"pixel", "the protocol with exact noise of the pixel"}, solve_as_published},
+    Known{{"joint_logistic", "the joint composition with logistic noise"}, solve_as_published},
     Known{{"joint_cauchy", "the same with Cauchy noise"}, solve_as_published},
     Known{{"perturbed_pose", "the protocol with noise on the rotation instead"}, solve_on_perturbed_pose},
     Known{{"anneal", "this library's descent: annealed smoothing, joint composition, restarts"},
