@@ -13,7 +13,7 @@ namespace dpr::cli {
 namespace {
 
 constexpr const char* k_files = "FILES";
-constexpr const char* k_list = "LIST";
+constexpr const char* k_several = "LIST";
 constexpr const char* k_words = "words: ";  // begins the name of a validator that holds them
 
 // Commands are followed down to the last one; then the word before the cursor may be an option with a value.
@@ -61,7 +61,7 @@ std::string given_words(CLI::Option& option) {
 /// some; else nothing.
 std::string values_of(CLI::Option& option) {
   if (const std::string words = given_words(option); !words.empty())
-    return (option.get_delimiter() == ',' ? std::string(k_list) + " " : "") + words;
+    return (option.get_delimiter() == ',' ? std::string(k_several) + " " : "") + words;
   const std::string type = option.get_type_name();
   if (type.find('.') != std::string::npos || type == "DIR" || type == "FILE") return k_files;
   const auto is_plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };

@@ -112,13 +112,13 @@ void AttributeImages::Impl::require_forward(const char* caller) const {
   if (views == 0) throw InvalidArgument(caller, "no images of an attribute", "forward() first");
 }
 
-void AttributeImages::Impl::require_values(const Renderer::Impl& source) const {
+void AttributeImages::Impl::require_values(Renderer::Impl& source) const {
   const std::size_t expected = channels * source.geometry->vertices;
   if (!attribute && value_count_ != expected) {
     throw InvalidArgument("values (attribute images)", std::to_string(value_count_),
                           std::to_string(expected) + ", vertices of the scene x channels");
   }
-  if (attribute == Attribute::texcoords && texcoords_->empty()) {
+  if (attribute == Attribute::texcoords && source.corner_texcoords_in_force()->empty()) {
     throw InvalidArgument("texcoords (attribute images)", "a mesh that has no texture coordinates",
                           "texture coordinates on all meshes");
   }
@@ -215,9 +215,9 @@ void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
 }
 
 void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
-  if (attribute == Attribute::texcoords) texcoords_ = source.corner_texcoords_in_force();
   require_values(source);
   views = 0;  // until everything is there
+  if (attribute == Attribute::texcoords) texcoords_ = source.corner_texcoords;
   follow(source);
   Renderer::Impl& r = renderer.impl();
   r.frame.color_stride = to_uint(r.geometry->colors);

@@ -56,7 +56,7 @@ struct AttributeImages::Impl {
   AttributeDomain domain() const;
   bool has_rows() const { return !attribute || attribute == Attribute::texcoords; }
   bool shows_faces_of(const Scene& scene) const;
-  void require_values(const Renderer::Impl& source) const;
+  void require_values(Renderer::Impl& source) const;
   void show_faces_of(const Scene& scene);
   void follow(Renderer::Impl& source);
   void follow_views(const Renderer::Impl& source);

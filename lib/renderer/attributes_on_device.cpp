@@ -7,7 +7,7 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_pixel = 4;  // floats
+constexpr std::size_t k_rgba = 4;  // floats
 
 Device::Impl& device_of(const AttributeImages& images) { return images.impl().renderer.device().impl(); }
 
@@ -25,7 +25,7 @@ void set_values(AttributeImages& images, const BufferSpan& values, std::size_t v
 void reserve(AttributeImages& images, const FrameRoom& room) {
   AttributeImages::Impl& m = images.impl();
   m.room = counts_of(room);
-  if (m.views > 0) m.renderer.impl().reserve(*m.room);
+  if (m.renderer.impl().geometry) m.renderer.impl().reserve(*m.room);
 }
 
 void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
@@ -45,7 +45,7 @@ void backward_on_device(AttributeImages& images, const BufferSpan& grad_images, 
   m.require_forward("backward_on_device");
   const std::size_t count = m.images().size();
   const FloatVectors from =
-      require_vectors(device_of(images), grad_images, {count, k_pixel}, Access::read, "grad_images");
+      require_vectors(device_of(images), grad_images, {count, k_rgba}, Access::read, "grad_images");
   enqueue(device_of(images), events,
           [&] { m.backward_on_device(gradient_of_images(m.renderer.impl(), from, count)); });
 }
@@ -53,7 +53,7 @@ void backward_on_device(AttributeImages& images, const BufferSpan& grad_images, 
 BufferView image_view(const AttributeImages& images) {
   const AttributeImages::Impl& m = images.impl();
   m.require_forward("image_view");
-  return {m.images().cl_buffer()(), 0, sizeof(cl_float4), m.images().size(), k_pixel};
+  return {m.images().cl_buffer()(), 0, sizeof(cl_float4), m.images().size(), k_rgba};
 }
 
 void copy_images(AttributeImages& images, const BufferSpan& to, const Events& events) {

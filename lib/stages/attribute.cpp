@@ -58,7 +58,7 @@ ShownRows::ShownRows(Device::Impl& device)
 
 namespace {
 
-cl_uint4 sizes(std::size_t x, std::size_t y, std::size_t z, std::size_t w) {
+cl_uint4 sizes_of(std::size_t x, std::size_t y, std::size_t z, std::size_t w) {
   return {{to_uint(x), to_uint(y), to_uint(z), to_uint(w)}};
 }
 
@@ -68,26 +68,27 @@ void ShownRows::forward(const RowMap& map, std::size_t channels, const Buffer<fl
                         std::size_t passes, std::size_t views, Buffer<cl_float4>& colors) {
   const std::size_t count = passes * views * map.shown;
   colors.resize(device_, count);
-  rows_(count, sizes(passes, views, map.shown, channels), map.row_of, values, colors);
+  rows_(count, sizes_of(passes, views, map.shown, channels), map.row_of, values, colors);
 }
 
 void ShownRows::backward(const RowMap& map, std::size_t channels, std::size_t views,
                          const Buffer<cl_float4>& grad_colors, Buffer<float>& grad) {
   grad.resize(device_, map.rows * channels);
-  rows_backward_(map.rows * channels, sizes(map.rows, views, map.shown, channels), map.starts, map.shown_by,
-                 BufferRef<float>(grad_colors.cl_buffer()()), grad);
+  rows_backward_(map.rows * channels, sizes_of(map.rows, views, map.shown, channels), map.starts,
+                 map.shown_by, BufferRef<float>(grad_colors.cl_buffer()()), grad);
 }
 
 void ShownRows::move(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& positions,
                      std::size_t copies, Buffer<cl_float4>& moved) {
   moved.resize(device_, copies * map.shown);
-  positions_(copies * map.shown, sizes(copies, sources, map.shown, map.rows), map.row_of, positions, moved);
+  positions_(copies * map.shown, sizes_of(copies, sources, map.shown, map.rows), map.row_of, positions,
+             moved);
 }
 
 void ShownRows::move_backward(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& grad_moved,
                               std::size_t copies, Buffer<cl_float4>& grad) {
   grad.resize(device_, sources * map.rows);
-  positions_backward_(sources * map.rows, sizes(copies, sources, map.shown, map.rows), map.starts,
+  positions_backward_(sources * map.rows, sizes_of(copies, sources, map.shown, map.rows), map.starts,
                       map.shown_by, grad_moved, grad);
 }
 

@@ -61,6 +61,14 @@ TEST_SUITE("unit") {
     exchange.give(vectors_of(source, 0, 3), 2, vectors_of(given, 0, 3));
     CHECK(given.download()[1] == infinite);
     CHECK(std::isnan(given.download()[2]));
+    Buffer<float> packed(device.impl(), 6);
+    exchange.take({source.cl_buffer()(), 0, 3, 3}, 2, packed, 3);
+    CHECK(packed.download() == std::vector<float>{1, 0, 0, 0, 2, 3});
+    // Of integers too, every bit: these are small numbers beyond floats', and one that is none.
+    const Buffer<cl_uint> integers(device.impl(), std::vector<cl_uint>{5, 0xffffffffU, 0x7f800001U});
+    Buffer<cl_uint> copied(device.impl(), 3);
+    exchange.give({integers.cl_buffer()(), 0, 1, 1}, 3, {copied.cl_buffer()(), 0, 1, 1});
+    CHECK(copied.download() == integers.download());
   }
 
   TEST_CASE("exchange: cameras of matrices have the eye that the inverse gives") {
