@@ -173,6 +173,13 @@ std::vector<Variant> make_variants(const Definition& d, const Smoothing& publish
     smoothing.sigma = d.pixel_sigma;
     list.push_back({"pixel", smoothing});
   }
+  if (d.pixel_sigma > 0 && d.own && d.scenery == Scenery::plain) {
+    const float half_a_pixel = 1.0F / static_cast<float>(d.size);  // NDC, of which sigma is the square
+    Smoothing smoothing;
+    smoothing.noise = Noise::triangle;
+    smoothing.sigma = half_a_pixel * half_a_pixel;
+    list.push_back({"sharp", smoothing});
+  }
   return list;
 }
 

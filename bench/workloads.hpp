@@ -13,7 +13,9 @@ namespace dpr::bench {
 
 /// One way in which a workload is rendered.
 struct Variant {
-  std::string preset;  ///< "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"
+  /// "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"; "sharp": what
+  /// Smoothing{} says, with noise of the triangles whose sigma is half a pixel.
+  std::string preset;
   Smoothing smoothing;
 };
 

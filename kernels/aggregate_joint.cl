@@ -24,8 +24,12 @@
 /// Fragments that cover less than this of what the pixel's most covering one does are left out.
 #define DPR_NEGLIGIBLE 1e-8f
 
-/// Up to so many slots are sorted by insertion.
-#define DPR_INSERTION_SORT 24
+/// Up to so many slots are few.
+#if DPR_LANES == 1
+#define DPR_FEW_SLOTS 24
+#else
+#define DPR_FEW_SLOTS 64
+#endif
 
 /// By view depth, which a slot's beta holds until it is in a cluster; equal depths by fragment.
 static inline int comes_before(const Slot a, const Slot b) {
@@ -42,15 +46,46 @@ static inline void sift_down(global Slot* slots, uint root, uint count) {
   slots[root] = moved;
 }
 
-/// Insertion for few, heap sort for many.
+#if DPR_LANES == 1
+
+/// By insertion.
+static inline void sort_few_slots(global Slot* slots, uint count) {
+  for (uint i = 1; i < count; ++i) {
+    const Slot moved = slots[i];
+    uint k = i;
+    for (; k > 0 && comes_before(moved, slots[k - 1]); --k) slots[k] = slots[k - 1];
+    slots[k] = moved;
+  }
+}
+
+#else
+
+/// Each goes where as many come before it as there are: counted on lanes, without a branch to mispredict.
+/// Slots come in the order of their fragments.
+static inline void sort_few_slots(global Slot* slots, uint count) {
+  Slot moved[DPR_FEW_SLOTS];
+  float depths[DPR_FEW_SLOTS];
+  int ranks[DPR_FEW_SLOTS];
+  for (uint i = 0; i < count; ++i) {
+    moved[i] = slots[i];
+    depths[i] = moved[i].beta;
+  }
+  for (uint first = 0; first < count; first += DPR_WIDTH) {
+    const realn depth = load_n(first, depths);
+    const intn place = (int)first + DPR_LANE_INDEX;
+    intn before = 0;
+    for (uint k = 0; k < count; ++k) before -= depths[k] < depth || (depths[k] == depth && (int)k < place);
+    store_n(before, first, ranks);
+  }
+  for (uint i = 0; i < count; ++i) slots[ranks[i]] = moved[i];
+}
+
+#endif
+
+/// Heap sort for many.
 static inline void sort_slots(global Slot* slots, uint count) {
-  if (count <= DPR_INSERTION_SORT) {
-    for (uint i = 1; i < count; ++i) {
-      const Slot moved = slots[i];
-      uint k = i;
-      for (; k > 0 && comes_before(moved, slots[k - 1]); --k) slots[k] = slots[k - 1];
-      slots[k] = moved;
-    }
+  if (count <= DPR_FEW_SLOTS) {
+    sort_few_slots(slots, count);
     return;
   }
   for (uint root = count / 2; root-- > 0;) sift_down(slots, root, count);

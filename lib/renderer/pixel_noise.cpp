@@ -41,6 +41,7 @@ void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raste
                          float reach) {
   antialias.cross(in, contour, reach);
   antialias.forward(in.p, contour, raster, blended_);
+  is_blended_ = true;
   if (sampled) sampled->draw(size, in.p.first_view);
   blur_forward(size, blended_, image);
   blur_holds_image_ = true;
@@ -65,6 +66,7 @@ void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& sample
 
 void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
                           const BufferRef<cl_float4>& grad_image, bool by_scale) {
+  if (by_scale && !is_blended_) antialias.forward(in.p, contour, raster, blended_);
   if (sampled) {
     sampled->backward(grad_image, grad_blended_);
     if (by_scale) sampled->backward_scale(blended_, grad_image);
@@ -76,13 +78,14 @@ void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& rast
     blur_holds_image_ = true;
     blur.backward_scale(size, blended_, grad_image);
   }
-  antialias.backward(in, contour, raster, grad_blended_, grad_raster);
+  antialias.backward(in, contour, raster, grad_blended_, blended_);
+  is_blended_ = false;
 }
 
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
-         (edges ? edges->bytes() : 0) + image.capacity_bytes() + grad_raster.capacity_bytes() +
-         blended_.capacity_bytes() + grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
+         (edges ? edges->bytes() : 0) + image.capacity_bytes() + blended_.capacity_bytes() +
+         grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
 }
 
 }  // namespace dpr

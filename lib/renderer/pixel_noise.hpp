@@ -51,15 +51,18 @@ class PixelNoise {
 
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
-  Buffer<cl_float4> image;        ///< [view][height][width] RGBA
-  Buffer<cl_float4> grad_raster;  ///< of the samples
+  Buffer<cl_float4> image;  ///< [view][height][width] RGBA
+  /// Of the samples, after backward().
+  const Buffer<cl_float4>& grad_raster() const { return blended_; }
 
   std::size_t bytes() const;
 
  private:
   void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
 
-  Buffer<cl_float4> blended_, grad_blended_, other_blended_;
+  Buffer<cl_float4> blended_;  // the samples; from backward() on their gradient, which comes where they go
+  Buffer<cl_float4> grad_blended_, other_blended_;
+  bool is_blended_ = false;        // blended_ holds samples
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;
 };

@@ -266,7 +266,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
   }
   const bool textured = !geometry->textures.empty();
   if (wanted.texture && textured) texels->start(geometry->textures);
-  const BufferRef<cl_float4> grad_raster = pixel_noise ? pixel_noise->grad_raster : grad_images;
+  const BufferRef<cl_float4> grad_raster = pixel_noise ? pixel_noise->grad_raster() : grad_images;
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     differentiate(grad_raster);
