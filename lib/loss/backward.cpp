@@ -5,7 +5,7 @@
 #include "dpr/renderer.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
-#include "renderer/renderer_impl.hpp"
+#include "renderer/scene_batch_impl.hpp"
 
 namespace dpr {
 namespace {
@@ -13,11 +13,17 @@ namespace {
 /// Throws unless what was evaluated was the last frame.
 void require_same_frame(std::uint64_t evaluated, std::uint64_t rendered, const char* what) {
   if (evaluated == rendered) return;
-  throw InvalidArgument(std::string(what) + " (Renderer::backward)", "the gradient of other images",
+  throw InvalidArgument(std::string(what) + " (backward)", "the gradient of other images",
                         "a loss evaluated on this renderer's last forward()");
 }
 
 }  // namespace
+
+std::vector<SceneGradient> SceneBatch::backward(const ImageLoss& loss) {
+  impl_->require_forward("SceneBatch::backward");
+  require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
+  return impl_->backward(loss.impl().grad_image());
+}
 
 SceneGradient Renderer::backward(const ImageLoss& loss) {
   impl_->require_forward("Renderer::backward");

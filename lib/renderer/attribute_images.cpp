@@ -27,7 +27,8 @@ std::vector<glm::vec3> at_corners(std::span<const glm::vec3> positions,
   return values;
 }
 
-/// The scene's faces in the dark, with a colour for every number of the domain.
+/// The scene's faces in the dark, with a colour for every number of the domain. What instances show differs:
+/// each is a mesh.
 Scene shown_scene(const Scene& source, AttributeDomain domain) {
   Scene scene;
   scene.width = source.width;
@@ -36,8 +37,8 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   scene.smoothing = source.smoothing;
   scene.perspective_correct = source.perspective_correct;
   scene.cull = source.cull;
-  for (const Instance& instance : source.meshes)
-    scene.meshes.push_back({shown_mesh(instance.mesh, domain), instance.transform});
+  for (std::size_t m = 0; m < source.meshes.size(); ++m)
+    scene.meshes.push_back({shown_mesh(mesh_of(source, m), domain), source.meshes[m].transform});
   return scene;
 }
 
@@ -88,13 +89,18 @@ AttributeImages::Impl::Impl(const Device& device, std::optional<Attribute> attri
 
 bool AttributeImages::Impl::shows_faces_of(const Scene& scene) const {
   const Scene& own = renderer.scene();
-  return own.width == scene.width && own.height == scene.height &&
-         own.perspective_correct == scene.perspective_correct &&
-         std::ranges::equal(meshes_, scene.meshes, [](const SourceMesh& mesh, const Instance& instance) {
-           const Mesh& other = instance.mesh;
-           return mesh.vertices == other.positions.size() && mesh.texcoords == other.texcoords.size() &&
-                  mesh.faces == other.faces && mesh.face_texcoords == other.face_texcoords;
-         });
+  if (own.width != scene.width || own.height != scene.height ||
+      own.perspective_correct != scene.perspective_correct || meshes_.size() != scene.meshes.size())
+    return false;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    const SourceMesh& mesh = meshes_[m];
+    const Mesh& other = mesh_of(scene, m);
+    if (mesh.mesh != scene.meshes[m].instance_of.value_or(m) || mesh.vertices != other.positions.size() ||
+        mesh.texcoords != other.texcoords.size() || mesh.faces != other.faces ||
+        mesh.face_texcoords != other.face_texcoords)
+      return false;
+  }
+  return true;
 }
 
 /// Brings the renderer's scene and views up to the source's.
@@ -104,9 +110,10 @@ void AttributeImages::Impl::follow(const Renderer::Impl& source) {
   if (!shows_faces_of(scene)) {
     meshes_.clear();
     renderer.set_scene(shown_scene(scene, domain()));
-    for (const Instance& instance : scene.meshes) {
-      const Mesh& mesh = instance.mesh;
-      meshes_.push_back({mesh.positions.size(), mesh.texcoords.size(), mesh.faces, mesh.face_texcoords});
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      const Mesh& mesh = mesh_of(scene, m);
+      meshes_.push_back({scene.meshes[m].instance_of.value_or(m), source.geometry->meshes[m].first_position,
+                         mesh.positions.size(), mesh.texcoords.size(), mesh.faces, mesh.face_texcoords});
     }
   }
   take_positions(source);
@@ -133,7 +140,7 @@ void AttributeImages::Impl::take_positions(const Renderer::Impl& source) {
   if (!has_own_shapes_) {
     for (std::size_t m = 0; m < meshes_.size(); ++m) {
       const std::size_t first = positions_.size();
-      append(source.scene.meshes[m].mesh.positions, meshes_[m]);
+      append(mesh_of(source.scene, m).positions, meshes_[m]);
       const std::span<const glm::vec3> moved = std::span(positions_).subspan(first);
       if (!std::ranges::equal(renderer.scene().meshes[m].mesh.positions, moved))
         renderer.set_positions(m, moved);
@@ -143,12 +150,9 @@ void AttributeImages::Impl::take_positions(const Renderer::Impl& source) {
   std::vector<glm::vec3> shapes;
   for (const cl_float4& v : source.geometry->view_positions.download())
     shapes.emplace_back(v.s[0], v.s[1], v.s[2]);
-  std::size_t first = 0;
   for (std::size_t view = 0; view < source.views.size(); ++view) {
-    for (const SourceMesh& mesh : meshes_) {
-      append(std::span(shapes).subspan(first, mesh.vertices), mesh);
-      first += mesh.vertices;
-    }
+    const auto of_view = std::span(shapes).subspan(view * source.geometry->position_count);
+    for (const SourceMesh& mesh : meshes_) append(of_view.subspan(mesh.first_position, mesh.vertices), mesh);
   }
 }
 
@@ -262,7 +266,7 @@ SceneGradient AttributeImages::Impl::folded(SceneGradient&& of_passes) {
   } else if (!grad_values_shown.empty()) {
     add_by_geometry(grad_values_shown, positions, gradient);
   }
-  if (wanted_.positions) set_positions(positions, gradient);
+  if (wanted_.positions) add_to_positions(positions, gradient);
   return gradient;
 }
 
@@ -323,16 +327,19 @@ void AttributeImages::Impl::set_texcoords(std::span<const glm::vec3> grad, Scene
       glm::dvec2& sum = sums[mesh.face_texcoords[i / 3][static_cast<int>(i % 3)]];
       for (std::size_t view = 0; view < views; ++view) sum += glm::dvec2(grad[view * corners + first + i]);
     }
-    gradient.meshes[m].texcoords.assign(sums.begin(), sums.end());
+    std::vector<glm::vec2>& out = gradient.meshes[mesh.mesh].texcoords;
+    out.resize(sums.size(), glm::vec2(0));
+    for (std::size_t i = 0; i < sums.size(); ++i) out[i] += glm::vec2(sums[i]);
     first += 3 * mesh.face_texcoords.size();
   }
 }
 
 /// From the shown vertices to those of the source's meshes, or of its views' shapes.
-void AttributeImages::Impl::set_positions(std::span<const glm::dvec3> positions,
-                                          SceneGradient& gradient) const {
+void AttributeImages::Impl::add_to_positions(std::span<const glm::dvec3> positions,
+                                             SceneGradient& gradient) const {
   const bool by_corner = domain() == AttributeDomain::corners;
-  for (std::size_t first = 0; first < positions.size();) {
+  for (std::size_t first = 0, of_view = 0; first < positions.size();) {
+    const std::size_t in_shapes = of_view;
     for (std::size_t m = 0; m < meshes_.size(); ++m) {
       const SourceMesh& mesh = meshes_[m];
       const std::size_t count = by_corner ? 3 * mesh.faces.size() : mesh.vertices;
@@ -340,8 +347,11 @@ void AttributeImages::Impl::set_positions(std::span<const glm::dvec3> positions,
       const std::vector<glm::vec3> found = by_corner ? at_vertices(own, mesh.faces, mesh.vertices)
                                                      : std::vector<glm::vec3>(own.begin(), own.end());
       std::vector<glm::vec3>& out =
-          has_own_shapes_ ? gradient.shapes.positions : gradient.meshes[m].positions;
-      out.insert(out.end(), found.begin(), found.end());
+          has_own_shapes_ ? gradient.shapes.positions : gradient.meshes[mesh.mesh].positions;
+      const std::size_t place = has_own_shapes_ ? in_shapes + mesh.first_position : 0;
+      out.resize(std::max(out.size(), place + mesh.vertices), glm::vec3(0));
+      for (std::size_t i = 0; i < found.size(); ++i) out[place + i] += found[i];
+      of_view = std::max(of_view, place + mesh.vertices);
       first += count;
     }
   }
@@ -376,7 +386,7 @@ void AttributeImages::set_values(std::span<const float> values) {
 }
 
 void AttributeImages::forward(const Renderer& of) {
-  require_same_device(impl_->renderer.device(), of, "AttributeImages::forward");
+  require_same_device(impl_->renderer.device(), of.device(), "AttributeImages::forward");
   of.impl().require_forward("AttributeImages::forward");
   impl_->forward(of.impl());
 }

@@ -9,9 +9,9 @@
 namespace dpr {
 
 struct AttributeImages::Impl {
-  /// Whose faces are shown.
+  /// Whose faces are shown: a mesh's or an instance's, of which `mesh` is the mesh.
   struct SourceMesh {
-    std::size_t vertices, texcoords;
+    std::size_t mesh, first_position, vertices, texcoords;
     std::vector<glm::uvec3> faces, face_texcoords;
   };
 
@@ -51,7 +51,7 @@ struct AttributeImages::Impl {
                        SceneGradient& gradient) const;
   void sum_grad_values(std::span<const glm::vec3> grad);
   void set_texcoords(std::span<const glm::vec3> grad, SceneGradient& gradient) const;
-  void set_positions(std::span<const glm::dvec3> positions, SceneGradient& gradient) const;
+  void add_to_positions(std::span<const glm::dvec3> positions, SceneGradient& gradient) const;
 
   Kernel<cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> weigh_, weigh_backward_;
   Buffer<cl_float4> weighed_, grad_rendered_;

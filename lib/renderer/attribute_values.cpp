@@ -93,7 +93,7 @@ std::vector<glm::vec3> attribute_values(Attribute attribute, const ShownView& sh
 Scene texcoords_in_force(const Renderer::Impl& source) {
   Scene scene;
   for (std::size_t m = 0; m < source.scene.meshes.size(); ++m) {
-    const Mesh& mesh = source.scene.meshes[m].mesh;
+    const Mesh& mesh = mesh_of(source.scene, m);
     Mesh& in_force = scene.meshes.emplace_back().mesh;
     in_force.texcoords = mesh.texcoords;
     in_force.face_texcoords = mesh.face_texcoords;

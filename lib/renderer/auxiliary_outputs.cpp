@@ -18,8 +18,8 @@ constexpr std::array<std::string_view, 6> k_names{"depth",        "normal", "fac
 /// Texture coordinates of the faces' corners, the meshes of the scene joined; empty if one has none.
 std::vector<std::array<glm::vec2, 3>> corner_texcoords(const Scene& scene) {
   std::vector<std::array<glm::vec2, 3>> corners;
-  for (const Instance& instance : scene.meshes) {
-    const Mesh& mesh = instance.mesh;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
     if (mesh.face_texcoords.empty()) return {};
     for (const glm::uvec3& f : mesh.face_texcoords) {
       corners.push_back({mesh.texcoords[f.x], mesh.texcoords[f.y], mesh.texcoords[f.z]});

@@ -25,9 +25,8 @@ class NearPlane {
   void forget(std::size_t mesh) noexcept { is_known_[mesh] = false; }
   void forget_views() noexcept { are_views_known_ = false; }
   bool knows(std::size_t mesh) const noexcept { return is_known_[mesh]; }
-  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][vertex]. O(positions).
-  static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions,
-                                          std::span<const MeshRange> meshes);
+  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][position]. O(positions).
+  static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions, const Geometry& geometry);
   /// [view][mesh]; empty: the views share the scene's meshes.
   void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept {
     boxes_of_views_ = std::move(boxes);
@@ -41,7 +40,7 @@ class NearPlane {
  private:
   const BoxCorners& box_of(const Scene& scene, std::size_t view, std::size_t mesh);
 
-  std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured
+  std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured; not of instances
   std::vector<BoxCorners> boxes_of_views_;
   std::vector<bool> is_known_;  // [mesh]
   bool are_views_known_ = true;
