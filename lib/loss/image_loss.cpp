@@ -185,6 +185,7 @@ std::size_t ImageLoss::Impl::sums_before(std::size_t loss) const {
 
 void ImageLoss::Impl::set_views_of_mean(std::size_t count) {
   views_of_mean = count;
+  for (AttributeLoss& attribute : attributes) attribute.set_views_of_mean(count);
   if (ssim)
     ssim_weights.upload(device.impl(), std::vector(views, ssim_weight / static_cast<float>(views_of_mean)));
 }
