@@ -10,6 +10,7 @@
 #include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
+#include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/vectors.hpp"
@@ -33,7 +34,8 @@ class DPR_API SceneBatch {
   SceneBatch& operator=(SceneBatch&&) noexcept;
 
   /// Validates and uploads the scenes, at least one; each has the view of its own camera. Throws
-  /// InvalidArgument, with the number of the scene that cannot be rendered or differs in its images' size.
+  /// InvalidArgument, with the number of the scene that cannot be rendered or differs in its images' size,
+  /// and keeps the scenes there were; where a device fails there are none.
   void set_scenes(std::span<const Scene> scenes);
 
   /// How many scenes, and how many images of all of them.
@@ -60,6 +62,9 @@ class DPR_API SceneBatch {
   std::vector<SceneGradient> backward_pixels(std::span<const vec4> grad_pixels);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   std::vector<SceneGradient> backward(const ImageLoss& loss);
+  /// The same, with the gradient of a mesh's own loss added in every scene: [scene], each evaluated on the
+  /// scene's own renderer. Throws InvalidArgument if a scene asks for no positions' gradient.
+  std::vector<SceneGradient> backward(const ImageLoss& loss, std::span<const MeshLoss> mesh_losses);
 
   /// Summed over the scenes, with what the batch holds itself.
   RenderStatistics statistics() const;

@@ -93,14 +93,16 @@ FrameImages SceneBatch::Impl::images() const {
   return {frame_number, views(), scene.width, scene.height, image};
 }
 
-std::vector<SceneGradient> SceneBatch::Impl::backward(const BufferRef<cl_float4>& grad_images) {
+std::vector<SceneGradient> SceneBatch::Impl::backward(const BufferRef<cl_float4>& grad_images,
+                                                      std::span<const AddToGradient> add_to_positions) {
   std::size_t first = 0;
-  for (Renderer& renderer : renderers) {
-    Renderer::Impl& scene = renderer.impl();
+  for (std::size_t i = 0; i < renderers.size(); ++i) {
+    Renderer::Impl& scene = renderers[i].impl();
     const std::size_t pixels = scene.image().size();
     scene.host_grad_images.resize(device.impl(), pixels);
     copy_part(device.impl(), grad_images.handle(), first, scene.host_grad_images, 0, pixels);
-    scene.enqueue_backward(scene.host_grad_images);
+    scene.enqueue_backward(scene.host_grad_images,
+                           add_to_positions.empty() ? AddToGradient() : add_to_positions[i]);
     first += pixels;
   }
   std::vector<SceneGradient> gradients;
@@ -118,10 +120,11 @@ void SceneBatch::set_scenes(std::span<const Scene> scenes) {
   check_scenes(scenes);
   Impl& m = *impl_;
   m.frames.clear();
-  while (m.renderers.size() > scenes.size()) m.renderers.pop_back();
-  while (m.renderers.size() < scenes.size()) m.renderers.emplace_back(m.device);
-  for (std::size_t i = 0; i < scenes.size(); ++i) m.renderers[i].impl().set_scene(scenes[i]);
-  m.require_one_size();
+  std::vector<Renderer> renderers = std::exchange(m.renderers, {});
+  while (renderers.size() > scenes.size()) renderers.pop_back();
+  while (renderers.size() < scenes.size()) renderers.emplace_back(m.device);
+  for (std::size_t i = 0; i < scenes.size(); ++i) renderers[i].impl().set_scene(scenes[i]);
+  m.renderers = std::move(renderers);
 }
 
 std::size_t SceneBatch::scenes() const { return impl_->renderers.size(); }

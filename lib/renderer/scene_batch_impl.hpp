@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -21,7 +22,9 @@ struct SceneBatch::Impl : OnDevice {
   /// The images after require_forward().
   FrameImages images() const;
   /// From [view][height][width] on the device: first all backward passes, then the host reads of them.
-  std::vector<SceneGradient> backward(const BufferRef<cl_float4>& grad_images);
+  /// `add_to_positions`: [scene], or none.
+  std::vector<SceneGradient> backward(const BufferRef<cl_float4>& grad_images,
+                                      std::span<const AddToGradient> add_to_positions = {});
   /// Throws InvalidArgument unless all images are of one size and can be counted.
   void require_one_size() const;
   /// Of all scenes' images.

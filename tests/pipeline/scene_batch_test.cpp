@@ -185,6 +185,39 @@ TEST_SUITE("pipeline") {
     CHECK(value == doctest::Approx(sum / 4));
   }
 
+  TEST_CASE("a mesh's own loss joins in every scene") {
+    const std::vector<Scene> scenes = unlike_scenes();
+    SceneBatch batch(open_device());
+    batch.set_scenes(scenes);
+    batch.forward();
+    ImageLoss loss(batch.device(), {.mse = 1}, random_images(4));
+    loss.evaluate(batch);
+    const std::vector<SceneGradient> of_images = batch.backward(loss);
+    std::vector<MeshLoss> smooth;
+    for (std::size_t s = 0; s < 4; ++s) {
+      const MeshLossWeights weights{.edge_length = 0.1F * static_cast<float>(s + 1)};
+      smooth.emplace_back(batch.device(), weights, scenes[s].meshes[0].mesh).evaluate(batch.renderer(s));
+    }
+    const std::vector<SceneGradient> found = batch.backward(loss, smooth);
+    for (std::size_t s = 0; s < 4; ++s) {
+      CAPTURE(s);
+      Renderer alone(batch.device());
+      alone.set_scene(scenes[s]);
+      alone.forward();
+      ImageLoss nothing(batch.device(), {.mse = 1}, std::vector{alone.image()});
+      nothing.evaluate(alone);  // its gradient is 0
+      smooth[s].evaluate(alone);
+      Block block{"positions", flat(found[s].meshes[0].positions), flat(of_images[s].meshes[0].positions)};
+      const std::vector<double> more = flat(alone.backward(nothing, smooth[s]).meshes[0].positions);
+      CHECK(norm(more) > 1e-3);
+      for (std::size_t i = 0; i < more.size(); ++i) block.expected[i] += more[i];
+      CHECK(block_error(block, 1e-5) < 1e-5);
+    }
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, batch.backward(loss, smooth), "mesh_loss (backward)");
+    smooth.pop_back();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, batch.backward(loss, smooth), "one for each of the 4 scenes");
+  }
+
   TEST_CASE("images and gradients by buffer") {
     const Caller caller;
     SceneBatch batch(adopt_device(caller.context(), caller.queue()));
