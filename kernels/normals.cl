@@ -57,17 +57,19 @@ static inline NormalMap normal_map(global const float4* model) {
 
 /// One work-item per (view, given normal).
 /// in   models       float4[view][mesh][3]  rows of the models' matrices
-/// in   given        float4[given]          object space; any length
+/// in   values       float4[value]          object space; any length
 /// in   given_mesh   uint[given]
+/// in   places       MeshPlace[mesh]
 /// out  normals      float4[view][normal]   those given: as normals_forward
 kernel void normals_given_forward(const FrameParams p, global const float4* restrict models,
-                                  global const float4* restrict given, global const uint* restrict given_mesh,
-                                  global float4* restrict normals) {
+                                  global const float4* restrict values,
+                                  global const uint* restrict given_mesh,
+                                  global const MeshPlace* restrict places, global float4* restrict normals) {
   const uint i = (uint)get_global_id(0), count = p.normals - p.vertices;
   if (i >= p.views * count) return;
-  const uint view = i / count, g = i - view * count;
-  const NormalMap m = normal_map(models + 3 * (view * p.meshes + given_mesh[g]));
-  const float3 n = given[g].xyz;
+  const uint view = i / count, g = i - view * count, mesh = given_mesh[g];
+  const NormalMap m = normal_map(models + 3 * (view * p.meshes + mesh));
+  const float3 n = values[g - places[mesh].normal_shift].xyz;
   normals[view * p.normals + p.vertices + g] =
       unit_normal((float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n)));
 }
@@ -110,28 +112,38 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
   grad_world[i] += (float4)(sum, 0.0f);
 }
 
-/// From the gradients of the turned normals to those given, the views added up. One work-item per given
-/// normal. Models and given normals as normals_given_forward, and in   grad_sums   float4[view][normal] out
-/// grad_given  float4[given] out  channels    float[3][view][given]  of the model's rotation vector
+/// From the gradients of the turned normals to the values given, the views and instances added up. One
+/// work-item per given normal, of which instances' do nothing. Models, values, meshes and places as
+/// normals_given_forward, and
+/// in   grad_sums    float4[view][normal]
+/// out  grad_values  float4[value]
+/// out  channels     float[3][view][given]  of the model's rotation vector
 kernel void normals_given_backward(const FrameParams p, global const float4* restrict models,
-                                   global const float4* restrict given,
+                                   global const float4* restrict values,
                                    global const uint* restrict given_mesh,
+                                   global const MeshPlace* restrict places,
                                    global const float4* restrict grad_sums,
-                                   global float4* restrict grad_given, global float* restrict channels) {
+                                   global float4* restrict grad_values, global float* restrict channels) {
   const uint g = (uint)get_global_id(0), count = p.normals - p.vertices;
   if (g >= count) return;
-  const float3 n = given[g].xyz;
+  const uint first_mesh = given_mesh[g];
+  if (places[first_mesh].is_instance) return;
+  const uint value = g - places[first_mesh].normal_shift;
+  const float3 n = values[value].xyz;
   float3 sum = (float3)(0.0f);
   for (uint view = 0; view < p.views; ++view) {
-    const NormalMap m = normal_map(models + 3 * (view * p.meshes + given_mesh[g]));
-    const float3 grad = grad_sums[view * p.normals + p.vertices + g].xyz;
-    sum += m.row[0] * grad.x + m.row[1] * grad.y + m.row[2] * grad.z;
-    const float3 turned = (float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n));
-    const float3 by_rotation = cross(turned, grad);
-    global float* channel = channels + view * count + g;
-    channel[0] = by_rotation.x;
-    channel[p.views * count] = by_rotation.y;
-    channel[2 * p.views * count] = by_rotation.z;
+    for (uint mesh = first_mesh; mesh < p.meshes; mesh = places[mesh].next) {
+      const uint seen = value + places[mesh].normal_shift;
+      const NormalMap m = normal_map(models + 3 * (view * p.meshes + mesh));
+      const float3 grad = grad_sums[view * p.normals + p.vertices + seen].xyz;
+      sum += m.row[0] * grad.x + m.row[1] * grad.y + m.row[2] * grad.z;
+      const float3 turned = (float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n));
+      const float3 by_rotation = cross(turned, grad);
+      global float* channel = channels + view * count + seen;
+      channel[0] = by_rotation.x;
+      channel[p.views * count] = by_rotation.y;
+      channel[2 * p.views * count] = by_rotation.z;
+    }
   }
-  grad_given[g] = (float4)(sum, 0.0f);
+  grad_values[value] = (float4)(sum, 0.0f);
 }

@@ -158,7 +158,7 @@ using float4 = cl_float4;
 typedef struct FrameParams {
   DPR_SHARED_NAME(FrameParams)
   uint views, meshes, vertices, faces;
-  uint position_stride;  /* from one view's positions to the next: vertices where views have shapes, else 0 */
+  uint position_stride;  /* from one view's positions to the next where views have shapes, else 0 */
   uint color_stride;     /* the same for colours */
   uint first_view;       /* of a larger batch, which names the noise; 0 otherwise */
   uint width, height;    /* pixels */
@@ -174,6 +174,16 @@ typedef struct FrameParams {
   uint distorts;     /* some view does */
   uint normals;      /* of a view: those of the vertices, then those that meshes give */
 } FrameParams;
+
+/// Where a mesh stands: itself, or an instance of it. Each has vertices and given normals of its own in the
+/// frame; the positions and values of an instance's are its mesh's.
+typedef struct MeshPlace {
+  DPR_SHARED_NAME(MeshPlace)
+  uint vertex_shift; /* the number of a vertex less that of its position */
+  uint normal_shift; /* the number of a given normal less that of its value */
+  uint is_instance;
+  uint next; /* instance of the same mesh; the number of meshes after the last */
+} MeshPlace;
 
 /// A camera, ready for the kernels.
 typedef struct ViewParams {

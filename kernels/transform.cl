@@ -9,22 +9,25 @@ DPR_COMPENSATED_ADD(add_channels, float8)
 /// Projects vertices. One work-item per (view, vertex).
 /// in   views        ViewParams[view]
 /// in   models       float4[view][mesh][3]  rows of object to world
-/// in   positions    float4[vertex] or, with a stride, float4[view][vertex]  object space; w unused
+/// in   positions    float4[position] or, with a stride, float4[view][position]  object space; w unused
 /// in   vertex_mesh  uint[vertex]
+/// in   places       MeshPlace[mesh]
 /// out  world        float4[view][vertex]   world space; w = 1
 /// out  ndc          float4[view][vertex]   x, y in NDC, z = view depth, positive in front; w = 0
 kernel void transform_forward(const FrameParams p, global const ViewParams* restrict views,
                               global const float4* restrict models, global const float4* restrict positions,
-                              global const uint* restrict vertex_mesh, global float4* restrict world,
+                              global const uint* restrict vertex_mesh,
+                              global const MeshPlace* restrict places, global float4* restrict world,
                               global float4* restrict ndc) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
-  const uint view = i / p.vertices, vertex = i - view * p.vertices;
-  global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
+  const uint view = i / p.vertices, vertex = i - view * p.vertices, mesh = vertex_mesh[vertex];
+  const uint position = vertex - places[mesh].vertex_shift;
+  global const float4* model = models + 3 * (view * p.meshes + mesh);
   global const ViewParams* camera = views + view;
 
   const float3 w =
-      apply_affine(model[0], model[1], model[2], positions[view * p.position_stride + vertex].xyz);
+      apply_affine(model[0], model[1], model[2], positions[view * p.position_stride + position].xyz);
   const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
   const float depth = -c.z;
   world[i] = (float4)(w, 1.0f);
@@ -133,22 +136,29 @@ kernel void transform_backward(const FrameParams p, const uint lit, const uint s
 }
 
 /// Gradients of the object-space positions: the views' contributions in order, or, where every view has a
-/// shape of its own, its contribution alone. One work-item per vertex, or per (view, vertex). Models and the
-/// vertices' meshes as transform_forward.
+/// shape of its own, its contribution alone; of a view that of the mesh, then those of its instances. One
+/// work-item per vertex, or per (view, vertex), of which instances' do nothing. Models, the vertices' meshes
+/// and their places as transform_forward.
 /// in   grad_world      float4[view][vertex]
-/// out  grad_positions  float4[vertex] or, with a stride, float4[view][vertex]
+/// out  grad_positions  float4[position] or, with a stride, float4[view][position]
 kernel void transform_backward_positions(const FrameParams p, global const float4* restrict models,
                                          global const uint* restrict vertex_mesh,
+                                         global const MeshPlace* restrict places,
                                          global const float4* restrict grad_world,
                                          global float4* restrict grad_positions) {
   const uint i = (uint)get_global_id(0);
   if (i >= (p.position_stride ? p.views * p.vertices : p.vertices)) return;
-  const uint vertex = i % p.vertices;
+  const uint vertex = i % p.vertices, first_mesh = vertex_mesh[vertex];
+  if (places[first_mesh].is_instance) return;
+  const uint position = vertex - places[first_mesh].vertex_shift;
   const uint first_view = i / p.vertices, last_view = p.position_stride ? first_view + 1 : p.views;
   float3 sum = (float3)(0.0f);
   for (uint view = first_view; view < last_view; ++view) {
-    global const float4* model = models + 3 * (view * p.meshes + vertex_mesh[vertex]);
-    sum += apply_transposed(model[0], model[1], model[2], grad_world[view * p.vertices + vertex].xyz);
+    for (uint mesh = first_mesh; mesh < p.meshes; mesh = places[mesh].next) {
+      global const float4* model = models + 3 * (view * p.meshes + mesh);
+      const uint seen = view * p.vertices + position + places[mesh].vertex_shift;
+      sum += apply_transposed(model[0], model[1], model[2], grad_world[seen].xyz);
+    }
   }
-  grad_positions[i] = (float4)(sum, 0.0f);
+  grad_positions[first_view * p.position_stride + position] = (float4)(sum, 0.0f);
 }

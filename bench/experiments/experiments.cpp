@@ -14,6 +14,7 @@ void run_gradient_noise(const Settings& settings);
 void run_gallery(const Settings& settings);
 void run_estimators(const Settings& settings);
 void run_devices(const Settings& settings);
+void run_batches(const Settings& settings);
 void run_shapes(const Settings& settings);
 void run_lights(const Settings& settings);
 void run_textures(const Settings& settings);
@@ -28,6 +29,8 @@ std::span<const Experiment> experiments() {
       {"gallery", "Renders for growing sigma and gamma, each composition (Figure 2)", run_gallery},
       {"estimators", "Error, time and error^2 x time of every estimator, and which is best", run_estimators},
       {"devices", "Throughput of a batch of views on more and more parts of the device", run_devices},
+      {"batches", "Throughput of unlike scenes in a batch, by themselves, and of one in as many views",
+       run_batches},
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
        run_shapes},
       {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights},

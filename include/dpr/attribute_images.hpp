@@ -50,8 +50,9 @@ class DPR_API AttributeImages {
   AttributeImages(AttributeImages&&) noexcept;
   AttributeImages& operator=(AttributeImages&&) noexcept;
 
-  /// New numbers for the next forward(): [vertex][channel], the vertices of all meshes one after the other.
-  /// Throws InvalidArgument for numbers that are not finite, and for attributes that the scene gives.
+  /// New numbers for the next forward(): [vertex][channel], the vertices of all meshes one after the other,
+  /// instances' among them, which may have numbers of their own. Throws InvalidArgument for numbers that are
+  /// not finite, and for attributes that the scene gives.
   void set_values(std::span<const float> values);
 
   /// Renders what the renderer's last forward() shows: its scene, views, shapes, smoothing and culling as

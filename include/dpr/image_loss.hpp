@@ -14,6 +14,7 @@
 namespace dpr {
 
 class Renderer;
+class SceneBatch;
 
 /// mse, l1: means over pixels and the three colour channels. silhouette: 1 - IoU of the alpha channel, eq.
 /// (75). robust: mse in which pixels of quite another colour hardly count: the mean of s / (1 + s / c^2),
@@ -79,9 +80,12 @@ class DPR_API ImageLoss {
   ImageLoss& operator=(ImageLoss&&) noexcept;
 
   /// The loss of the renderer's last images; keeps d loss / d image on the device for Renderer::backward.
-  /// Blocks. Throws InvalidArgument for images of another number or size, for a renderer of another Device, and
-  /// for losses on attributes where the renderer's positions or transforms came from a buffer.
+  /// Blocks. Throws InvalidArgument for images of another number or size, for a renderer of another Device,
+  /// and for losses on attributes where the renderer's positions or transforms came from a buffer.
   double evaluate(const Renderer& renderer);
+  /// The same of a batch's last images, all scenes' one after the other, for SceneBatch::backward; without
+  /// losses on attributes.
+  double evaluate(const SceneBatch& batch);
   /// The same for every view of the last evaluate(): the total is their mean.
   std::span<const double> per_view() const;
 

@@ -72,7 +72,7 @@ class DPR_API MultiDeviceRenderer {
   /// rendered again for it: no device keeps the frames of all its chunks.
   SceneGradient gradient(std::span<const Image> grad_images);
 
-  /// One target a view, as ImageLoss, without attributes. They are uploaded where and when they are needed
+  /// One target a view, as ImageLoss, of attributes too. They are uploaded where and when they are needed
   /// first, then kept until the next set_loss(), or until views are dealt in other chunks that share some
   /// with theirs. Each device may come to hold those of all views, once: plan as for an ImageLoss of all on
   /// each.

@@ -8,12 +8,14 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "dpr/aov.hpp"
 #include "dpr/attribute_images.hpp"
 #include "dpr/device.hpp"
 #include "dpr/export.h"
 #include "dpr/renderer.hpp"
+#include "dpr/scene_batch.hpp"
 
 namespace dpr {
 
@@ -197,5 +199,10 @@ DPR_API cl_mem image_handle(const Renderer& renderer);
 /// device's context, and waits for it. Throws InvalidArgument for a buffer of another context, or one that is
 /// too small.
 DPR_API SceneGradient backward(Renderer& renderer, cl_mem grad_images);
+
+/// The same of the images of all scenes. The view is valid until the batch's next forward(); blocks where it
+/// is not known that the frames fitted their room.
+DPR_API BufferView image_view(SceneBatch& batch);
+DPR_API std::vector<SceneGradient> backward(SceneBatch& batch, cl_mem grad_images);
 
 }  // namespace dpr

@@ -44,6 +44,7 @@ struct ViewGradient {
   std::vector<PoseGradient> transforms;  ///< [mesh]
 };
 
+/// Of a mesh, summed over its instances; all empty for an entry of Scene::meshes that is one of these.
 struct MeshGradient {
   std::vector<vec3> positions;  ///< [vertex] object space; empty if not requested
   std::vector<vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
@@ -109,7 +110,9 @@ class DPR_API Renderer {
   /// larger batch then.
   void set_views(std::span<const View> views, std::size_t first_view = 0);
   void set_smoothing(const Smoothing& smoothing);
-  /// New positions, object space, for a mesh of the scene: [vertex], as many as it has.
+  /// New positions, object space, for a mesh of the scene and all its instances: [vertex], as many as it has.
+  /// This and what follows throw InvalidArgument for an entry of Scene::meshes that is an instance of
+  /// another.
   void set_positions(std::size_t mesh, std::span<const vec3> positions);
   /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
   void set_colors(std::size_t mesh, std::span<const vec3> colors);
@@ -125,7 +128,8 @@ class DPR_API Renderer {
 
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
-  /// the other. Empty: the scene's own for all views, to which set_views() returns as well.
+  /// the other, without instances, which have their mesh's. Empty: the scene's own for all views, to which
+  /// set_views() returns as well.
   void set_shapes(std::span<const vec3> positions, std::span<const vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);

@@ -1,6 +1,7 @@
 // A scene as it is described in a file: everything a render needs.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -20,6 +21,8 @@ namespace dpr {
 struct Instance {
   Mesh mesh;
   mat4 transform{1.0F};  ///< object to world; affine, may hold a scale
+  /// An earlier entry of Scene::meshes whose mesh stands here too. `mesh` is empty then.
+  std::optional<std::size_t> instance_of = std::nullopt;
 };
 
 /// Which faces are left out: none; those that wind clockwise in the image, as the outside of a mesh does seen
@@ -55,6 +58,11 @@ struct Scene {
   Cull cull = Cull::none;
   GradientRequest gradients;
 };
+
+/// The mesh that stands at an entry of Scene::meshes: its own, or that which it is an instance of.
+inline const Mesh& mesh_of(const Scene& scene, std::size_t entry) {
+  return scene.meshes[scene.meshes[entry].instance_of.value_or(entry)].mesh;
+}
 
 /// Throws InvalidArgument where the scene cannot be rendered: size, camera, meshes, transforms, lights,
 /// smoothing.

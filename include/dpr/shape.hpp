@@ -31,6 +31,10 @@ struct ShapeView {
   bool has_alpha = true;  ///< false: the image has no silhouette and is compared in colour alone
   Image mask = {};  ///< its first channel is how much each pixel counts, at least 0; empty: all the same
   CameraKnowledge knowledge = CameraKnowledge::known;
+  /// View depth in the first channel, and normals in world space, where a sensor or another program has
+  /// measured them; alpha is how much each pixel counts, at least 0: 0 where nothing is known, as in what
+  /// aov_image() makes. Empty: none. All views have them, or none has.
+  Image depth = {}, normal = {};
 };
 
 /// What a shape is found from.
@@ -78,6 +82,9 @@ struct ShapeOptions {
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
   double color_learning_rate = 0.05;  ///< >= 0; 0: the colours stay
   LossWeights loss{.l1 = 4, .silhouette = 1};
+  /// >= 0: of mean absolute differences of depths, in radii of that sphere, and of normals' components, where
+  /// views have images of them. Each costs about as much as the images.
+  float depth = 1, normal = 0.1F;
   MeshLossWeights regularizers;  ///< as if that sphere had a radius of 1; edge_target too
   /// >= 0: weight of the mean squared strain against the start, as rigid as possible (Sorkine & Alexa 2007):
   /// of how every vertex' edges differ from those of the start in the rotation that suits them best, over the

@@ -128,19 +128,20 @@ inline reference::Scene to_reference(const Scene& scene) {
   result.height = scene.height;
   result.camera = to_reference(scene.camera);
   result.background = to_reference(scene.background);
-  for (const Instance& instance : scene.meshes) {
-    reference::Mesh mesh{to_reference(instance.mesh.positions),
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& from = mesh_of(scene, m);
+    reference::Mesh mesh{to_reference(from.positions),
                          {},
-                         to_reference(instance.mesh.vertex_colors),
-                         to_reference(instance.mesh.face_colors),
-                         to_reference(instance.transform),
+                         to_reference(from.vertex_colors),
+                         to_reference(from.face_colors),
+                         to_reference(scene.meshes[m].transform),
                          {},
                          {},
                          {},
                          {}};
-    add_textures(instance.mesh, mesh);
-    add_looks(instance.mesh, mesh);
-    for (const glm::uvec3& face : instance.mesh.faces) mesh.faces.push_back({face.x, face.y, face.z});
+    add_textures(from, mesh);
+    add_looks(from, mesh);
+    for (const glm::uvec3& face : from.faces) mesh.faces.push_back({face.x, face.y, face.z});
     result.meshes.push_back(mesh);
   }
   if (scene.lights) result.lights = to_reference(*scene.lights);

@@ -50,7 +50,7 @@ AovFiles::AovFiles(const std::vector<std::string>& names, const std::string& out
   }
   if (std::ranges::find(aovs_, Aov::uv) == aovs_.end()) return;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    if (!scene.meshes[i].mesh.face_texcoords.empty()) continue;
+    if (!mesh_of(scene, i).face_texcoords.empty()) continue;
     throw InvalidArgument("uv (--aov)", "mesh " + std::to_string(i) + ", which has no texture coordinates",
                           "meshes that have some, as OBJ files with vt");
   }

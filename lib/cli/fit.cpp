@@ -45,6 +45,9 @@ void resize(ShapeViews& views, glm::ivec2 size) {
   }
   for (ShapeView& view : views.views) {
     if (!view.mask.pixels.empty()) view.mask = resample(view.mask, size.x, size.y);
+    for (Image* measured : {&view.depth, &view.normal}) {
+      if (!measured->pixels.empty()) *measured = resample_weighted(std::move(*measured), size.x, size.y);
+    }
     view.camera = resample(view.camera, views.width, views.height, size.x, size.y);
     view.image = resample(view.image, size.x, size.y);
   }
@@ -232,6 +235,9 @@ void add_loss_options(CLI::App& command, ShapeOptions& solver) {
   add("--robust-scale", solver.loss.robust_scale,
       "Colour difference from which on --robust leaves pixels out");
   add("--ssim", solver.loss.ssim, "1 - structural similarity; the smallest level needs 11x11 pixels");
+  add("--depth", solver.depth,
+      "Mean absolute difference of depths, in radii of the first sphere, where views have them");
+  add("--normal", solver.normal, "Mean absolute difference of normals, where views have them");
   add("--laplacian", solver.regularizers.laplacian,
       "Sum of squared distances of vertices from their neighbours' mean");
   add("--edge-length", solver.regularizers.edge_length, "Mean squared length of edges");

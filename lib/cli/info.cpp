@@ -89,12 +89,13 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
 }
 
 /// Triangles that the camera's clipping planes drop or clip.
-void add_clipping_notes(const Scene& scene, const Instance& instance, Json& notes) {
+void add_clipping_notes(const Scene& scene, std::size_t entry, Json& notes) {
+  const Mesh& mesh = mesh_of(scene, entry);
   std::vector<float> depths;
-  for (const glm::vec3& p : instance.mesh.positions)
-    depths.push_back(-(scene.camera.view * instance.transform * glm::vec4(p, 1)).z);
+  for (const glm::vec3& p : mesh.positions)
+    depths.push_back(-(scene.camera.view * scene.meshes[entry].transform * glm::vec4(p, 1)).z);
   std::size_t near = 0, crossing = 0, far = 0;
-  for (const glm::uvec3& face : instance.mesh.faces) {
+  for (const glm::uvec3& face : mesh.faces) {
     const auto [low, high] = std::minmax({depths[face.x], depths[face.y], depths[face.z]});
     if (high < scene.camera.znear) {
       ++near;
@@ -135,13 +136,15 @@ Json scene_to_json(const fs::path& file) {
   const Json document = Json::parse(read_file(file));  // for the names, which the scene does not keep
   Json meshes = Json::array();
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    const Json& entry = document.at("meshes").at(i);
+    const std::optional<std::size_t> instance_of = scene.meshes[i].instance_of;
+    const Json& entry = document.at("meshes").at(instance_of.value_or(i));
     const std::string name = entry.contains("file") ? entry["file"].get<std::string>() : "";
     const auto materials =
         name.empty() ? std::vector<MeshMaterial>() : mesh_materials(file.parent_path() / name);
     Json mesh{{"file", name.empty() ? Json() : Json(name)}};
-    mesh.update(mesh_to_json(scene.meshes[i].mesh, materials));
-    add_clipping_notes(scene, scene.meshes[i], mesh["notes"]);
+    if (instance_of) mesh["instance_of"] = *instance_of;
+    mesh.update(mesh_to_json(mesh_of(scene, i), materials));
+    add_clipping_notes(scene, i, mesh["notes"]);
     meshes.push_back(mesh);
   }
   Json lights;
@@ -272,8 +275,11 @@ void print_scene(const Json& scene) {
   print_line("gradients", list_text(scene["gradients"]));
   print_notes(scene["notes"]);
   for (const Json& mesh : scene["meshes"]) {
-    std::printf("%s: mesh\n",
-                mesh["file"].is_null() ? "(in the scene file)" : mesh["file"].get<std::string>().c_str());
+    const std::string instance =
+        mesh.contains("instance_of") ? "another place of mesh " + mesh["instance_of"].dump() : "mesh";
+    std::printf("%s: %s\n",
+                mesh["file"].is_null() ? "(in the scene file)" : mesh["file"].get<std::string>().c_str(),
+                instance.c_str());
     print_mesh(mesh);
   }
 }

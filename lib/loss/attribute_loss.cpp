@@ -64,6 +64,8 @@ std::span<const double> AttributeLoss::evaluate(const Renderer& renderer) {
   return loss_.per_view();
 }
 
+void AttributeLoss::set_views_of_mean(std::size_t count) { loss_.impl().set_views_of_mean(count); }
+
 SceneGradient AttributeLoss::backward() {
   const std::size_t pixels = target_.size();
   backward_(pixels, static_cast<cl_uint>(pixels), target_, loss_.impl().grad_image(), grad_images_);

@@ -12,8 +12,9 @@ class AttributeLoss {
 
   /// Of the renderer's last images, one value a view.
   std::span<const double> evaluate(const Renderer& renderer);
-  /// Of the mean over the views, after evaluate().
+  /// Of the mean over the views, after evaluate(): those of the targets, or a batch that they are part of.
   SceneGradient backward();
+  void set_views_of_mean(std::size_t count);
 
  private:
   AttributeImages images_;

@@ -12,6 +12,7 @@
 #include "base/require.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/frame.hpp"
+#include "renderer/scene_batch_impl.hpp"
 
 namespace dpr {
 namespace {
@@ -184,6 +185,7 @@ std::size_t ImageLoss::Impl::sums_before(std::size_t loss) const {
 
 void ImageLoss::Impl::set_views_of_mean(std::size_t count) {
   views_of_mean = count;
+  for (AttributeLoss& attribute : attributes) attribute.set_views_of_mean(count);
   if (ssim)
     ssim_weights.upload(device.impl(), std::vector(views, ssim_weight / static_cast<float>(views_of_mean)));
 }
@@ -230,25 +232,46 @@ ImageLoss& ImageLoss::operator=(ImageLoss&&) noexcept = default;
 
 double ImageLoss::evaluate(const Renderer& renderer) {
   Impl& m = *impl_;
-  require_same_device(m.device, renderer, "ImageLoss::evaluate");
+  require_same_device(m.device, renderer.device(), "ImageLoss::evaluate");
   const Frame frame = last_frame(renderer, "ImageLoss::evaluate");
-  if (frame.views != m.views) {
-    throw InvalidArgument("targets (loss)", std::to_string(m.views) + " images",
-                          "one for each of the " + std::to_string(frame.views) + " views");
-  }
-  if (frame.width != m.width || frame.height != m.height) {
-    throw InvalidArgument("target size (loss)", checks::size(m.width, m.height),
-                          "the size of the render, " + checks::size(frame.width, frame.height));
-  }
-  m.frame_number = 0;  // until everything of this one is there
-  m.evaluate(frame.image);
+  m.evaluate(frame);
   for (AttributeLoss& attribute : m.attributes) {
     const std::span<const double> values = attribute.evaluate(renderer);
     for (std::size_t view = 0; view < m.views; ++view) m.per_view[view] += values[view];
   }
-  m.frame_number = frame.number;
+  return m.finish(frame.number);
+}
+
+double ImageLoss::evaluate(const SceneBatch& batch) {
+  Impl& m = *impl_;
+  require_same_device(m.device, batch.device(), "ImageLoss::evaluate");
+  if (!m.attributes.empty()) {
+    throw InvalidArgument("attributes (ImageLoss::evaluate)", std::to_string(m.attributes.size()),
+                          "none for a SceneBatch: they need a Renderer");
+  }
+  batch.impl().require_forward("ImageLoss::evaluate");
+  const FrameImages images = batch.impl().images();
+  m.evaluate(images);
+  return m.finish(images.number);
+}
+
+void ImageLoss::Impl::evaluate(const FrameImages& images) {
+  if (images.views != views) {
+    throw InvalidArgument("targets (loss)", std::to_string(views) + " images",
+                          "one for each of the " + std::to_string(images.views) + " views");
+  }
+  if (images.width != width || images.height != height) {
+    throw InvalidArgument("target size (loss)", checks::size(width, height),
+                          "the size of the render, " + checks::size(images.width, images.height));
+  }
+  frame_number = 0;  // until everything of this one is there
+  evaluate(images.image);
+}
+
+double ImageLoss::Impl::finish(std::uint64_t number) {
+  frame_number = number;
   double total = 0;
-  for (const double value : m.per_view) total += value / static_cast<double>(m.views);
+  for (const double value : per_view) total += value / static_cast<double>(views);
   return total;
 }
 

@@ -9,6 +9,7 @@
 #include "image_losses.h"
 #include "loss/attribute_loss.hpp"
 #include "loss/ssim.hpp"
+#include "renderer/frame.hpp"
 #include "stages/reduce.hpp"
 
 namespace dpr {
@@ -72,6 +73,10 @@ struct ImageLoss::Impl {
             level.target,
             level.windows};
   }
+  /// Of images that the targets are for; throws InvalidArgument for others.
+  void evaluate(const FrameImages& images);
+  /// The total, once everything of that frame is there.
+  double finish(std::uint64_t number);
   /// Of the mean over the levels: value by view, and gradient.
   void evaluate(const Buffer<cl_float4>& image);
   /// Adds the gradients of the attributes after evaluate().

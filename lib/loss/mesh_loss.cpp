@@ -110,7 +110,7 @@ MeshLoss& MeshLoss::operator=(MeshLoss&&) noexcept = default;
 
 double MeshLoss::evaluate(const Renderer& renderer, std::size_t mesh) {
   Impl& m = *impl_;
-  require_same_device(m.device, renderer, "MeshLoss::evaluate");
+  require_same_device(m.device, renderer.device(), "MeshLoss::evaluate");
   const Frame frame = last_frame(renderer, "MeshLoss::evaluate");
   if (frame.has_own_shapes) {
     throw InvalidArgument("mesh (mesh loss)", "a shape of its own for every view", "one for all views");
@@ -125,7 +125,7 @@ double MeshLoss::evaluate(const Renderer& renderer, std::size_t mesh) {
                           std::to_string(m.params.vertices));
   }
   m.frame_number = 0;  // until everything of this one is there
-  const double loss = m.evaluate(frame.positions, range.first_vertex);
+  const double loss = m.evaluate(frame.positions, range.first_position);
   m.frame_number = frame.number;
   return loss;
 }

@@ -137,15 +137,7 @@ SceneGradient MultiDeviceRenderer::gradient(std::span<const Image> grad_images) 
 void MultiDeviceRenderer::set_loss(const LossOptions& options, std::span<const Image> targets) {
   impl_->require_views("MultiDeviceRenderer::set_loss");
   check_loss(options, targets);
-  if (!options.attributes.empty()) {
-    throw InvalidArgument("attributes (MultiDeviceRenderer::set_loss)",
-                          std::to_string(options.attributes.size()), "none: they need a Renderer");
-  }
-  OwnLoss loss{options.weights,
-               {options.has_alpha.begin(), options.has_alpha.end()},
-               {options.masks.begin(), options.masks.end()},
-               {targets.begin(), targets.end()},
-               options.levels};
+  OwnLoss loss = OwnLoss::of(options, targets);
   std::swap(impl_->loss, loss);
   ++impl_->losses;
 }
@@ -165,7 +157,7 @@ void MultiDeviceRenderer::set_mesh_loss(const MeshLossWeights& weights, std::siz
     throw InvalidArgument("mesh loss (MultiDeviceRenderer)", "a scene without gradients of positions",
                           "GradientRequest::positions");
   }
-  check_mesh_loss(weights, m.scene.meshes[mesh].mesh);
+  check_mesh_loss(weights, mesh_of(m.scene, mesh));
   m.mesh_loss = {weights, mesh};
   ++m.mesh_losses;
 }

@@ -25,14 +25,32 @@ double seconds_since(Clock::time_point start) {
 
 }  // namespace
 
+OwnLoss OwnLoss::of(const LossOptions& options, std::span<const Image> targets) {
+  OwnLoss own{options.weights,
+              {options.has_alpha.begin(), options.has_alpha.end()},
+              {options.masks.begin(), options.masks.end()},
+              {targets.begin(), targets.end()},
+              options.levels,
+              {}};
+  for (const AttributeTarget& target : options.attributes)
+    own.attributes.push_back(
+        {target.attribute, target.weights, {target.targets.begin(), target.targets.end()}});
+  return own;
+}
+
 ImageLoss OwnLoss::make(const Device& device, const Chunk& chunk) const {
   const auto part = [&](const auto& all) {
     return all.empty() ? std::span(all) : std::span(all).subspan(chunk.first, chunk.size());
   };
-  return {
-      device,
-      LossOptions{.weights = weights, .has_alpha = part(has_alpha), .masks = part(masks), .levels = levels},
-      part(targets)};
+  std::vector<AttributeTarget> of_views;
+  for (const Attributes& of : attributes) of_views.push_back({of.attribute, of.weights, part(of.targets)});
+  return {device,
+          LossOptions{.weights = weights,
+                      .has_alpha = part(has_alpha),
+                      .masks = part(masks),
+                      .levels = levels,
+                      .attributes = of_views},
+          part(targets)};
 }
 
 /// By the setters that check nothing: what was set is checked, but a scene's own camera, or the views of the
@@ -178,8 +196,7 @@ ImageLoss& MultiDeviceRenderer::Impl::loss_of(Worker& worker, const Batch& of, s
 
 MeshLoss& MultiDeviceRenderer::Impl::mesh_loss_of(Worker& worker) const {
   if (worker.mesh_loss_of != mesh_losses) {
-    worker.mesh_loss.emplace(worker.renderer.device(), mesh_loss->weights,
-                             scene.meshes[mesh_loss->mesh].mesh);
+    worker.mesh_loss.emplace(worker.renderer.device(), mesh_loss->weights, mesh_of(scene, mesh_loss->mesh));
     worker.mesh_loss_of = mesh_losses;
   }
   return *worker.mesh_loss;

@@ -33,10 +33,18 @@ struct Versions {
 
 /// A LossOptions that has what it speaks of.
 struct OwnLoss {
+  struct Attributes {
+    Attribute attribute;
+    LossWeights weights;
+    std::vector<Image> targets;  // [view]
+  };
+
+  static OwnLoss of(const LossOptions& options, std::span<const Image> targets);
   LossWeights weights;
   std::vector<unsigned char> has_alpha;  // [view] or none
   std::vector<Image> masks, targets;     // [view] or none; [view]
   unsigned levels = 1;
+  std::vector<Attributes> attributes;
 
   /// Of a chunk's views.
   ImageLoss make(const Device& device, const Chunk& chunk) const;

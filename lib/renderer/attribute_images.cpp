@@ -40,7 +40,8 @@ Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain) {
   return shown;
 }
 
-/// The scene's faces in the dark, with a colour for every number of the domain.
+/// The scene's faces in the dark, with a colour for every number of the domain. What instances show differs:
+/// each is a mesh.
 Scene shown_scene(const Scene& source, AttributeDomain domain) {
   Scene scene;
   scene.width = source.width;
@@ -49,24 +50,26 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   scene.smoothing = source.smoothing;
   scene.perspective_correct = source.perspective_correct;
   scene.cull = source.cull;
-  for (const Instance& instance : source.meshes)
-    scene.meshes.push_back({shown_mesh(instance.mesh, domain), instance.transform});
+  for (std::size_t m = 0; m < source.meshes.size(); ++m)
+    scene.meshes.push_back({shown_mesh(mesh_of(source, m), domain), source.meshes[m].transform});
   return scene;
 }
 
-/// Which vertex of the scene each shown one is.
-std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain) {
+/// Which vertex of the scene each shown one is; `first` is the number of a mesh's first.
+std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain, const Geometry& geometry,
+                                    std::size_t MeshRange::*first) {
   std::vector<cl_uint> vertices;
-  cl_uint first = 0;
-  for (const Instance& instance : scene.meshes) {
-    const cl_uint count = to_uint(instance.mesh.positions.size());
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    const cl_uint first_vertex = to_uint(geometry.meshes[m].*first);
     if (domain == AttributeDomain::corners) {
-      for (const glm::uvec3& face : instance.mesh.faces)
-        vertices.insert(vertices.end(), {first + face.x, first + face.y, first + face.z});
+      for (const glm::uvec3& face : mesh.faces)
+        vertices.insert(vertices.end(),
+                        {first_vertex + face.x, first_vertex + face.y, first_vertex + face.z});
     } else {
-      for (cl_uint vertex = 0; vertex < count; ++vertex) vertices.push_back(first + vertex);
+      for (cl_uint vertex = 0; vertex < mesh.positions.size(); ++vertex)
+        vertices.push_back(first_vertex + vertex);
     }
-    first += count;
   }
   return vertices;
 }
@@ -126,29 +129,40 @@ void AttributeImages::Impl::require_values(Renderer::Impl& source) const {
 
 bool AttributeImages::Impl::shows_faces_of(const Scene& scene) const {
   const Scene& own = renderer.scene();
-  return own.width == scene.width && own.height == scene.height &&
-         own.perspective_correct == scene.perspective_correct &&
-         std::ranges::equal(meshes_, scene.meshes, [](const SourceMesh& mesh, const Instance& instance) {
-           return mesh.vertices == instance.mesh.positions.size() && mesh.faces == instance.mesh.faces;
-         });
+  if (own.width != scene.width || own.height != scene.height ||
+      own.perspective_correct != scene.perspective_correct || meshes_.size() != scene.meshes.size())
+    return false;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    if (meshes_[m].instance_of != scene.meshes[m].instance_of ||
+        meshes_[m].vertices != mesh.positions.size() || meshes_[m].faces != mesh.faces)
+      return false;
+  }
+  return true;
 }
 
-void AttributeImages::Impl::show_faces_of(const Scene& scene) {
+void AttributeImages::Impl::show_faces_of(const Renderer::Impl& source) {
+  const Scene& scene = source.scene;
+  const Geometry& geometry = *source.geometry;
+  Device::Impl& device = renderer.device().impl();
   meshes_.clear();
   fold_.reset();
   renderer.set_scene(shown_scene(scene, domain()));
   if (room) renderer.impl().reserve(*room);
-  std::size_t vertices = 0;
-  for (const Instance& instance : scene.meshes) vertices += instance.mesh.positions.size();
-  vertices_ = RowMap(renderer.device().impl(), vertices_shown(scene, domain()), vertices);
-  for (const Instance& instance : scene.meshes)
-    meshes_.push_back({instance.mesh.positions.size(), instance.mesh.faces});
+  positions_ = RowMap(device, vertices_shown(scene, domain(), geometry, &MeshRange::first_position),
+                      geometry.position_count);
+  vertices_ =
+      RowMap(device, vertices_shown(scene, domain(), geometry, &MeshRange::first_vertex), geometry.vertices);
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    meshes_.push_back({scene.meshes[m].instance_of, mesh.positions.size(), mesh.faces});
+  }
 }
 
 /// Brings the renderer's scene and views up to the source's.
 void AttributeImages::Impl::follow(Renderer::Impl& source) {
   const Scene& scene = source.scene;
-  if (!shows_faces_of(scene)) show_faces_of(scene);
+  if (!shows_faces_of(scene)) show_faces_of(source);
   if (renderer.scene().cull != scene.cull) renderer.set_cull(scene.cull);
   if (renderer.scene().smoothing != scene.smoothing) renderer.set_smoothing(scene.smoothing);
   follow_views(source);
@@ -181,7 +195,7 @@ void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
 
 /// Of the mesh as the host knows it.
 std::vector<glm::vec3> AttributeImages::Impl::shown_positions(const Scene& scene, std::size_t mesh) const {
-  return shown_mesh(scene.meshes[mesh].mesh, domain()).positions;
+  return shown_mesh(mesh_of(scene, mesh), domain()).positions;
 }
 
 void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
@@ -190,7 +204,7 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
   r.near_plane.set_boxes_of_views({});
   bool all_are_known = true;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (!source.near_plane.knows(m)) {
+    if (!source.near_plane.knows(meshes_[m].instance_of.value_or(m))) {
       r.forget_positions(m);
       all_are_known = false;
       continue;
@@ -199,12 +213,12 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
     if (!r.near_plane.knows(m) || r.scene.meshes[m].mesh.positions != positions)
       renderer.set_positions(m, positions);
   }
-  if (!all_are_known) rows_.move(vertices_, 1, source.geometry->positions, 1, r.geometry->positions);
+  if (!all_are_known) rows_.move(positions_, 1, source.geometry->positions, 1, r.geometry->positions);
 }
 
 void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
   Renderer::Impl& r = renderer.impl();
-  rows_.move(vertices_, source.views.size(), source.geometry->view_positions, r.views.size(),
+  rows_.move(positions_, source.views.size(), source.geometry->view_positions, r.views.size(),
              r.geometry->view_positions);
   r.frame.position_stride = r.frame.vertices;
   std::vector<BoxCorners> boxes;
@@ -250,7 +264,7 @@ void AttributeImages::Impl::gather() {
   Renderer::Impl& r = renderer.impl();
   if (wanted_.positions) {
     const std::size_t sources = has_own_shapes_ ? views : 1, copies = has_own_shapes_ ? r.views.size() : 1;
-    rows_.move_backward(vertices_, sources, r.transform.grad_positions, copies, grad_positions_);
+    rows_.move_backward(positions_, sources, r.transform.grad_positions, copies, grad_positions_);
   }
   if (has_rows() && r.wants_colors()) rows_.backward(row_map(), channels, views, r.grad_colors, grad_rows_);
 }
@@ -304,6 +318,7 @@ SceneGradient AttributeImages::Impl::folded(SceneGradient&& of_passes) {
     for (const cl_float4& g : grad_positions_.download()) positions.emplace_back(g.s[0], g.s[1], g.s[2]);
     auto next = positions.begin();
     for (std::size_t m = 0; !has_own_shapes_ && m < meshes_.size(); ++m) {
+      if (meshes_[m].instance_of) continue;
       const auto first = std::exchange(next, next + static_cast<std::ptrdiff_t>(meshes_[m].vertices));
       gradient.meshes[m].positions.assign(first, next);
     }
@@ -350,15 +365,16 @@ BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
   };
   if (!attribute && name == "values") return rows(0, vertices_.rows);
   if (wanted_.positions && has_own_shapes_ && name == "shapes.positions")
-    return positions(0, views * vertices_.rows);
-  std::size_t first_vertex = 0;
+    return positions(0, views * positions_.rows);
+  std::size_t first_position = 0;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (meshes_[m].instance_of) continue;
     const std::string mesh = checks::element("meshes", m);
     if (wanted_.positions && !has_own_shapes_ && name == mesh + ".positions")
-      return positions(first_vertex, meshes_[m].vertices);
+      return positions(first_position, meshes_[m].vertices);
     if (attribute == Attribute::texcoords && wanted_.texcoords && name == mesh + ".texcoords")
       return rows(texcoords_->first[m], texcoords_->first[m + 1] - texcoords_->first[m]);
-    first_vertex += meshes_[m].vertices;
+    first_position += meshes_[m].vertices;
   }
   SceneGradient arrays = empty_gradient();
   if (const auto numbers = summed_view(arrays, r, grad_numbers_, name)) return *numbers;
@@ -392,7 +408,7 @@ void AttributeImages::set_values(std::span<const float> values) {
 }
 
 void AttributeImages::forward(const Renderer& of) {
-  require_same_device(impl_->renderer.device(), of, "AttributeImages::forward");
+  require_same_device(impl_->renderer.device(), of.device(), "AttributeImages::forward");
   of.impl().require_forward("AttributeImages::forward");
   impl_->forward(of.impl(), FrameSizes::read);
 }

@@ -16,6 +16,7 @@ enum class AttributeDomain { vertices, faces, corners };
 struct AttributeImages::Impl {
   /// Whose faces are shown.
   struct SourceMesh {
+    std::optional<std::size_t> instance_of;
     std::size_t vertices;
     std::vector<glm::uvec3> faces;
   };
@@ -57,7 +58,7 @@ struct AttributeImages::Impl {
   bool has_rows() const { return !attribute || attribute == Attribute::texcoords; }
   bool shows_faces_of(const Scene& scene) const;
   void require_values(Renderer::Impl& source) const;
-  void show_faces_of(const Scene& scene);
+  void show_faces_of(const Renderer::Impl& source);
   void follow(Renderer::Impl& source);
   void follow_views(const Renderer::Impl& source);
   void follow_positions(const Renderer::Impl& source);
@@ -76,7 +77,7 @@ struct AttributeImages::Impl {
   Buffer<cl_float4> weighed_, grad_rendered_;
   GradientRequest wanted_;          // of the source's scene
   std::vector<SourceMesh> meshes_;  // of the source
-  RowMap vertices_;                 // of the source, at those that are shown
+  RowMap positions_, vertices_;  // of the source, at those that are shown; places of a mesh share positions
   bool has_own_shapes_ = false;
   std::shared_ptr<CornerTexcoords> texcoords_;  // the source's, where they are shown
   Buffer<float> values_;                        // the caller's

@@ -30,7 +30,7 @@ void reserve(AttributeImages& images, const FrameRoom& room) {
 
 void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
   AttributeImages::Impl& m = images.impl();
-  require_same_device(m.renderer.device(), renderer, "forward_on_device");
+  require_same_device(m.renderer.device(), renderer.device(), "forward_on_device");
   renderer.impl().require_rendered("forward_on_device");
   enqueue(device_of(images), events, [&] { m.forward(renderer.impl(), FrameSizes::kept); });
 }

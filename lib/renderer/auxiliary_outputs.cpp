@@ -16,7 +16,10 @@ constexpr std::array<std::string_view, 6> k_names{"depth",        "normal", "fac
                                                   "barycentrics", "uv",     "effective_faces"};
 
 bool have_texcoords(const Scene& scene) {
-  return std::ranges::none_of(scene.meshes, [](const Instance& i) { return i.mesh.face_texcoords.empty(); });
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (mesh_of(scene, m).face_texcoords.empty()) return false;
+  }
+  return true;
 }
 
 InvalidArgument no_texcoords() {

@@ -45,12 +45,13 @@ float BackFaces::hidden_of(const State& state, const Camera& camera, const glm::
 
 std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, float depth_reach) {
   for (std::size_t m = 0; m < states_.size(); ++m) {
-    if (!states_[m].is_measured) measure(states_[m], scene.meshes[m].mesh);
+    if (!states_[m].is_measured && !scene.meshes[m].instance_of) measure(states_[m], scene.meshes[m].mesh);
   }
   std::vector<float> hidden;
   for (const View& view : views) {
     for (std::size_t m = 0; m < states_.size(); ++m)
-      hidden.push_back(hidden_of(states_[m], view.camera, view.transforms[m], depth_reach));
+      hidden.push_back(hidden_of(states_[scene.meshes[m].instance_of.value_or(m)], view.camera,
+                                 view.transforms[m], depth_reach));
   }
   return hidden;
 }

@@ -37,7 +37,7 @@ class BackFaces {
   static void measure(State& state, const Mesh& mesh);
   static float hidden_of(const State& state, const Camera& camera, const glm::mat4& model, float depth_reach);
 
-  std::vector<State> states_;
+  std::vector<State> states_;  // [mesh]; not of instances, which have their mesh's
 };
 
 }  // namespace dpr

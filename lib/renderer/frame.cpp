@@ -7,8 +7,10 @@ namespace dpr {
 Frame last_frame(const Renderer& renderer, const char* caller) {
   Renderer::Impl& r = renderer.impl();
   r.require_forward(caller);
-  return {r.frame_number, r.views.size(),        r.scene.width,      r.scene.height,
-          r.image(),      r.geometry->positions, r.geometry->meshes, r.frame.position_stride != 0};
+  return {{r.frame_number, r.views.size(), r.scene.width, r.scene.height, r.image()},
+          r.geometry->positions,
+          r.geometry->meshes,
+          r.frame.position_stride != 0};
 }
 
 FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
@@ -22,8 +24,8 @@ FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
           r.rasterize.depth, r.occupancy.log_occupancy, r.occupancy.occupancy};
 }
 
-void require_same_device(const Device& device, const Renderer& renderer, const char* what) {
-  const Device::Impl &mine = device.impl(), &its = renderer.device().impl();
+void require_same_device(const Device& device, const Device& other, const char* what) {
+  const Device::Impl &mine = device.impl(), &its = other.impl();
   if (mine.context() == its.context() && mine.queue() == its.queue()) return;
   throw InvalidArgument(std::string("device (") + what + ")",
                         mine.info.name + (mine.device() == its.device() ? ", opened a second time" : ""),

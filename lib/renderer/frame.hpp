@@ -10,14 +10,21 @@
 
 namespace dpr {
 
-/// A complete frame, valid until the renderer is changed or renders again.
-struct Frame {
+/// Frames of all renderers are counted, so that a loss knows which one it was evaluated on.
+std::uint64_t next_frame_number();
+
+/// The images of a complete frame, valid until the renderer is changed or renders again.
+struct FrameImages {
   std::uint64_t number;  ///< which one, among all renderers' frames
   std::size_t views;
   int width, height;
-  const Buffer<cl_float4>& image;      ///< [view][height][width] RGBA
-  const Buffer<cl_float4>& positions;  ///< [vertex] object space
-  std::span<const MeshRange> meshes;   ///< whose vertices these are
+  const Buffer<cl_float4>& image;  ///< [view][height][width] RGBA
+};
+
+/// And of what they are.
+struct Frame : FrameImages {
+  const Buffer<cl_float4>& positions;  ///< [position] object space
+  std::span<const MeshRange> meshes;   ///< whose positions these are
   bool has_own_shapes;                 ///< every view has positions of its own, not these
 };
 
@@ -36,7 +43,8 @@ struct FrameFragments {
 /// Throws InvalidArgument where the memory budget made several bands of the frame: then none has all of them.
 FrameFragments last_fragments(const Renderer& renderer, const char* caller);
 
-/// Throws InvalidArgument unless what `device` holds can be used together with the renderer; `what` names it.
-void require_same_device(const Device& device, const Renderer& renderer, const char* what);
+/// Throws InvalidArgument unless what `device` holds can be used together with what a renderer has on its
+/// own; `what` names it.
+void require_same_device(const Device& device, const Device& of_renderer, const char* what);
 
 }  // namespace dpr

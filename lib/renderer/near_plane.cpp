@@ -4,21 +4,20 @@
 
 namespace dpr {
 
-std::vector<BoxCorners> NearPlane::boxes_of(std::span<const glm::vec3> positions,
-                                            std::span<const MeshRange> meshes) {
+std::vector<BoxCorners> NearPlane::boxes_of(std::span<const glm::vec3> positions, const Geometry& geometry) {
   std::vector<BoxCorners> boxes;
   while (!positions.empty()) {
-    for (const MeshRange& mesh : meshes)
-      boxes.push_back(box_corners(positions.subspan(mesh.first_vertex, mesh.vertices)));
-    positions = positions.subspan(meshes.back().first_vertex + meshes.back().vertices);
+    for (const MeshRange& mesh : geometry.meshes)
+      boxes.push_back(box_corners(positions.subspan(mesh.first_position, mesh.vertices)));
+    positions = positions.subspan(geometry.position_count);
   }
   return boxes;
 }
 
 const BoxCorners& NearPlane::box_of(const Scene& scene, std::size_t view, std::size_t mesh) {
   if (!boxes_of_views_.empty()) return boxes_of_views_[view * boxes_.size() + mesh];
-  std::optional<BoxCorners>& box = boxes_[mesh];
-  if (!box) box = box_corners(scene.meshes[mesh].mesh.positions);
+  std::optional<BoxCorners>& box = boxes_[scene.meshes[mesh].instance_of.value_or(mesh)];
+  if (!box) box = box_corners(mesh_of(scene, mesh).positions);
   return *box;
 }
 

@@ -27,9 +27,8 @@ class NearPlane {
   bool knows(std::size_t mesh) const noexcept { return is_known_[mesh]; }
   bool knows_views() const noexcept { return are_views_known_; }
   std::span<const BoxCorners> boxes_of_views() const noexcept { return boxes_of_views_; }
-  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][vertex]. O(positions).
-  static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions,
-                                          std::span<const MeshRange> meshes);
+  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][position]. O(positions).
+  static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions, const Geometry& geometry);
   /// [view][mesh]; empty: the views share the scene's meshes.
   void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept {
     boxes_of_views_ = std::move(boxes);
@@ -43,7 +42,7 @@ class NearPlane {
  private:
   const BoxCorners& box_of(const Scene& scene, std::size_t view, std::size_t mesh);
 
-  std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured
+  std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured; not of instances
   std::vector<BoxCorners> boxes_of_views_;
   std::vector<bool> is_known_;  // [mesh]
   bool are_views_known_ = true;

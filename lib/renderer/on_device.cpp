@@ -72,7 +72,7 @@ void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpa
     if (span.buffer != nullptr) from = source(m, span, {m.views.size() * of_view, k_vector}, name);
     return from;
   };
-  const auto from_positions = optional_source(positions, m.geometry->vertices, "positions");
+  const auto from_positions = optional_source(positions, m.geometry->position_count, "positions");
   const auto from_colors = optional_source(colors, m.geometry->colors, "colors");
   enqueue(m.device.impl(), events, [&] { m.take_shapes(from_positions, from_colors); });
 }
@@ -200,11 +200,11 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
     const shared::Texture& t = m.geometry->textures.list[range.first_texture + *texture];
     return view_of(m.texels->grad, t.first, std::size_t{t.width} * t.height, k_vector);
   }
-  if (name != array) return std::nullopt;
+  if (name != array || (!of_views && m.scene.meshes[mesh].instance_of)) return std::nullopt;
   if (row.wanted == &GradientRequest::positions && of_views == (m.frame.position_stride != 0)) {
     const Buffer<cl_float4>& grad = m.transform.grad_positions;
     return of_views ? view_of(grad, 0, grad.size(), k_vector)
-                    : view_of(grad, range.first_vertex, range.vertices, k_vector);
+                    : view_of(grad, range.first_position, range.vertices, k_vector);
   }
   if (row.wanted == &GradientRequest::colors && m.wants_colors() && of_views == (m.frame.color_stride != 0)) {
     if (of_views) return view_of(m.grad_colors, 0, m.grad_colors.size(), k_vector);

@@ -7,6 +7,7 @@
 
 #include "dpr/error.hpp"
 #include "renderer/finite.hpp"
+#include "renderer/frame.hpp"
 #include "renderer/renderer_impl.hpp"
 
 namespace dpr {
@@ -28,10 +29,12 @@ FrameCounts larger(const FrameCounts& a, const FrameCounts& b) {
   return {std::max(a.pairs, b.pairs), std::max(a.fragments, b.fragments), std::max(a.contours, b.contours)};
 }
 
-/// Frames of all renderers, so that a loss knows which one it was evaluated on.
-std::atomic<std::uint64_t> frames_rendered = 0;
-
 }  // namespace
+
+std::uint64_t next_frame_number() {
+  static std::atomic<std::uint64_t> frames_rendered = 0;
+  return ++frames_rendered;
+}
 
 Renderer::Impl::Impl(Device device_)
     : OnDevice{std::move(device_)},
@@ -77,7 +80,7 @@ void Renderer::Impl::forward(FrameSizes sizes) {
     forward_measured();
   }
   rendered = true;
-  frame_number = ++frames_rendered;
+  frame_number = next_frame_number();
 }
 
 void Renderer::Impl::build_pyramids() {
@@ -88,7 +91,7 @@ void Renderer::Impl::build_pyramids() {
 
 void Renderer::Impl::find_edges() {
   if (!pixel_noise || pixel_noise->edges) return;
-  pixel_noise->edges.emplace(device.impl(), scene, shape_of_first_view());
+  pixel_noise->edges.emplace(device.impl(), scene, geometry->meshes, shape_of_first_view());
   pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids), frame.position_stride == 0);
   for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
@@ -121,7 +124,7 @@ void Renderer::Impl::set_up() {
 }
 
 std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
-  std::vector<cl_float4> values(geometry->vertices);
+  std::vector<cl_float4> values(geometry->position_count);
   geometry->positions_of(frame).download(values);
   std::vector<glm::vec3> shape;
   shape.reserve(values.size());
@@ -239,6 +242,10 @@ void Renderer::Impl::shade_and_aggregate() {
 SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,
                                        const AddToGradient& add_to_positions) {
   enqueue_backward(grad_images, add_to_positions);
+  return read_gradient();
+}
+
+SceneGradient Renderer::Impl::read_gradient() {
   SceneGradient gradient = finish_summed_gradients(gradient_sums_.download());
   read_mesh_gradients(gradient);
   require_finite(gradient);
@@ -246,7 +253,7 @@ SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,
 }
 
 void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images) {
-  enqueue_backward(grad_images, {});
+  enqueue_backward(grad_images);
   if (!gradient_map) gradient_map = make_gradient_map();
   made_exchange().map(*gradient_map, gradient_sums_, grad_numbers);
   device_gradient_frame = frame_number;

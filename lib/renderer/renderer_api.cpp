@@ -75,7 +75,7 @@ void Renderer::set_materials(std::size_t mesh, std::span<const Material> materia
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   Impl& m = *impl_;
   m.require_scene("Renderer::set_shapes");
-  if (!positions.empty()) check_values("positions", positions, m.views.size() * m.geometry->vertices);
+  if (!positions.empty()) check_values("positions", positions, m.views.size() * m.geometry->position_count);
   if (!colors.empty()) check_values("colors", colors, m.views.size() * m.geometry->colors);
   m.set_shapes(positions, colors);
 }
@@ -112,12 +112,6 @@ const Device& Renderer::device() const { return impl_->device; }
 void Renderer::forward() { impl_->forward(); }
 
 namespace {
-
-void require_pixel_count(std::size_t found, std::size_t expected) {
-  if (found == expected) return;
-  throw InvalidArgument("pixels", std::to_string(found),
-                        std::to_string(expected) + ", views x height x width");
-}
 
 /// The pixels of a frame from `first` on. Blocks.
 void read_image(const Renderer::Impl& m, std::size_t first, std::span<glm::vec4> pixels) {

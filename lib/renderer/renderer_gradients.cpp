@@ -69,10 +69,12 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
   }
   if (wants_colors() && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (scene.meshes[m].instance_of) continue;
     const MeshRange& range = geometry->meshes[m];
     const Mesh& mesh = scene.meshes[m].mesh;
     if (scene.gradients.positions && !own_positions) {
-      gradient.meshes[m].positions = read_range(transform.grad_positions, range.first_vertex, range.vertices);
+      gradient.meshes[m].positions =
+          read_range(transform.grad_positions, range.first_position, range.vertices);
     }
     if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
       gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);

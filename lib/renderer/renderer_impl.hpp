@@ -104,6 +104,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// blocks to read the sizes to allocate.
   void forward(FrameSizes sizes = FrameSizes::read);
   SceneGradient backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
+  /// Its two halves: what the device does, and what the host reads of it.
+  void enqueue_backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
+  SceneGradient read_gradient();
   /// Leaves the gradients on the device: `transform.grad_positions`, `grad_colors`, `grad_texcoords`,
   /// `texels->grad`, and `grad_numbers`. Works on the last frame as it is, even if that has been emptied.
   void backward_on_device(const BufferRef<cl_float4>& grad_images);
@@ -208,7 +211,6 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void shade_and_aggregate();
   void differentiate(const BufferRef<cl_float4>& grad_images);
 
-  void enqueue_backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions);
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
   void add_sums(std::span<const Summation> all);

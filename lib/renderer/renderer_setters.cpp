@@ -274,12 +274,12 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   spare_view_colors_.resize(device.impl(), colors.size());
   write_range(device.impl(), spare_view_positions_, 0, to_cl(positions));
   write_range(device.impl(), spare_view_colors_, 0, to_cl(colors));
-  std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, geometry->meshes);
+  std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, *geometry);
 
   std::swap(geometry->view_positions, spare_view_positions_);
   std::swap(geometry->view_colors, spare_view_colors_);
   near_plane.set_boxes_of_views(std::move(boxes));
-  frame.position_stride = positions.empty() ? 0 : frame.vertices;
+  frame.position_stride = positions.empty() ? 0 : static_cast<cl_uint>(geometry->position_count);
   frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
   rendered = false;
 }
@@ -299,7 +299,7 @@ void Renderer::Impl::set_cull(Cull cull) noexcept {
 }
 
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  replace(geometry->positions, geometry->meshes[mesh].first_vertex, to_cl(positions));
+  replace(geometry->positions, geometry->meshes[mesh].first_position, to_cl(positions));
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
   near_plane.move(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
@@ -351,7 +351,7 @@ Exchange& Renderer::Impl::made_exchange() {
 
 void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) {
   const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.vertices, geometry->positions, range.first_vertex);
+  made_exchange().take(from, range.vertices, geometry->positions, range.first_position);
   forget_positions(mesh);
   rendered = false;
 }
@@ -397,7 +397,7 @@ void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
     if (from) made_exchange().take(*from, count, values, 0);
     return static_cast<cl_uint>(from ? of_view : 0);
   };
-  const cl_uint position_stride = take(positions, geometry->vertices, spare_view_positions_);
+  const cl_uint position_stride = take(positions, geometry->position_count, spare_view_positions_);
   const cl_uint color_stride = take(colors, geometry->colors, spare_view_colors_);
 
   std::swap(geometry->view_positions, spare_view_positions_);

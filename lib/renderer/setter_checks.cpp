@@ -61,6 +61,12 @@ void check_values(const char* name, std::span<const glm::vec3> values, std::size
   }
 }
 
+void require_pixel_count(std::size_t found, std::size_t expected) {
+  if (found == expected) return;
+  throw InvalidArgument("pixels", std::to_string(found),
+                        std::to_string(expected) + ", views x height x width");
+}
+
 std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int width, int height) {
   std::vector<cl_float4> pixels;
   for (const Image& image : grad_images) {
@@ -75,8 +81,12 @@ std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int wi
 }
 
 void check_mesh(const Scene& scene, std::size_t mesh) {
-  if (mesh < scene.meshes.size()) return;
-  throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));
+  if (mesh >= scene.meshes.size())
+    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));
+  if (const auto source = scene.meshes[mesh].instance_of) {
+    throw InvalidArgument("mesh", std::to_string(mesh) + ", an instance of mesh " + std::to_string(*source),
+                          std::to_string(*source) + ": what is set there is its instances' too");
+  }
 }
 
 void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture) {
@@ -169,9 +179,9 @@ Raster raster_of(const Scene& scene) {
 
 std::size_t most_views(const Scene& scene, const Raster& raster) {
   std::size_t vertices = 0, faces = 0;
-  for (const Instance& instance : scene.meshes) {
-    vertices += instance.mesh.positions.size();
-    faces += instance.mesh.faces.size();
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    vertices += mesh_of(scene, m).positions.size();
+    faces += mesh_of(scene, m).faces.size();
   }
   const std::size_t samples = samples_of_side(scene.width, raster) * samples_of_side(scene.height, raster);
   const std::size_t largest =

@@ -36,6 +36,9 @@ void check_lights(const Scene& scene, std::span<const View> views, const std::op
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
 
+/// Throws InvalidArgument unless there are as many pixels as the views have.
+void require_pixel_count(std::size_t found, std::size_t expected);
+
 /// The pixels of the images, one after the other, whose derivative by which these are has that size.
 std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int width, int height);
 

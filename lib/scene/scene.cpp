@@ -14,6 +14,17 @@ void validate_side(int value, const std::string& argument) {
                         "1 to " + std::to_string(checks::k_largest_side) + " pixels");
 }
 
+void validate_instance(const Scene& scene, std::size_t i, const std::string& name) {
+  const std::size_t source = *scene.meshes[i].instance_of;
+  if (source >= i || scene.meshes[source].instance_of) {
+    throw InvalidArgument(checks::in("instance_of", name), std::to_string(source),
+                          "an earlier one of the meshes, which is no instance itself");
+  }
+  const Mesh& mesh = scene.meshes[i].mesh;
+  if (!mesh.positions.empty() || !mesh.faces.empty())
+    throw InvalidArgument(name, "a mesh of its own and instance_of", "one of the two");
+}
+
 }  // namespace
 
 void validate(const Scene& scene) {
@@ -24,7 +35,11 @@ void validate(const Scene& scene) {
   if (scene.meshes.empty()) throw InvalidArgument("meshes (scene)", "none", "at least one");
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     const std::string name = checks::element("meshes", i);
-    validate(scene.meshes[i].mesh, name);
+    if (scene.meshes[i].instance_of) {
+      validate_instance(scene, i, name);
+    } else {
+      validate(scene.meshes[i].mesh, name);
+    }
     checks::require_affine(scene.meshes[i].transform, checks::in("transform", name));
   }
   if (scene.lights) validate(*scene.lights);

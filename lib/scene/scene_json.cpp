@@ -128,7 +128,18 @@ void take_material(const JsonNode& node, Mesh& mesh) {
   mesh.face_materials.clear();
 }
 
+/// Another place of a mesh that is there.
+Instance parse_place(const JsonNode& node) {
+  constexpr std::uint64_t k_most = std::numeric_limits<std::uint32_t>::max();
+  node.require_keys({"instance_of", "transform"});
+  Instance instance;
+  instance.instance_of = node.at("instance_of").whole_number(k_most);
+  take(node, "transform", instance.transform, [](const JsonNode& n) { return n.mat4(); });
+  return instance;
+}
+
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
+  if (node.find("instance_of")) return parse_place(node);
   node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors", "texcoords",
                      "face_texcoords", "texture", "normals", "face_normals", "material"});
   Instance instance;

@@ -69,6 +69,15 @@ void add(Hash& hash, const ShapeOptions& o) {
   hash.add(o.color_learning_rate);
 }
 
+/// Depths or normals and what they weigh, if there are any.
+void add_measured(Hash& hash, const Image& measured, float weight) {
+  if (measured.pixels.empty()) return;
+  hash.add(weight);
+  for (const glm::vec4& pixel : measured.pixels) {
+    for (int i = 0; i < 4; ++i) hash.add(pixel[i]);
+  }
+}
+
 }  // namespace
 
 std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const ShapeOptions& options) {
@@ -81,6 +90,8 @@ std::uint64_t fingerprint(const ShapeViews& views, const Mesh& start, const Shap
       for (int i = 0; i < 4; ++i) hash.add(pixel[i]);
     }
     for (const glm::vec4& pixel : view.mask.pixels) hash.add(pixel.x);
+    add_measured(hash, view.depth, options.depth);
+    add_measured(hash, view.normal, options.normal);
     add(hash, view.camera);
     hash.add(static_cast<int>(view.has_alpha));
   }

@@ -54,6 +54,13 @@ Image resample(const Image& image, int width, int height) {
   return resample_rows(resample_columns(image, width), height);
 }
 
+Image resample_weighted(Image image, int width, int height) {
+  for (glm::vec4& p : image.pixels) p = glm::vec4(p.w * glm::vec3(p), p.w);
+  Image result = resample(image, width, height);
+  for (glm::vec4& p : result.pixels) p = p.w > 0 ? glm::vec4(glm::vec3(p) / p.w, p.w) : glm::vec4(0);
+  return result;
+}
+
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height) {
   if ((width == new_width && height == new_height) || camera.orthographic_height) return camera;
   // In pixels, whatever the camera was given by: the ratio of the sides may change by rounding.

@@ -9,6 +9,9 @@ namespace dpr {
 /// The mean over the area of every new pixel; linear in the image, alpha included. Sizes at least 1.
 Image resample(const Image& image, int width, int height);
 
+/// The same of numbers that count by their alpha: the means of what counts, and of how much it does.
+Image resample_weighted(Image image, int width, int height);
+
 /// The camera that sees the same picture in images of another size. An orthographic one keeps its height:
 /// where rounding changes the ratio of the sides, it sees a little more or less at the left and right.
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);

@@ -86,8 +86,8 @@ class Run {
     if (remeshes) make_mesh_anew(level);
     if (is_new_level || remeshes) prepare();
     if (is_new_level) {
-      const ShapeTargets targets(views_, *level_);
-      renderer_.set_loss(targets.options(options_.loss), targets.images);
+      const ShapeTargets targets(views_, options_, *level_);
+      renderer_.set_loss(targets.loss(), targets.images);
     }
     const double rate = std::pow(options_.learning_rate_end, progress(in_level));
     position_optimizer_.set_learning_rate(rate * options_.learning_rate * common_.radius);
@@ -245,13 +245,36 @@ class Run {
   ShapeState state_;
 };
 
+/// An image of depths or normals, beside the view's and the first view's.
+void check_measured(const Image& measured, const Image& image, const Image& of_first,
+                    const std::string& name) {
+  if (measured.pixels.empty() != of_first.pixels.empty()) {
+    throw InvalidArgument(checks::in(name, "shape"), measured.pixels.empty() ? "none" : "one",
+                          "one for each of the views, or for none");
+  }
+  if (measured.pixels.empty()) return;
+  if (measured.width != image.width || measured.height != image.height) {
+    throw InvalidArgument(checks::in("size of the " + name, "shape"),
+                          checks::size(measured.width, measured.height),
+                          checks::size(image.width, image.height));
+  }
+  checks::require_pixels(measured, checks::in(name, "shape"));
+  float largest = 0;
+  for (const glm::vec4& pixel : measured.pixels) {
+    require(pixel.w >= 0, checks::in("alpha of the " + name, "shape").c_str(), pixel.w, "at least 0");
+    largest = std::max(largest, pixel.w);
+  }
+  require(largest > 0, checks::in("alpha of the " + name, "shape").c_str(), largest,
+          "some above 0: pixels that count");
+}
+
 void check(const ShapeViews& views) {
   if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
   if (views.width < 1 || views.height < 1) {
     throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
   }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
-    const auto& [image, camera, has_alpha, mask, knowledge] = views.views[i];
+    const auto& [image, camera, has_alpha, mask, knowledge, depth, normal] = views.views[i];
     const std::string name = checks::element("views", i);
     if (image.width != views.width || image.height != views.height) {
       throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
@@ -259,6 +282,8 @@ void check(const ShapeViews& views) {
     }
     checks::require_pixels(image, checks::in(name, "shape"));
     if (!mask.pixels.empty()) require_mask(mask, image, checks::in("mask of " + name, "shape"));
+    check_measured(depth, image, views.views[0].depth, "depth of " + name);
+    check_measured(normal, image, views.views[0].normal, "normal of " + name);
     validate(camera, name + ".camera");
   }
   require_known_cameras(views, "shape");
@@ -298,6 +323,8 @@ void check(const ShapeOptions& o, const ShapeViews& views) {
           "a finite number above 0");
   require(not_negative(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
           "a finite number, at least 0");
+  require(not_negative(o.depth), "depth (shape)", o.depth, "a finite number, at least 0");
+  require(not_negative(o.normal), "normal (shape)", o.normal, "a finite number, at least 0");
   require(not_negative(o.rigidity), "rigidity (shape)", o.rigidity, "a finite number, at least 0");
   require(o.rigidity == 0 || o.remesh_interval == 0, "remesh_interval (shape)", o.remesh_interval,
           "0 beside a rigidity: it compares with the start, whose faces have to stay");
@@ -337,8 +364,8 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
   check(options_, views_);
   start_ = make_start(views_);
   check_mesh_loss(options_.regularizers, start_);
-  const ShapeTargets targets(views_, ShapeLevel(views_, options_, 0));
-  check_loss(targets.options(options_.loss), targets.images);
+  const ShapeTargets targets(views_, options_, ShapeLevel(views_, options_, 0));
+  check_loss(targets.loss(), targets.images);
 }
 
 unsigned ShapeSolver::most_iterations() const { return options_.levels * options_.iterations; }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "solve/resample.hpp"
+#include "solve/shape_space.hpp"
 
 namespace dpr {
 namespace {
@@ -37,7 +38,8 @@ std::pair<std::size_t, std::size_t> ShapeLevel::batch(unsigned iteration) const 
   return {starts[b], starts[b + 1] - starts[b]};
 }
 
-ShapeTargets::ShapeTargets(const ShapeViews& all, const ShapeLevel& level) {
+ShapeTargets::ShapeTargets(const ShapeViews& all, const ShapeOptions& options, const ShapeLevel& level)
+    : weights(options.loss) {
   const auto has_mask = [](const ShapeView& view) { return !view.mask.pixels.empty(); };
   const bool any_mask = std::ranges::any_of(all.views, has_mask);
   for (const std::size_t i : level.order) {
@@ -48,6 +50,15 @@ ShapeTargets::ShapeTargets(const ShapeViews& all, const ShapeLevel& level) {
     masks.push_back(has_mask(view) ? resample(view.mask, level.width, level.height)
                                    : Image(level.width, level.height, glm::vec4(1)));
   }
+  const auto add = [&](Attribute attribute, float weight, Image ShapeView::*image, std::vector<Image>& list) {
+    if (weight == 0 || (all.views.front().*image).pixels.empty()) return;
+    for (const std::size_t i : level.order)
+      list.push_back(resample_weighted(all.views[i].*image, level.width, level.height));
+    attributes.push_back({attribute, {.l1 = weight}, list});
+  };
+  add(Attribute::depth, options.depth / static_cast<float>(common_view(all).radius), &ShapeView::depth,
+      depths);
+  add(Attribute::normal, options.normal, &ShapeView::normal, normals);
 }
 
 }  // namespace dpr

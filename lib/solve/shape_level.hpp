@@ -28,14 +28,16 @@ struct ShapeLevel {
 
 /// What the views of a level are compared with.
 struct ShapeTargets {
-  ShapeTargets(const ShapeViews& all, const ShapeLevel& level);
+  ShapeTargets(const ShapeViews& all, const ShapeOptions& options, const ShapeLevel& level);
 
   /// Valid as long as this.
-  LossOptions options(const LossWeights& weights) const {
-    return {.weights = weights, .has_alpha = has_alpha, .masks = masks};
+  LossOptions loss() const {
+    return {.weights = weights, .has_alpha = has_alpha, .masks = masks, .attributes = attributes};
   }
 
-  std::vector<Image> images, masks;
+  LossWeights weights;
+  std::vector<Image> images, masks, depths, normals;
+  std::vector<AttributeTarget> attributes;  // of the last two
   std::vector<unsigned char> has_alpha;
 };
 

@@ -56,6 +56,17 @@ Image read_beside(const JsonNode& node, const std::filesystem::path& folder, con
   return image;
 }
 
+/// Depths or normals, numbers in the first channels. Pixels without any, all 0, do not count.
+Image read_measured(const JsonNode& node, const std::filesystem::path& folder, const Image& picture,
+                    int channels) {
+  Image image = read_beside(node, folder, picture, Encoding::linear);
+  for (glm::vec4& pixel : image.pixels) {
+    if (channels == 1) pixel = glm::vec4(glm::vec3(pixel.x), pixel.w);
+    if (glm::vec3(pixel) == glm::vec3(0)) pixel.w = 0;
+  }
+  return image;
+}
+
 /// What the file says of where the object is in the picture, if it says something.
 std::optional<Image> parse_silhouette(const JsonNode& node, const std::filesystem::path& folder,
                                       const Image& picture, Encoding encoding) {
@@ -83,7 +94,8 @@ void parse_view_camera(const JsonNode& node, ShapeView& view, const std::string&
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
                      Encoding encoding) {
-  node.require_keys({"image", "camera", "initial_camera", "silhouette", "background", "mask"});
+  node.require_keys(
+      {"image", "camera", "initial_camera", "silhouette", "background", "mask", "depth", "normal"});
   ShapeView view;
   const std::filesystem::path file = node.at("image").file_in(folder);
   view.image = read_image(file, &view.has_alpha, encoding);
@@ -100,6 +112,8 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
     view.mask = read_image(mask->file_in(folder), nullptr, Encoding::linear);
     require_mask(view.mask, view.image, "mask (" + mask->file_in(folder).string() + ")");
   }
+  if (const auto depth = node.find("depth")) view.depth = read_measured(*depth, folder, view.image, 1);
+  if (const auto normal = node.find("normal")) view.normal = read_measured(*normal, folder, view.image, 3);
   parse_view_camera(node, view, checks::element("views", views.views.size()));
   return view;
 }

@@ -96,15 +96,16 @@ CornerTexcoords::CornerTexcoords(Device::Impl& device, const Scene& scene) {
   std::vector<cl_uint> row_of_corner;
   std::vector<float> numbers;
   first = {0};
-  for (const Instance& instance : scene.meshes) {
-    const Mesh& mesh = instance.mesh;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
     if (mesh.face_texcoords.empty()) return;
+    const std::size_t base = first[scene.meshes[m].instance_of.value_or(m)];
     for (const glm::uvec3& face : mesh.face_texcoords) {
-      for (int corner = 0; corner < 3; ++corner)
-        row_of_corner.push_back(to_uint(first.back() + face[corner]));
+      for (int corner = 0; corner < 3; ++corner) row_of_corner.push_back(to_uint(base + face[corner]));
     }
-    for (const glm::vec2& uv : mesh.texcoords) numbers.insert(numbers.end(), {uv.x, uv.y});
-    first.push_back(first.back() + mesh.texcoords.size());
+    const std::vector<glm::vec2>& own = scene.meshes[m].mesh.texcoords;  // an instance has none
+    for (const glm::vec2& uv : own) numbers.insert(numbers.end(), {uv.x, uv.y});
+    first.push_back(first.back() + own.size());
   }
   values.upload(device, numbers);
   map = RowMap(device, row_of_corner, first.back());
@@ -113,7 +114,8 @@ CornerTexcoords::CornerTexcoords(Device::Impl& device, const Scene& scene) {
 void CornerTexcoords::update(const Geometry& geometry, Exchange& exchange) {
   for (std::size_t m = 0; !empty() && m < geometry.meshes.size(); ++m) {
     const MeshRange& range = geometry.meshes[m];
-    if (range.texcoords == 0) continue;  // without textures they are what the scene began with
+    // Without textures they are what the scene began with; an instance's are its mesh's.
+    if (range.texcoords == 0 || first[m] == first[m + 1]) continue;
     exchange.give(vectors_of(geometry.textures.texcoord_values, range.first_texcoord, k_channels),
                   range.texcoords, vectors_of(values, k_channels * first[m], k_channels));
   }

@@ -75,12 +75,13 @@ cl_uint4 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const We
 
 }  // namespace
 
-Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3> positions) {
+Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const MeshRange> meshes,
+             std::span<const glm::vec3> positions) {
   std::vector<cl_uint4> rows;
   std::size_t first_vertex = 0, first_face = 0;
-  for (const Instance& instance : scene.meshes) {
-    const Mesh& mesh = instance.mesh;
-    const std::span<const glm::vec3> own = positions.subspan(first_vertex, mesh.positions.size());
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    const std::span<const glm::vec3> own = positions.subspan(meshes[m].first_position, mesh.positions.size());
     const std::vector<WeldedEdge> welded = make_welded_edges(own, mesh.faces);
     for (const WeldedEdge& edge : welded) rows.push_back(joined(mesh, own, edge, first_vertex, first_face));
     solids.emplace_back(welded, mesh.faces.size());

@@ -16,8 +16,9 @@ namespace dpr {
 
 /// The edges of the scene's meshes on the device.
 struct Edges {
-  /// `positions` are [vertex], object space: what coincides there belongs together.
-  Edges(Device::Impl& device, const Scene& scene, std::span<const glm::vec3> positions);
+  /// `positions` are [position], object space: what coincides there belongs together.
+  Edges(Device::Impl& device, const Scene& scene, std::span<const MeshRange> meshes,
+        std::span<const glm::vec3> positions);
 
   std::size_t count = 0;
   std::vector<Solid> solids;   ///< [mesh], for the first who wants them

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <utility>
 
 namespace dpr {
 namespace {
@@ -119,19 +120,25 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   std::vector<cl_uint> all_mesh;
   std::vector<cl_uint4> all_faces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = scene.meshes[m].mesh;
-    const cl_uint base = to_uint(all_positions.size());
-    meshes.push_back({.first_vertex = all_positions.size(),
-                      .vertices = mesh.positions.size(),
-                      .first_material = materials.count,
-                      .materials = material_count(mesh)});
-    materials.count += meshes[m].materials;
+    const Mesh& mesh = mesh_of(scene, m);
+    const cl_uint base = to_uint(vertices);
+    if (const auto source = scene.meshes[m].instance_of) {
+      meshes.push_back(meshes[*source]);
+    } else {
+      meshes.push_back({.vertices = mesh.positions.size(),
+                        .first_position = all_positions.size(),
+                        .first_material = materials.count,
+                        .materials = material_count(mesh)});
+      materials.count += meshes[m].materials;
+      for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
+    }
+    meshes[m].first_vertex = vertices;
+    vertices += meshes[m].vertices;
     for (const glm::uvec3& f : mesh.faces)
       all_faces.push_back({{base + f.x, base + f.y, base + f.z, to_uint(m)}});
-    for (const glm::vec3& position : mesh.positions) all_positions.push_back(to_cl(position));
-    all_mesh.resize(all_positions.size(), to_uint(m));
+    all_mesh.resize(vertices, to_uint(m));
   }
-  vertices = all_positions.size();
+  position_count = all_positions.size();
   faces = all_faces.size();
   if (faces > std::numeric_limits<cl_uint>::max() / 3) {
     throw InvalidArgument("faces (scene)", std::to_string(faces), "at most 2^32 / 3");
@@ -144,23 +151,47 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   if (is_textured(scene)) add_textures(device, scene);
   if (gives_normals(scene)) add_normals(device, scene);
   add_materials(device, scene);
+  add_places(device, scene);
+}
+
+/// Once everything that meshes have is there.
+void Geometry::add_places(Device::Impl& device, const Scene& scene) {
+  std::vector<shared::MeshPlace> all(meshes.size());
+  std::size_t first_given = 0;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    if (const auto source = scene.meshes[m].instance_of) {
+      const std::size_t first_vertex = meshes[m].first_vertex;
+      meshes[m] = meshes[*source];  // colours, textures and all
+      meshes[m].first_vertex = first_vertex;
+    }
+    all[m].vertex_shift = to_uint(meshes[m].first_vertex - meshes[m].first_position);
+    all[m].normal_shift = to_uint(first_given - meshes[m].first_normal);
+    all[m].is_instance = scene.meshes[m].instance_of ? 1 : 0;
+    first_given += meshes[m].normals;
+  }
+  std::vector<cl_uint> next(meshes.size(), to_uint(meshes.size()));  // [mesh] the first of those seen so far
+  for (std::size_t m = meshes.size(); m-- > 0;)
+    all[m].next = std::exchange(next[scene.meshes[m].instance_of.value_or(m)], to_uint(m));
+  places.upload(device, all);
 }
 
 void Geometry::add_colors(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> all_colors;
   std::vector<cl_uint4> all_faces;
-  // With a material a mesh, the number of the mesh is that of its material.
+  // With a material a mesh, the number of the mesh is that of its material. Instances have no colours.
   colors_by_vertex_ = std::ranges::all_of(scene.meshes, [](const Instance& i) {
     return !i.mesh.vertex_colors.empty() && material_count(i.mesh) == 1;
   });
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = scene.meshes[m].mesh;
-    const std::vector<glm::vec3> mesh_color = mesh_colors(mesh);
-    meshes[m].first_color = all_colors.size();
-    meshes[m].colors = mesh_color.size();
+    const Mesh& mesh = mesh_of(scene, m);
+    const MeshRange& source = meshes[scene.meshes[m].instance_of.value_or(m)];
+    if (!scene.meshes[m].instance_of) {
+      meshes[m].first_color = all_colors.size();
+      for (const glm::vec3& color : mesh_colors(mesh)) all_colors.push_back(to_cl(color));
+      meshes[m].colors = all_colors.size() - meshes[m].first_color;
+    }
     for (std::size_t face = 0; face < mesh.faces.size() && !colors_by_vertex_; ++face)
-      all_faces.push_back(corner_colors(mesh, face, all_colors.size(), meshes[m].first_material));
-    for (const glm::vec3& color : mesh_color) all_colors.push_back(to_cl(color));
+      all_faces.push_back(corner_colors(mesh, face, source.first_color, source.first_material));
   }
   colors = all_colors.size();
   color_values.upload(device, all_colors);
@@ -174,15 +205,18 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> all_texcoords, all_texels;
   std::vector<cl_uint4> all_faces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = scene.meshes[m].mesh;
-    const cl_uint first_texture = to_uint(textures.list.size()),
-                  first_texcoord = to_uint(all_texcoords.size());
+    const Mesh& mesh = mesh_of(scene, m);
+    const bool adds = !mesh.textures.empty() && !scene.meshes[m].instance_of;
+    const MeshRange& source = meshes[scene.meshes[m].instance_of.value_or(m)];
+    if (adds) {
+      meshes[m].first_texture = textures.list.size();
+      meshes[m].first_texcoord = all_texcoords.size();
+      meshes[m].texcoords = mesh.texcoords.size();
+    }
     for (std::size_t face = 0; face < mesh.faces.size(); ++face)
-      all_faces.push_back(corner_texcoords(mesh, face, first_texcoord, first_texture));
-    if (mesh.textures.empty()) continue;
-    meshes[m].first_texture = first_texture;
-    meshes[m].first_texcoord = first_texcoord;
-    meshes[m].texcoords = mesh.texcoords.size();
+      all_faces.push_back(
+          corner_texcoords(mesh, face, to_uint(source.first_texcoord), to_uint(source.first_texture)));
+    if (!adds) continue;
     for (const glm::vec2& uv : mesh.texcoords) all_texcoords.push_back(to_cl(glm::vec3(uv, 0)));
     for (const Texture& texture : mesh.textures) {
       textures.list.push_back(device_texture(texture, all_texels.size()));
@@ -209,18 +243,18 @@ void Geometry::add_normals(Device::Impl& device, const Scene& scene) {
   std::vector<cl_uint> all_mesh;
   std::vector<cl_uint4> all_faces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = scene.meshes[m].mesh;
+    const Mesh& mesh = mesh_of(scene, m);
     const bool gives = !mesh.face_normals.empty();
-    const cl_uint base = to_uint(gives ? vertices + all_normals.size() : meshes[m].first_vertex);
+    const cl_uint base = to_uint(gives ? vertices + all_mesh.size() : meshes[m].first_vertex);
     for (const glm::uvec3& f : gives ? mesh.face_normals : mesh.faces)
       all_faces.push_back({{base + f.x, base + f.y, base + f.z, 0}});
     if (!gives) continue;
     meshes[m].first_normal = all_normals.size();
     meshes[m].normals = mesh.normals.size();
-    for (const glm::vec3& normal : mesh.normals) all_normals.push_back(to_cl(normal));
-    all_mesh.resize(all_normals.size(), to_uint(m));
+    for (const glm::vec3& normal : scene.meshes[m].mesh.normals) all_normals.push_back(to_cl(normal));
+    all_mesh.resize(all_mesh.size() + mesh.normals.size(), to_uint(m));
   }
-  given_normals.count = all_normals.size();
+  given_normals.count = all_mesh.size();
   given_normals.values.upload(device, all_normals);
   given_normals.mesh.upload(device, all_mesh);
   given_normals.face_normals.upload(device, all_faces);
@@ -231,13 +265,13 @@ void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> values;
   for (const Instance& instance : scene.meshes) {
     for (const Material& material : instance.mesh.materials) values.push_back(to_cl(material));
-    if (instance.mesh.materials.empty()) values.push_back(to_cl(glm::vec3(1)));
+    if (instance.mesh.materials.empty() && !instance.instance_of) values.push_back(to_cl(glm::vec3(1)));
   }
   materials.values.upload(device, values);
   if (!has_materials(scene)) return;
   std::vector<std::vector<cl_uint>> by_material(materials.count);
   for (std::size_t m = 0, face = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = scene.meshes[m].mesh;
+    const Mesh& mesh = mesh_of(scene, m);
     for (std::size_t i = 0; i < mesh.faces.size(); ++i)
       by_material[meshes[m].first_material + material_of(mesh, i)].push_back(to_uint(face++));
   }
@@ -266,10 +300,11 @@ std::size_t Textures::bytes() const {
 }
 
 std::size_t Geometry::bytes() const {
-  std::size_t bytes =
-      positions.capacity_bytes() + vertex_mesh.capacity_bytes() + face_vertices.capacity_bytes() +
-      face_colors_.capacity_bytes() + color_values.capacity_bytes() + view_positions.capacity_bytes() +
-      view_colors.capacity_bytes() + textures.bytes() + given_normals.bytes() + materials.bytes();
+  std::size_t bytes = positions.capacity_bytes() + places.capacity_bytes() + vertex_mesh.capacity_bytes() +
+                      face_vertices.capacity_bytes() + face_colors_.capacity_bytes() +
+                      color_values.capacity_bytes() + view_positions.capacity_bytes() +
+                      view_colors.capacity_bytes() + textures.bytes() + given_normals.bytes() +
+                      materials.bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

@@ -18,12 +18,14 @@ struct Incidence {
   Buffer<cl_uint> corners;  ///< [face * 3]
 };
 
-/// Where a mesh lies in the joined buffers.
+/// Where a mesh lies in the joined buffers. An instance has vertices, and as many given normals, of its own;
+/// the rest is where its mesh has it.
 struct MeshRange {
-  std::size_t first_vertex = 0, vertices = 0, first_color = 0, colors = 0;
+  std::size_t first_vertex = 0, vertices = 0;
+  std::size_t first_position = 0, first_color = 0, colors = 0;
   std::size_t first_texcoord = 0, texcoords = 0;  // of textured meshes
   std::size_t first_texture = 0;
-  std::size_t first_normal = 0, normals = 0;  // of meshes that give some
+  std::size_t first_normal = 0, normals = 0;  // of meshes that give some: their values
   std::size_t first_material = 0, materials = 1;
 };
 
@@ -48,10 +50,10 @@ struct Textures {
 };
 
 /// The normals that meshes give, and where corners look: into those of the vertices, then these. Empty where
-/// no mesh gives any.
+/// no mesh gives any. Instances' are counted among them, but have their mesh's values.
 struct GivenNormals {
   std::size_t count = 0;
-  Buffer<cl_float4> values;  ///< [given] object space
+  Buffer<cl_float4> values;  ///< [value] object space
   Buffer<cl_uint> mesh;      ///< [given]
   Buffer<cl_uint4>
       face_normals;   ///< [face] of each corner: a vertex, or the number of vertices + a given one
@@ -74,14 +76,15 @@ struct SurfaceMaterials {
 struct Geometry {
   Geometry(Device::Impl& device, const Scene& scene);
 
-  std::size_t vertices = 0, faces = 0, colors = 0;
-  std::vector<MeshRange> meshes;
+  std::size_t vertices = 0, position_count = 0, faces = 0, colors = 0;
+  std::vector<MeshRange> meshes;  ///< instances among them
 
-  Buffer<cl_float4> positions;                    ///< [vertex] object space
+  Buffer<cl_float4> positions;                    ///< [position] object space
+  Buffer<shared::MeshPlace> places;               ///< [mesh]
   Buffer<cl_uint> vertex_mesh;                    ///< [vertex]
   Buffer<cl_uint4> face_vertices;                 ///< [face] vertex indices; w = mesh
   Buffer<cl_float4> color_values;                 ///< [color]
-  Buffer<cl_float4> view_positions, view_colors;  ///< [view][vertex], [view][color]: of views' own shapes
+  Buffer<cl_float4> view_positions, view_colors;  ///< [view][position], [view][color]: of views' own
   Incidence vertex_corners;
   Textures textures;
   GivenNormals given_normals;
@@ -111,6 +114,7 @@ struct Geometry {
   std::size_t bytes() const;
 
  private:
+  void add_places(Device::Impl& device, const Scene& scene);
   void add_colors(Device::Impl& device, const Scene& scene);
   void add_textures(Device::Impl& device, const Scene& scene);
   void add_normals(Device::Impl& device, const Scene& scene);

@@ -80,7 +80,7 @@ void Shade::find_normals(const ShadeInputs& in) {
                                 in.transform.world, normals_);
   if (given.empty()) return;
   now_.kernels->normals_given_forward(in.p.views * given.count, in.p, in.views.models, given.values,
-                                      given.mesh, normals_);
+                                      given.mesh, in.geometry.places, normals_);
 }
 
 void Shade::light(const ShadeInputs& in) {
@@ -142,7 +142,7 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
 void Shade::backward_given_normals(const ShadeInputs& in) {
   const GivenNormals& given = in.geometry.given_normals;
   if (given.empty()) return;
-  grad_given_normals.resize(device_, given.count);
+  grad_given_normals.resize(device_, given.values.size());
   normal_channels.resize(device_, std::size_t{3} * in.p.views * given.count);
   if (is_flat()) {
     grad_given_normals.fill(cl_float4{});
@@ -150,7 +150,8 @@ void Shade::backward_given_normals(const ShadeInputs& in) {
     return;
   }
   now_.kernels->normals_given_backward(given.count, in.p, in.views.models, given.values, given.mesh,
-                                       grad_normals_, grad_given_normals, normal_channels);
+                                       in.geometry.places, grad_normals_, grad_given_normals,
+                                       normal_channels);
 }
 
 void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {

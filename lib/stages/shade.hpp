@@ -36,10 +36,11 @@ class LitShading {
   Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
          Out<cl_float4>>
       normals_backward;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>,
+         Out<cl_float4>>
       normals_given_forward;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>,
-         Out<float>>
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>, In<cl_float4>,
+         Out<cl_float4>, Out<float>>
       normals_given_backward;
   Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
          In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
@@ -122,7 +123,7 @@ class Shade {
   Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
   Buffer<float> grad_corner_colors;      ///< [pair][9]
   Buffer<float> grad_materials;          ///< [pair][DPR_MATERIAL_CHANNELS]
-  Buffer<cl_float4> grad_given_normals;  ///< [given]
+  Buffer<cl_float4> grad_given_normals;  ///< [value] of given normals
   Buffer<float> normal_channels;         ///< [3][view][given] of models' rotation vectors
   Buffer<float> grad_eye;                ///< [3][pair]
   Buffer<float> light_channels;          ///< [light_channel_count()][pair], of the environment, then by light

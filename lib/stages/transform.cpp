@@ -14,7 +14,8 @@ void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, 
   const std::size_t count = std::size_t{p.views} * p.vertices;
   world.resize(device_, count);
   ndc.resize(device_, count);
-  forward_(count, p, views.cameras, views.models, geometry.positions_of(p), geometry.vertex_mesh, world, ndc);
+  forward_(count, p, views.cameras, views.models, geometry.positions_of(p), geometry.vertex_mesh,
+           geometry.places, world, ndc);
 }
 
 void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
@@ -32,8 +33,10 @@ void Transform::backward(const shared::FrameParams& p, const DeviceViews& views,
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,
                                    const Geometry& geometry, const Buffer<cl_float4>& grad_world) {
   const std::size_t count = p.position_stride != 0 ? std::size_t{p.views} * p.vertices : p.vertices;
-  grad_positions.resize(device_, count);
-  backward_positions_(count, p, views.models, geometry.vertex_mesh, grad_world, grad_positions);
+  grad_positions.resize(device_,
+                        p.position_stride != 0 ? p.views * geometry.position_count : geometry.position_count);
+  backward_positions_(count, p, views.models, geometry.vertex_mesh, geometry.places, grad_world,
+                      grad_positions);
 }
 
 }  // namespace dpr

@@ -33,7 +33,7 @@ class Transform {
   /// [DPR_POSE_CHANNELS or, distorted, DPR_LENS_CHANNELS][view][mesh][2][slot]: see Summation.
   Buffer<float> partial_sums;
   std::size_t slots = 0;
-  Buffer<cl_float4> grad_positions;  ///< [vertex], of views' own shapes [view][vertex]; object space
+  Buffer<cl_float4> grad_positions;  ///< [position], of views' own shapes [view][position]; object space
 
   std::size_t bytes() const {
     return world.capacity_bytes() + ndc.capacity_bytes() + partial_sums.capacity_bytes() +
@@ -43,12 +43,14 @@ class Transform {
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>,
-         Out<cl_float4>, Out<cl_float4>>
+         In<shared::MeshPlace>, Out<cl_float4>, Out<cl_float4>>
       forward_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>,
          In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
       backward_;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> backward_positions_;
+  Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>, In<cl_float4>,
+         Out<cl_float4>>
+      backward_positions_;
 };
 
 }  // namespace dpr

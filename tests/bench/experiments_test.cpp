@@ -147,6 +147,17 @@ TEST_SUITE("bench-smoke") {
     }
   }
 
+  TEST_CASE("batches: a row for every way to render unlike scenes") {
+    const TempDir folder;
+    const Json data = run(folder, "batches");
+    if (data.is_null()) return;
+    REQUIRE(data["rows"].size() == 3);
+    for (const Json& row : data["rows"]) {
+      CHECK(row["images_per_second"].get<double>() > 0);
+      CHECK(row["device_bytes"].get<double>() > 64 * 64 * 16 * 3);
+    }
+  }
+
   TEST_CASE("shapes: every method comes nearer to the truth than the sphere it begins with") {
     const TempDir folder;
     const Json data = run(folder, "shapes");

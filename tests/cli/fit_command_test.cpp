@@ -67,6 +67,40 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(dpr::read_mesh(folder / "mesh.obj").faces.empty());
   }
 
+  TEST_CASE("dpr fit: depths and normals beside the images") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    for (int i = 0; i < 3; ++i) {
+      const std::string name = "view" + std::to_string(i);
+      const json scene = {{"width", 24},
+                          {"height", 24},
+                          {"camera", views["views"][i]["camera"]},
+                          {"meshes", {{{"file", "cube.ply"}}}}};
+      folder.write("scene.json", scene.dump());
+      REQUIRE(run_command(folder, {"render", "--scene", "scene.json", "--preset", "rigid", "--aov",
+                                   "depth,normal", "-o", name + ".exr"})
+                  .status == 0);
+      views["views"][i]["depth"] = name + ".depth.exr";
+      views["views"][i]["normal"] = name + ".normal.exr";
+    }
+    const auto loss = [&](const std::vector<std::string>& options) {
+      folder.write("views.json", views.dump());
+      const auto outcome = run_command(folder, with(k_short, options));
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      const std::size_t at = outcome.out.rfind(", loss ");
+      return std::stod(outcome.out.substr(at + 7));
+    };
+    CHECK(loss({}) > loss({"--depth", "0", "--normal", "0"}));
+    CHECK(loss({"--size", "12x12"}) > 0);
+    views["views"][2].erase("normal");
+    folder.write("views.json", views.dump());
+    const auto outcome = run_command(folder, k_short);
+    CHECK(outcome.status == 1);
+    CHECK(contains(outcome.err, "normal of views[2] (shape): got none"));
+  }
+
   TEST_CASE("dpr fit says that opaque images do not tell where the object is") {
     if (is_skipped()) return;
     const TempDir folder;

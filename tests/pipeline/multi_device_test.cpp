@@ -110,6 +110,35 @@ Scene sampled(Scene scene) {
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("losses of attributes in chunks are those of one renderer with all views") {
+    const Scene scene = small_scene();
+    const std::vector<View> views = ring(scene, 3);
+    const std::vector<Image> targets = random_images(scene, 3);
+    const std::vector<AttributeTarget> attributes{{Attribute::depth, {.l1 = 0.5F}, targets},
+                                                  {Attribute::normal, {.mse = 0.2F}, targets}};
+    const LossOptions options{.weights = {.mse = 1}, .attributes = attributes};
+    MultiDeviceRenderer several(several_devices(2));
+    several.set_scene(scene);
+    several.set_views(views);
+    several.set_chunk(1);
+    several.set_loss(options, targets);
+    const MultiDeviceRenderer::Evaluation found = several.evaluate();
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.set_views(views);
+    renderer.forward();
+    ImageLoss loss(renderer.device(), options, targets);
+    CHECK(found.loss == doctest::Approx(loss.evaluate(renderer)).epsilon(1e-5));
+    const std::vector<Block> expected = blocks_of(renderer.backward(loss));
+    std::vector<Block> blocks = blocks_of(found.gradient);
+    REQUIRE(blocks.size() == expected.size());
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      CAPTURE(blocks[i].name);
+      blocks[i].expected = expected[i].found;
+      CHECK(block_error(blocks[i], 1e-4) < 1e-4);
+    }
+  }
+
   TEST_CASE("several devices: the same bits as one") {
     const std::size_t views = reduced(29, 3);
     for (const Scene& scene : {small_scene(), sampled(small_scene())}) {

@@ -329,6 +329,27 @@ TEST_SUITE("robustness") {
     check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,-1,0]])"), "meshes[0].faces[0][1] (");
   }
 
+  TEST_CASE("instances are places of a mesh that comes before them") {
+    const TempDir folder;
+    const auto text = [](const std::string& second) {
+      return R"({"meshes": [{)" + k_triangle + "}, {" + second + "}]}";
+    };
+    const Scene scene =
+        read(folder, text(R"("instance_of": 0, "transform": [[1,0,0,2],[0,1,0,3],[0,0,1,4],[0,0,0,1]])"));
+    REQUIRE(scene.meshes.size() == 2);
+    CHECK_FALSE(scene.meshes[0].instance_of.has_value());
+    CHECK(scene.meshes[1].instance_of == 0U);
+    CHECK(scene.meshes[1].mesh.positions.empty());
+    CHECK(scene.meshes[1].transform[3] == glm::vec4(2, 3, 4, 1));
+    CHECK(&mesh_of(scene, 1) == &scene.meshes[0].mesh);
+    const auto check = [&](const std::string& second, const std::string& part) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text(second)), part);
+    };
+    check(R"("instance_of": 1)", "instance_of (meshes[1]): got 1, expected an earlier one");
+    check(R"("instance_of": -1)", "meshes[1].instance_of");
+    check(R"("instance_of": 0, "face_colors": [[1, 0, 0]])", "face_colors");
+  }
+
   TEST_CASE("contradictions") {
     const TempDir folder;
     const auto check = [&](const std::string& text, const std::string& part) {

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <limits>
 
+#include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/voxels.hpp"
@@ -74,6 +75,35 @@ ShapeOptions small_options() {
 double error_of(const Mesh& mesh) {
   const dpr::Bounds box{k_place - 1.6F, k_place + 1.6F};
   return 1 - dpr::iou(dpr::voxelize(mesh, 24, box), dpr::voxelize(ellipsoid(), 24, box));
+}
+
+struct Measured {
+  dpr::Image depth, normal;
+};
+
+/// What a perfect sensor sees of a mesh.
+Measured measured(const dpr::Device& device, const Mesh& mesh, const dpr::Camera& camera) {
+  dpr::Scene scene;
+  scene.width = scene.height = reduced(32, 8);
+  scene.camera = camera;
+  scene.meshes.push_back({mesh});
+  scene.smoothing = dpr::rigid_smoothing();
+  dpr::Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  const dpr::AuxiliaryOutputs outputs = dpr::auxiliary_outputs(renderer);
+  return {dpr::aov_image(outputs, dpr::Aov::depth), dpr::aov_image(outputs, dpr::Aov::normal)};
+}
+
+/// The mean distance of pixels that show something in both.
+double difference(const dpr::Image& a, const dpr::Image& b) {
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    if (a.pixels[i].w == 0 || b.pixels[i].w == 0) continue;
+    sum += static_cast<double>(glm::distance(glm::vec3(a.pixels[i]), glm::vec3(b.pixels[i])));
+    ++count;
+  }
+  return sum / count;
 }
 
 bool same(const Mesh& a, const Mesh& b) {
@@ -215,6 +245,31 @@ TEST_SUITE("pipeline") {
   }
 }
 
+TEST_SUITE("pipeline") {
+  TEST_CASE("depths and normals of a view find what its colours leave open") {
+    if (dpr::test::is_reduced()) return;  // no few pixels and steps show it
+    const dpr::Device device = dpr::open_device();
+    ShapeViews views = make_views(device, 1);
+    Measured target = measured(device, ellipsoid(), views.views[0].camera);
+    const auto found = [&](float depth, float normal) {
+      ShapeOptions options = small_options();
+      options.depth = depth;
+      options.normal = normal;
+      return measured(device, ShapeSolver(device, views, options).solve().mesh, views.views[0].camera);
+    };
+    const Measured by_colors = found(1, 1);
+    views.views[0].depth = target.depth;
+    views.views[0].normal = target.normal;
+    const Measured by_depth = found(1, 0), by_normal = found(0, 1);
+    MESSAGE("depth off by " << difference(by_colors.depth, target.depth) << ", with depths "
+                            << difference(by_depth.depth, target.depth));
+    MESSAGE("normals off by " << difference(by_colors.normal, target.normal) << ", with normals "
+                              << difference(by_normal.normal, target.normal));
+    CHECK(difference(by_depth.depth, target.depth) < 0.3 * difference(by_colors.depth, target.depth));
+    CHECK(difference(by_normal.normal, target.normal) < 0.6 * difference(by_colors.normal, target.normal));
+  }
+}
+
 TEST_SUITE("robustness") {
   TEST_CASE("the shape solver refuses what it cannot use") {
     const dpr::Device device = dpr::open_device();
@@ -235,6 +290,18 @@ TEST_SUITE("robustness") {
     refuses([](ShapeViews& v) { v.views[0].image.pixels[3].x = std::numeric_limits<float>::infinity(); },
             nothing);
     refuses([](ShapeViews& v) { v.initial = Mesh{}; }, nothing);
+    refuses([](ShapeViews& v) { v.views[0].depth = dpr::Image(4, 8, glm::vec4(1)); }, nothing);
+    refuses([](ShapeViews& v) { v.views[0].normal = dpr::Image(8, 8); }, nothing);  // no pixel counts
+    refuses([](ShapeViews& v) { v.views[0].depth = dpr::Image(8, 8, glm::vec4(-1)); }, nothing);
+    refuses(
+        [](ShapeViews& v) {  // one view has depths, the other none
+          v.views[0].depth = dpr::Image(8, 8, glm::vec4(1));
+          v.views.push_back(v.views[0]);
+          v.views[1].depth = {};
+        },
+        nothing);
+    refuses(nothing, [](ShapeOptions& o) { o.depth = -1; });
+    refuses(nothing, [](ShapeOptions& o) { o.normal = std::numeric_limits<float>::infinity(); });
     refuses(nothing, [](ShapeOptions& o) { o.levels = 0; });
     refuses(nothing, [](ShapeOptions& o) { o.levels = 5; });  // less than a pixel
     refuses(nothing, [](ShapeOptions& o) { o.iterations = 0; });

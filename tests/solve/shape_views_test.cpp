@@ -75,6 +75,31 @@ TEST_SUITE("unit") {
     refuse(R"("silhouette": "bright.exr")", "[0, 1]");
   }
 
+  TEST_CASE("views: depths are in the first channel, and what is 0 is not known") {
+    const TempDir folder;
+    dpr::write_image(folder / "view.exr", Image(3, 1));
+    Image depth(3, 1, glm::vec4(4, 7, 7, 1)), normal(3, 1, glm::vec4(0, 0.6F, 0.8F, 0.5F));
+    depth.pixels[1] = glm::vec4(0, 0, 0, 1);
+    depth.pixels[2].w = 0;
+    normal.pixels[0] = glm::vec4(0, 0, 0, 1);
+    dpr::write_image(folder / "depth.exr", depth);
+    dpr::write_image(folder / "normal.exr", normal);
+    const auto read = [&](const std::string& more) {
+      folder.write("views.json",
+                   R"({"width": 3, "height": 1, "views": [{"image": "view.exr", )" + more + "}]}");
+      return dpr::read_views(folder / "views.json").views.at(0);
+    };
+    const dpr::ShapeView view = read(R"("depth": "depth.exr", "normal": "normal.exr")");
+    CHECK(view.depth.pixels[0] == glm::vec4(4, 4, 4, 1));
+    CHECK(view.depth.pixels[1].w == 0);
+    CHECK(view.depth.pixels[2].w == 0);
+    CHECK(view.normal.pixels[0].w == 0);
+    CHECK(view.normal.pixels[1] == glm::vec4(0, 0.6F, 0.8F, 0.5F));
+    CHECK(read(R"("depth": "depth.exr")").normal.pixels.empty());
+    dpr::write_image(folder / "large.exr", Image(4, 1));
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read(R"("normal": "large.exr")"), "large.exr");
+  }
+
   TEST_CASE("views: a camera is known, near another, or unknown") {
     const TempDir folder;
     dpr::write_image(folder / "view.exr", Image(2, 1));

@@ -18,7 +18,7 @@ class ContourFrame {
       : geometry(device_impl(), scene_of(mesh)),
         transform(device_impl()),
         setup(device_impl()),
-        edges(device_impl(), scene_of(mesh), mesh.positions),
+        edges(device_impl(), scene_of(mesh), geometry.meshes, mesh.positions),
         contour(device_impl()),
         antialias(device_impl()) {
     p.views = p.meshes = 1;
