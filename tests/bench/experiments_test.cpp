@@ -15,16 +15,21 @@ using dpr::test::TempDir;
 namespace {
 
 /// Runs one; its numbers, or null where it cannot be run.
-Json run(const TempDir& folder, const std::string& name) {
+Json run_without_picture(const TempDir& folder, const std::string& name) {
   constexpr const char* k_program = "DPR_EXPERIMENTS";
   if (dpr::test::is_skipped(k_program)) return {};
   const auto outcome =
       dpr::test::run_program(dpr::test::program_path(k_program), folder, {name, "--smoke", "-o", "out"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.status == 0);
-  CHECK(std::filesystem::file_size(folder / ("out/" + name + ".png")) > 1000);
   CHECK(std::filesystem::directory_iterator(folder / "out") != std::filesystem::directory_iterator());
   return Json(dpr::read_json(folder / ("out/" + name + ".json")));
+}
+
+Json run(const TempDir& folder, const std::string& name) {
+  Json numbers = run_without_picture(folder, name);
+  if (!numbers.is_null()) CHECK(std::filesystem::file_size(folder / ("out/" + name + ".png")) > 1000);
+  return numbers;
 }
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
@@ -149,7 +154,7 @@ TEST_SUITE("bench-smoke") {
 
   TEST_CASE("batches: a row for every way to render unlike scenes") {
     const TempDir folder;
-    const Json data = run(folder, "batches");
+    const Json data = run_without_picture(folder, "batches");
     if (data.is_null()) return;
     REQUIRE(data["rows"].size() == 3);
     for (const Json& row : data["rows"]) {
