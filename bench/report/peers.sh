@@ -9,12 +9,12 @@ python3 - "$work" <<'END'
 import csv, json, pathlib, sys
 results, work = pathlib.Path("bench/results"), pathlib.Path(sys.argv[1])
 order = ["cube128", "sphere256", "sphere20k", "sphere80k", "million"]
-lines = {"default": ("dpr, its defaults", "default", "barrier"), "joint": ("dpr, joint composition", "gaussian", "joint")}
+presets = ["pixel", "sharp"]  # noise of the pixel, a blur of four pixels at 256x256; of the triangles, half a pixel
 ours = json.loads((results / "pocl-3.1-skylake-avx512-2-cores.json").read_text())["results"]
-for file, (_, preset, composition) in lines.items():
-    with open(work / file, "w") as out:
+for preset in presets:
+    with open(work / preset, "w") as out:
         for row in ours:
-            if (row["preset"], row["composition"], row["estimator"]) == (preset, composition, "exact") and row["workload"] in order:
+            if (row["preset"], row["estimator"]) == (preset, "exact") and row["workload"] in order:
                 if row["views"] == 1 and row["status"] == "ok":
                     print(order.index(row["workload"]), row["forward_ms"]["median"] + row["backward_ms"]["median"], file=out)
 rows = csv.DictReader(line for line in open(results / "peers.csv") if not line.startswith("#"))
@@ -33,6 +33,6 @@ set xrange [-0.3:4.3]
 set xtics ("cube\n12 triangles\n128x128" 0, "sphere\n1,280\n256x256" 1, "sphere\n20,480\n256x256" 2, \
            "sphere\n81,920\n512x512" 3, "sphere\n1,310,720\n1024x1024" 4)
 set style data linespoints
-plot "$work/default" title "dpr, its defaults" lw 2 pt 7, "$work/joint" title "dpr, joint composition" lw 2 pt 5, \
+plot "$work/pixel" title "dpr, noise of the pixel" lw 2 pt 7, "$work/sharp" title "dpr, noise of the triangles, sharp" lw 2 pt 5, \
      "$work/DEODR" title "DEODR 0.2.3, sharp" lw 2 pt 9, "$work/Mitsuba" title "Mitsuba 3.9, 16 samples a pixel" lw 2 pt 11
 END
