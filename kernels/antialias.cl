@@ -124,8 +124,10 @@ static inline Cut gradient_at_end(const Cell c, int k, uint pixel, global const 
 
 /// The gradients of the cuts, and those of the samples: what each has kept of its own colour, and given to
 /// its neighbours. One work-item per row of a tile; a step's cut is its first sample's to write.
-/// Deterministic. Inputs as antialias_forward, and in   grad_blended   float4[pixel] out  grad_cut
-/// Cut[2][pixel]  not written where nothing crosses out  grad_raster    float4[pixel]
+/// Deterministic. Inputs as antialias_forward, and
+/// in   grad_blended   float4[pixel]
+/// out  grad_cut       Cut[2][pixel]  not written where nothing crosses
+/// out  grad_raster    float4[pixel]
 kernel void antialias_backward(const FrameParams p, global const uint* restrict tile_starts,
                                global const uint* restrict winner, global const float2* restrict cut,
                                global const float4* restrict raster,

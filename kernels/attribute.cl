@@ -153,9 +153,11 @@ kernel void attribute_normals_backward(const FrameParams p, const uint shown_vie
 }
 
 /// Rows of numbers as colours of what shows them, three channels a pass; behind the last channel, and in
-/// passes behind all of them, 0 and 1. One work-item per (pass, view, shown). in   passes, views, shown,
-/// channels  in `size` in   row_of  uint[shown] in   values  float[row][channel] out  colors
-/// float4[pass][view][shown]
+/// passes behind all of them, 0 and 1. One work-item per (pass, view, shown).
+/// in   passes, views, shown, channels  in `size`
+/// in   row_of  uint[shown]
+/// in   values  float[row][channel]
+/// out  colors  float4[pass][view][shown]
 kernel void attribute_rows_forward(const uint4 size, global const uint* restrict row_of,
                                    global const float* restrict values, global float4* restrict colors) {
   const uint i = (uint)get_global_id(0), shown = size.z, channels = size.w;

@@ -85,7 +85,7 @@ Struct versioned(const Struct* given, Struct defaults, const char* argument) {
   const std::size_t size = deref(given, argument).size;
   if (size < sizeof(std::size_t) || size > sizeof(Struct)) {
     throw InvalidArgument(std::string(argument) + ".size", std::to_string(size),
-                          "at most " + std::to_string(sizeof(Struct)) + ", the struct's size");
+                          "1 to " + std::to_string(sizeof(Struct)) + ", as the struct's DPR_..._INIT has it");
   }
   std::memcpy(&defaults, given, size);
   return defaults;

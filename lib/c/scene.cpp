@@ -121,6 +121,8 @@ void copy_textures(const dpr_mesh& given, Mesh& mesh) {
 /// Its normals and materials.
 void copy_reflection(const dpr_mesh& given, Mesh& mesh) {
   if (given.normals) {
+    if (!given.face_normals)
+      throw InvalidArgument("mesh.normals", "no face_normals", "both, or neither of the two");
     require_count(given.normal_count, "mesh.normal_count");
     mesh.normals = triples(given.normals, given.normal_count);
   }

@@ -17,9 +17,12 @@ Aov parse(const std::string& name) {
   try {
     return parse_aov(name, "--aov");
   } catch (const InvalidArgument& error) {
-    throw InvalidArgument(error.argument(), error.got(),
-                          error.expected() + ", " + std::string(k_standard_error) + " or " +
-                              std::string(k_gradient_standard_error));
+    constexpr std::string_view k_before_last = " or ";
+    std::string names(error.expected());
+    names.replace(names.rfind(k_before_last), k_before_last.size(), ", ");
+    throw InvalidArgument(
+        error.argument(), error.got(),
+        names.append(", ").append(k_standard_error).append(k_before_last).append(k_gradient_standard_error));
   }
 }
 

@@ -131,6 +131,8 @@ void take_material(const JsonNode& node, Mesh& mesh) {
 /// Another place of a mesh that is there.
 Instance parse_place(const JsonNode& node) {
   constexpr std::uint64_t k_most = std::numeric_limits<std::uint32_t>::max();
+  if (node.find("file") || node.find("positions"))
+    node.fail("a mesh of its own and instance_of", "one of the two");
   node.require_keys({"instance_of", "transform"});
   Instance instance;
   instance.instance_of = node.at("instance_of").whole_number(k_most);
@@ -141,7 +143,7 @@ Instance parse_place(const JsonNode& node) {
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   if (node.find("instance_of")) return parse_place(node);
   node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors", "texcoords",
-                     "face_texcoords", "texture", "normals", "face_normals", "material"});
+                     "face_texcoords", "texture", "normals", "face_normals", "material", "instance_of"});
   Instance instance;
   const auto file = node.find("file");
   if (file && (node.find("positions") || node.find("faces"))) {
