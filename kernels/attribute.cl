@@ -1,5 +1,6 @@
 // Images of attributes (include/dpr/attribute_images.hpp): their alpha in the barrier composition, and what a
 // loss compares of them.
+#include "face_normal.h"
 #include "shared_types.h"
 
 /// Puts the sum of the faces' weights into alpha: the red of a group of images that shows 1. One work-item
@@ -90,12 +91,6 @@ kernel void attribute_vertices_backward(const FrameParams p, const uint shows_de
   grad_world[i] = (float4)(shows_depth ? (float3)(0.0f) : grad, 0.0f);
 }
 
-/// A face's normal before it is made of length 1, on the side from which it winds counter-clockwise.
-static inline float3 long_normal(global const float4* world, uint4 face) {
-  const float3 a = world[face.x].xyz;
-  return cross(world[face.y].xyz - a, world[face.z].xyz - a);
-}
-
 /// 0: a face without area has no normal.
 static inline float inverse_length(float3 v) {
   const float size = length(v);
@@ -117,7 +112,7 @@ kernel void attribute_normals_forward(const FrameParams p, const uint shown_view
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
-  const float3 normal = long_normal(world + view * p.vertices, faces[i % p.faces]);
+  const float3 normal = face_normal(world + view * p.vertices, faces[i % p.faces]);
   colors[i] = (float4)(view < shown_views ? normal * inverse_length(normal) : (float3)(1.0f), 0.0f);
 }
 
@@ -142,7 +137,7 @@ kernel void attribute_normals_backward(const FrameParams p, const uint shown_vie
   for (uint k = corner_starts[vertex]; k < last; ++k) {
     const uint face = corners[k] / 3, at = corners[k] % 3;
     global const float4* of_view = world + view * p.vertices;
-    const float3 normal = long_normal(of_view, faces[face]), grad = grad_colors[view * p.faces + face].xyz;
+    const float3 normal = face_normal(of_view, faces[face]), grad = grad_colors[view * p.faces + face].xyz;
     const float scale = inverse_length(normal);
     const float3 unit = normal * scale, g = scale * (grad - unit * dot(unit, grad));
     // cross(b - a, c - a) . g has the gradient cross(b - c, g) by a, and so on around the face.

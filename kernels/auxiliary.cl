@@ -1,12 +1,7 @@
 // Auxiliary outputs of a pixel from the weights of its fragments: expected depth and normal, the face of the
 // largest weight with its barycentrics, the effective number of faces.
+#include "face_normal.h"
 #include "shared_types.h"
-
-/// The normal of a face, not normalised, on the side from which it winds counter-clockwise.
-static inline float3 face_normal(uint4 face, global const float4* world) {
-  const float3 a = world[face.x].xyz;
-  return cross(world[face.y].xyz - a, world[face.z].xyz - a);
-}
 
 /// 0 for vectors without a length.
 static inline float3 normalized(float3 v) {
@@ -51,7 +46,7 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
     sum += w;
     squares += w * w;
     depth_sum += w * depth[k];
-    normal += w * normalized(face_normal(faces[face], vertices));
+    normal += w * normalized(face_normal(vertices, faces[face]));
     if (w <= largest) continue;
     largest = w;
     seen = face;
@@ -90,14 +85,19 @@ kernel void auxiliary_weigh(const FrameParams p, global const float* restrict ou
 
 /// The samples' outputs as those of pixels: with noise on the pixel the face and where it is seen are those
 /// of the sample at the pixel's centre or, of an even number, behind it, and the rest is the mean over what
-/// covers the pixel. One work-item per pixel of the images. in   image      uint4  width and height of an
-/// image, samples along a pixel's side and around the image in   blurred    1: noise on the pixel; else a
-/// sample is a pixel, and there are no `surface` and `coverage` in   has_uv     1: every corner of a face has
-/// texture coordinates in   outputs    float[DPR_AUXILIARY_CHANNELS][sample],  face_id  uint[sample]  as
-/// auxiliary_forward in   surface, coverage  float4[pixel]  as auxiliary_weigh, blurred in   texcoord_of
-/// uint[face * 3 + corner],  texcoords  float2[...] out  normals    float4[pixel]  the normal; w = depth out
-/// places     float4[pixel]  barycentrics, 0 on the background; w = the effective number of faces out  uvs
-/// float2[pixel]  0 on the background out  faces      uint[pixel]    DPR_NO_FACE on the background
+/// covers the pixel. One work-item per pixel of the images.
+/// in   image      uint4  width and height of an image, samples along a pixel's side and around the image
+/// in   blurred    1: noise on the pixel; else a sample is a pixel, without `surface` and `coverage`
+/// in   has_uv     1: every corner of a face has texture coordinates
+/// in   outputs    float[DPR_AUXILIARY_CHANNELS][sample]  as auxiliary_forward
+/// in   face_id    uint[sample]                           as auxiliary_forward
+/// in   surface, coverage  float4[pixel]  as auxiliary_weigh, blurred
+/// in   texcoord_of  uint[face * 3 + corner]
+/// in   texcoords    float2[...]
+/// out  normals    float4[pixel]  the normal; w = depth
+/// out  places     float4[pixel]  barycentrics, 0 on the background; w = the effective number of faces
+/// out  uvs        float2[pixel]  0 on the background
+/// out  faces      uint[pixel]    DPR_NO_FACE on the background
 kernel void auxiliary_finish(const FrameParams p, const uint4 image, const uint blurred, const uint has_uv,
                              global const float* restrict outputs, global const uint* restrict face_id,
                              global const float4* restrict surface, global const float4* restrict coverage,

@@ -10,6 +10,7 @@
 // Where faces cross the near plane, edges end there, and what the plane cuts of a face is a boundary: the
 // cuts of all faces are numbered behind the edges of the scene.
 #include "contour.h"
+#include "face_normal.h"
 
 /// What rounding may move a crossing by, in samples.
 #define DPR_CROSSING_SLACK 0.01f
@@ -45,14 +46,9 @@ static inline int color_jumps(const ContourScene s, uint4 edge, uint vertex) {
                   s.colors[component(s.face_colors[other], in_other)]);
 }
 
-static inline float3 winding_normal(const ContourScene s, uint face) {
-  const uint4 f = s.faces[face];
-  const float3 a = s.world[f.x].xyz;
-  return cross(s.world[f.y].xyz - a, s.world[f.z].xyz - a);
-}
-
 static inline int normals_differ(const ContourScene s, uint4 edge) {
-  const float3 n0 = winding_normal(s, own_face(edge)), n1 = winding_normal(s, other_face(edge));
+  const float3 n0 = face_normal(s.world, s.faces[own_face(edge)]);
+  const float3 n1 = face_normal(s.world, s.faces[other_face(edge)]);
   const float3 c = cross(n0, n1);
   return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
 }

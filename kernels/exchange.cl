@@ -4,9 +4,12 @@
 
 /// Copies vectors of floats, bit by bit, from one layout to another. A layout is the first float, the floats
 /// from one group to the next, the vectors of a group, which follow one another, and the floats of a vector.
-/// One work-item per vector. What the source has not is 0. in   vectors   how many there are in   from, to
-/// uint4  the layouts in   clean     1: numbers that are not finite become 0 in   source    float[...] out
-/// target    float[...]
+/// One work-item per vector. What the source has not is 0.
+/// in   vectors   how many there are
+/// in   from, to  uint4  the layouts
+/// in   clean     1: numbers that are not finite become 0
+/// in   source    float[...]
+/// out  target    float[...]
 kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 to, const uint clean,
                              global const uint* restrict source, global uint* restrict target) {
   const uint i = (uint)get_global_id(0);

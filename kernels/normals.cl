@@ -1,14 +1,10 @@
 // Normals in world space: of vertices, the faces' area-weighted normals, summed in order and normalised;
 // those that meshes give, turned with the mesh; and back. A view has those of all vertices, then those given.
+#include "face_normal.h"
 #include "shared_types.h"
 
 /// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
 #define DPR_MIN_NORMAL 1e-20f
-
-static inline float3 face_normal(global const float4* world, uint4 face) {
-  const float3 a = world[face.x].xyz;
-  return cross(world[face.y].xyz - a, world[face.z].xyz - a);
-}
 
 /// Of length one, or zero where there is no direction; w = 1 / length, or zero.
 static inline float4 unit_normal(float3 sum) {

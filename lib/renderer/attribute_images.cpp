@@ -2,23 +2,25 @@
 #include "dpr/attribute_images.hpp"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <string>
 
 #include "base/checks.hpp"
-#include "base/name_list.hpp"
-#include "base/require.hpp"
 #include "renderer/attribute_images_impl.hpp"
-#include "renderer/frame.hpp"
 #include "renderer/on_device.hpp"
-#include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 
 namespace dpr {
 namespace {
 
-constexpr std::array<std::string_view, 4> k_attribute_names{"depth", "position", "normal", "texcoords"};
+/// Those of the faces' corners, face after face.
+std::vector<glm::vec3> positions_of_corners(const Mesh& mesh) {
+  std::vector<glm::vec3> positions;
+  for (const glm::uvec3& face : mesh.faces) {
+    for (int corner = 0; corner < 3; ++corner) positions.push_back(mesh.positions[face[corner]]);
+  }
+  return positions;
+}
 
 /// The mesh with a colour for every number of the domain. Corners become vertices, face after face.
 Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain) {
@@ -31,11 +33,9 @@ Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain) {
         .resize(of_faces ? mesh.faces.size() : mesh.positions.size());
     return shown;
   }
-  for (const glm::uvec3& face : mesh.faces) {
-    const auto first = static_cast<unsigned>(shown.positions.size());
-    for (int corner = 0; corner < 3; ++corner) shown.positions.push_back(mesh.positions[face[corner]]);
+  shown.positions = positions_of_corners(mesh);
+  for (unsigned first = 0; first < shown.positions.size(); first += 3)
     shown.faces.emplace_back(first, first + 1, first + 2);
-  }
   shown.vertex_colors.resize(shown.positions.size());
   return shown;
 }
@@ -87,14 +87,6 @@ GradientRequest request_of(const GradientRequest& wanted, std::optional<Attribut
 }
 
 }  // namespace
-
-std::string_view to_string(Attribute attribute) {
-  return k_attribute_names[static_cast<std::size_t>(attribute)];
-}
-
-Attribute parse_attribute(std::string_view word, std::string_view where) {
-  return static_cast<Attribute>(position_of(word, k_attribute_names, std::string(where)));
-}
 
 AttributeImages::Impl::Impl(const Device& device, std::optional<Attribute> attribute_, std::size_t channels_)
     : attribute(attribute_),
@@ -193,15 +185,11 @@ void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
   r.has_device_cameras = source.has_device_cameras;
 }
 
-/// Of the mesh as the host knows it.
-std::vector<glm::vec3> AttributeImages::Impl::shown_positions(const Scene& scene, std::size_t mesh) const {
-  return shown_mesh(mesh_of(scene, mesh), domain()).positions;
-}
-
 void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
   Renderer::Impl& r = renderer.impl();
   r.frame.position_stride = 0;
   r.near_plane.set_boxes_of_views({});
+  const bool by_corner = domain() == AttributeDomain::corners;
   bool all_are_known = true;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
     if (!source.near_plane.knows(meshes_[m].instance_of.value_or(m))) {
@@ -209,7 +197,10 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
       all_are_known = false;
       continue;
     }
-    const std::vector<glm::vec3> positions = shown_positions(source.scene, m);
+    const Mesh& mesh = mesh_of(source.scene, m);
+    const std::vector<glm::vec3> of_corners =
+        by_corner ? positions_of_corners(mesh) : std::vector<glm::vec3>();
+    const std::vector<glm::vec3>& positions = by_corner ? of_corners : mesh.positions;
     if (!r.near_plane.knows(m) || r.scene.meshes[m].mesh.positions != positions)
       renderer.set_positions(m, positions);
   }
@@ -382,67 +373,5 @@ BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
                         "a gradient that attribute images have and the scene asks for, such as "
                         "\"meshes[0].positions\", \"views[0].camera.rotation\", \"sigma\" or \"values\"");
 }
-
-AttributeImages::AttributeImages(const Device& device, Attribute attribute)
-    : impl_(std::make_unique<Impl>(device, attribute,
-                                   attribute == Attribute::depth       ? 1
-                                   : attribute == Attribute::texcoords ? 2
-                                                                       : 3)) {}
-
-AttributeImages::AttributeImages(const Device& device, std::size_t channels, std::span<const float> values) {
-  if (channels == 0) throw InvalidArgument("channels (attribute images)", "0", "at least 1");
-  impl_ = std::make_unique<Impl>(device, std::nullopt, channels);
-  set_values(values);
-}
-
-AttributeImages::~AttributeImages() = default;
-AttributeImages::AttributeImages(AttributeImages&&) noexcept = default;
-AttributeImages& AttributeImages::operator=(AttributeImages&&) noexcept = default;
-
-void AttributeImages::set_values(std::span<const float> values) {
-  impl_->require_own_values();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) checks::require_finite(values[i], checks::element("values", i));
-  }
-  impl_->set_values(values);
-}
-
-void AttributeImages::forward(const Renderer& of) {
-  require_same_device(impl_->renderer.device(), of.device(), "AttributeImages::forward");
-  of.impl().require_forward("AttributeImages::forward");
-  impl_->forward(of.impl(), FrameSizes::read);
-}
-
-std::size_t AttributeImages::channels() const { return impl_->channels; }
-std::size_t AttributeImages::groups() const { return impl_->groups(); }
-
-Image AttributeImages::image(std::size_t view, std::size_t group) const {
-  const Impl& m = *impl_;
-  m.require_forward("AttributeImages::image");
-  require(view < m.views, "view", view, ("below " + std::to_string(m.views)).c_str());
-  require(group < m.groups(), "group", group, ("below " + std::to_string(m.groups())).c_str());
-  const Scene& scene = m.renderer.scene();
-  Image image(scene.width, scene.height);
-  std::vector<cl_float4> pixels(image.pixels.size());
-  m.images().download(pixels, (group * m.views + view) * pixels.size());
-  std::ranges::transform(pixels, image.pixels.begin(),
-                         [](const cl_float4& p) { return glm::vec4(p.s[0], p.s[1], p.s[2], p.s[3]); });
-  return image;
-}
-
-SceneGradient AttributeImages::backward(std::span<const Image> grad_images) {
-  Impl& m = *impl_;
-  m.require_forward("AttributeImages::backward");
-  const Scene& scene = m.renderer.scene();
-  if (grad_images.size() != m.groups() * m.views) {
-    throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
-                          std::to_string(m.groups() * m.views) + ", groups x views");
-  }
-  const std::vector<cl_float4> pixels = checked_pixels(grad_images, scene.width, scene.height);
-  m.host_grad_images.upload(m.renderer.device().impl(), pixels);
-  return m.backward(m.host_grad_images);
-}
-
-std::span<const float> AttributeImages::grad_values() const { return impl_->grad_values; }
 
 }  // namespace dpr

@@ -63,7 +63,6 @@ struct AttributeImages::Impl {
   void follow_views(const Renderer::Impl& source);
   void follow_positions(const Renderer::Impl& source);
   void follow_shapes(const Renderer::Impl& source);
-  std::vector<glm::vec3> shown_positions(const Scene& scene, std::size_t mesh) const;
   const RowMap& row_map() const { return attribute ? texcoords_->map : vertices_; }
   const Buffer<float>& row_values() const { return attribute ? texcoords_->values : values_; }
 

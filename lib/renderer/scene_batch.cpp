@@ -37,12 +37,12 @@ void check_scenes(std::span<const Scene> scenes) {
   }
 }
 
-/// Enqueues a copy of a part of a buffer.
-void copy_part(Device::Impl& device, cl_mem from, std::size_t first, const Buffer<cl_float4>& to,
-               std::size_t to_first, std::size_t count) {
+/// Enqueues a copy of as many pixels as `to` has, from `first` on.
+void copy_part(Device::Impl& device, const BufferRef<cl_float4>& from, std::size_t first,
+               const Buffer<cl_float4>& to) {
   constexpr std::size_t k_bytes = sizeof(cl_float4);
-  check_cl(device.queue.enqueueCopyBuffer(cl::Buffer(from, /*retain*/ true), to.cl_buffer(), first * k_bytes,
-                                          to_first * k_bytes, count * k_bytes),
+  check_cl(device.queue.enqueueCopyBuffer(cl::Buffer(from.handle(), /*retain*/ true), to.cl_buffer(),
+                                          first * k_bytes, 0, to.size() * k_bytes),
            "clEnqueueCopyBuffer");
 }
 
@@ -82,7 +82,7 @@ void SceneBatch::Impl::require_forward(const char* caller) {
   for (Renderer& renderer : renderers) {
     renderer.impl().require_forward(caller);
     const Buffer<cl_float4>& own = renderer.impl().image();
-    copy_part(device.impl(), own.cl_buffer()(), 0, image, first, own.size());
+    own.copy_to(image, first);
     first += own.size();
   }
   is_gathered = true;
@@ -100,7 +100,7 @@ std::vector<SceneGradient> SceneBatch::Impl::backward(const BufferRef<cl_float4>
     Renderer::Impl& scene = renderers[i].impl();
     const std::size_t pixels = scene.image().size();
     scene.host_grad_images.resize(device.impl(), pixels);
-    copy_part(device.impl(), grad_images.handle(), first, scene.host_grad_images, 0, pixels);
+    copy_part(device.impl(), grad_images, first, scene.host_grad_images);
     scene.enqueue_backward(scene.host_grad_images,
                            add_to_positions.empty() ? AddToGradient() : add_to_positions[i]);
     first += pixels;

@@ -1,0 +1,11 @@
+// A face's normal from the positions of its vertices.
+#ifndef DPR_FACE_NORMAL_H
+#define DPR_FACE_NORMAL_H
+
+/// Not normalised: twice the area long, on the side from which the face winds counter-clockwise.
+static inline float3 face_normal(global const float4* world, uint4 face) {
+  const float3 a = world[face.x].xyz;
+  return cross(world[face.y].xyz - a, world[face.z].xyz - a);
+}
+
+#endif
