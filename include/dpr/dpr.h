@@ -292,6 +292,31 @@ typedef struct dpr_loss_weights {
 DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights,
                                    const float* targets, size_t count, size_t views, int width, int height,
                                    dpr_loss** loss);
+/* What surfaces show in place of their colours, compared with what they ought to: dpr/image_loss.hpp. */
+typedef struct dpr_attribute_target {
+  const char* name;                /* "depth", "position", "normal" or "texcoords" */
+  const dpr_loss_weights* weights; /* no silhouette, no ssim */
+  const float* targets; /* [view][height][width][4]: RGB as attribute images have it where a surface fills
+                         * the pixel, alpha how much the pixel counts */
+} dpr_attribute_target;
+
+typedef struct dpr_loss_options {
+  size_t size;
+  const dpr_loss_weights* weights; /* of the images; NULL: none, if there are attributes */
+  const uint8_t* has_alpha;        /* [view], 0: the target has no silhouette; NULL: all have one */
+  const float* masks;              /* [view][height][width], how much each pixel counts; NULL: all the same */
+  unsigned levels;                 /* of a pyramid, 1 to 16: the mean of the loss over ever smaller images */
+  const dpr_attribute_target* attributes; /* [attribute_count]; NULL if that is 0 */
+  size_t attribute_count;
+} dpr_loss_options;
+
+#define DPR_LOSS_OPTIONS_INIT \
+  { sizeof(dpr_loss_options), NULL, NULL, NULL, 1, NULL, 0 }
+
+/* The same with more to say of what counts. */
+DPR_API dpr_status dpr_loss_create_with(const dpr_device* device, const dpr_loss_options* options,
+                                        const float* targets, size_t count, size_t views, int width,
+                                        int height, dpr_loss** loss);
 /* The loss of the renderer's last images, mean over the views; its gradient stays on the device. */
 DPR_API dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, double* value);
 DPR_API void dpr_loss_destroy(dpr_loss* loss);

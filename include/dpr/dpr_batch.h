@@ -8,6 +8,10 @@
 #ifndef DPR_DPR_BATCH_H
 #define DPR_DPR_BATCH_H
 
+#ifndef DPR_DPR_H
+#error "include dpr/dpr.h, which includes this"
+#endif
+
 #include "dpr/dpr_on_device.h"
 
 #ifdef __cplusplus

@@ -7,7 +7,9 @@
 #ifndef DPR_DPR_ON_DEVICE_H
 #define DPR_DPR_ON_DEVICE_H
 
-#include "dpr/dpr.h"
+#ifndef DPR_DPR_H
+#error "include dpr/dpr.h, which includes this"
+#endif
 
 #ifdef __cplusplus
 extern "C" {

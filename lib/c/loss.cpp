@@ -12,12 +12,31 @@ using dpr::c::renderer_of;
 namespace dpr::c {
 namespace {
 
-std::vector<Image> to_images(std::span<const glm::vec4> pixels, std::size_t views, int width, int height) {
-  std::vector<Image> images(views, Image(width, height));
-  const std::size_t size = images.front().pixels.size();
-  for (std::size_t v = 0; v < views; ++v)
-    std::ranges::copy(pixels.subspan(v * size, size), images[v].pixels.begin());
+/// Images of as many views as the caller says.
+struct Targets {
+  const float* values;
+  std::size_t count, views;
+  int width, height;
+};
+
+std::vector<Image> to_images(const float* values, const Targets& like) {
+  std::vector<Image> images(like.views, Image(like.width, like.height));
+  for (Image& image : images) {
+    const std::size_t floats = image_floats(1, like.width, like.height);
+    std::ranges::copy(to_pixels(values, floats, "targets"), image.pixels.begin());
+    values += floats;
+  }
   return images;
+}
+
+/// Of one channel.
+std::vector<Image> to_masks(const float* values, const Targets& like) {
+  std::vector<Image> masks;
+  if (values) masks.assign(like.views, Image(like.width, like.height));
+  for (Image& mask : masks) {
+    for (glm::vec4& pixel : mask.pixels) pixel = glm::vec4(*values++);
+  }
+  return masks;
 }
 
 /// What a program's version of the struct has. The first was padded to where robust begins.
@@ -31,20 +50,66 @@ LossWeights to_weights(const dpr_loss_weights* given) {
   return converted;
 }
 
+/// What is compared beside colours; `images` holds it.
+std::vector<AttributeTarget> to_attributes(const dpr_loss_options& options, const Targets& like,
+                                           std::vector<std::vector<Image>>& images) {
+  constexpr std::size_t k_most = 16;
+  if (options.attribute_count > 0) deref(options.attributes, "options.attributes");
+  if (options.attribute_count > k_most) {
+    throw InvalidArgument("options.attribute_count", std::to_string(options.attribute_count),
+                          "at most " + std::to_string(k_most));
+  }
+  std::vector<AttributeTarget> attributes;
+  for (const dpr_attribute_target& given : std::span(options.attributes, options.attribute_count)) {
+    images.push_back(to_images(&deref(given.targets, "options.attributes.targets"), like));
+    const Attribute attribute = parse_attribute(&deref(given.name, "options.attributes.name"), "name");
+    attributes.push_back({attribute, to_weights(given.weights), images.back()});
+  }
+  return attributes;
+}
+
+void give_loss(dpr_loss** loss, const dpr_device* device, const dpr_loss_options& options,
+               const Targets& targets) {
+  deref(loss, "loss");
+  deref(device, "device");
+  const LossWeights weights = options.weights ? to_weights(options.weights) : LossWeights();
+  require_views(targets.views);
+  require_size(targets.width, targets.height, "size (targets)");
+  const std::size_t floats = image_floats(targets.views, targets.width, targets.height);
+  require_count(numbers(targets.values, targets.count, 1, "targets").size(), floats, "targets");
+  std::vector<std::vector<Image>> images;
+  const std::vector<AttributeTarget> attributes = to_attributes(options, targets, images);
+  const std::vector<Image> masks = to_masks(options.masks, targets);
+  const std::span<const unsigned char> has_alpha(options.has_alpha, options.has_alpha ? targets.views : 0);
+  give(loss, ImageLoss(device->device,
+                       {.weights = weights,
+                        .has_alpha = has_alpha,
+                        .masks = masks,
+                        .levels = options.levels,
+                        .attributes = attributes},
+                       to_images(targets.values, targets)));
+}
+
 }  // namespace
 }  // namespace dpr::c
 
 dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights, const float* targets,
                            std::size_t count, std::size_t views, int width, int height, dpr_loss** loss) {
   return guarded([&] {
-    deref(loss, "loss");
-    deref(device, "device");
-    const dpr::LossWeights wanted = dpr::c::to_weights(weights);
-    dpr::c::require_views(views);
-    dpr::c::require_size(width, height, "size (targets)");
-    const std::span<const glm::vec4> pixels = dpr::c::to_pixels(targets, count, "targets");
-    dpr::c::require_count(count, dpr::c::image_floats(views, width, height), "targets");
-    give(loss, dpr::ImageLoss(device->device, wanted, dpr::c::to_images(pixels, views, width, height)));
+    deref(weights, "weights");
+    dpr_loss_options options = DPR_LOSS_OPTIONS_INIT;
+    options.weights = weights;
+    dpr::c::give_loss(loss, device, options, {targets, count, views, width, height});
+  });
+}
+
+dpr_status dpr_loss_create_with(const dpr_device* device, const dpr_loss_options* options,
+                                const float* targets, std::size_t count, std::size_t views, int width,
+                                int height, dpr_loss** loss) {
+  return guarded([&] {
+    dpr::c::give_loss(loss, device,
+                      dpr::c::versioned<dpr_loss_options>(options, DPR_LOSS_OPTIONS_INIT, "options"),
+                      {targets, count, views, width, height});
   });
 }
 

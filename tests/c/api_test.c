@@ -363,6 +363,76 @@ static void test_losses(const dpr_device* device, const dpr_scene* scene) {
   dpr_renderer_destroy(renderer);
 }
 
+/* Masks, targets without a silhouette, pyramids and depths: each says something of the loss. */
+static void test_loss_options(const dpr_device* device, const dpr_scene* scene) {
+  const uint8_t none[1] = {0};
+  float black[FLOATS], mask[SIDE * SIDE], deep[FLOATS];
+  double of_all, of_half, value, at_depth[9], before;
+  size_t i;
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT, of_depth = DPR_LOSS_WEIGHTS_INIT;
+  dpr_loss_options options = DPR_LOSS_OPTIONS_INIT;
+  dpr_attribute_target depth = {"depth", NULL, NULL};
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  dpr_loss *loss = NULL, *refused = NULL;
+  for (i = 0; i < FLOATS; ++i) black[i] = 0, deep[i] = i % 4 == 3 ? 1.0f : 2.5f; /* nearer than it is */
+  for (i = 0; i < SIDE * SIDE; ++i) mask[i] = i % SIDE < SIDE / 4 ? 1.0f : 0.0f; /* little of the triangle */
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  weights.mse = 1;
+  of_all = loss_of(device, renderer, &weights);
+  options.weights = &weights;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value == of_all); /* nothing said: the same loss */
+  dpr_loss_destroy(loss);
+  options.masks = mask;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &of_half));
+  EXPECT(of_half < 0.5 * of_all);
+  dpr_loss_destroy(loss);
+  options.masks = NULL, options.levels = 3;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value > 0 && value < of_all); /* means of blocks are nearer to black */
+  dpr_loss_destroy(loss);
+  options.levels = 1, options.has_alpha = none;
+  weights.silhouette = 1;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value == of_all); /* without a silhouette there is no loss of it */
+  dpr_loss_destroy(loss);
+
+  of_depth.l1 = 1;
+  depth.weights = &of_depth, depth.targets = deep;
+  options = (dpr_loss_options)DPR_LOSS_OPTIONS_INIT;
+  options.attributes = &depth, options.attribute_count = 1;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &before));
+  OK(dpr_backward_loss(renderer, loss, &gradient));
+  OK(dpr_gradient_read(gradient, "meshes[0].positions", at_depth, 9));
+  EXPECT(before > 0 && at_depth[2] < 0 && at_depth[5] < 0 && at_depth[8] < 0); /* towards the camera */
+  dpr_gradient_destroy(gradient);
+  dpr_loss_destroy(loss);
+  depth.name = "deep";
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "texcoords");
+  depth.name = "depth", depth.targets = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused),
+          "attributes.targets");
+  depth.targets = deep, depth.weights = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "weights");
+  options.attribute_count = (size_t)-1;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "attribute_count");
+  options.attributes = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused),
+          "options.attributes");
+  options.attribute_count = 0, options.levels = 17, options.weights = &weights;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "levels");
+  REFUSED(dpr_loss_create_with(device, NULL, black, FLOATS, 1, SIDE, SIDE, &refused), "options");
+  dpr_renderer_destroy(renderer);
+}
+
 /* The same image and gradient without the host: positions from a buffer, the gradient into one. */
 static void test_on_device(cl_context context, cl_command_queue queue, dpr_renderer* renderer,
                            const float* image, const double* expected) {
@@ -1235,6 +1305,7 @@ int main(void) {
   scene = make_scene();
   test_descent(device, scene);
   test_losses(device, scene);
+  test_loss_options(device, scene);
   test_views(device, scene);
   test_textures(device);
   test_wrap_and_filter(device);
