@@ -15,8 +15,8 @@ class AovFiles {
   /// Throws InvalidArgument for a word that names none, and for uv of a scene without texture coordinates.
   AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene);
 
-  /// Writes them, from the renderer's last forward(), to OUT.NAME.exr for the output OUT.png.
-  void write(Renderer& renderer) const;
+  /// Writes them, from the renderer's last forward(), to OUT.NAME.exr for the output OUT.png: these files.
+  std::vector<std::string> write(Renderer& renderer) const;
   /// A line on the standard error of the image, if the scene is sampled.
   void print_sampling_error(Renderer& renderer) const;
 

@@ -129,7 +129,7 @@ void run(const RenderOptions& options, CommonOptions& common) {
   const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
-  aovs.write(renderer);
+  const std::vector<std::string> files_beside = aovs.write(renderer);
   if (statistics.fragments == 0) {
     print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
                  "znear and zfar"},
@@ -145,6 +145,7 @@ void run(const RenderOptions& options, CommonOptions& common) {
           statistics.faces_dropped);
     }
     std::printf("\n");
+    for (const std::string& file : files_beside) std::printf("%s\n", file.c_str());
   }
   if (common.verbose) {
     std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
