@@ -40,12 +40,35 @@ static inline void copy_row(TileRow r, global const float4* restrict from, globa
   for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
-/// Whether anything is at a step from a sample.
-static inline int is_crossed(const FrameParams p, const Steps steps, Sample s) {
+/// Whether anything is at a step from a sample, or, with a reach of 2, at the next in the same direction.
+static inline int is_touched(const FrameParams p, const Steps steps, Sample s, int reach) {
   uint all = DPR_NO_CROSSING;
 #pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) all &= at_step(p, steps, s, k);
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    all &= at_step(p, steps, s, k);
+    if (reach == 2) all &= at_step(p, steps, sample_beside(p, s, k), k);
+  }
   return all != DPR_NO_CROSSING;
+}
+
+/// Where is_touched() holds in a row of a tile: a bit a sample. Most of the samples near a contour are not.
+static inline uint touched_in_row(const FrameParams p, const Steps steps, TileRow r, int reach) {
+  const int is_inner = r.at.x >= 2 && r.at.x + DPR_TILE < p.width && r.at.y >= 2 && r.at.y + 1 < p.height;
+  uint bits = 0;
+  if (!is_inner) {
+    for (uint k = 0; k < r.count; ++k) bits |= is_touched(p, steps, sample_of(r, k), reach) ? 1u << k : 0u;
+    return bits;
+  }
+  global const uint *right = steps.winner + r.first, *down = right + steps.pixels;
+  uint8 all = vload8(0, right) & vload8(0, right - 1) & vload8(0, down) & vload8(0, down - p.width);
+  if (reach == 2) {
+    all &= vload8(0, right + 1) & vload8(0, right - 2) & vload8(0, down + p.width) &
+           vload8(0, down - 2 * p.width);
+  }
+  const int8 is_clear = all == (uint8)(DPR_NO_CROSSING);
+  const int8 bit = ~is_clear & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+  const int4 half_bits = bit.lo | bit.hi;
+  return (uint)(half_bits.x | half_bits.y | half_bits.z | half_bits.w);
 }
 
 /// What a sample's parts at a step take: the difference of the colours with the sample's own continued all
@@ -67,13 +90,15 @@ static inline Taken taken_at(const FrameParams p, const Steps steps, Sample s, i
 static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
                               global const float4* restrict raster) {
   float4 sum = 0.0f;
+  float total = 0.0f;
   for (int k = 0; k < DPR_STEPS; ++k) {
     if (!is_contour(at_step(p, steps, s, k))) continue;
     const Parts parts = parts_taken(steps.cut[place_of(p, steps, s, k)], turn_of(k));
     const Taken taken = taken_at(p, steps, s, k, raster);
     sum += parts.x * taken.difference + parts.y * taken.changes;
+    total += parts.x;
   }
-  return sum / total_taken(p, steps, s);
+  return sum / fmax(total, 1.0f);
 }
 
 /// Blends the samples. One work-item per row of a tile. Deterministic.
@@ -91,54 +116,48 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
     return;
   }
   const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const uint touched = touched_in_row(p, steps, r, 1);
   for (uint k = 0; k < r.count; ++k) {
     const Sample s = sample_of(r, k);
     const float4 own = raster[s.index];
-    blended[s.index] = is_crossed(p, steps, s) ? own + added_to(p, steps, s, raster) : own;
+    blended[s.index] = touched >> k & 1u ? own + added_to(p, steps, s, raster) : own;
   }
 }
 
-/// What the end of a step gives the step's cut. Where the parts are scaled to add up to 1, so is what one of
-/// them changes.
-static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
+/// What the end of a step gives the step's cut. Where the parts are scaled by their `total`, so is what one
+/// of them changes.
+static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step, float total,
                                   global const float4* restrict raster, float4 grad) {
   const Taken taken = taken_at(p, steps, s, step, raster);
-  const float total = total_taken(p, steps, s);
   const float4 added = total > 1.0f ? added_to(p, steps, s, raster) : 0.0f;
   const Parts grad_parts = (Parts)(dot(grad, taken.difference - added), dot(grad, taken.changes)) / total;
   return parts_taken_gradient(steps.cut[place_of(p, steps, s, step)], turn_of(step), grad_parts);
 }
 
-/// The parts that a sample takes at a step that is crossed, of what it takes in all.
-static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s, int step) {
-  return parts_taken(steps.cut[place_of(p, steps, s, step)], turn_of(step)) / total_taken(p, steps, s);
+/// The parts that a sample takes at a step that is crossed.
+static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s, int step, float total) {
+  return parts_taken(steps.cut[place_of(p, steps, s, step)], turn_of(step)) / total;
 }
 
 /// What a sample is to the samples at a step from it, itself among them, if that is crossed; and to those
 /// at the next step, behind whose first it lies.
-static inline float4 gradient_through(const FrameParams p, const Steps steps, Sample s, int step,
+static inline float4 gradient_through(const FrameParams p, const Steps steps, Sample s, int step, float total,
                                       global const float4* restrict grad) {
   const int back = DPR_OPPOSITE(step);
   const uint here = at_step(p, steps, s, step);
   const Sample other = sample_beside(p, s, step);
   if (is_contour(here)) {
-    const Parts own = share_taken(p, steps, s, step), others = share_taken(p, steps, other, back);
+    const Parts own = share_taken(p, steps, s, step, total),
+                others = share_taken(p, steps, other, back, total_taken(p, steps, other));
     const float is_continued = continues(p, steps, s, step) ? 1.0f : 0.0f;
     return (others.x + is_continued * others.y) * grad[other.index] -
            (own.x + is_continued * (own.x - own.y)) * grad[s.index];
   }
   if (here != DPR_NO_CROSSING || !is_contour(at_step(p, steps, other, step))) return 0.0f;
   const Sample beyond = sample_beside(p, other, step);
-  const Parts first = share_taken(p, steps, other, step), second = share_taken(p, steps, beyond, back);
+  const Parts first = share_taken(p, steps, other, step, total_taken(p, steps, other)),
+              second = share_taken(p, steps, beyond, back, total_taken(p, steps, beyond));
   return (first.x - first.y) * grad[other.index] - second.y * grad[beyond.index];
-}
-
-/// Whether anything is at a step from a sample, or at the next in the same direction.
-static inline int is_near_crossing(const FrameParams p, const Steps steps, Sample s) {
-  uint all = DPR_NO_CROSSING;
-#pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) all &= at_step(p, steps, sample_beside(p, s, k), k);
-  return all != DPR_NO_CROSSING || is_crossed(p, steps, s);
 }
 
 /// The gradients of the cuts, and those of the samples: what each has kept of its own colour, and given to
@@ -159,19 +178,20 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
     return;
   }
   const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const uint touched = touched_in_row(p, steps, r, 2);
   for (uint i = 0; i < r.count; ++i) {
     const Sample s = sample_of(r, i);
-    float4 grad = grad_blended[s.index];
-    if (is_near_crossing(p, steps, s)) {
-      for (int k = 0; k < DPR_STEPS; ++k) {
-        grad += gradient_through(p, steps, s, k, grad_blended);
-        if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
-        const Sample other = sample_beside(p, s, k);
-        grad_cut[place_of(p, steps, s, k)] =
-            gradient_at_end(p, steps, s, k, raster, grad_blended[s.index]) +
-            gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_blended[other.index]);
-      }
+    grad_raster[s.index] = grad_blended[s.index];
+    if (!(touched >> i & 1u)) continue;
+    const float total = total_taken(p, steps, s);
+    for (int k = 0; k < DPR_STEPS; ++k) {
+      grad_raster[s.index] += gradient_through(p, steps, s, k, total, grad_blended);
+      if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
+      const Sample other = sample_beside(p, s, k);
+      grad_cut[place_of(p, steps, s, k)] =
+          gradient_at_end(p, steps, s, k, total, raster, grad_blended[s.index]) +
+          gradient_at_end(p, steps, other, DPR_OPPOSITE(k), total_taken(p, steps, other), raster,
+                          grad_blended[other.index]);
     }
-    grad_raster[s.index] = grad;
   }
 }
