@@ -71,9 +71,10 @@ const SamplingError& AovFiles::sampling_error(Renderer& renderer) const {
   return *sampling_error_;
 }
 
-void AovFiles::write(Renderer& renderer) const {
+void AovFiles::write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const {
   if (!aovs_.empty()) {
-    const AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+    AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+    name_old_faces(scene, drawn, outputs);
     for (const Aov aov : aovs_) write_image(file_name(to_string(aov)), aov_image(outputs, aov));
   }
   if (gradient_standard_error_ && sampling_error(renderer).pixel_gradients.empty()) {
