@@ -28,7 +28,7 @@ struct Combinations {
   std::vector<uvec3> of;      ///< [new] indices of old values
   std::vector<vec3> weights;  ///< [new] theirs: multiples of 2^-24, >= 0, sum 1
 
-  /// The new values from [old][channel].
+  /// The new values from [old][channel]. Both throw InvalidArgument for lists that are too short.
   DPR_API std::vector<float> combine(std::span<const float> values, std::size_t channels) const;
   /// The gradient of `old_count` old values, [old][channel], from that of the new ones. Deterministic.
   DPR_API std::vector<float> pull_back(std::span<const float> gradient, std::size_t old_count,
@@ -58,8 +58,8 @@ DPR_API MeshGradient pull_back(const Mesh& mesh, const MeshSubdivision& subdivis
 /// A scene whose faces were cut, and how.
 struct SubdividedScene {
   Scene scene;  ///< entries of meshes, and instances, are those of the old one
-  std::vector<MeshSubdivision>
-      meshes;  ///< [entry of Scene::meshes] uncut for an instance, which has its mesh's
+  /// [entry of Scene::meshes] Of an instance: uncut, since it has its mesh's.
+  std::vector<MeshSubdivision> meshes;
 };
 
 /// Halves edges until the lens of no view shows a point of one further from where it is drawn than the

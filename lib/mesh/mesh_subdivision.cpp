@@ -120,10 +120,17 @@ std::vector<T> of_pieces(const std::vector<std::uint32_t>& face_of, const std::v
   return result;
 }
 
+void require_at_least(std::size_t least, std::size_t found, const std::string& what) {
+  if (found >= least) return;
+  throw InvalidArgument(what + " (subdivided mesh)", std::to_string(found),
+                        "at least " + std::to_string(least) + ", as the mesh has that was cut");
+}
+
 std::vector<glm::vec3> sum_over_pieces(const std::vector<std::uint32_t>& face_of,
                                        const std::vector<glm::vec3>& gradient, std::size_t faces) {
+  require_at_least(face_of.size(), gradient.size(), "gradient of colours");
   std::vector<glm::dvec3> sums(faces, glm::dvec3(0));
-  for (std::size_t i = 0; i < gradient.size(); ++i) sums[face_of[i]] += glm::dvec3(gradient[i]);
+  for (std::size_t i = 0; i < face_of.size(); ++i) sums[face_of[i]] += glm::dvec3(gradient[i]);
   return {sums.begin(), sums.end()};
 }
 
@@ -183,27 +190,25 @@ std::vector<glm::dvec3> directions_backward(const std::vector<glm::dvec3>& norma
   return result;
 }
 
+/// One more than the last index.
+std::size_t old_count_of(const std::vector<glm::uvec3>& of) {
+  std::size_t count = 0;
+  for (const glm::uvec3& i : of) count = std::max(count, std::size_t{std::max({i.x, i.y, i.z})} + 1);
+  return count;
+}
+
 void require_same_counts(const Mesh& mesh, const MeshSubdivision& subdivision) {
-  const auto require = [](std::size_t least, std::size_t found, const char* what) {
-    if (found < least) {
-      throw InvalidArgument(std::string(what) + " (subdivided mesh)", std::to_string(found),
-                            "at least " + std::to_string(least) + ", as the mesh had that was cut");
-    }
-  };
-  require(std::size_t{subdivision.face_of.back()} + 1, mesh.faces.size(), "faces");
-  const auto require_all = [&](const Combinations& list, std::size_t found, const char* what) {
-    std::uint32_t most = 0;
-    for (const glm::uvec3& of : list.of) most = std::max({most, of.x, of.y, of.z});
-    if (!list.of.empty()) require(std::size_t{most} + 1, found, what);
-  };
-  require_all(subdivision.vertices, mesh.positions.size(), "positions");
-  require_all(subdivision.texcoords, mesh.texcoords.size(), "texcoords");
-  if (subdivision.computed_normals == 0) require_all(subdivision.normals, mesh.normals.size(), "normals");
+  require_at_least(std::size_t{subdivision.face_of.back()} + 1, mesh.faces.size(), "faces");
+  require_at_least(old_count_of(subdivision.vertices.of), mesh.positions.size(), "positions");
+  require_at_least(old_count_of(subdivision.texcoords.of), mesh.texcoords.size(), "texcoords");
+  if (subdivision.computed_normals == 0)
+    require_at_least(old_count_of(subdivision.normals.of), mesh.normals.size(), "normals");
 }
 
 }  // namespace
 
 std::vector<float> Combinations::combine(std::span<const float> values, std::size_t channels) const {
+  require_at_least(old_count_of(of) * channels, values.size(), "values");
   std::vector<float> result;
   result.reserve(of.size() * channels);
   for (std::size_t i = 0; i < of.size(); ++i) {
@@ -219,6 +224,8 @@ std::vector<float> Combinations::combine(std::span<const float> values, std::siz
 
 std::vector<float> Combinations::pull_back(std::span<const float> gradient, std::size_t old_count,
                                            std::size_t channels) const {
+  require_at_least(old_count_of(of), old_count, "old_count");
+  require_at_least(of.size() * channels, gradient.size(), "gradient");
   std::vector<double> sums(old_count * channels, 0.0);
   for (std::size_t i = 0; i < of.size(); ++i) {
     for (int k = 0; k < 3; ++k) {

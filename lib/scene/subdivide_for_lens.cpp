@@ -68,6 +68,12 @@ MeshSubdivision cut(const Scene& scene, const Instance& entry, std::span<const L
   return make_subdivision(mesh, pieces, computed_normals(scene, entry));
 }
 
+void require_same_meshes(const Scene& scene, const SubdividedScene& subdivided) {
+  if (scene.meshes.size() == subdivided.meshes.size()) return;
+  throw InvalidArgument("meshes (subdivided scene)", std::to_string(scene.meshes.size()),
+                        std::to_string(subdivided.meshes.size()) + ", as the scene has that was cut");
+}
+
 /// What a face of the cut scene is a piece of.
 struct OldFace {
   std::size_t face;                              ///< counted through the meshes of the scene
@@ -114,6 +120,7 @@ SubdividedScene subdivide_for_lens(const Scene& scene, const LensSubdivisionOpti
 }
 
 SceneGradient pull_back(const Scene& scene, const SubdividedScene& subdivided, SceneGradient of_pieces) {
+  require_same_meshes(scene, subdivided);
   const bool is_cut = std::ranges::any_of(subdivided.meshes, &MeshSubdivision::is_cut);
   if (is_cut && !(of_pieces.shapes.positions.empty() && of_pieces.shapes.colors.empty())) {
     throw InvalidArgument("shapes (gradient of a subdivided scene)", "views with shapes of their own",
@@ -128,10 +135,15 @@ SceneGradient pull_back(const Scene& scene, const SubdividedScene& subdivided, S
 }
 
 void name_old_faces(const Scene& scene, const SubdividedScene& subdivided, AuxiliaryOutputs& outputs) {
+  require_same_meshes(scene, subdivided);
   const std::vector<OldFace> faces = old_faces(scene, subdivided);
   for (std::size_t i = 0; i < outputs.face_id.size(); ++i) {
     std::int32_t& id = outputs.face_id[i];
     if (id < 0) continue;
+    if (static_cast<std::size_t>(id) >= faces.size()) {
+      throw InvalidArgument("face_id (subdivided scene)", std::to_string(id),
+                            "one of its " + std::to_string(faces.size()) + " faces");
+    }
     const OldFace& old = faces[static_cast<std::size_t>(id)];
     id = static_cast<std::int32_t>(old.face);
     if (old.barycentrics == nullptr) continue;

@@ -352,6 +352,13 @@ TEST_SUITE("unit") {
     Mesh less = scene.meshes[0].mesh;
     less.positions.pop_back();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide(less, cut.meshes[0]), "positions (subdivided mesh)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.combine({}, 1), "values (subdivided mesh)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.pull_back({}, 4, 1), "gradient");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back({}, cut, {}), "meshes (subdivided scene)");
+    AuxiliaryOutputs outputs;
+    outputs.face_id = {1 << 20};
+    outputs.barycentrics = {glm::vec3(1, 0, 0)};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, name_old_faces(scene, cut, outputs), "face_id (subdivided scene)");
     SceneGradient of_shapes;
     of_shapes.shapes.positions.resize(4);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back(scene, cut, of_shapes), "shapes");

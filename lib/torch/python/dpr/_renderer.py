@@ -104,14 +104,15 @@ class Renderer:
         these: cut again when they have moved. With lights, normals are those of the pieces: new vertices have their
         face's own, so that what coarse faces shade smoothly gets flat within them.
 
-        Returns a Subdivision, whose faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
+        Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
         """
         arguments = [("vertices", vertices, [("V", 3)]), ("views", views, [("N", 4, 4)]),
                      ("intrinsics", intrinsics, [("N", n) for n in (4, 9, 1)])]
         vertices, views, intrinsics = (_arguments.floats(*a, copy).detach() for a in arguments)
         tolerance = float(_arguments.number("tolerance", tolerance))
-        return Subdivision(*torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance,
-                                                     _arguments.indices(faces, copy), vertices[None], views, intrinsics))
+        faces = _arguments.indices(faces, copy)
+        return Subdivision(*torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance, faces,
+                                                     vertices[None], views, intrinsics))
 
     def _render_each(self, vertices, faces, views, intrinsics, colors, face_colors, shared):
         """Meshes that differ, one a view. Sampled noise is that of the views' places in the batch."""
