@@ -24,15 +24,15 @@ struct LensSubdivisionOptions {
 };
 
 /// New values as linear combinations of old ones: those that there were, in their order, then new ones.
-struct Combinations {
+struct DPR_API Combinations {
   std::vector<uvec3> of;      ///< [new] indices of old values
   std::vector<vec3> weights;  ///< [new] theirs: multiples of 2^-24, >= 0, sum 1
 
   /// The new values from [old][channel]. Both throw InvalidArgument for lists that are too short.
-  DPR_API std::vector<float> combine(std::span<const float> values, std::size_t channels) const;
+  std::vector<float> combine(std::span<const float> values, std::size_t channels) const;
   /// The gradient of `old_count` old values, [old][channel], from that of the new ones. Deterministic.
-  DPR_API std::vector<float> pull_back(std::span<const float> gradient, std::size_t old_count,
-                                       std::size_t channels) const;
+  std::vector<float> pull_back(std::span<const float> gradient, std::size_t old_count,
+                               std::size_t channels) const;
 };
 
 /// How the faces of a mesh were cut. All empty where none was.
