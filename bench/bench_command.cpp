@@ -42,6 +42,11 @@ void run_report(const BenchOptions& options, const CommonOptions& common) {
 }
 
 void run(const BenchOptions& options, const CommonOptions& common) {
+  const bool writes =
+      !options.measure.output.empty() || !options.measure.csv.empty() || !options.report.empty();
+  if (common.quiet && !writes && options.fail_above == 0)
+    throw InvalidArgument("--quiet (command line)", "nothing to write",
+                          "-o FILE, --csv FILE or --report DIR beside it");
   if (options.fail_above > 0 && options.compared.empty())
     throw InvalidArgument("--fail-above (command line)", "no --compare", "--compare A.json B.json beside it");
   if (!options.compared.empty()) return run_compare(options, common);

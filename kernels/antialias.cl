@@ -1,54 +1,10 @@
 // Samples blended across the contours between them. Where a contour crosses the step between two neighbouring
-// samples, each takes a part of the other's colour (crossing.h): the image follows the contour, and its
-// derivative by what is cut is the jump across it. What crosses, and how much it cuts, antialias_cross.cl
-// finds.
+// samples, each takes a part of what the other's colour is beyond it (steps.h): the image follows the
+// contour, and its derivative by what is cut is the jump across it. What crosses, and how much it cuts,
+// antialias_cross.cl finds.
 //
 // Few steps are crossed: a work-item takes a row of a tile, and copies it where no contour is near.
-#include "crossing.h"
-
-/// The steps from a sample: to the right, down, from the left, from above; and the same step as the sample at
-/// its other end counts it.
-#define DPR_STEPS 4
-#define DPR_OPPOSITE(step) ((step) ^ 2)
-
-/// Which end of a step a sample is: see part_taken().
-static inline float turn_of(int step) { return step < 2 ? -1.0f : 1.0f; }
-
-typedef struct {
-  uint step[DPR_STEPS], other[DPR_STEPS];  // the step, and the sample at its other end
-  int is_crossed[DPR_STEPS];
-  Cut cut[DPR_STEPS];     // of those that are
-  float part[DPR_STEPS];  // that is taken of the other sample's colour
-  float total;            // of the parts, or 1 if that is less
-} Cell;
-
-/// Whether anything crosses a step from a sample, in column and row `at` of its view.
-static inline int is_crossed(const FrameParams p, uint pixel, uint2 at, uint pixels,
-                             global const uint* restrict winner) {
-  const uint left = at.x > 0 ? winner[pixel - 1] : DPR_NO_CROSSING;
-  const uint above = at.y > 0 ? winner[pixels + pixel - p.width] : DPR_NO_CROSSING;
-  return (winner[pixel] & winner[pixels + pixel] & left & above) != DPR_NO_CROSSING;
-}
-
-static inline Cell load_cell(const FrameParams p, uint pixel, uint2 at, uint pixels,
-                             global const uint* restrict winner, global const float2* restrict cut) {
-  const int has[DPR_STEPS] = {1, 1, at.x > 0, at.y > 0};
-  const uint first[DPR_STEPS] = {pixel, pixels + pixel, pixel - 1, pixels + pixel - p.width};
-  const uint other[DPR_STEPS] = {pixel + 1, pixel + p.width, pixel - 1, pixel - p.width};
-  Cell c;
-  float sum = 0.0f;
-#pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    c.step[k] = first[k];
-    c.other[k] = other[k];
-    c.is_crossed[k] = has[k] && winner[first[k]] != DPR_NO_CROSSING;
-    c.cut[k] = c.is_crossed[k] ? cut[first[k]] : (Cut)(0.0f);
-    c.part[k] = part_taken(c.cut[k], turn_of(k));
-    sum += c.part[k];
-  }
-  c.total = fmax(sum, 1.0f);
-  return c;
-}
+#include "steps.h"
 
 /// A row of a tile: `count` samples from `first` on, at column and row `at` of its view; none below the
 /// raster.
@@ -68,6 +24,11 @@ static inline TileRow tile_row(const FrameParams p, uint i) {
   return r;
 }
 
+static inline Sample sample_of(TileRow r, uint k) {
+  const Sample s = {r.first + k, (int2)((int)(r.at.x + k), (int)r.at.y)};
+  return s;
+}
+
 static inline void copy_row(TileRow r, global const float4* restrict from, global float4* restrict to) {
   if (r.count == DPR_TILE) {
     global const float* first = (global const float*)(from + r.first);
@@ -79,18 +40,43 @@ static inline void copy_row(TileRow r, global const float4* restrict from, globa
   for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
-/// What becomes of a sample's colour `own`.
-static inline float4 mixed_cell(const Cell c, float4 own, global const float4* restrict raster) {
-  float4 sum = own;
+/// Whether anything is at a step from a sample.
+static inline int is_crossed(const FrameParams p, const Steps steps, Sample s) {
+  uint all = DPR_NO_CROSSING;
 #pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (c.is_crossed[k]) sum += c.part[k] / c.total * (raster[c.other[k]] - own);
-  }
-  return sum;
+  for (int k = 0; k < DPR_STEPS; ++k) all &= at_step(p, steps, s, k);
+  return all != DPR_NO_CROSSING;
 }
 
-/// Blends the samples. Contours on all sides of a sample may leave nothing of it: then the others share it.
-/// One work-item per row of a tile. Deterministic.
+/// What a sample's parts at a step take: the difference of the colours with the sample's own continued all
+/// the way, and the sum of their changes.
+typedef struct {
+  float4 difference, changes;
+} Taken;
+
+static inline Taken taken_at(const FrameParams p, const Steps steps, Sample s, int step,
+                             global const float4* restrict raster) {
+  const Sample other = sample_beside(p, s, step);
+  const float4 change = change_towards(p, steps, s, step, raster);
+  const Taken t = {raster[other.index] - raster[s.index] - change,
+                   change_towards(p, steps, other, DPR_OPPOSITE(step), raster) + change};
+  return t;
+}
+
+/// What contours add to a sample.
+static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
+                              global const float4* restrict raster) {
+  float4 sum = 0.0f;
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    if (!is_contour(at_step(p, steps, s, k))) continue;
+    const Parts parts = parts_taken(steps.cut[place_of(p, steps, s, k)], turn_of(k));
+    const Taken taken = taken_at(p, steps, s, k, raster);
+    sum += parts.x * taken.difference + parts.y * taken.changes;
+  }
+  return sum / total_taken(p, steps, s);
+}
+
+/// Blends the samples. One work-item per row of a tile. Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   winner, cut  as antialias_cross leaves them
 /// in   raster       float4[pixel]  the samples
@@ -104,27 +90,60 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
     copy_row(r, raster, blended);
     return;
   }
-  const uint pixels = p.views * p.width * p.height;
+  const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint k = 0; k < r.count; ++k) {
-    const uint pixel = r.first + k;
-    const uint2 at = r.at + (uint2)(k, 0u);
-    blended[pixel] = is_crossed(p, pixel, at, pixels, winner)
-                         ? mixed_cell(load_cell(p, pixel, at, pixels, winner, cut), raster[pixel], raster)
-                         : raster[pixel];
+    const Sample s = sample_of(r, k);
+    const float4 own = raster[s.index];
+    blended[s.index] = is_crossed(p, steps, s) ? own + added_to(p, steps, s, raster) : own;
   }
 }
 
-/// What the end of step k of a sample gives the step's cut. Where the parts are scaled to add up to 1, so is
-/// what one of them changes.
-static inline Cut gradient_at_end(const Cell c, int k, uint pixel, global const float4* restrict raster,
-                                  float4 grad) {
-  const float4 own = raster[pixel], from = c.total > 1.0f ? mixed_cell(c, own, raster) : own;
-  return dot(grad, raster[c.other[k]] - from) / c.total * part_taken_gradient(c.cut[k], turn_of(k));
+/// What the end of a step gives the step's cut. Where the parts are scaled to add up to 1, so is what one of
+/// them changes.
+static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
+                                  global const float4* restrict raster, float4 grad) {
+  const Taken taken = taken_at(p, steps, s, step, raster);
+  const float total = total_taken(p, steps, s);
+  const float4 added = total > 1.0f ? added_to(p, steps, s, raster) : 0.0f;
+  const Parts grad_parts = (Parts)(dot(grad, taken.difference - added), dot(grad, taken.changes)) / total;
+  return parts_taken_gradient(steps.cut[place_of(p, steps, s, step)], turn_of(step), grad_parts);
+}
+
+/// The parts that a sample takes at a step that is crossed, of what it takes in all.
+static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s, int step) {
+  return parts_taken(steps.cut[place_of(p, steps, s, step)], turn_of(step)) / total_taken(p, steps, s);
+}
+
+/// What a sample is to the samples at a step from it, itself among them, if that is crossed; and to those
+/// at the next step, behind whose first it lies.
+static inline float4 gradient_through(const FrameParams p, const Steps steps, Sample s, int step,
+                                      global const float4* restrict grad) {
+  const int back = DPR_OPPOSITE(step);
+  const uint here = at_step(p, steps, s, step);
+  const Sample other = sample_beside(p, s, step);
+  if (is_contour(here)) {
+    const Parts own = share_taken(p, steps, s, step), others = share_taken(p, steps, other, back);
+    const float is_continued = continues(p, steps, s, step) ? 1.0f : 0.0f;
+    return (others.x + is_continued * others.y) * grad[other.index] -
+           (own.x + is_continued * (own.x - own.y)) * grad[s.index];
+  }
+  if (here != DPR_NO_CROSSING || !is_contour(at_step(p, steps, other, step))) return 0.0f;
+  const Sample beyond = sample_beside(p, other, step);
+  const Parts first = share_taken(p, steps, other, step), second = share_taken(p, steps, beyond, back);
+  return (first.x - first.y) * grad[other.index] - second.y * grad[beyond.index];
+}
+
+/// Whether anything is at a step from a sample, or at the next in the same direction.
+static inline int is_near_crossing(const FrameParams p, const Steps steps, Sample s) {
+  uint all = DPR_NO_CROSSING;
+#pragma unroll
+  for (int k = 0; k < DPR_STEPS; ++k) all &= at_step(p, steps, sample_beside(p, s, k), k);
+  return all != DPR_NO_CROSSING || is_crossed(p, steps, s);
 }
 
 /// The gradients of the cuts, and those of the samples: what each has kept of its own colour, and given to
-/// its neighbours. One work-item per row of a tile; a step's cut is its first sample's to write.
-/// Deterministic. Inputs as antialias_forward, and
+/// others. One work-item per row of a tile; a step's cut is its first sample's to write. Deterministic.
+/// Inputs as antialias_forward, and
 /// in   grad_blended   float4[pixel]
 /// out  grad_cut       Cut[2][pixel]  not written where nothing crosses
 /// out  grad_raster    float4[pixel]
@@ -135,36 +154,24 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
                                global float4* restrict grad_raster) {
   const TileRow r = tile_row(p, (uint)get_global_id(0));
   if (r.count == 0) return;
-  if (!may_be_crossed(p, r.tile, tile_starts)) {
+  if (!is_near_contour(p, r.tile, 1, tile_starts)) {
     copy_row(r, grad_blended, grad_raster);
     return;
   }
-  const uint pixels = p.views * p.width * p.height;
+  const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint i = 0; i < r.count; ++i) {
-    const uint pixel = r.first + i;
-    const uint2 at = r.at + (uint2)(i, 0u);
-    const float4 grad = grad_blended[pixel];
-    if (!is_crossed(p, pixel, at, pixels, winner)) {
-      grad_raster[pixel] = grad;
-      continue;
-    }
-    const Cell c = load_cell(p, pixel, at, pixels, winner, cut);
-    const uint2 beside[DPR_STEPS] = {at + (uint2)(1u, 0u), at + (uint2)(0u, 1u), at - (uint2)(1u, 0u),
-                                     at - (uint2)(0u, 1u)};
-    float kept = 1.0f;
-    float4 given = 0.0f;
-#pragma unroll
-    for (int k = 0; k < DPR_STEPS; ++k) {
-      if (!c.is_crossed[k]) continue;
-      const Cell other = load_cell(p, c.other[k], beside[k], pixels, winner, cut);
-      const float4 grad_other = grad_blended[c.other[k]];
-      kept -= c.part[k] / c.total;
-      given += other.part[DPR_OPPOSITE(k)] / other.total * grad_other;
-      if (k < 2) {
-        grad_cut[c.step[k]] = gradient_at_end(c, k, pixel, raster, grad) +
-                              gradient_at_end(other, DPR_OPPOSITE(k), c.other[k], raster, grad_other);
+    const Sample s = sample_of(r, i);
+    float4 grad = grad_blended[s.index];
+    if (is_near_crossing(p, steps, s)) {
+      for (int k = 0; k < DPR_STEPS; ++k) {
+        grad += gradient_through(p, steps, s, k, grad_blended);
+        if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
+        const Sample other = sample_beside(p, s, k);
+        grad_cut[place_of(p, steps, s, k)] =
+            gradient_at_end(p, steps, s, k, raster, grad_blended[s.index]) +
+            gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_blended[other.index]);
       }
     }
-    grad_raster[pixel] = given + kept * grad;
+    grad_raster[s.index] = grad;
   }
 }

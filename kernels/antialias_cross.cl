@@ -39,6 +39,17 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
   return is_crease < before_is_crease || (is_crease == before_is_crease && depth < before_depth);
 }
 
+static inline void clear_steps(const FrameParams p, const TileSamples s, uint first_pixel,
+                               global uint* restrict winner) {
+  const uint pixels = p.views * p.width * p.height;
+  for (int row = s.first_row; row < s.last_row; ++row) {
+    for (int column = s.first_column; column < s.last_column; ++column) {
+      const uint pixel = first_pixel + (uint)row * p.width + (uint)column;
+      winner[pixel] = winner[pixels + pixel] = DPR_NO_CROSSING;
+    }
+  }
+}
+
 /// Finds what crosses the steps of a tile. One work-item per tile of all views. Deterministic.
 /// in   edges         uint4[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
@@ -48,8 +59,9 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
 /// in   tile_starts   uint[view * tile + 1] runs of pairs
 /// in   pair_contour  uint[pair]            see DPR_CONTOUR_FLAGS, ascending within a tile
 /// in   front         float[pixel]
-/// out  winner        uint[2][pixel]        the contour that crosses a step, or DPR_NO_CROSSING. Not written
-///                                          in tiles that are not near a contour: is_near_contour()
+/// out  winner        uint[2][pixel]        the contour that crosses a step, DPR_PASSED, or DPR_NO_CROSSING.
+///                                          Not written in tiles further than two from a contour: nothing
+///                                          asks for their steps
 /// out  cut           Cut[2][pixel]         what it cuts. Not written where nothing crosses
 /// out  crowded       uint[tile][4]         see bit_in_tile(): steps that several contours cross. Not
 ///                                          written where the winners are not
@@ -62,15 +74,10 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
                             global float2* restrict cut, global uint* restrict crowded) {
   const uint tile = (uint)get_global_id(0);
   const uint tiles = p.tiles_x * p.tiles_y, view = tile / tiles;
-  if (view >= p.views || !is_near_contour(p, tile, tile_starts)) return;
-  const uint pixels = p.views * p.width * p.height, first_pixel = view * p.width * p.height;
+  if (view >= p.views || !is_near_contour(p, tile, 2, tile_starts)) return;
+  const uint first_pixel = view * p.width * p.height;
   const TileSamples s = tile_samples(p, tile);
-  for (int row = s.first_row; row < s.last_row; ++row) {
-    for (int column = s.first_column; column < s.last_column; ++column) {
-      const uint pixel = first_pixel + (uint)row * p.width + (uint)column;
-      winner[pixel] = winner[pixels + pixel] = DPR_NO_CROSSING;
-    }
-  }
+  clear_steps(p, s, first_pixel, winner);
   const CrossingScene v = {faces, ndc, front + first_pixel, a.depth_reach / views[view].inverse_range};
   float nearest[2 * DPR_TILE * DPR_TILE];
   uint several[DPR_TILE_WORDS] = {0, 0, 0, 0};
@@ -78,19 +85,27 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
     const uint contour = pair_contour[pair];
     const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
-      if (c.by_rows == (by_rows ? 0.0f : 1.0f)) continue;
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
+      const int only_passes = weight_of_slope(e.slope * e.slope) == 0.0f;
       const int2 lines = lines_of_edge(p, e, s);
       for (int line = lines.x; line < lines.y; ++line) {
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
         const uint step = step_of(p, view, e, x), bit = bit_in_tile(e, x);
         const float depth = mix_depths(p, c.depths, x.along);
-        if (winner[step] != DPR_NO_CROSSING) {
-          several[bit / 32] |= 1u << bit % 32;
-          if (!goes_before(winner[step], nearest[bit], contour, depth)) continue;
+        const int loses = is_contour(winner[step]) &&
+                          (only_passes || !goes_before(winner[step], nearest[bit], contour, depth));
+        if (loses && (several[bit / 32] >> bit % 32 & 1u)) continue;
+        const int hidden = hidden_from(p, v, c, e, x, (int)(contour & DPR_CONTOUR_CREASE), depth);
+        if (hidden == 2) continue;
+        if (winner[step] != DPR_NO_CROSSING) several[bit / 32] |= 1u << bit % 32;
+        if (loses) continue;
+        // Where one of the samples shows what lies beyond another contour, a crease is there, but wins
+        // nothing.
+        if (only_passes || hidden) {
+          if (winner[step] == DPR_NO_CROSSING) winner[step] = DPR_PASSED;
+          continue;
         }
-        if (is_hidden(p, v, c, e, x, (int)(contour & DPR_CONTOUR_CREASE), depth)) continue;
         winner[step] = contour;
         cut[step] = cut_of(p, c, e, x);
         nearest[bit] = depth;
@@ -138,19 +153,18 @@ kernel void antialias_cross_backward(
   const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
   const TileSamples s = tile_samples(p, pair_tile[pair]);
   float2 grad_a = 0.0f, grad_b = 0.0f;
-  float grad_weight = 0.0f;  // of what counts by rows
   for (int by_rows = 0; by_rows < 2; ++by_rows) {
-    if (c.by_rows == (by_rows ? 0.0f : 1.0f)) continue;
     const RasterEdge e = raster_edge(c.a, c.b, by_rows);
+    if (weight_of_slope(e.slope * e.slope) == 0.0f) continue;
     const int2 lines = lines_of_edge(p, e, s);
-    float at_a = 0.0f, at_b = 0.0f, across_a = 0.0f, across_b = 0.0f, of_weight = 0.0f;
+    float at_a = 0.0f, at_b = 0.0f, across_a = 0.0f, across_b = 0.0f, of_slope2 = 0.0f;
     for (int line = lines.x; line < lines.y; ++line) {
       const Crossing x = cross_line(p, e, line);
       if (!is_step_of(p, e, x, s)) continue;
       const Cut grad_of = gradient_of_cut(contour, step_of(p, c.view, e, x), pair_tile[pair], winner,
                                           grad_cut, second_counts, seconds, grad_seconds);
       const float grad = grad_of.x;
-      of_weight += grad_of.y;
+      of_slope2 += grad_of.y;
       if (grad == 0.0f) continue;
       const CornerArea first = corner_of(p, c, e, x, 0), second = corner_of(p, c, e, x, 1);
       at_a += grad *
@@ -164,10 +178,9 @@ kernel void antialias_cross_backward(
     const float scale = (by_rows ? 1.0f : -1.0f) / p.pixel_size;
     const float2 direction = by_rows ? (float2)(1.0f, -e.slope) : (float2)(-e.slope, 1.0f);
     const float2 across = by_rows ? (float2)(0.0f, -1.0f) : (float2)(-1.0f, 0.0f);
-    grad_a += scale * (at_a * direction + across_a * across);
-    grad_b += scale * (at_b * direction + across_b * across);
-    grad_weight += by_rows ? of_weight : -of_weight;
+    const float2 by_slope = 2.0f * of_slope2 * e.slope * e.inverse * direction;
+    grad_a += scale * (at_a * direction + across_a * across) - by_slope;
+    grad_b += scale * (at_b * direction + across_b * across) + by_slope;
   }
-  const float2 by_direction = grad_weight * weight_by_rows_gradient(c.b - c.a);
-  grad_ends[pair] = (float4)(grad_a - by_direction, grad_b + by_direction);
+  grad_ends[pair] = (float4)(grad_a, grad_b);
 }

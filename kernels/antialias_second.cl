@@ -9,13 +9,14 @@
 #include "visibility.h"
 
 /// How many lines away a contour looks for a step of its own. Crossings are at most twice as far along the
-/// lines: it lies in the tile or in one around it.
-#define DPR_REFERENCE_LINES 3
+/// lines, and the samples behind the step one more: all of it lies at most DPR_NEAR_TILES away.
+#define DPR_REFERENCE_LINES 6
+#define DPR_NEAR_TILES 2
 
 /// Set in a reference whose samples lie the other way round.
 #define DPR_TURNED 0x80000000u
 
-static inline int is_on_raster(const FrameParams p, const RasterEdge e, const Crossing x) {
+static inline int lies_on_raster(const FrameParams p, const RasterEdge e, const Crossing x) {
   return x.exists && x.column >= 0 && x.row >= 0 && x.column + e.is_by_rows < (int)p.width &&
          x.row + !e.is_by_rows < (int)p.height;
 }
@@ -31,7 +32,7 @@ static inline uint own_step(const FrameParams p, uint view, uint contour, const 
                             global const uint* restrict crowded) {
   const RasterEdge e = raster_edge(c.a, c.b, by_rows);
   const Crossing x = cross_line(p, e, line);
-  if (!is_on_raster(p, e, x)) return DPR_NO_CROSSING;
+  if (!lies_on_raster(p, e, x)) return DPR_NO_CROSSING;
   const uint step = step_of(p, view, e, x);
   const uint tile = tile_of_sample(p, view, (uint)x.column, (uint)x.row);
   if (winner[step] != contour || has_bit(crowded + DPR_TILE_WORDS * tile, bit_in_tile(e, x)))
@@ -85,7 +86,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
     return hides_crease(p, c, v.faces, v.ndc, inner_first == is_first, pixel_centre(p, column, row), front,
                         depth, slack);
   }
-  if (inner_first != is_first && is_hidden(p, v, c, e, x, 0, depth)) return 1;
+  if (inner_first != is_first && hidden_from(p, v, c, e, x, 0, depth)) return 1;
   // What the winner bounds hides what lies behind it; contours that meet lie on one surface.
   return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
          mix_depths(p, winner.depths, at.along) < depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
@@ -103,7 +104,7 @@ static inline int may_be_second(const FrameParams p, uint view, uint contour, co
     x.column = e.is_by_rows ? first : line;
     x.row = e.is_by_rows ? line : first;
     const uint other = winner[step_of(p, view, e, x)];
-    if (other != DPR_NO_CROSSING && other != contour) return 1;
+    if (is_contour(other) && other != contour) return 1;
   }
   return 0;
 }
@@ -141,7 +142,7 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
         const uint step = step_of(p, view, e, x), first = winner[step];
-        if (first == DPR_NO_CROSSING) continue;
+        if (!is_contour(first)) continue;
         const float depth = mix_depths(p, c.depths, x.along);
         if (first == contour) continue;
         const TileContour other = load_contour(p, a, first, edges, faces, facing, ndc, clipped);
@@ -163,18 +164,12 @@ static inline uint2 ends_of_step(const FrameParams p, uint step) {
   return step < pixels ? (uint2)(step, step + 1) : (uint2)(step - pixels, step - pixels + p.width);
 }
 
-/// The samples at the ends of a reference, the first on the side of the second's first.
-static inline uint2 ends_of_reference(const FrameParams p, uint reference) {
-  const uint2 ends = ends_of_step(p, reference & ~DPR_TURNED);
-  return reference & DPR_TURNED ? ends.yx : ends;
-}
-
 static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
   const uint line = sample / p.width;
   return tile_of_sample(p, line / p.height, sample % p.width, line % p.height) == tile;
 }
 
-/// The tiles that touch one, itself among them: a rectangle, row by row.
+/// The tiles at most DPR_NEAR_TILES away from one: a rectangle, row by row.
 typedef struct {
   uint first, columns, count;
 } NearTiles;
@@ -182,8 +177,9 @@ typedef struct {
 static inline NearTiles near_tiles(const FrameParams p, uint tile) {
   const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
              row = in_view / p.tiles_x;
-  const uint left = column > 0, above = row > 0;
-  const uint columns = 1 + left + (column + 1 < p.tiles_x), rows = 1 + above + (row + 1 < p.tiles_y);
+  const uint left = min(column, (uint)DPR_NEAR_TILES), above = min(row, (uint)DPR_NEAR_TILES);
+  const uint columns = 1 + left + min(p.tiles_x - 1 - column, (uint)DPR_NEAR_TILES),
+             rows = 1 + above + min(p.tiles_y - 1 - row, (uint)DPR_NEAR_TILES);
   const NearTiles tiles = {tile - left - above * p.tiles_x, columns, columns * rows};
   return tiles;
 }
@@ -192,43 +188,98 @@ static inline uint near_tile(const FrameParams p, const NearTiles tiles, uint k)
   return tiles.first + k / tiles.columns * p.tiles_x + k % tiles.columns;
 }
 
-static inline Cut own_cut(const SecondCrossing c) { return (Cut)(c.cut, c.weight); }
+static inline Cut own_cut(const SecondCrossing c) { return (Cut)(c.cut, c.slope2); }
 
 /// The parts of a second's jump that the two samples of its step gain: its own, less the winner's.
 static inline float2 parts_gained(const SecondCrossing c, Cut winner) {
-  return (float2)(part_taken(own_cut(c), -1.0f) - part_taken(winner, -1.0f),
-                  part_taken(winner, 1.0f) - part_taken(own_cut(c), 1.0f));
+  return (float2)(parts_taken(own_cut(c), -1.0f).x - parts_taken(winner, -1.0f).x,
+                  parts_taken(winner, 1.0f).x - parts_taken(own_cut(c), 1.0f).x);
 }
 
 /// The gradient of a cut, with those of the parts that it takes of the jump at both samples.
 static inline Cut gradient_by_parts(Cut cut, float of_first, float of_second) {
-  return of_first * part_taken_gradient(cut, -1.0f) - of_second * part_taken_gradient(cut, 1.0f);
+  return parts_taken_gradient(cut, -1.0f, (Parts)(of_first, 0.0f)) -
+         parts_taken_gradient(cut, 1.0f, (Parts)(of_second, 0.0f));
+}
+
+/// The step at which a second's jump is taken, from the sample on the side of the second's first to the
+/// other; and the way to the contour from each.
+typedef struct {
+  uint place;
+  Sample first, second;
+  int step;  // from the first sample
+  float way_first, way_second;
+} Reference;
+
+static inline Reference load_reference(const FrameParams p, const Steps steps, uint reference) {
+  Reference r;
+  r.place = reference & ~DPR_TURNED;
+  const uint2 ends = ends_of_step(p, r.place);
+  const float t = 0.5f + steps.cut[r.place].x;
+  const int is_turned = (reference & DPR_TURNED) != 0, ahead = r.place < steps.pixels ? 0 : 1;
+  r.step = is_turned ? DPR_OPPOSITE(ahead) : ahead;
+  r.first = sample_at(p, is_turned ? ends.y : ends.x);
+  r.second = sample_beside(p, r.first, r.step);
+  r.way_first = is_turned ? 1.0f - t : t;
+  r.way_second = 1.0f - r.way_first;
+  return r;
+}
+
+/// The jump across a contour, of the colours on both sides as they continue to it.
+static inline float4 jump_at(const FrameParams p, const Steps steps, const Reference r,
+                             global const float4* restrict raster) {
+  return raster[r.second.index] +
+         r.way_second * change_towards(p, steps, r.second, DPR_OPPOSITE(r.step), raster) -
+         raster[r.first.index] - r.way_first * change_towards(p, steps, r.first, r.step, raster);
+}
+
+/// Adds what a jump's gradient is to the sample at one end of its step, and to the one behind.
+static inline void add_to_end(const FrameParams p, const Steps steps, uint tile, Sample s, int step,
+                              float way, float4 grad, global float4* grad_raster) {
+  const float changes = continues(p, steps, s, step) ? way : 0.0f;
+  if (is_in_tile(p, tile, s.index)) grad_raster[s.index] += (1.0f + changes) * grad;
+  if (changes == 0.0f) return;
+  const Sample behind = sample_beside(p, s, DPR_OPPOSITE(step));
+  if (is_in_tile(p, tile, behind.index)) grad_raster[behind.index] -= changes * grad;
 }
 
 /// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
 /// in      counts, seconds  as antialias_second_find leaves them
-/// in      cut              Cut[2][pixel]    of the winners
+/// in      winner, cut      as antialias_cross does
 /// in      raster           float4[pixel]    the samples
 /// in out  blended          float4[pixel]
 kernel void antialias_second_forward(const FrameParams p, global const uint* restrict counts,
                                      global const SecondCrossing* restrict seconds,
-                                     global const float2* restrict cut, global const float4* restrict raster,
-                                     global float4* restrict blended) {
+                                     global const uint* restrict winner, global const float2* restrict cut,
+                                     global const float4* restrict raster, global float4* restrict blended) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  const Steps steps = {winner, cut, p.views * p.width * p.height};
   const NearTiles tiles = near_tiles(p, tile);
   for (uint i = 0; i < tiles.count; ++i) {
     const uint near = near_tile(p, tiles, i);
     for (uint k = 0; k < counts[near]; ++k) {
       const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
-      const uint2 ends = ends_of_reference(p, c.reference);
-      const float4 jump = raster[ends.y] - raster[ends.x];
+      const float4 jump = jump_at(p, steps, load_reference(p, steps, c.reference), raster);
       const uint2 samples = ends_of_step(p, c.step);
       const float2 parts = parts_gained(c, cut[c.step]);
       if (is_in_tile(p, tile, samples.x)) blended[samples.x] += parts.x * jump;
       if (is_in_tile(p, tile, samples.y)) blended[samples.y] += parts.y * jump;
     }
   }
+}
+
+/// What the gradient of a second's jump is to the samples at its reference, and to the reference's cut.
+static inline void add_to_reference(const FrameParams p, const Steps steps, uint tile, const Reference r,
+                                    float4 grad_jump, global const float4* restrict raster,
+                                    global float2* grad_cut, global float4* grad_raster) {
+  const int back = DPR_OPPOSITE(r.step);
+  add_to_end(p, steps, tile, r.first, r.step, r.way_first, -grad_jump, grad_raster);
+  add_to_end(p, steps, tile, r.second, back, r.way_second, grad_jump, grad_raster);
+  if (!is_in_tile(p, tile, ends_of_step(p, r.place).x)) return;
+  const float4 changes =
+      change_towards(p, steps, r.first, r.step, raster) + change_towards(p, steps, r.second, back, raster);
+  grad_cut[r.place].x += turn_of(r.step) * dot(grad_jump, changes);
 }
 
 /// The gradients of what winners and seconds cut, and of the samples at the references. One work-item per
@@ -239,27 +290,27 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
 /// out     grad_seconds  Cut[tile][DPR_SECOND_CROSSINGS]
 kernel void antialias_second_backward(const FrameParams p, global const uint* restrict counts,
                                       global const SecondCrossing* restrict seconds,
-                                      global const float2* restrict cut, global const float4* restrict raster,
+                                      global const uint* restrict winner, global const float2* restrict cut,
+                                      global const float4* restrict raster,
                                       global const float4* restrict grad_blended,
                                       global float2* restrict grad_cut, global float4* restrict grad_raster,
                                       global float2* restrict grad_seconds) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  const Steps steps = {winner, cut, p.views * p.width * p.height};
   const NearTiles tiles = near_tiles(p, tile);
   for (uint i = 0; i < tiles.count; ++i) {
     const uint near = near_tile(p, tiles, i);
     for (uint k = 0; k < counts[near]; ++k) {
       const uint place = DPR_SECOND_CROSSINGS * near + k;
       const SecondCrossing c = seconds[place];
-      const uint2 ends = ends_of_reference(p, c.reference);
+      const Reference r = load_reference(p, steps, c.reference);
       const uint2 samples = ends_of_step(p, c.step);
       const float4 first = grad_blended[samples.x], second = grad_blended[samples.y];
       const float2 parts = parts_gained(c, cut[c.step]);
-      const float4 grad_jump = parts.x * first + parts.y * second;
-      if (is_in_tile(p, tile, ends.x)) grad_raster[ends.x] -= grad_jump;
-      if (is_in_tile(p, tile, ends.y)) grad_raster[ends.y] += grad_jump;
+      add_to_reference(p, steps, tile, r, parts.x * first + parts.y * second, raster, grad_cut, grad_raster);
       if (near != tile) continue;
-      const float4 jump = raster[ends.y] - raster[ends.x];
+      const float4 jump = jump_at(p, steps, r, raster);
       const float of_first = dot(first, jump), of_second = dot(second, jump);
       grad_cut[c.step] -= gradient_by_parts(cut[c.step], of_first, of_second);
       grad_seconds[place] = gradient_by_parts(own_cut(c), of_first, of_second);

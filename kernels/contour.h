@@ -161,12 +161,14 @@ static inline int may_be_crossed(const FrameParams p, uint tile, global const ui
   return in_view >= p.tiles_x && have_contours(tile_starts, tile - p.tiles_x, tile - p.tiles_x);
 }
 
-/// Whether a contour lies in a tile or beside it: further away nothing asks for the steps of its samples.
-static inline int is_near_contour(const FrameParams p, uint tile, global const uint* tile_starts) {
+/// Whether a contour lies at most `reach` tiles away from a tile.
+static inline int is_near_contour(const FrameParams p, uint tile, uint reach,
+                                  global const uint* tile_starts) {
   const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
              row = in_view / p.tiles_x;
-  const uint left = column > 0 ? 1 : 0, right = column + 1 < p.tiles_x ? 1 : 0;
-  const uint first = row > 0 ? tile - p.tiles_x : tile, last = row + 1 < p.tiles_y ? tile + p.tiles_x : tile;
+  const uint left = min(column, reach), right = min(p.tiles_x - 1 - column, reach);
+  const uint first = tile - min(row, reach) * p.tiles_x,
+             last = tile + min(p.tiles_y - 1 - row, reach) * p.tiles_x;
   for (uint middle = first; middle <= last; middle += p.tiles_x) {
     if (have_contours(tile_starts, middle - left, middle + right)) return 1;
   }

@@ -39,31 +39,30 @@ static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
   return e;
 }
 
-/// The squared sine of an edge's angle to the rows below which the columns alone count it, and the width of
-/// the range in which both do: slopes of 1/2 to 2.
-#define DPR_FLATTEST_BY_ROWS 0.2f
-#define DPR_RANGE_BY_ROWS 0.6f
+/// Of an edge's angle to the lines, the squared sine below which those across alone count it, and the width
+/// of the range in which both do: slopes of 1/2 to 2.
+#define DPR_FLATTEST 0.2f
+#define DPR_RANGE_OF_BOTH 0.6f
 
-static inline float range_by_rows(float2 d) {
-  const float length2 = dot(d, d);
-  return length2 > 0.0f ? clamp((d.y * d.y / length2 - DPR_FLATTEST_BY_ROWS) / DPR_RANGE_BY_ROWS, 0.0f, 1.0f)
-                        : 0.0f;
+/// Edges of a larger squared slope do not count.
+#define DPR_SLOPE2_THAT_COUNTS 4.0f
+
+static inline float range_of_slope(float slope2) {
+  return clamp((1.0f / (1.0f + slope2) - DPR_FLATTEST) / DPR_RANGE_OF_BOTH, 0.0f, 1.0f);
 }
 
-/// How much an edge counts by rows; by columns it counts the rest. A step function of the slope would leave
-/// out, or count twice, up to half a cell where a smooth contour passes 45 degrees.
-static inline float weight_by_rows(float2 d) {
-  const float x = range_by_rows(d);
+/// How much an edge counts by lines to whose normal it has a slope; by those across it counts the rest. A
+/// step function of the slope would leave out, or count twice, up to half a cell where a smooth contour
+/// passes 45 degrees.
+static inline float weight_of_slope(float slope2) {
+  const float x = range_of_slope(slope2);
   return x * x * (3.0f - 2.0f * x);
 }
 
-/// Its gradient by d.
-static inline float2 weight_by_rows_gradient(float2 d) {
-  const float x = range_by_rows(d), length2 = dot(d, d);
-  if (!(x > 0.0f && x < 1.0f)) return (float2)(0.0f);
-  const float2 direction = d / length2;
-  const float by_sine2 = 6.0f * x * (1.0f - x) / DPR_RANGE_BY_ROWS;
-  return 2.0f * by_sine2 * direction.x * direction.y * (float2)(-d.y, d.x);
+/// Its derivative by the squared slope.
+static inline float weight_of_slope_gradient(float slope2) {
+  const float x = range_of_slope(slope2), sine2 = 1.0f / (1.0f + slope2);
+  return -6.0f * x * (1.0f - x) / DPR_RANGE_OF_BOTH * sine2 * sine2;
 }
 
 /// A crossing of an edge with a line of samples, a row or a column.
@@ -152,22 +151,9 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
 }
 
 /// What a crossing cuts: x is the area between the edge and the cells' border, negative where it is the first
-/// sample's cell that is cut, in [-1/2, 1/2] but for what the edge's ends add; y how much the crossing
-/// counts.
+/// sample's cell that is cut, in [-1/2, 1/2] but for what the edge's ends add; y the edge's squared slope to
+/// the lines' normal.
 typedef float2 Cut;
-
-/// The part that a sample takes of the colour at the other end of the step. `turn` is -1 for the step's first
-/// sample, 1 for its second.
-static inline float part_taken(Cut cut, float turn) {
-  const float way = 0.5f + turn * cut.x;
-  return 0.5f * cut.y * way * way;
-}
-
-/// Its gradient by the cut.
-static inline Cut part_taken_gradient(Cut cut, float turn) {
-  const float way = 0.5f + turn * cut.x;
-  return (Cut)(turn * cut.y * way, 0.5f * way * way);
-}
 
 /// The lines [x, y) of a tile that an edge may cross.
 static inline int2 lines_of_edge(const FrameParams p, const RasterEdge e, const TileSamples s) {

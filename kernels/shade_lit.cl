@@ -39,7 +39,7 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
   Surface s;
   s.eye = views[view].eye;
   s.material = materials[c.w];
-  if (s.material.w == 0.0f) s.material.w = lp.shininess;
+  if (s.material.w < 1.0f) s.material.w = lp.shininess;
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     if (DPR_BASE == DPR_BASE_OF_CORNERS) s.color[k] = splat3(colors[view * p.color_stride + color[k]]);
@@ -105,7 +105,7 @@ static inline Vec3n load_base(intn in_run, uint first, global const float* red, 
 /// in   world   float4[view][vertex]
 /// in   face_normals  uint4[face]      normals of the corners
 /// in   normals  float4[view][normal]; not read by flat shading
-/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, 0: that of the lights
+/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, below 1: that of the lights
 /// in   base_red, base_green, base_blue  float[fragment]  read where DPR_BASE says so; the colours are not,
 ///      then
 /// out  red, green, blue  float[fragment]

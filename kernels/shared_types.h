@@ -322,7 +322,7 @@ typedef struct SecondCrossing {
   DPR_SHARED_NAME(SecondCrossing)
   uint step, contour;
   uint reference; /* the nearest step that the contour has won: it shows the jump across it */
-  float cut, weight; /* of the contour: Cut of crossing.h */
+  float cut, slope2; /* of the contour: Cut of crossing.h */
 } SecondCrossing;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its

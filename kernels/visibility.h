@@ -3,7 +3,7 @@
 #ifndef DPR_VISIBILITY_H
 #define DPR_VISIBILITY_H
 
-#include "crossing.h"
+#include "steps.h"
 
 /// Depths that differ by less than this part of them are not told apart.
 #define DPR_DEPTH_SLACK 1e-5f
@@ -17,8 +17,7 @@ typedef struct {
   float2 depths;  // of its ends
   uint4 record;
   uint view, flags;
-  int inner;      // on which side of a -> b its surface lies: inner_side()
-  float by_rows;  // how much it counts by rows
+  int inner;  // on which side of a -> b its surface lies: inner_side()
 } TileContour;
 
 static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
@@ -36,7 +35,6 @@ static inline TileContour load_contour(const FrameParams p, const AntialiasParam
   c.b = e.end[1].xy;
   c.depths = (float2)(e.end[0].z, e.end[1].z);
   c.inner = inner_side(edge_sides(c.record, facing + c.view * p.faces));
-  c.by_rows = weight_by_rows(c.b - c.a);
   return c;
 }
 
@@ -51,7 +49,7 @@ static inline CornerArea corner_of(const FrameParams p, const TileContour c, con
 /// What a crossing cuts.
 static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
   const float area = x.t - 0.5f + corner_of(p, c, e, x, 0).area + corner_of(p, c, e, x, 1).area;
-  return (Cut)(area, e.is_by_rows ? c.by_rows : 1.0f - c.by_rows);
+  return (Cut)(area, fmin(e.slope * e.slope, DPR_SLOPE2_THAT_COUNTS));
 }
 
 /// Whether the first sample of a step is on the contour's inner side.
@@ -104,23 +102,24 @@ typedef struct {
   float reach;                // view depth behind the nearest that may still be seen
 } CrossingScene;
 
-/// Whether something hides a contour from the step that it crosses.
-static inline int is_hidden(const FrameParams p, const CrossingScene v, const TileContour c,
-                            const RasterEdge e, const Crossing x, int is_crease, float depth) {
+/// From how many of the samples of the step that it crosses something hides a contour.
+static inline int hidden_from(const FrameParams p, const CrossingScene v, const TileContour c,
+                              const RasterEdge e, const Crossing x, int is_crease, float depth) {
   const int to_next = e.is_by_rows ? 1 : (int)p.width, first = x.row * (int)p.width + x.column;
   const int inner_first = first_is_inner(c, e);
   const float slack = v.reach + DPR_DEPTH_SLACK * depth;
   if (is_crease) {
     const float2 here = pixel_centre(p, x.column, x.row);
     const float2 next = pixel_centre(p, x.column + e.is_by_rows, x.row + !e.is_by_rows);
-    return hides_crease(p, c, v.faces, v.ndc, inner_first, here, v.front[first], depth, slack) ||
+    return hides_crease(p, c, v.faces, v.ndc, inner_first, here, v.front[first], depth, slack) +
            hides_crease(p, c, v.faces, v.ndc, !inner_first, next, v.front[first + to_next], depth, slack);
   }
   const int outer = inner_first ? first + to_next : first, outwards = inner_first ? to_next : -to_next;
   const int place = (e.is_by_rows ? x.column : x.row) + (inner_first ? 2 : -1);
   const int is_inside = place >= 0 && place < (int)(e.is_by_rows ? p.width : p.height);
   const float beyond = is_inside ? v.front[outer + outwards] : INFINITY;
-  return depth_at_crossing(v.front[outer], beyond, inner_first ? 1.0f - x.t : x.t) < depth - slack;
+  const float front = depth_at_crossing(v.front[outer], beyond, inner_first ? 1.0f - x.t : x.t);
+  return front < depth - slack ? 2 : 0;
 }
 
 /// The place of a crossing's step in the planes of steps, of which each has `pixels`.

@@ -32,8 +32,16 @@ DPR_API Attribute parse_attribute(std::string_view word, std::string_view where)
 ///
 /// depth in all three channels, texture coordinates in red and green. RGB / A is the expectation
 /// over what is seen, the depth of AuxiliaryOutputs; its normal is RGB made of length 1. What is here is not
-/// divided: it is linear in the weights, so that values and gradients stay smooth and finite where a surface
-/// fades out. A loss of e = RGB / A with the gradient g has g / A by RGB, and -<g, e> / A by A.
+/// divided: it is linear in the weights, so that values and gradients stay finite where a surface fades out,
+/// and smooth where its weights do. A loss of e = RGB / A with the gradient g has g / A by RGB, and
+/// -<g, e> / A by A.
+///
+/// In the barrier composition weights need not fade: (gamma / alpha) ln p is little beside the difference of
+/// depths, so that a face over the background may have all the weight up to the blur radius, and none beyond
+/// it. No gradient knows of that step. Where the default radius leaves one, gradients at silhouettes are
+/// those of the interior alone, and may have the sign opposite to that of moving the silhouette, for
+/// attributes, which are far from 0, above all. They are right with a blur_radius at which the weight is gone
+/// (0.5 for sigma 1e-3 and gamma 1e-2), and say something of larger steps if it goes over more than a pixel.
 ///
 /// With noise on the pixel an edge between faces whose numbers differ is a contour, as between colours.
 ///

@@ -6,6 +6,9 @@
  * Threads may work at the same time on handles that nothing connects: each thread has a device, and what is
  * made from it, of its own.
  *
+ * dpr/dpr_batch.h, batches of scenes, and dpr/dpr_on_device.h, buffers of the caller's, come with this
+ * header.
+ *
  * Arrays are copied. Matrices are row-major and act on column vectors; a colour is linear RGB, a pixel is
  * linear RGBA. Structs begin with their size: fill them by their DPR_..._INIT, so that a program which was
  * compiled with an earlier version of this header works with a later library. */
@@ -46,6 +49,7 @@ struct _cl_event;
 typedef struct dpr_device dpr_device;
 typedef struct dpr_scene dpr_scene;
 typedef struct dpr_renderer dpr_renderer;
+typedef struct dpr_batch dpr_batch;
 typedef struct dpr_loss dpr_loss;
 typedef struct dpr_mesh_loss dpr_mesh_loss;
 typedef struct dpr_attribute dpr_attribute;
@@ -194,6 +198,10 @@ DPR_API dpr_status dpr_scene_create(int width, int height, dpr_scene** scene);
 DPR_API dpr_status dpr_scene_read(const char* file, dpr_scene** scene);
 /* Meshes are counted from 0 in the order in which they are added. */
 DPR_API dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh);
+/* Another place of a mesh that was added before, and is no instance itself. Instances are counted as meshes:
+ * they have transforms, [16] as dpr_mesh has them, and gradients of these. All else is their mesh's: calls
+ * that set positions, colours and so on take the mesh alone, and refuse an instance. */
+DPR_API dpr_status dpr_scene_add_instance(dpr_scene* scene, size_t mesh, const float* transform);
 DPR_API dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera);
 DPR_API dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]);
 /* Leaves out faces that wind clockwise in the image, "back", or the others, "front". "none" unless called. */
@@ -218,7 +226,8 @@ DPR_API dpr_status dpr_renderer_create(const dpr_device* device, dpr_renderer** 
 /* Checks and uploads the scene as it is now; its camera and transforms become the only view. */
 DPR_API dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene);
 /* Replaces the views, all rendered by the same launches. cameras: [views]. transforms: [view][mesh][16],
- * object to world, `transform_count` floats; NULL and 0: where the scene has the meshes. */
+ * object to world, `transform_count` floats; NULL and 0: where the scene has the meshes. Instances are meshes
+ * here. */
 DPR_API dpr_status dpr_renderer_set_views(dpr_renderer* renderer, const dpr_camera* cameras, size_t views,
                                           const float* transforms, size_t transform_count);
 /* New positions of a mesh, [vertex][3], `count` floats: as many as it has. */
@@ -240,7 +249,7 @@ DPR_API dpr_status dpr_renderer_set_normals(dpr_renderer* renderer, size_t mesh,
 DPR_API dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, size_t mesh,
                                               const dpr_material* materials, size_t count);
 /* Gives every view a shape of its own: [view][vertex][3] and [view][color][3], each of all meshes one after
- * the other, so many floats. NULL and 0: the scene's. */
+ * the other without instances, so many floats. NULL and 0: the scene's. */
 DPR_API dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions,
                                            size_t position_count, const float* colors, size_t color_count);
 /* New lights; NULL: none. */
@@ -283,6 +292,31 @@ typedef struct dpr_loss_weights {
 DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights,
                                    const float* targets, size_t count, size_t views, int width, int height,
                                    dpr_loss** loss);
+/* What surfaces show in place of their colours, compared with what they ought to: dpr/image_loss.hpp. */
+typedef struct dpr_attribute_target {
+  const char* name;                /* "depth", "position", "normal" or "texcoords" */
+  const dpr_loss_weights* weights; /* no silhouette, no ssim */
+  const float* targets; /* [view][height][width][4]: RGB as attribute images have it where a surface fills
+                         * the pixel, alpha how much the pixel counts */
+} dpr_attribute_target;
+
+typedef struct dpr_loss_options {
+  size_t size;
+  const dpr_loss_weights* weights; /* of the images; NULL: none, if there are attributes */
+  const uint8_t* has_alpha;        /* [view], 0: the target has no silhouette; NULL: all have one */
+  const float* masks;              /* [view][height][width], how much each pixel counts; NULL: all the same */
+  unsigned levels;                 /* of a pyramid, 1 to 16: the mean of the loss over ever smaller images */
+  const dpr_attribute_target* attributes; /* [attribute_count]; NULL if that is 0 */
+  size_t attribute_count;
+} dpr_loss_options;
+
+#define DPR_LOSS_OPTIONS_INIT \
+  { sizeof(dpr_loss_options), NULL, NULL, NULL, 1, NULL, 0 }
+
+/* The same with more to say of what counts. */
+DPR_API dpr_status dpr_loss_create_with(const dpr_device* device, const dpr_loss_options* options,
+                                        const float* targets, size_t count, size_t views, int width,
+                                        int height, dpr_loss** loss);
 /* The loss of the renderer's last images, mean over the views; its gradient stays on the device. */
 DPR_API dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, double* value);
 DPR_API void dpr_loss_destroy(dpr_loss* loss);
@@ -319,7 +353,9 @@ DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad
 DPR_API dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr_gradient** gradient);
 
 /* The arrays that the scene asked for, by names such as "meshes[0].positions", "views[0].camera.rotation" or
- * "sigma". Those of a mesh's textures are one, "meshes[0].textures": one texture after the other. */
+ * "sigma". Those of a mesh's textures are one, "meshes[0].textures": one texture after the other. A mesh's
+ * arrays are summed over its instances; of an instance itself, mesh 1 say, there are no "meshes[1]. ...", but
+ * "views[0].meshes[1].rotation" and "views[0].meshes[1].translation". */
 DPR_API dpr_status dpr_gradient_count(const dpr_gradient* gradient, size_t* count);
 /* Valid as long as the handle. */
 DPR_API dpr_status dpr_gradient_name(const dpr_gradient* gradient, size_t index, const char** name);
@@ -346,7 +382,8 @@ DPR_API dpr_status dpr_attribute_create(const dpr_device* device, const char* na
 /* Of numbers at the vertices, so many channels, which dpr_attribute_set_values() sets. */
 DPR_API dpr_status dpr_attribute_create_values(const dpr_device* device, size_t channels,
                                                dpr_attribute** attribute);
-/* [vertex][channel], the vertices of all meshes one after the other. */
+/* [vertex][channel], the vertices of all meshes one after the other, instances' among them, which may have
+ * numbers of their own. */
 DPR_API dpr_status dpr_attribute_set_values(dpr_attribute* attribute, const float* values, size_t count);
 /* Renders what the renderer's last forward pass shows. */
 DPR_API dpr_status dpr_attribute_forward(dpr_attribute* attribute, const dpr_renderer* renderer);
@@ -360,110 +397,11 @@ DPR_API dpr_status dpr_attribute_backward_pixels(dpr_attribute* attribute, const
                                                  dpr_gradient** gradient);
 DPR_API void dpr_attribute_destroy(dpr_attribute* attribute);
 
-/* ---- Everything on the device ---- */
-
-/* Positions, colours, texels, texture coordinates and transforms come from the caller's buffers, images and
- * gradients stay in buffers, and no call waits for the device or moves a byte to or from it, except
- * dpr_renderer_frame_history() and those frames and backward passes of which dpr/opencl_handles.hpp says so:
- * it says all of this. */
-
-/* Vectors of floats in a cl_mem of the device's context. One that a call fills is the library's, not
- * retained. */
-typedef struct dpr_buffer {
-  size_t size;
-  struct _cl_mem* buffer;
-  size_t byte_offset; /* before the first vector */
-  size_t byte_stride; /* from one vector to the next; 0: they are packed */
-  size_t count;       /* filled in by the library: vectors, and floats of each */
-  size_t components;
-} dpr_buffer;
-
-#define DPR_BUFFER_INIT \
-  { sizeof(dpr_buffer), NULL, 0, 0, 0, 0 }
-
-/* What the work of a call waits for, and its own event, which the caller releases. NULL for neither. */
-typedef struct dpr_events {
-  size_t size;
-  struct _cl_event* const* wait; /* [wait_count]; NULL if that is 0 */
-  size_t wait_count;
-  struct _cl_event** done; /* or NULL */
-} dpr_events;
-
-#define DPR_EVENTS_INIT \
-  { sizeof(dpr_events), NULL, 0, NULL }
-
-/* How much room frames have; with noise on the pixel, contours need some too. */
-typedef struct dpr_frame_room {
-  size_t size;
-  size_t pairs, fragments, contours;
-} dpr_frame_room;
-
-#define DPR_FRAME_ROOM_INIT \
-  { sizeof(dpr_frame_room), 0, 0, 0 }
-
-/* Vectors of three floats, as those of the calls without "_from"; texture coordinates are two. */
-DPR_API dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, size_t mesh,
-                                                   const dpr_buffer* positions, const dpr_events* events);
-DPR_API dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, size_t mesh, const dpr_buffer* colors,
-                                                const dpr_events* events);
-DPR_API dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, size_t mesh, size_t texture,
-                                                const dpr_buffer* texels, const dpr_events* events);
-DPR_API dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, size_t mesh,
-                                                   const dpr_buffer* texcoords, const dpr_events* events);
-DPR_API dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, size_t mesh,
-                                                 const dpr_buffer* normals, const dpr_events* events);
-/* As dpr_renderer_set_shapes(); one that is NULL is the scene's. */
-DPR_API dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
-                                                const dpr_buffer* colors, const dpr_events* events);
-/* World to camera, [view] of twelve floats: the upper three rows of a matrix. */
-DPR_API dpr_status dpr_renderer_set_view_matrices_from(dpr_renderer* renderer, const dpr_buffer* matrices,
-                                                       const dpr_events* events);
-/* Object to world, [view][mesh] of twelve floats: the upper three rows of a matrix. */
-DPR_API dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_buffer* transforms,
-                                                    const dpr_events* events);
-/* Frames that need no more than this are whole; until the next scene. Each count is at most 3435973832. */
-DPR_API dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room);
-/* A frame that exceeds its room is emptied. */
-DPR_API dpr_status dpr_renderer_forward_on_device(dpr_renderer* renderer, const dpr_events* events);
-/* Frames that were emptied since the last call, and what the largest needed. Waits for the device. */
-DPR_API dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, size_t* emptied,
-                                              dpr_frame_room* largest);
-/* From d loss / d image, [view][height][width] of four floats. */
-DPR_API dpr_status dpr_renderer_backward_on_device(dpr_renderer* renderer, const dpr_buffer* grad,
-                                                   const dpr_events* events);
-/* The images, [view][height][width] of four floats; or a gradient of the last backward pass on the device, by
- * its name. Fills a struct that holds its size; valid as dpr/opencl_handles.hpp says. */
-DPR_API dpr_status dpr_renderer_image_view(dpr_renderer* renderer, dpr_buffer* view);
-DPR_API dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view);
-/* Copies of them, to the caller's buffers. */
-DPR_API dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_buffer* images,
-                                            const dpr_events* events);
-DPR_API dpr_status dpr_renderer_copy_gradient(dpr_renderer* renderer, const char* name,
-                                              const dpr_buffer* gradient, const dpr_events* events);
-/* Auxiliary outputs by name, in a buffer of the library's or to the caller's; "face_id" are int32. */
-DPR_API dpr_status dpr_renderer_aov_view(dpr_renderer* renderer, const char* name, dpr_buffer* view,
-                                         const dpr_events* events);
-DPR_API dpr_status dpr_renderer_copy_aov(dpr_renderer* renderer, const char* name, const dpr_buffer* outputs,
-                                         const dpr_events* events);
-/* The same calls for images of attributes. Values are [vertex] of as many floats as channels. */
-DPR_API dpr_status dpr_attribute_set_values_from(dpr_attribute* attribute, const dpr_buffer* values,
-                                                 size_t vertices, const dpr_events* events);
-DPR_API dpr_status dpr_attribute_reserve(dpr_attribute* attribute, const dpr_frame_room* room);
-DPR_API dpr_status dpr_attribute_forward_on_device(dpr_attribute* attribute, const dpr_renderer* renderer,
-                                                   const dpr_events* events);
-DPR_API dpr_status dpr_attribute_frame_history(dpr_attribute* attribute, size_t* emptied,
-                                               dpr_frame_room* largest);
-DPR_API dpr_status dpr_attribute_backward_on_device(dpr_attribute* attribute, const dpr_buffer* grad,
-                                                    const dpr_events* events);
-DPR_API dpr_status dpr_attribute_image_view(dpr_attribute* attribute, dpr_buffer* view);
-DPR_API dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view);
-DPR_API dpr_status dpr_attribute_copy_images(dpr_attribute* attribute, const dpr_buffer* images,
-                                             const dpr_events* events);
-DPR_API dpr_status dpr_attribute_copy_gradient(dpr_attribute* attribute, const char* name,
-                                               const dpr_buffer* gradient, const dpr_events* events);
-
 #ifdef __cplusplus
 }
 #endif
+
+#include "dpr/dpr_batch.h"
+#include "dpr/dpr_on_device.h"
 
 #endif

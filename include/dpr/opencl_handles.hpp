@@ -78,6 +78,9 @@ DPR_API void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpa
 /// the last normals that the host has given jump.
 DPR_API void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals,
                          const Events& events = {});
+/// [material] of four floats: RGB of the specular coefficient, and the shininess; one below 1 is the lights'.
+DPR_API void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials,
+                           const Events& events = {});
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
@@ -141,14 +144,14 @@ DPR_API void copy_images(Renderer& renderer, const BufferSpan& images, const Eve
 
 /// A gradient of the last backward_on_device() by the name that gradient files and messages have for it:
 /// "meshes[0].positions", "meshes[0].colors", "meshes[0].texcoords", "meshes[0].textures[0]",
-/// "meshes[0].normals",
-/// "shapes.positions", "views[0].meshes[0].rotation", "views[0].camera.translation",
-/// "lights.point[0].diffuse", "sigma", "background", ... Arrays are [vertex] and so on as SceneGradient has
-/// them. Numbers are packed, and those of one name lie side by side in the order of views, then meshes or
-/// lights. Valid until the next set_scene(), set_views(), set_shapes(), set_lights(), set_smoothing() or
-/// set_gradients(); written by backward_on_device(). Throws InvalidArgument for a gradient that the scene
-/// does not have or did not ask for, for those of materials, which the host has alone, and before the first
-/// backward_on_device().
+/// "meshes[0].normals", "meshes[0].specular", "meshes[0].shininess", "shapes.positions",
+/// "views[0].meshes[0].rotation", "views[0].camera.translation", "lights.point[0].diffuse", "sigma",
+/// "background", ... Arrays are [vertex] and so on as SceneGradient has them. Numbers are packed, and those
+/// of one name lie side by side in the order of views, then meshes or lights. Valid until the next
+/// set_scene(), set_views(), set_shapes(), set_lights(), set_smoothing() or set_gradients(); written by
+/// backward_on_device(). Throws InvalidArgument for a gradient that the scene does not have or did not ask
+/// for, and before the first backward_on_device(). Of what an entry of Scene::meshes that is an instance
+/// shares with others, the gradients are the mesh's; its rotation and translation are its own.
 DPR_API BufferView gradient_view(Renderer& renderer, const std::string& name);
 /// Copies one.
 DPR_API void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,

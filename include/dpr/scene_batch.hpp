@@ -62,9 +62,10 @@ class DPR_API SceneBatch {
   std::vector<SceneGradient> backward_pixels(std::span<const vec4> grad_pixels);
   /// The same for a loss that was evaluated on the last forward(); its gradient never leaves the device.
   std::vector<SceneGradient> backward(const ImageLoss& loss);
-  /// The same, with the gradient of a mesh's own loss added in every scene: [scene], each evaluated on the
-  /// scene's own renderer. Throws InvalidArgument if a scene asks for no positions' gradient.
-  std::vector<SceneGradient> backward(const ImageLoss& loss, std::span<const MeshLoss> mesh_losses);
+  /// The same, with the gradient of a mesh's own loss added in every scene that has one: [scene], each
+  /// evaluated on the scene's own renderer, or nullptr. Throws InvalidArgument if such a scene asks for no
+  /// positions' gradient.
+  std::vector<SceneGradient> backward(const ImageLoss& loss, std::span<const MeshLoss* const> mesh_losses);
 
   /// Summed over the scenes, with what the batch holds itself.
   RenderStatistics statistics() const;

@@ -5,12 +5,14 @@
 #include "c/buffers.hpp"
 #include "dpr/aov.hpp"
 #include "renderer/attribute_images_impl.hpp"
+#include "renderer/on_device.hpp"
 
 using dpr::InvalidArgument;
 using dpr::c::deref;
 using dpr::c::fill;
 using dpr::c::give;
 using dpr::c::guarded;
+using dpr::c::renderer_of;
 using dpr::c::to_events;
 using dpr::c::to_span;
 
@@ -19,7 +21,6 @@ namespace {
 
 constexpr std::size_t k_channels_of_pixel = 4;  // floats
 
-Renderer& renderer_to_show(dpr_renderer* renderer) { return deref(renderer, "renderer").renderer; }
 AttributeImages& images_of(dpr_attribute* attribute) { return deref(attribute, "attribute").images; }
 
 std::size_t floats_of(Aov aov) {
@@ -28,7 +29,9 @@ std::size_t floats_of(Aov aov) {
 }
 
 std::size_t count_of(const Renderer& renderer, Aov aov) {
+  renderer.impl().require_scene("auxiliary output");
   const Scene& scene = renderer.scene();
+  require_shown(scene, aov);
   return renderer.views().size() * static_cast<std::size_t>(scene.width) *
          static_cast<std::size_t>(scene.height) * floats_of(aov);
 }
@@ -84,14 +87,13 @@ std::vector<dpr_gradient::Array> arrays_of_attribute(const AttributeImages& imag
 dpr_status dpr_renderer_aov_size(const dpr_renderer* renderer, const char* name, std::size_t* count) {
   return guarded([&] {
     deref(count, "count");
-    *count =
-        dpr::c::count_of(deref(renderer, "renderer").renderer, dpr::parse_aov(&deref(name, "name"), "name"));
+    *count = dpr::c::count_of(renderer_of(renderer), dpr::parse_aov(&deref(name, "name"), "name"));
   });
 }
 
 dpr_status dpr_renderer_read_aov(dpr_renderer* renderer, const char* name, float* values, std::size_t count) {
   return guarded([&] {
-    dpr::Renderer& r = dpr::c::renderer_to_show(renderer);
+    dpr::Renderer& r = renderer_of(renderer);
     const dpr::Aov aov = dpr::parse_aov(&deref(name, "name"), "name");
     deref(values, "values");
     dpr::c::require_count(count, dpr::c::count_of(r, aov), "values");
@@ -104,7 +106,7 @@ dpr_status dpr_renderer_aov_view(dpr_renderer* renderer, const char* name, dpr_b
                                  const dpr_events* events) {
   return guarded([&] {
     const dpr::Aov aov = dpr::parse_aov(&deref(name, "name"), "name");
-    fill(view, dpr::aov_view(dpr::c::renderer_to_show(renderer), aov, to_events(events)));
+    fill(view, dpr::aov_view(renderer_of(renderer), aov, to_events(events)));
   });
 }
 
@@ -112,7 +114,7 @@ dpr_status dpr_renderer_copy_aov(dpr_renderer* renderer, const char* name, const
                                  const dpr_events* events) {
   return guarded([&] {
     const dpr::Aov aov = dpr::parse_aov(&deref(name, "name"), "name");
-    dpr::copy_aov(dpr::c::renderer_to_show(renderer), aov, to_span(outputs, "outputs"), to_events(events));
+    dpr::copy_aov(renderer_of(renderer), aov, to_span(outputs, "outputs"), to_events(events));
   });
 }
 
@@ -138,7 +140,7 @@ dpr_status dpr_attribute_set_values(dpr_attribute* attribute, const float* value
 }
 
 dpr_status dpr_attribute_forward(dpr_attribute* attribute, const dpr_renderer* renderer) {
-  return guarded([&] { dpr::c::images_of(attribute).forward(deref(renderer, "renderer").renderer); });
+  return guarded([&] { dpr::c::images_of(attribute).forward(renderer_of(renderer)); });
 }
 
 dpr_status dpr_attribute_image_size(const dpr_attribute* attribute, std::size_t* count) {
@@ -184,8 +186,7 @@ dpr_status dpr_attribute_reserve(dpr_attribute* attribute, const dpr_frame_room*
 dpr_status dpr_attribute_forward_on_device(dpr_attribute* attribute, const dpr_renderer* renderer,
                                            const dpr_events* events) {
   return guarded([&] {
-    dpr::forward_on_device(dpr::c::images_of(attribute), deref(renderer, "renderer").renderer,
-                           to_events(events));
+    dpr::forward_on_device(dpr::c::images_of(attribute), renderer_of(renderer), to_events(events));
   });
 }
 

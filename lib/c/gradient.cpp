@@ -9,6 +9,7 @@ using dpr::InvalidArgument;
 using dpr::c::deref;
 using dpr::c::give;
 using dpr::c::guarded;
+using dpr::c::renderer_of;
 
 namespace dpr::c {
 
@@ -49,7 +50,7 @@ const dpr_gradient::Array& array_named(const dpr_gradient* gradient, const char*
 dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_gradient** gradient) {
   return guarded([&] {
     deref(gradient, "gradient");
-    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    dpr::Renderer& r = renderer_of(renderer);
     dpr::c::give_gradient(gradient, r, r.backward(deref(loss, "loss").loss));
   });
 }
@@ -58,7 +59,7 @@ dpr_status dpr_backward_losses(dpr_renderer* renderer, const dpr_loss* loss, con
                                dpr_gradient** gradient) {
   return guarded([&] {
     deref(gradient, "gradient");
-    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    dpr::Renderer& r = renderer_of(renderer);
     dpr::c::give_gradient(gradient, r,
                           r.backward(deref(loss, "loss").loss, deref(mesh_loss, "mesh_loss").loss));
   });
@@ -68,10 +69,8 @@ dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad, std::s
                                dpr_gradient** gradient) {
   return guarded([&] {
     deref(gradient, "gradient");
-    dpr::Renderer& r = deref(renderer, "renderer").renderer;
-    const std::span<const float> values = dpr::c::numbers(grad, count, 4, "grad");
-    dpr::c::give_gradient(gradient, r,
-                          r.backward_pixels({reinterpret_cast<const glm::vec4*>(values.data()), count / 4}));
+    dpr::Renderer& r = renderer_of(renderer);
+    dpr::c::give_gradient(gradient, r, r.backward_pixels(dpr::c::to_pixels(grad, count, "grad")));
   });
 }
 
@@ -79,7 +78,7 @@ dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr
   return guarded([&] {
     deref(gradient, "gradient");
     deref(grad, "grad");
-    dpr::Renderer& r = deref(renderer, "renderer").renderer;
+    dpr::Renderer& r = renderer_of(renderer);
     dpr::c::give_gradient(gradient, r, dpr::backward(r, grad));
   });
 }

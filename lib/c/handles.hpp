@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "dpr/attribute_images.hpp"
@@ -14,6 +15,7 @@
 #include "dpr/image_loss.hpp"
 #include "dpr/mesh_loss.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/scene_batch.hpp"
 #include "dpr/smoothing_options.hpp"
 
 struct dpr_device {
@@ -27,7 +29,16 @@ struct dpr_scene {
 };
 
 struct dpr_renderer {
-  dpr::Renderer renderer;
+  /// A scene of a batch, which lives as long as one of its handles.
+  struct OfBatch {
+    std::shared_ptr<dpr::SceneBatch> batch;
+    std::size_t scene;
+  };
+  std::variant<dpr::Renderer, OfBatch> held;
+};
+
+struct dpr_batch {
+  std::shared_ptr<dpr::SceneBatch> batch;
 };
 
 struct dpr_loss {
@@ -79,6 +90,11 @@ void give(Handle** out, Content&&... content) {
   *out = new Handle{std::forward<Content>(content)...};
 }
 
+/// The renderer of a handle. Throws for NULL, and for a scene that its batch does not have any more.
+Renderer& renderer_of(dpr_renderer* renderer);
+const Renderer& renderer_of(const dpr_renderer* renderer);
+SceneBatch& batch_of(const dpr_batch* batch);
+
 /// A versioned struct of the caller's: what an older program does not know keeps its default.
 template <class Struct>
 Struct versioned(const Struct* given, Struct defaults, const char* argument) {
@@ -105,7 +121,7 @@ template <class Number>
 std::span<Number> numbers(Number* pointer, std::size_t count, std::size_t width, const char* argument) {
   deref(pointer, argument);
   if (count % width != 0) {
-    throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count),
+    throw InvalidArgument(std::string("count (") + argument + ")", std::to_string(count) + " floats",
                           "a multiple of " + std::to_string(width));
   }
   return {pointer, count};
@@ -121,6 +137,8 @@ Camera to_camera(const dpr_camera* camera, const char* argument);
 glm::vec3 to_vector(const float* values);
 /// NULL: none.
 std::optional<Lights> to_lights(const dpr_lights* given);
+/// What a renderer takes of a scene now.
+Scene resolved(const dpr_scene& scene);
 /// A mesh without its transform.
 Mesh to_mesh(const dpr_mesh& given);
 std::vector<Material> to_materials(const dpr_material* given, std::size_t count, const char* argument);
@@ -132,7 +150,17 @@ GradientRequest to_request(const char* const* names, std::size_t count);
 /// The arrays that the renderer's scene asked for and has.
 std::vector<dpr_gradient::Array> arrays_of(const Renderer& renderer, SceneGradient gradient);
 
-/// Throws InvalidArgument unless `count` is what is expected of the argument.
+/// Throw InvalidArgument unless there are as many floats as are expected of the argument, a number of views
+/// that a device may have room for, and an image that may be rendered.
 void require_count(std::size_t count, std::size_t expected, const char* argument);
+void require_views(std::size_t views);
+void require_size(int width, int height, const char* argument);
+
+/// Of RGBA images.
+std::size_t image_floats(std::size_t views, int width, int height);
+/// Floats as pixels, of which there is a whole number.
+std::span<const glm::vec4> to_pixels(const float* values, std::size_t count, const char* argument);
+/// Where a caller wants `expected` floats of pixels.
+std::span<glm::vec4> to_pixels(float* values, std::size_t count, std::size_t expected);
 
 }  // namespace dpr::c

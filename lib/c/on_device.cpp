@@ -4,6 +4,7 @@
 using dpr::c::deref;
 using dpr::c::fill;
 using dpr::c::guarded;
+using dpr::c::renderer_of;
 using dpr::c::to_events;
 using dpr::c::to_span;
 using dpr::c::versioned;
@@ -42,12 +43,6 @@ void fill_history(std::size_t* emptied, dpr_frame_room* largest, const FrameHist
 
 }  // namespace dpr::c
 
-namespace {
-
-dpr::Renderer& renderer_of(dpr_renderer* renderer) { return deref(renderer, "renderer").renderer; }
-
-}  // namespace
-
 dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* positions, const dpr_events* events) {
   return guarded([&] {
@@ -79,6 +74,13 @@ dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mes
                                          const dpr_events* events) {
   return guarded(
       [&] { dpr::set_normals(renderer_of(renderer), mesh, to_span(normals, "normals"), to_events(events)); });
+}
+
+dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* materials, const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_materials(renderer_of(renderer), mesh, to_span(materials, "materials"), to_events(events));
+  });
 }
 
 dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
@@ -123,6 +125,10 @@ dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, std::size_t* empti
     versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
     dpr::c::fill_history(emptied, largest, dpr::frame_history(renderer_of(renderer)));
   });
+}
+
+dpr_status dpr_renderer_frame_history_view(dpr_renderer* renderer, dpr_buffer* view) {
+  return guarded([&] { fill(view, dpr::frame_history_view(renderer_of(renderer))); });
 }
 
 dpr_status dpr_renderer_backward_on_device(dpr_renderer* renderer, const dpr_buffer* grad,

@@ -5,6 +5,7 @@
 #include "c/handles.hpp"
 #include "scene/cull.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/instance_check.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 
@@ -161,14 +162,16 @@ Mesh to_mesh(const dpr_mesh& mesh) {
 
 namespace {
 
+/// NULL: the identity.
+glm::mat4 to_transform(const float* given, const char* argument) {
+  const glm::mat4 transform = given ? to_matrix(given) : glm::mat4(1);
+  checks::require_affine(transform, argument);
+  return transform;
+}
+
 Instance to_instance(const dpr_mesh* given) {
   const dpr_mesh mesh = versioned<dpr_mesh>(given, DPR_MESH_INIT, "mesh");
-  Instance instance{.mesh = to_mesh(mesh)};
-  if (mesh.transform) {
-    instance.transform = to_matrix(mesh.transform);
-    checks::require_affine(instance.transform, "mesh.transform");
-  }
-  return instance;
+  return {to_mesh(mesh), to_transform(mesh.transform, "mesh.transform")};
 }
 
 }  // namespace
@@ -204,6 +207,12 @@ std::optional<Lights> to_lights(const dpr_lights* given) {
 
 Smoothing smoothing_of(const dpr_scene& scene) {
   return resolve_smoothing(scene.smoothing, scene.scene.width, scene.scene.height, scene.of_file);
+}
+
+Scene resolved(const dpr_scene& scene) {
+  Scene resolved = scene.scene;
+  resolved.smoothing = smoothing_of(scene);
+  return resolved;
 }
 
 namespace {
@@ -248,11 +257,7 @@ GradientRequest to_request(const char* const* names, std::size_t count) {
 dpr_status dpr_scene_create(int width, int height, dpr_scene** scene) {
   return guarded([&] {
     deref(scene, "scene");
-    constexpr int k_most = dpr::checks::k_largest_side;
-    if (width < 1 || height < 1 || width > k_most || height > k_most) {
-      throw InvalidArgument("size (scene)", dpr::checks::size(width, height),
-                            "1 to " + std::to_string(k_most) + " pixels on a side");
-    }
+    dpr::c::require_size(width, height, "size (scene)");
     dpr_scene made;
     made.scene.width = width;
     made.scene.height = height;
@@ -272,6 +277,14 @@ dpr_status dpr_scene_read(const char* file, dpr_scene** scene) {
 
 dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh) {
   return guarded([&] { deref(scene, "scene").scene.meshes.push_back(dpr::c::to_instance(mesh)); });
+}
+
+dpr_status dpr_scene_add_instance(dpr_scene* scene, std::size_t mesh, const float* transform) {
+  return guarded([&] {
+    dpr::Scene& s = deref(scene, "scene").scene;
+    dpr::require_source(s.meshes, s.meshes.size(), mesh, "mesh (instance)");
+    s.meshes.push_back({{}, dpr::c::to_transform(transform, "transform"), mesh});
+  });
 }
 
 dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera) {

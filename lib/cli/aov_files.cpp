@@ -71,22 +71,28 @@ const SamplingError& AovFiles::sampling_error(Renderer& renderer) const {
   return *sampling_error_;
 }
 
-void AovFiles::write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const {
+std::vector<std::string> AovFiles::write(Renderer& renderer, const Scene& scene,
+                                         const SubdividedScene& drawn) const {
+  std::vector<std::string> files;
+  const auto write = [&](std::string_view name, const Image& image) {
+    write_image(files.emplace_back(file_name(name)), image);
+  };
   if (!aovs_.empty()) {
     AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
     name_old_faces(scene, drawn, outputs);
-    for (const Aov aov : aovs_) write_image(file_name(to_string(aov)), aov_image(outputs, aov));
+    for (const Aov aov : aovs_) write(to_string(aov), aov_image(outputs, aov));
   }
   if (gradient_standard_error_ && sampling_error(renderer).pixel_gradients.empty()) {
     throw InvalidArgument("gradient_standard_error (--aov)",
                           "noise of the pixel, or a frame in bands of the memory budget",
                           "noise of the triangles, and an image whose fragments fit the device's memory");
   }
-  if (standard_error_) write_image(file_name(k_standard_error), sampling_error(renderer).images.front());
+  if (standard_error_) write(k_standard_error, sampling_error(renderer).images.front());
   if (gradient_standard_error_) {
-    write_image(file_name(k_gradient_standard_error),
-                grey(sampling_error(renderer).pixel_gradients.front(), renderer.scene()));
+    write(k_gradient_standard_error,
+          grey(sampling_error(renderer).pixel_gradients.front(), renderer.scene()));
   }
+  return files;
 }
 
 void AovFiles::print_sampling_error(Renderer& renderer) const {

@@ -17,8 +17,8 @@ class AovFiles {
   AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene);
 
   /// Writes them, from the last forward() of a renderer that draws `drawn`, to OUT.NAME.exr for the output
-  /// OUT.png. Faces and barycentrics are the scene's.
-  void write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const;
+  /// OUT.png: these files. Faces and barycentrics are the scene's.
+  std::vector<std::string> write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const;
   /// A line on the standard error of the image, if the scene is sampled.
   void print_sampling_error(Renderer& renderer) const;
 

@@ -82,6 +82,15 @@ ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
   return std::move(views);
 }
 
+/// A weight for images that no view has says nothing.
+void require_measured(const CLI::App& command, const char* name, float weight, const ShapeViews& views,
+                      Image ShapeView::*image, const std::string& key) {
+  const auto has_one = [&](const ShapeView& view) { return !(view.*image).pixels.empty(); };
+  if (command.count(name) == 0 || weight == 0 || std::ranges::any_of(views.views, has_one)) return;
+  throw InvalidArgument(std::string(name) + " (command line)", "views without a \"" + key + "\"",
+                        "an image of one beside every view's, in the views file");
+}
+
 /// What can be wrong about the output is found out before the work, not after it.
 void check_outputs(const FitCommandOptions& options) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
@@ -147,6 +156,8 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   ShapeViews views = read_views(command, options, common);
+  require_measured(command, "--depth", options.solver.depth, views, &ShapeView::depth, "depth");
+  require_measured(command, "--normal", options.solver.normal, views, &ShapeView::normal, "normal");
   const std::vector<Device> devices = open_devices(common);
   complete_photographs(command, options, devices.front(), views, common);
   const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},

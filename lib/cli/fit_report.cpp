@@ -11,6 +11,7 @@
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/text.hpp"
+#include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
@@ -104,11 +105,14 @@ Json shape_to_json(const ShapeResult& result) {
           {"history", history}};
 }
 
-std::vector<TableRow> facts(const ShapeResult& result) {
+std::vector<TableRow> facts(const ShapeResult& result, const MeasuredDifferences& differences) {
   std::vector<TableRow> rows{{"vertices", std::to_string(result.mesh.positions.size())},
                              {"triangles", std::to_string(result.mesh.faces.size())}};
   if (!result.history.empty()) rows.push_back({"loss", format("%.4g", result.history.back().loss)});
   rows.push_back({"iterations", std::to_string(result.history.size())});
+  if (differences.depth) rows.push_back({"depths off by, mean", format("%.4g", *differences.depth)});
+  if (differences.normal)
+    rows.push_back({"normals' components off by, mean", format("%.4g", *differences.normal)});
   rows.push_back({"time of this run", format("%.1f seconds", result.seconds)});
   return rows;
 }
@@ -140,17 +144,41 @@ ShapeSolver::Callback FitObserver::callback() {
   };
 }
 
-std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const std::vector<Camera>& cameras,
-                                  int width, int height, glm::vec3 background,
-                                  const std::optional<Lights>& lights) {
+namespace {
+
+Scene rigid_scene(const Mesh& mesh, const Camera& camera, int width, int height) {
   Scene scene;
   scene.width = width;
   scene.height = height;
-  scene.background = background;
-  scene.camera = cameras.front();
+  scene.camera = camera;
   scene.meshes.push_back({mesh});
-  scene.lights = lights;
   scene.smoothing = rigid_smoothing();
+  return scene;
+}
+
+/// Of numbers that a view has measured, where the shape is seen: each channel's absolute difference.
+struct MeanDifference {
+  double sum = 0, weight = 0;
+
+  void add(const Image& found, const Image& measured, int channels) {
+    for (std::size_t i = 0; i < measured.pixels.size(); ++i) {
+      const double counts = static_cast<double>(measured.pixels[i].w * found.pixels[i].w);
+      const glm::vec4 difference = glm::abs(found.pixels[i] - measured.pixels[i]);
+      for (int k = 0; k < channels; ++k) sum += counts * static_cast<double>(difference[k]);
+      weight += counts * channels;
+    }
+  }
+  std::optional<double> mean() const { return weight > 0 ? std::optional(sum / weight) : std::nullopt; }
+};
+
+}  // namespace
+
+std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const std::vector<Camera>& cameras,
+                                  int width, int height, glm::vec3 background,
+                                  const std::optional<Lights>& lights) {
+  Scene scene = rigid_scene(mesh, cameras.front(), width, height);
+  scene.background = background;
+  scene.lights = lights;
   std::vector<View> views;
   for (const Camera& camera : cameras) views.push_back({camera, {glm::mat4(1.0F)}});
   Renderer renderer(device);
@@ -172,11 +200,8 @@ void FitReport::keep(unsigned iteration, const Mesh& mesh) const {
   write_picture(folder_ / iteration_file(iteration), images.front(), "");
 }
 
-std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>& cameras) const {
-  const auto on = [&](const Device& device) {
-    return render_rigidly(device, mesh, cameras, views_.width, views_.height, views_.background,
-                          views_.lights);
-  };
+template <class Work>
+auto FitReport::on_any_device(const Work& on) const {
   for (std::size_t d = 0; d + 1 < devices_.size(); ++d) {
     try {
       return on(devices_[d]);
@@ -185,6 +210,34 @@ std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>
     }
   }
   return on(devices_.back());
+}
+
+std::vector<Image> FitReport::render(const Mesh& mesh, const std::vector<Camera>& cameras) const {
+  return on_any_device([&](const Device& device) {
+    return render_rigidly(device, mesh, cameras, views_.width, views_.height, views_.background,
+                          views_.lights);
+  });
+}
+
+MeasuredDifferences FitReport::measured_differences(const Mesh& mesh) const {
+  const auto measures = [](const ShapeView& view) {
+    return !view.depth.pixels.empty() || !view.normal.pixels.empty();
+  };
+  if (std::ranges::none_of(views_.views, measures)) return {};
+  return on_any_device([&](const Device& device) -> MeasuredDifferences {
+    Renderer renderer(device);
+    renderer.set_scene(rigid_scene(mesh, views_.views.front().camera, views_.width, views_.height));
+    MeanDifference depth, normal;
+    for (const ShapeView& view : views_.views) {
+      const View seen{view.camera, {glm::mat4(1.0F)}};
+      renderer.set_views({&seen, 1});
+      renderer.forward();
+      const AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+      depth.add(aov_image(outputs, Aov::depth), view.depth, 1);
+      normal.add(aov_image(outputs, Aov::normal), view.normal, 3);
+    }
+    return {depth.mean(), normal.mean()};
+  });
 }
 
 /// The start, and the iterations of which there are pictures.
@@ -241,6 +294,9 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   Json numbers = shape_to_json(result);
   numbers["cameras"] = cameras_to_json(views_);
+  const MeasuredDifferences differences = measured_differences(result.mesh);
+  if (differences.depth) numbers["depth_difference"] = *differences.depth;
+  if (differences.normal) numbers["normal_difference"] = *differences.normal;
   if (views_.lights) numbers["harmonics"] = to_json(views_.lights->harmonics);
   write_json(folder_ / "fit.json", numbers);
 
@@ -255,7 +311,7 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
   page.add_heading("All around");
   page.add_player({}, one_by_one(turns));
   page.add_heading("Result");
-  page.add_facts(facts(result));
+  page.add_facts(facts(result, differences));
   if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration");
   page.write(folder_ / "index.html");
 }

@@ -31,6 +31,12 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
                                   int width, int height, glm::vec3 background = glm::vec3(0),
                                   const std::optional<Lights>& lights = {});
 
+/// How far a shape is off what its views have measured, where it is seen: means of absolute differences of
+/// depths, world units, and of normals' components. None: no view has measured them, or nothing is seen.
+struct MeasuredDifferences {
+  std::optional<double> depth, normal;
+};
+
 /// The report's folder. The pictures of iterations are written while the solver works: an interrupted run
 /// leaves them, and a run that goes on from its checkpoint shows them too.
 class FitReport {
@@ -46,7 +52,11 @@ class FitReport {
   void write(const PageSource& source, const ShapeResult& result, bool quiet) const;
 
  private:
+  /// What work returns on the first device that is not lost.
+  template <class Work>
+  auto on_any_device(const Work& on) const;
   std::vector<Image> render(const Mesh& mesh, const std::vector<Camera>& cameras) const;
+  MeasuredDifferences measured_differences(const Mesh& mesh) const;
   std::vector<Picture> frames(const ShapeResult& result) const;
   std::vector<std::vector<Picture>> compare_views(const Mesh& mesh) const;
 

@@ -139,7 +139,12 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   });
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
-  write_json(options.output, pose_to_json(scene, result));
+  Json json = pose_to_json(scene, result);
+  if (result.light == PoseLight::harmonics) {
+    if (const auto light = found_light(device, scene, target, result, options.least_squares))
+      json["harmonics"] = to_json(light->harmonics);
+  }
+  write_json(options.output, json);
   if (!options.report.empty()) {
     const std::string title = "The pose of " + std::filesystem::path(options.scene).filename().string();
     write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, target, result,

@@ -17,6 +17,7 @@
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
+#include "solve/scene_light.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -194,6 +195,19 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) history.push_back(iteration_to_json(step, truth));
   return json;
+}
+
+std::optional<Lights> found_light(const Device& device, Scene scene, const Image& target,
+                                  const PoseResult& result, const LeastSquares& method) {
+  constexpr float k_blur_pixels = 0.25F, k_robust_scale = 0.1F;  // of a robust fit that leaves it open
+  const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(scene.width, scene.height));  // NDC
+  scene.meshes.front().transform = affine(result.pose.rotation * stretch_of(scene), result.pose.translation);
+  scene.smoothing = Smoothing();
+  scene.smoothing.sigma = blur * blur;
+  scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
+  const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
+  const float scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
+  return find_light(device, scene, {&view, 1}, method.robust ? scale : 0);
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,

@@ -10,6 +10,7 @@
 #include "cli/common_options.hpp"
 #include "cli/json.hpp"
 #include "cli/page.hpp"
+#include "dpr/light.hpp"
 #include "dpr/pose.hpp"
 
 namespace dpr::cli {
@@ -24,6 +25,11 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 
 /// pose.json, of a fit to the scene's only mesh. With the true rotation, the angle errors too.
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
+
+/// The distant light, in world space, in which the scene's mesh explains the target where it was found; none
+/// where it is not seen. By what counts in the method.
+std::optional<Lights> found_light(const Device& device, Scene scene, const Image& target,
+                                  const PoseResult& result, const LeastSquares& method);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw

@@ -147,13 +147,16 @@ void run(const CLI::App& command, const RenderOptions& options, CommonOptions& c
   const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
-  aovs.write(renderer, scene, drawn);
+  const std::vector<std::string> files_beside = aovs.write(renderer, scene, drawn);
   if (statistics.fragments == 0) {
     print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
                  "znear and zfar"},
                 common);
   }
-  if (!common.quiet) print_triangles(options, scene, statistics);
+  if (!common.quiet) {
+    print_triangles(options, scene, statistics);
+    for (const std::string& file : files_beside) std::printf("%s\n", file.c_str());
+  }
   if (common.verbose) {
     std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
                 statistics.fragments, statistics.bands, statistics.device_bytes);

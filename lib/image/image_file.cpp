@@ -12,7 +12,7 @@
 #include "base/module.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
-#include "image/codec.hpp"
+#include "image/image_file.hpp"
 #include "image/srgb.hpp"
 
 namespace dpr {
@@ -85,9 +85,8 @@ const ImageCodec& png() {
 
 }  // namespace
 
-Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding encoding) {
+Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts) {
   require_file(file);
-  PixelFacts facts;
   Image image;
   try {
     image = openimageio().read(file.string(), facts);
@@ -98,6 +97,12 @@ Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding en
   if (encoding == Encoding::srgb && !facts.floats) {
     for (glm::vec4& pixel : image.pixels) pixel = transferred(pixel, decode_srgb);
   }
+  return image;
+}
+
+Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding encoding) {
+  PixelFacts facts;
+  Image image = read_image(file, encoding, facts);
   if (has_alpha) *has_alpha = facts.has_alpha;
   return image;
 }

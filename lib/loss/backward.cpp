@@ -34,7 +34,7 @@ AddToGradient checked_gradient(const MeshLoss& mesh_loss, const Renderer::Impl& 
 std::vector<SceneGradient> SceneBatch::backward(const ImageLoss& loss) { return backward(loss, {}); }
 
 std::vector<SceneGradient> SceneBatch::backward(const ImageLoss& loss,
-                                                std::span<const MeshLoss> mesh_losses) {
+                                                std::span<const MeshLoss* const> mesh_losses) {
   impl_->require_forward("SceneBatch::backward");
   require_same_frame(loss.impl().frame_number, impl_->frame_number, "loss");
   if (!mesh_losses.empty() && mesh_losses.size() != scenes()) {
@@ -42,8 +42,10 @@ std::vector<SceneGradient> SceneBatch::backward(const ImageLoss& loss,
                           "one for each of the " + std::to_string(scenes()) + " scenes");
   }
   std::vector<AddToGradient> add_to_positions;
-  for (std::size_t i = 0; i < mesh_losses.size(); ++i)
-    add_to_positions.push_back(checked_gradient(mesh_losses[i], impl_->renderers[i].impl()));
+  for (std::size_t i = 0; i < mesh_losses.size(); ++i) {
+    const MeshLoss* const own = mesh_losses[i];
+    add_to_positions.push_back(own ? checked_gradient(*own, impl_->renderers[i].impl()) : AddToGradient());
+  }
   return impl_->backward(loss.impl().grad_image(), add_to_positions);
 }
 

@@ -29,6 +29,10 @@ InvalidArgument no_texcoords() {
 
 }  // namespace
 
+void require_shown(const Scene& scene, Aov aov) {
+  if (aov == Aov::uv && !have_texcoords(scene)) throw no_texcoords();
+}
+
 std::string_view to_string(Aov aov) { return k_names[static_cast<std::size_t>(aov)]; }
 
 Aov parse_aov(std::string_view word, std::string_view where) {
@@ -95,7 +99,7 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
 BufferView aov_view(Renderer& renderer, Aov aov, const Events& events) {
   Renderer::Impl& m = renderer.impl();
   m.require_rendered("aov_view");
-  if (aov == Aov::uv && !have_texcoords(m.scene)) throw no_texcoords();
+  require_shown(m.scene, aov);
   enqueue(m.device.impl(), events, [&] { m.render_aov(); });
   const std::size_t count = m.image().size();
   const auto part = [&](const auto& buffer, std::size_t first, std::size_t components) {

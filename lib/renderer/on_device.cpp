@@ -63,6 +63,15 @@ void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals
   enqueue(m.device.impl(), events, [&] { m.take_normals(mesh, from); });
 }
 
+void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials, const Events& events) {
+  Renderer::Impl& m = renderer.impl();
+  m.require_scene("set_materials");
+  check_has_materials(m.scene, mesh);
+  const FloatVectors from =
+      source(m, materials, {m.geometry->meshes[mesh].materials, DPR_MATERIAL_CHANNELS}, "materials");
+  enqueue(m.device.impl(), events, [&] { m.take_materials(mesh, from); });
+}
+
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
                 const Events& events) {
   Renderer::Impl& m = renderer.impl();
@@ -188,6 +197,17 @@ std::optional<std::size_t> texture_of(const std::string& name, const std::string
   return std::nullopt;
 }
 
+/// Of the specular coefficients of a mesh's materials, or of their shininess; none where it has none.
+std::optional<BufferView> material_gradient(const Renderer::Impl& m, std::size_t mesh, bool of_specular) {
+  const std::size_t count = m.scene.meshes[mesh].mesh.materials.size();
+  if (count == 0) return std::nullopt;
+  BufferView view = view_of(m.grad_materials, m.geometry->meshes[mesh].first_material, count, k_vector);
+  if (of_specular) return view;
+  view.offset += k_vector * sizeof(float);
+  view.components = 1;
+  return view;
+}
+
 /// The array of a mesh, or of all views' shapes, if the name is its.
 std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientRow& row, std::size_t mesh,
                                         const std::string& name) {
@@ -213,6 +233,8 @@ std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientR
   }
   if (row.wanted == &GradientRequest::normals && m.wants_normals() && range.normals > 0)
     return view_of(m.shade.grad_given_normals, range.first_normal, range.normals, k_vector);
+  if (row.wanted == &GradientRequest::materials && m.wants_materials())
+    return material_gradient(m, mesh, row.path.ends_with("specular"));
   if (row.wanted == &GradientRequest::texcoords && range.texcoords > 0)
     return view_of(m.grad_texcoords, range.first_texcoord, range.texcoords, k_pair);
   return std::nullopt;

@@ -25,6 +25,9 @@ void copy_view(Renderer::Impl& m, const BufferView& view, const BufferSpan& to, 
 /// `count` pixels of d loss / d image where kernels can read them as they are, or in a copy of ours.
 BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& from, std::size_t count);
 
+/// Throws InvalidArgument for texture coordinates of a scene in which a mesh has none.
+void require_shown(const Scene& scene, Aov aov);
+
 /// Throws InvalidArgument for more than can be counted.
 FrameCounts counts_of(const FrameRoom& room);
 /// Waits for the device.

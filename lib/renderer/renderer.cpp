@@ -256,6 +256,7 @@ void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images)
   enqueue_backward(grad_images);
   if (!gradient_map) gradient_map = make_gradient_map();
   made_exchange().map(*gradient_map, gradient_sums_, grad_numbers);
+  if (wants_materials()) join_material_gradients();
   device_gradient_frame = frame_number;
 }
 
@@ -345,8 +346,9 @@ std::size_t Renderer::Impl::bytes() const {
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
          grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() +
-         material_channels.capacity_bytes() + grad_numbers.capacity_bytes() +
-         gradient_sums_.capacity_bytes() + (gradient_map ? gradient_map->bytes() : 0);
+         material_channels.capacity_bytes() + grad_materials.capacity_bytes() +
+         grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
+         (gradient_map ? gradient_map->bytes() : 0);
 }
 
 }  // namespace dpr

@@ -50,6 +50,12 @@ void Renderer::Impl::take_normals(std::size_t mesh, const FloatVectors& from) {
   rendered = false;
 }
 
+void Renderer::Impl::take_materials(std::size_t mesh, const FloatVectors& from) {
+  const MeshRange& range = geometry->meshes[mesh];
+  made_exchange().take(from, range.materials, geometry->materials.values, range.first_material);
+  rendered = false;
+}
+
 void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
                                  const std::optional<FloatVectors>& colors) {
   const auto take = [&](const std::optional<FloatVectors>& from, std::size_t of_view,

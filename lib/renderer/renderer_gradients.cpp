@@ -276,6 +276,15 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
   return gradient;
 }
 
+void Renderer::Impl::join_material_gradients() {
+  const std::size_t count = geometry->materials.count;
+  grad_materials.resize(device.impl(), count);
+  for (std::size_t k = 0; k < DPR_MATERIAL_CHANNELS; ++k) {
+    made_exchange().give(vectors_of(gradient_sums_, summed_.materials.first + k * count, 1), count,
+                         {grad_materials.cl_buffer()(), k, DPR_MATERIAL_CHANNELS, 1});
+  }
+}
+
 GradientMap Renderer::Impl::make_gradient_map() const {
   return make_map(device.impl(), summed_, scene.meshes.size(),
                   [this](std::span<const float> sums) { return finish_summed_gradients(sums); });

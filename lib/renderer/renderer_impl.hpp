@@ -90,6 +90,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
   void take_texcoords(std::size_t mesh, const FloatVectors& from);
   void take_normals(std::size_t mesh, const FloatVectors& from);
+  void take_materials(std::size_t mesh, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
@@ -169,6 +170,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
   Buffer<cl_float4> grad_texcoords;                     // [texcoord]
   Buffer<float> material_channels;                      // [channel][face] in the order of the materials
+  Buffer<cl_float4> grad_materials;                     // [material] of backward_on_device(), as Geometry's
   Buffer<float> grad_numbers;                           // as GradientMap has them
   std::uint64_t device_gradient_frame = 0;              // the frame of backward_on_device()
   std::optional<GradientMap> gradient_map;              // of the scene and views as they are
@@ -217,6 +219,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void read_mesh_gradients(SceneGradient& gradient);
   SceneGradient finish_summed_gradients(std::span<const float> sums) const;
   GradientMap make_gradient_map() const;
+  /// From sums by channel to `grad_materials`.
+  void join_material_gradients();
 
   Buffer<float> hidden_;  // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;

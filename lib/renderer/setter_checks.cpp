@@ -54,7 +54,7 @@ void check_lights(const Scene& scene, std::span<const View> views, const std::op
 
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected) {
   if (values.size() != expected) {
-    throw InvalidArgument(name, std::to_string(values.size()) + " values", std::to_string(expected));
+    throw InvalidArgument(name, std::to_string(values.size()) + " vectors", std::to_string(expected));
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!checks::is_finite(values[i])) checks::require_finite(values[i], checks::element(name, i));
@@ -108,6 +108,12 @@ void check_has_normals(const Scene& scene, std::size_t mesh) {
     throw InvalidArgument("mesh (set_normals)", "a mesh without normals of its own", "one that gives some");
 }
 
+void check_has_materials(const Scene& scene, std::size_t mesh) {
+  check_mesh(scene, mesh);
+  if (scene.meshes[mesh].mesh.materials.empty())
+    throw InvalidArgument("mesh (set_materials)", "a mesh without materials", "one that has some");
+}
+
 void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions) {
   check_mesh(scene, mesh);
   check_values("positions", positions, scene.meshes[mesh].mesh.positions.size());
@@ -137,14 +143,10 @@ void check_normals(const Scene& scene, std::size_t mesh, std::span<const glm::ve
 }
 
 void check_materials(const Scene& scene, std::size_t mesh, std::span<const Material> materials) {
-  check_mesh(scene, mesh);
+  check_has_materials(scene, mesh);
   const std::size_t expected = scene.meshes[mesh].mesh.materials.size();
-  if (expected == 0)
-    throw InvalidArgument("mesh (set_materials)", "a mesh without materials", "one that has some");
-  if (materials.size() != expected) {
-    throw InvalidArgument("materials", std::to_string(materials.size()) + " values",
-                          std::to_string(expected));
-  }
+  if (materials.size() != expected)
+    throw InvalidArgument("materials", std::to_string(materials.size()), std::to_string(expected));
   for (std::size_t i = 0; i < expected; ++i) validate(materials[i], checks::element("materials", i));
 }
 

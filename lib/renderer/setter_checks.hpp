@@ -32,6 +32,7 @@ void check_mesh(const Scene& scene, std::size_t mesh);
 void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture);
 void check_has_texcoords(const Scene& scene, std::size_t mesh);
 void check_has_normals(const Scene& scene, std::size_t mesh);
+void check_has_materials(const Scene& scene, std::size_t mesh);
 void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights);
 /// As many finite values as expected; `name` says of what.
 void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "base/checks.hpp"
+#include "scene/instance_check.hpp"
 
 namespace dpr {
 namespace {
@@ -15,17 +16,28 @@ void validate_side(int value, const std::string& argument) {
 }
 
 void validate_instance(const Scene& scene, std::size_t i, const std::string& name) {
-  const std::size_t source = *scene.meshes[i].instance_of;
-  if (source >= i || scene.meshes[source].instance_of) {
-    throw InvalidArgument(checks::in("instance_of", name), std::to_string(source),
-                          "an earlier one of the meshes, which is no instance itself");
-  }
+  require_source(scene.meshes, i, *scene.meshes[i].instance_of, checks::in("instance_of", name));
   const Mesh& mesh = scene.meshes[i].mesh;
   if (!mesh.positions.empty() || !mesh.faces.empty())
     throw InvalidArgument(name, "a mesh of its own and instance_of", "one of the two");
 }
 
 }  // namespace
+
+void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t source,
+                    const std::string& argument) {
+  const auto fault = [&]() -> std::string {
+    if (source >= meshes.size()) return "where there are " + std::to_string(meshes.size()) + " meshes";
+    if (source == i) return "which is the instance itself";
+    if (source > i) return "a later mesh";
+    if (meshes[source].instance_of)
+      return "itself an instance of " + std::to_string(*meshes[source].instance_of);
+    return "";
+  }();
+  if (fault.empty()) return;
+  throw InvalidArgument(argument, std::to_string(source) + ", " + fault,
+                        "the number of an earlier mesh, from 0 on, that is no instance");
+}
 
 void validate(const Scene& scene) {
   validate_side(scene.width, "width (scene)");

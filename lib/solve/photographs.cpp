@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -14,6 +16,7 @@
 #include "mesh/bounding_box.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
+#include "solve/scene_light.hpp"
 #include "solve/shape_space.hpp"
 
 namespace dpr {
@@ -70,20 +73,16 @@ struct LitPixel {
   double weight;
 };
 
-/// The pixels that show the mesh.
-std::vector<LitPixel> lit_pixels(const Device& device, const ShapeViews& views) {
+/// The pixels that show the scene's only mesh.
+std::vector<LitPixel> lit_pixels(const Device& device, Scene scene, std::span<const ShapeView> views) {
   constexpr float k_shown = 0.99F;  // coverage: others show the background too
-  Scene scene;
-  scene.width = views.width;
-  scene.height = views.height;
-  scene.meshes.push_back({with_vertex_colors(template_of(views))});
-  scene.smoothing = finest_smoothing(views, {});
+  const glm::vec3 background = std::exchange(scene.background, glm::vec3(0));
   scene.gradients = no_gradients();
   Renderer renderer(device);
   renderer.set_scene(scene);
   std::vector<LitPixel> pixels;
-  for (const ShapeView& view : views.views) {
-    const View one{view.camera, {glm::mat4(1.0F)}};
+  for (const ShapeView& view : views) {
+    const View one{view.camera, {scene.meshes.front().transform}};
     renderer.set_views({&one, 1});
     std::vector<Image> images;
     for (std::size_t k = 0; k < k_harmonics; ++k) {
@@ -99,7 +98,7 @@ std::vector<LitPixel> lit_pixels(const Device& device, const ShapeViews& views) 
       const float weight =
           (view.mask.pixels.empty() ? 1.0F : view.mask.pixels[i].x) * (view.has_alpha ? target.a : 1.0F);
       if (alpha < k_shown || weight <= 0) continue;
-      LitPixel pixel{{}, glm::vec3(target) - (1 - alpha) * views.background, static_cast<double>(weight)};
+      LitPixel pixel{{}, glm::vec3(target) - (1 - alpha) * background, static_cast<double>(weight)};
       for (std::size_t k = 0; k < k_harmonics; ++k) pixel.terms[k] = glm::vec3(images[k].pixels[i]);
       pixels.push_back(pixel);
     }
@@ -175,14 +174,25 @@ ShapeOptions template_shape_options() {
 }
 
 Lights find_light(const Device& device, const ShapeViews& views, float robust_scale) {
-  constexpr int k_reweighings = 10;
   require(robust_scale >= 0 && std::isfinite(robust_scale), "robust_scale (photographs)", robust_scale,
           "a finite number, at least 0");
   require_known_cameras(views, "photographs");
-  const std::vector<LitPixel> pixels = lit_pixels(device, views);
-  if (pixels.empty())
-    throw InvalidArgument("initial mesh (photographs)", "one that no image shows",
-                          "one that some image shows");
+  Scene scene;
+  scene.width = views.width;
+  scene.height = views.height;
+  scene.background = views.background;
+  scene.meshes.push_back({with_vertex_colors(template_of(views))});
+  scene.smoothing = finest_smoothing(views, {});
+  const std::optional<Lights> found = find_light(device, scene, views.views, robust_scale);
+  if (found) return *found;
+  throw InvalidArgument("initial mesh (photographs)", "one that no image shows", "one that some image shows");
+}
+
+std::optional<Lights> find_light(const Device& device, const Scene& scene, std::span<const ShapeView> views,
+                                 float robust_scale) {
+  constexpr int k_reweighings = 10;
+  const std::vector<LitPixel> pixels = lit_pixels(device, scene, views);
+  if (pixels.empty()) return std::nullopt;
   std::vector<double> weights;
   for (const LitPixel& pixel : pixels) weights.push_back(pixel.weight);
   Coefficients light = weighted_least_squares(pixels, weights);

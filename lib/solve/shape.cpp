@@ -18,6 +18,7 @@
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/large_steps.hpp"
+#include "solve/measured_images.hpp"
 #include "solve/rigidity.hpp"
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
@@ -245,36 +246,14 @@ class Run {
   ShapeState state_;
 };
 
-/// An image of depths or normals, beside the view's and the first view's.
-void check_measured(const Image& measured, const Image& image, const Image& of_first,
-                    const std::string& name) {
-  if (measured.pixels.empty() != of_first.pixels.empty()) {
-    throw InvalidArgument(checks::in(name, "shape"), measured.pixels.empty() ? "none" : "one",
-                          "one for each of the views, or for none");
-  }
-  if (measured.pixels.empty()) return;
-  if (measured.width != image.width || measured.height != image.height) {
-    throw InvalidArgument(checks::in("size of the " + name, "shape"),
-                          checks::size(measured.width, measured.height),
-                          checks::size(image.width, image.height));
-  }
-  checks::require_pixels(measured, checks::in(name, "shape"));
-  float largest = 0;
-  for (const glm::vec4& pixel : measured.pixels) {
-    require(pixel.w >= 0, checks::in("alpha of the " + name, "shape").c_str(), pixel.w, "at least 0");
-    largest = std::max(largest, pixel.w);
-  }
-  require(largest > 0, checks::in("alpha of the " + name, "shape").c_str(), largest,
-          "some above 0: pixels that count");
-}
-
 void check(const ShapeViews& views) {
   if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
   if (views.width < 1 || views.height < 1) {
     throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
   }
   for (std::size_t i = 0; i < views.views.size(); ++i) {
-    const auto& [image, camera, has_alpha, mask, knowledge, depth, normal] = views.views[i];
+    const ShapeView& view = views.views[i];
+    const Image &image = view.image, &mask = view.mask;
     const std::string name = checks::element("views", i);
     if (image.width != views.width || image.height != views.height) {
       throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
@@ -282,10 +261,9 @@ void check(const ShapeViews& views) {
     }
     checks::require_pixels(image, checks::in(name, "shape"));
     if (!mask.pixels.empty()) require_mask(mask, image, checks::in("mask of " + name, "shape"));
-    check_measured(depth, image, views.views[0].depth, "depth of " + name);
-    check_measured(normal, image, views.views[0].normal, "normal of " + name);
-    validate(camera, name + ".camera");
+    validate(view.camera, name + ".camera");
   }
+  for (const Measured kind : {Measured::depth, Measured::normal}) check_measured(views, kind);
   require_known_cameras(views, "shape");
   checks::require_finite(views.background, "background (shape)");
   if (views.initial) validate(*views.initial, "initial (shape)");

@@ -9,6 +9,7 @@
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "scene/scene_json.hpp"
+#include "solve/measured_images.hpp"
 #include "solve/shape_views.hpp"
 
 namespace dpr {
@@ -56,17 +57,6 @@ Image read_beside(const JsonNode& node, const std::filesystem::path& folder, con
   return image;
 }
 
-/// Depths or normals, numbers in the first channels. Pixels without any, all 0, do not count.
-Image read_measured(const JsonNode& node, const std::filesystem::path& folder, const Image& picture,
-                    int channels) {
-  Image image = read_beside(node, folder, picture, Encoding::linear);
-  for (glm::vec4& pixel : image.pixels) {
-    if (channels == 1) pixel = glm::vec4(glm::vec3(pixel.x), pixel.w);
-    if (glm::vec3(pixel) == glm::vec3(0)) pixel.w = 0;
-  }
-  return image;
-}
-
 /// What the file says of where the object is in the picture, if it says something.
 std::optional<Image> parse_silhouette(const JsonNode& node, const std::filesystem::path& folder,
                                       const Image& picture, Encoding encoding) {
@@ -93,7 +83,7 @@ void parse_view_camera(const JsonNode& node, ShapeView& view, const std::string&
 
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
-                     Encoding encoding) {
+                     Encoding encoding, MeasuredImages& measured) {
   node.require_keys(
       {"image", "camera", "initial_camera", "silhouette", "background", "mask", "depth", "normal"});
   ShapeView view;
@@ -112,9 +102,13 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
     view.mask = read_image(mask->file_in(folder), nullptr, Encoding::linear);
     require_mask(view.mask, view.image, "mask (" + mask->file_in(folder).string() + ")");
   }
-  if (const auto depth = node.find("depth")) view.depth = read_measured(*depth, folder, view.image, 1);
-  if (const auto normal = node.find("normal")) view.normal = read_measured(*normal, folder, view.image, 3);
-  parse_view_camera(node, view, checks::element("views", views.views.size()));
+  if (const auto depth = node.find("depth"))
+    view.depth = measured.read(depth->file_in(folder), view.image, Measured::depth);
+  if (const auto normal = node.find("normal"))
+    view.normal = measured.read(normal->file_in(folder), view.image, Measured::normal);
+  const std::string name = checks::element("views", views.views.size());
+  parse_view_camera(node, view, name);
+  if (view.knowledge == CameraKnowledge::known) measured.check_range(view, name);
   return view;
 }
 
@@ -147,8 +141,10 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
   views.height = parse_side(node.at("height"));
   if (const auto background = node.find("background")) views.background = background->vec3();
   const std::filesystem::path folder = file.parent_path();
+  MeasuredImages measured;
   for (const JsonNode& view : node.at("views").elements())
-    views.views.push_back(parse_view(view, folder, views, encoding));
+    views.views.push_back(parse_view(view, folder, views, encoding, measured));
+  measured.append_to(notes);
   if (views.views.empty()) node.at("views").fail("none", "at least one");
   if (const auto initial = node.find("initial")) views.initial = read_mesh(initial->file_in(folder), notes);
   if (const auto smoothing = node.find("smoothing")) result.smoothing = parse_smoothing(*smoothing);

@@ -56,7 +56,7 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, co
                         Buffer<cl_float4>& blended) {
   blended.resize(device_, samples_of(p));
   forward_(tiles_of(p) * DPR_TILE, p, contour.tile_starts, winner, cut, raster, blended);
-  second_forward_(tiles_of(p), p, second_counts, seconds, cut, raster, blended);
+  second_forward_(tiles_of(p), p, second_counts, seconds, winner, cut, raster, blended);
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
@@ -68,7 +68,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   grad_ends.resize(device_, contour.pairs);
   backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
             grad_cut_, grad_raster);
-  second_backward_(tiles_of(in.p), in.p, second_counts, seconds, cut, raster, grad_blended, grad_cut_,
+  second_backward_(tiles_of(in.p), in.p, second_counts, seconds, winner, cut, raster, grad_blended, grad_cut_,
                    grad_raster, grad_seconds_);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,

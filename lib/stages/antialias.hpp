@@ -49,11 +49,11 @@ class Antialias {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
          Out<cl_float2>, Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, In<cl_float4>,
-         Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>, In<cl_float2>,
+         In<cl_float4>, Out<cl_float4>>
       second_forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, In<cl_float4>,
-         In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>, In<cl_float2>,
+         In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
       second_backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,

@@ -135,5 +135,7 @@ TEST_SUITE("bench-smoke") {
     check_fails(folder, {"--report", "report"}, "files");
     check_fails(folder, {"--report", "report", "empty.json"}, "no measured rows");
     check_fails(folder, {"empty.json"}, "--report");
+    check_fails(folder, {"--workload", "cube128", "--quiet"}, "--quiet (command line): got nothing to write");
+    check_fails(folder, {"--compare", "empty.json", "empty.json", "--quiet"}, "--quiet");
   }
 }

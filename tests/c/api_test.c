@@ -363,6 +363,76 @@ static void test_losses(const dpr_device* device, const dpr_scene* scene) {
   dpr_renderer_destroy(renderer);
 }
 
+/* Masks, targets without a silhouette, pyramids and depths: each says something of the loss. */
+static void test_loss_options(const dpr_device* device, const dpr_scene* scene) {
+  const uint8_t none[1] = {0};
+  float black[FLOATS], mask[SIDE * SIDE], deep[FLOATS];
+  double of_all, of_half, value, at_depth[9], before;
+  size_t i;
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT, of_depth = DPR_LOSS_WEIGHTS_INIT;
+  dpr_loss_options options = DPR_LOSS_OPTIONS_INIT;
+  dpr_attribute_target depth = {"depth", NULL, NULL};
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  dpr_loss *loss = NULL, *refused = NULL;
+  for (i = 0; i < FLOATS; ++i) black[i] = 0, deep[i] = i % 4 == 3 ? 1.0f : 2.5f; /* nearer than it is */
+  for (i = 0; i < SIDE * SIDE; ++i) mask[i] = i % SIDE < SIDE / 4 ? 1.0f : 0.0f; /* little of the triangle */
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  weights.mse = 1;
+  of_all = loss_of(device, renderer, &weights);
+  options.weights = &weights;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value == of_all); /* nothing said: the same loss */
+  dpr_loss_destroy(loss);
+  options.masks = mask;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &of_half));
+  EXPECT(of_half < 0.5 * of_all);
+  dpr_loss_destroy(loss);
+  options.masks = NULL, options.levels = 3;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value > 0 && value < of_all); /* means of blocks are nearer to black */
+  dpr_loss_destroy(loss);
+  options.levels = 1, options.has_alpha = none;
+  weights.silhouette = 1;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  EXPECT(value == of_all); /* without a silhouette there is no loss of it */
+  dpr_loss_destroy(loss);
+
+  of_depth.l1 = 1;
+  depth.weights = &of_depth, depth.targets = deep;
+  options = (dpr_loss_options)DPR_LOSS_OPTIONS_INIT;
+  options.attributes = &depth, options.attribute_count = 1;
+  OK(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &loss));
+  OK(dpr_loss_evaluate(loss, renderer, &before));
+  OK(dpr_backward_loss(renderer, loss, &gradient));
+  OK(dpr_gradient_read(gradient, "meshes[0].positions", at_depth, 9));
+  EXPECT(before > 0 && at_depth[2] < 0 && at_depth[5] < 0 && at_depth[8] < 0); /* towards the camera */
+  dpr_gradient_destroy(gradient);
+  dpr_loss_destroy(loss);
+  depth.name = "deep";
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "texcoords");
+  depth.name = "depth", depth.targets = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused),
+          "attributes.targets");
+  depth.targets = deep, depth.weights = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "weights");
+  options.attribute_count = (size_t)-1;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "attribute_count");
+  options.attributes = NULL;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused),
+          "options.attributes");
+  options.attribute_count = 0, options.levels = 17, options.weights = &weights;
+  REFUSED(dpr_loss_create_with(device, &options, black, FLOATS, 1, SIDE, SIDE, &refused), "levels");
+  REFUSED(dpr_loss_create_with(device, NULL, black, FLOATS, 1, SIDE, SIDE, &refused), "options");
+  dpr_renderer_destroy(renderer);
+}
+
 /* The same image and gradient without the host: positions from a buffer, the gradient into one. */
 static void test_on_device(cl_context context, cl_command_queue queue, dpr_renderer* renderer,
                            const float* image, const double* expected) {
@@ -400,6 +470,8 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   REFUSED(dpr_renderer_reserve(renderer, &room), "fragments (reserve)");
   OK(dpr_renderer_frame_history(renderer, &emptied, &room));
   EXPECT(emptied == 0 && room.pairs > 0 && room.fragments > 0);
+  OK(dpr_renderer_frame_history_view(renderer, &view));
+  EXPECT(view.buffer != NULL && view.count == 1 && view.components == 4);
   REFUSED(dpr_renderer_set_positions_from(renderer, 0, &to, NULL), "only write");
   REFUSED(dpr_renderer_set_positions_from(renderer, 0, NULL, NULL), "positions");
   REFUSED(dpr_renderer_set_colors_from(renderer, 1, &from, NULL), "mesh");
@@ -508,16 +580,71 @@ static void test_shapes_on_device(cl_context context, cl_command_queue queue, dp
   OK(dpr_renderer_forward(renderer));
   OK(dpr_renderer_read_image(renderer, found, FLOATS));
   EXPECT(memcmp(host, found, sizeof host) == 0);
-  REFUSED(dpr_renderer_set_shapes(renderer, shape, 6, NULL, 0), "positions: got 2 values, expected 3");
+  REFUSED(dpr_renderer_set_shapes(renderer, shape, 6, NULL, 0), "positions: got 2 vectors, expected 3");
   REFUSED(dpr_renderer_set_shapes(renderer, NULL, 9, NULL, 0), "positions");
   from.byte_offset = 48;
   REFUSED(dpr_renderer_set_shapes_from(renderer, NULL, &from, NULL), "colors");
   REFUSED(dpr_renderer_set_shapes_from(renderer, &from, NULL, NULL), "positions");
   REFUSED(dpr_renderer_set_view_matrices_from(renderer, NULL, NULL), "matrices");
   REFUSED(dpr_renderer_set_normals_from(renderer, 0, &from, NULL), "without normals");
+  REFUSED(dpr_renderer_set_materials_from(renderer, 0, &from, NULL), "without materials");
+  REFUSED(dpr_renderer_set_materials_from(renderer, 0, NULL, NULL), "materials");
   OK(dpr_renderer_set_views(renderer, &camera, 1, NULL, 0));
   clReleaseMemObject(vertices);
   clReleaseMemObject(matrix);
+}
+
+/* Materials from a buffer are those of the host; their gradient goes into one. */
+static void test_materials_on_device(cl_context context, cl_command_queue queue, const dpr_device* device) {
+  const dpr_material dull = {{0.1f, 0.2f, 0.3f}, 3}, bright = {{1, 0.9f, 0.8f}, 5};
+  const char* const wanted[] = {"materials"};
+  const dpr_camera camera = three_units_away();
+  dpr_point_light light = {{1, 2, 4}, {0.6f, 0.6f, 0.6f}, {0.5f, 0.5f, 0.5f}};
+  dpr_lights lights = DPR_LIGHTS_INIT;
+  dpr_mesh mesh = triangle();
+  dpr_buffer values = DPR_BUFFER_INIT;
+  dpr_scene* scene = NULL;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  float host[FLOATS], found[FLOATS], of_device[3], shininess = 0;
+  double of_host[3], of_shininess = 0;
+  int i;
+  cl_mem buffer = clCreateBuffer(context, CL_MEM_READ_WRITE, sizeof bright, NULL, NULL);
+  clEnqueueWriteBuffer(queue, buffer, CL_TRUE, 0, sizeof bright, &bright, 0, NULL, NULL);
+  values.buffer = buffer;
+  mesh.materials = &dull, mesh.material_count = 1;
+  lights.point = &light, lights.point_count = 1;
+  OK(dpr_scene_create(SIDE, SIDE, &scene));
+  OK(dpr_scene_add_mesh(scene, &mesh));
+  OK(dpr_scene_set_camera(scene, &camera));
+  OK(dpr_scene_set_lights(scene, &lights));
+  OK(dpr_scene_set_gradients(scene, wanted, 1));
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_set_materials(renderer, 0, &bright, 1));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, host, FLOATS));
+  OK(dpr_backward_pixels(renderer, host, FLOATS, &gradient));
+  OK(dpr_gradient_read(gradient, "meshes[0].specular", of_host, 3));
+  OK(dpr_gradient_read(gradient, "meshes[0].shininess", &of_shininess, 1));
+  OK(dpr_renderer_set_materials(renderer, 0, &dull, 1));
+  OK(dpr_renderer_set_materials_from(renderer, 0, &values, NULL));
+  OK(dpr_renderer_forward_on_device(renderer, NULL));
+  OK(dpr_renderer_read_image(renderer, found, FLOATS));
+  EXPECT(memcmp(host, found, sizeof host) == 0);
+  OK(dpr_renderer_image_view(renderer, &values));
+  OK(dpr_renderer_backward_on_device(renderer, &values, NULL));
+  values.buffer = buffer;
+  OK(dpr_renderer_copy_gradient(renderer, "meshes[0].specular", &values, NULL));
+  clEnqueueReadBuffer(queue, buffer, CL_TRUE, 0, sizeof of_device, of_device, 0, NULL, NULL);
+  OK(dpr_renderer_copy_gradient(renderer, "meshes[0].shininess", &values, NULL));
+  clEnqueueReadBuffer(queue, buffer, CL_TRUE, 0, sizeof shininess, &shininess, 0, NULL, NULL);
+  for (i = 0; i < 3; ++i) EXPECT((double)of_device[i] == of_host[i] && of_host[i] != 0);
+  EXPECT((double)shininess == of_shininess && shininess != 0);
+  dpr_gradient_destroy(gradient);
+  dpr_renderer_destroy(renderer);
+  dpr_scene_destroy(scene);
+  clReleaseMemObject(buffer);
 }
 
 /* In the caller's context, on the caller's queue: images and gradients as buffers. */
@@ -554,6 +681,7 @@ static void test_own_opencl(const dpr_scene* scene) {
   test_on_device(context, queue, renderer, read, of_pixels);
   test_attributes_on_device(context, queue, device, renderer);
   test_shapes_on_device(context, queue, renderer);
+  test_materials_on_device(context, queue, device);
   REFUSED(dpr_device_adopt(NULL, queue, &device), "context");
   REFUSED(dpr_device_adopt(context, NULL, &device), "queue");
   dpr_gradient_destroy(first);
@@ -710,7 +838,10 @@ static void test_attributes(const dpr_device* device, const dpr_scene* scene) {
   dpr_attribute *depths = NULL, *heats = NULL, *none = NULL;
   dpr_gradient* gradient = NULL;
   OK(dpr_renderer_create(device, &renderer));
+  REFUSED(dpr_renderer_aov_size(renderer, "depth", &count), "set_scene() first");
+  REFUSED(dpr_renderer_image_size(renderer, &count), "set_scene() first");
   OK(dpr_renderer_set_scene(renderer, scene));
+  REFUSED(dpr_renderer_aov_size(renderer, "uv", &count), "a mesh without texture coordinates");
   OK(dpr_attribute_create(device, "depth", &depths));
   REFUSED(dpr_attribute_forward(depths, renderer), "forward");
   REFUSED(dpr_attribute_image_size(depths, &count), "forward");
@@ -749,6 +880,214 @@ static void test_attributes(const dpr_device* device, const dpr_scene* scene) {
   dpr_attribute_destroy(depths);
   dpr_attribute_destroy(heats);
   dpr_renderer_destroy(renderer);
+}
+
+/* A mesh that stands in two places against two meshes: the image, and the gradients, which are summed. */
+static void test_instances(const dpr_device* device) {
+  const float aside[16] = {0.5f, 0, 0, 1, 0, 0.5f, 0, 0.25f, 0, 0, 0.5f, 0.5f, 0, 0, 0, 1};
+  const float singular[16] = {0};
+  const char* const wanted[] = {"positions", "transform"};
+  const char* const moved = "views[0].meshes[1].translation";
+  const dpr_camera camera = three_units_away();
+  float images[2][FLOATS];
+  double sums[2][9] = {{0}}, more[9], translation[2][3];
+  size_t i, count = 0;
+  int is_instance;
+  for (is_instance = 0; is_instance < 2; ++is_instance) {
+    dpr_scene* scene = NULL;
+    dpr_renderer* renderer = NULL;
+    dpr_gradient* gradient = NULL;
+    dpr_mesh mesh = triangle();
+    OK(dpr_scene_create(SIDE, SIDE, &scene));
+    OK(dpr_scene_add_mesh(scene, &mesh));
+    mesh.transform = aside;
+    if (is_instance) OK(dpr_scene_add_instance(scene, 0, aside));
+    if (!is_instance) OK(dpr_scene_add_mesh(scene, &mesh));
+    OK(dpr_scene_set_camera(scene, &camera));
+    OK(dpr_scene_set_gradients(scene, wanted, 2));
+    OK(dpr_renderer_create(device, &renderer));
+    OK(dpr_renderer_set_scene(renderer, scene));
+    OK(dpr_renderer_forward(renderer));
+    OK(dpr_renderer_read_image(renderer, images[is_instance], FLOATS));
+    OK(dpr_backward_pixels(renderer, images[is_instance], FLOATS, &gradient));
+    OK(dpr_gradient_read(gradient, "meshes[0].positions", sums[is_instance], 9));
+    OK(dpr_gradient_read(gradient, moved, translation[is_instance], 3));
+    if (is_instance) {
+      REFUSED(dpr_gradient_read(gradient, "meshes[1].positions", more, 9), "name (gradient)");
+      REFUSED(dpr_renderer_set_positions(renderer, 1, positions, 9), "an instance of mesh 0");
+      REFUSED(dpr_renderer_set_views(renderer, &camera, 1, aside, 16), "got 16 floats, expected 32");
+      REFUSED(dpr_scene_add_instance(scene, 1, aside), "got 1, itself an instance of 0");
+      REFUSED(dpr_scene_add_instance(scene, 2, aside), "got 2, where there are 2 meshes");
+      REFUSED(dpr_scene_add_instance(scene, 0, singular), "transform");
+      REFUSED(dpr_scene_add_instance(NULL, 0, aside), "scene");
+      OK(dpr_scene_add_instance(scene, 0, NULL));
+    } else {
+      OK(dpr_gradient_read(gradient, "meshes[1].positions", more, 9));
+      for (i = 0; i < 9; ++i) sums[0][i] += more[i];
+    }
+    OK(dpr_gradient_count(gradient, &count));
+    EXPECT(count == (is_instance ? 5u : 6u)); /* of two places each: rotation and translation */
+    dpr_gradient_destroy(gradient);
+    dpr_renderer_destroy(renderer);
+    dpr_scene_destroy(scene);
+  }
+  EXPECT(memcmp(images[0], images[1], sizeof images[0]) == 0);
+  EXPECT(memcmp(translation[0], translation[1], sizeof translation[0]) == 0 && translation[0][0] != 0);
+  for (i = 0; i < 9; ++i) EXPECT(fabs(sums[0][i] - sums[1][i]) < 1e-4 * (1 + fabs(sums[0][i])));
+}
+
+/* A scene of a batch: its gradient is that of a renderer of its own, with the loss' mean over so many views.
+ */
+static void expect_gradient_alone(const dpr_device* device, const dpr_scene* scene, const float* image,
+                                  const dpr_gradient* found, double share) {
+  const float black[FLOATS] = {0};
+  float pixels[FLOATS];
+  double alone[9], in_batch[9], value;
+  int i;
+  dpr_renderer* renderer = NULL;
+  dpr_gradient* gradient = NULL;
+  dpr_loss* loss = make_loss(device, black);
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_renderer_forward(renderer));
+  OK(dpr_renderer_read_image(renderer, pixels, FLOATS));
+  EXPECT(memcmp(pixels, image, sizeof pixels) == 0);
+  OK(dpr_loss_evaluate(loss, renderer, &value));
+  OK(dpr_backward_loss(renderer, loss, &gradient));
+  OK(dpr_gradient_read(gradient, "meshes[0].positions", alone, 9));
+  OK(dpr_gradient_read(found, "meshes[0].positions", in_batch, 9));
+  for (i = 0; i < 9; ++i)
+    EXPECT(alone[i] != 0 && fabs(in_batch[i] - share * alone[i]) < 1e-5 * (1 + fabs(alone[i])));
+  dpr_gradient_destroy(gradient);
+  dpr_loss_destroy(loss);
+  dpr_renderer_destroy(renderer);
+}
+
+/* What a batch refuses; `batch` has been rendered with two scenes of one view each. */
+static void test_wrong_batches(dpr_batch* batch, const dpr_scene* const* scenes) {
+  float pixels[2 * FLOATS] = {0};
+  dpr_gradient* gradients[2] = {NULL, NULL};
+  dpr_renderer *renderer = NULL, *none = NULL;
+  dpr_scene* larger = NULL;
+  const dpr_scene *unlike[2], *with_null[2] = {NULL, NULL};
+  OK(dpr_scene_create(SIDE + 1, SIDE, &larger));
+  {
+    const dpr_mesh mesh = triangle();
+    OK(dpr_scene_add_mesh(larger, &mesh));
+  }
+  unlike[0] = scenes[0], unlike[1] = larger;
+  REFUSED(dpr_batch_create(NULL, &batch), "device");
+  REFUSED(dpr_batch_set_scenes(NULL, scenes, 2), "batch");
+  REFUSED(dpr_batch_set_scenes(batch, scenes, 0), "at least one");
+  REFUSED(dpr_batch_set_scenes(batch, NULL, 2), "scenes");
+  REFUSED(dpr_batch_set_scenes(batch, with_null, 2), "scenes");
+  REFUSED(dpr_batch_set_scenes(batch, unlike, 2), "size (scenes[1]): got 17x16");
+  REFUSED(dpr_batch_scene_renderer(batch, 2, &none), "below 2");
+  REFUSED(dpr_batch_image_size(batch, NULL), "count");
+  REFUSED(dpr_batch_read_image(batch, pixels, FLOATS), "got 1024 floats, expected 2048");
+  REFUSED(dpr_batch_read_image(batch, NULL, 2 * FLOATS), "pixels");
+  REFUSED(dpr_batch_backward_pixels(batch, pixels, 2 * FLOATS, gradients, 1), "expected 2, one a scene");
+  REFUSED(dpr_batch_backward_pixels(batch, pixels, 2 * FLOATS, NULL, 2), "gradients");
+  REFUSED(dpr_batch_backward_pixels(batch, pixels, FLOATS, gradients, 2), "pixels");
+  REFUSED(dpr_batch_backward_buffer(batch, NULL, gradients, 2), "grad");
+  REFUSED(dpr_batch_backward_loss(batch, NULL, gradients, 2), "loss");
+  EXPECT(gradients[0] == NULL && gradients[1] == NULL && none == NULL);
+  /* A renderer of a scene that is gone is refused, and back with the scene. */
+  OK(dpr_batch_scene_renderer(batch, 1, &renderer));
+  OK(dpr_batch_set_scenes(batch, scenes, 1));
+  REFUSED(dpr_renderer_forward(renderer), "scene (SceneBatch::renderer): got 1, expected below 1");
+  REFUSED(dpr_batch_read_image(batch, pixels, FLOATS), "forward() first");
+  OK(dpr_batch_set_scenes(batch, scenes, 2));
+  OK(dpr_renderer_forward(renderer));
+  dpr_batch_destroy(batch);
+  OK(dpr_renderer_forward(renderer)); /* what was made from a handle may outlive it */
+  dpr_renderer_destroy(renderer);
+  dpr_scene_destroy(larger);
+  dpr_batch_destroy(NULL);
+}
+
+/* Unlike scenes as one batch: a loss, one backward pass, a gradient each; and a mesh's own loss in one. */
+static void test_batch(const dpr_device* device, dpr_scene* scene) {
+  const float near[3] = {0.2f, 0.1f, 0.3f};
+  const float targets[2 * FLOATS] = {0};
+  float before[2 * FLOATS], pixels[2 * FLOATS], smaller[9];
+  double value = 0, alone[9], with_mesh[9], changed = 0;
+  size_t count = 0, i;
+  dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT;
+  dpr_mesh_loss_weights of_mesh = DPR_MESH_LOSS_WEIGHTS_INIT;
+  dpr_mesh mesh = triangle();
+  dpr_buffer view = DPR_BUFFER_INIT;
+  dpr_scene* other = make_scene();
+  const dpr_scene* scenes[2];
+  dpr_batch* batch = NULL;
+  dpr_renderer* renderer = NULL;
+  dpr_loss* loss = NULL;
+  dpr_mesh_loss* shape = NULL;
+  const dpr_mesh_loss* shapes[2] = {NULL, NULL};
+  dpr_gradient* gradients[2] = {NULL, NULL};
+  OK(dpr_scene_set_background(other, near));
+  OK(dpr_scene_set_smoothing_number(other, "sigma", 0.03));
+  scenes[0] = scene, scenes[1] = other;
+  OK(dpr_batch_create(device, &batch));
+  REFUSED(dpr_batch_forward(batch), "no scenes");
+  REFUSED(dpr_batch_image_size(batch, &count), "set_scenes() first");
+  OK(dpr_batch_set_scenes(batch, scenes, 2));
+  REFUSED(dpr_batch_read_image(batch, pixels, 2 * FLOATS), "forward() first");
+  OK(dpr_batch_forward(batch));
+  OK(dpr_batch_image_size(batch, &count));
+  EXPECT(count == 2 * FLOATS);
+  OK(dpr_batch_read_image(batch, before, count));
+  weights.mse = 1;
+  OK(dpr_loss_create(device, &weights, targets, 2 * FLOATS, 2, SIDE, SIDE, &loss));
+  REFUSED(dpr_batch_backward_loss(batch, loss, gradients, 2), "loss");
+  OK(dpr_loss_evaluate_batch(loss, batch, &value));
+  EXPECT(value > 0);
+  OK(dpr_batch_backward_loss(batch, loss, gradients, 2));
+  for (i = 0; i < 2; ++i) {
+    expect_gradient_alone(device, scenes[i], before + i * FLOATS, gradients[i], 0.5);
+    OK(dpr_gradient_read(gradients[i], "meshes[0].positions", i ? with_mesh : alone, 9));
+    dpr_gradient_destroy(gradients[i]);
+  }
+  EXPECT(memcmp(alone, with_mesh, sizeof alone) != 0); /* the scenes are unlike */
+
+  of_mesh.edge_length = 1;
+  OK(dpr_mesh_loss_create(device, &of_mesh, &mesh, &shape));
+  OK(dpr_batch_scene_renderer(batch, 0, &renderer));
+  OK(dpr_mesh_loss_evaluate(shape, renderer, 0, &value));
+  shapes[0] = shape;
+  OK(dpr_batch_backward_losses(batch, loss, shapes, gradients, 2));
+  OK(dpr_gradient_read(gradients[0], "meshes[0].positions", with_mesh, 9));
+  for (i = 0; i < 9; ++i) changed += fabs(with_mesh[i] - alone[i]);
+  EXPECT(changed > 1);
+  REFUSED(dpr_batch_backward_losses(batch, loss, NULL, gradients, 2), "mesh_losses");
+  dpr_gradient_destroy(gradients[0]);
+  dpr_gradient_destroy(gradients[1]);
+
+  /* What a scene's renderer sets is in force with the next forward pass. */
+  for (i = 0; i < 9; ++i) smaller[i] = 0.5f * positions[i];
+  OK(dpr_renderer_set_positions(renderer, 0, smaller, 9));
+  REFUSED(dpr_batch_read_image(batch, pixels, 2 * FLOATS), "scenes[0]");
+  OK(dpr_batch_forward(batch));
+  OK(dpr_batch_read_image(batch, pixels, 2 * FLOATS));
+  EXPECT(memcmp(pixels, before, FLOATS * sizeof *pixels) != 0);
+  EXPECT(memcmp(pixels + FLOATS, before + FLOATS, FLOATS * sizeof *pixels) == 0);
+
+  OK(dpr_batch_backward_pixels(batch, pixels, 2 * FLOATS, gradients, 2));
+  OK(dpr_gradient_read(gradients[1], "meshes[0].positions", alone, 9));
+  dpr_gradient_destroy(gradients[0]);
+  dpr_gradient_destroy(gradients[1]);
+  OK(dpr_batch_image_view(batch, &view));
+  EXPECT(view.count == 2 * SIDE * SIDE && view.components == 4);
+  OK(dpr_batch_backward_buffer(batch, view.buffer, gradients, 2));
+  OK(dpr_gradient_read(gradients[1], "meshes[0].positions", with_mesh, 9));
+  EXPECT(memcmp(alone, with_mesh, sizeof alone) == 0);
+  dpr_gradient_destroy(gradients[0]);
+  dpr_gradient_destroy(gradients[1]);
+  dpr_mesh_loss_destroy(shape);
+  dpr_loss_destroy(loss);
+  dpr_renderer_destroy(renderer);
+  test_wrong_batches(batch, scenes);
+  dpr_scene_destroy(other);
 }
 
 static void test_wrong_meshes(dpr_scene* scene) {
@@ -917,7 +1256,7 @@ static void test_wrong_renderers(const dpr_device* device, const dpr_scene* scen
   OK(dpr_renderer_create(device, &renderer));
   REFUSED(dpr_renderer_forward(renderer), "scene");
   REFUSED(dpr_renderer_forward(NULL), "renderer");
-  REFUSED(dpr_renderer_read_image(renderer, pixels, 0), "forward");
+  REFUSED(dpr_renderer_read_image(renderer, pixels, 0), "set_scene() first");
   REFUSED(dpr_renderer_set_positions(renderer, 0, positions, 9), "scene");
   OK(dpr_scene_create(SIDE, SIDE, &empty));
   REFUSED(dpr_renderer_set_scene(renderer, empty), "mesh");
@@ -966,6 +1305,7 @@ int main(void) {
   scene = make_scene();
   test_descent(device, scene);
   test_losses(device, scene);
+  test_loss_options(device, scene);
   test_views(device, scene);
   test_textures(device);
   test_wrap_and_filter(device);
@@ -974,6 +1314,8 @@ int main(void) {
   test_setters(device);
   test_mesh_loss(device, scene);
   test_attributes(device, scene);
+  test_instances(device);
+  test_batch(device, scene);
   test_wrong_scenes();
   test_wrong_renderers(device, scene);
   dpr_scene_destroy(scene);

@@ -130,6 +130,40 @@ def check_surface(dpr, device, camera, positions, faces):
         getattr(dpr.library, f"dpr_{kind}_destroy")(handle)
 
 
+def check_instances(dpr, device, camera, positions, faces):
+    """A mesh in two places beside a mesh in one, as scenes of a batch: one loss, one backward pass, a gradient each."""
+    mesh = Mesh(ctypes.sizeof(Mesh), ctypes.addressof(positions), 3, ctypes.addressof(faces), 1)
+    aside = (c_float * 16)(0.5, 0, 0, 1, 0, 0.5, 0, 0, 0, 0, 0.5, 0.5, 0, 0, 0, 1)
+    scenes, batch, loss, gradients = (c_void_p * 2)(), c_void_p(), c_void_p(), (c_void_p * 2)()
+    for i in range(2):
+        scene = c_void_p()
+        dpr.scene_create(c_int(SIDE), c_int(SIDE), byref(scene))
+        dpr.scene_add_mesh(scene, byref(mesh))
+        dpr.scene_set_camera(scene, byref(camera))
+        scenes[i] = scene.value
+    dpr.scene_add_instance(c_void_p(scenes[1]), c_size_t(0), aside)
+    dpr.batch_create(device, byref(batch))
+    dpr.batch_set_scenes(batch, scenes, c_size_t(2))
+    dpr.batch_forward(batch)
+    count = 2 * SIDE * SIDE * 4
+    image = (c_float * count)()
+    dpr.batch_read_image(batch, image, c_size_t(count))
+    assert sum(image[count // 2:]) > 1.05 * sum(image[:count // 2])
+    dpr.loss_create(device, byref(LossWeights(ctypes.sizeof(LossWeights), 1, 0, 0)), (c_float * count)(),
+                    c_size_t(count), c_size_t(2), c_int(SIDE), c_int(SIDE), byref(loss))
+    dpr.loss_evaluate_batch(loss, batch, byref(c_double()))
+    dpr.batch_backward_loss(batch, loss, gradients, c_size_t(2))
+    grad = (c_double * 3)()
+    dpr.gradient_read(c_void_p(gradients[1]), b"views[0].meshes[1].translation", grad, c_size_t(3))
+    assert any(grad), list(grad)
+    missing = refusal(dpr.gradient_read, c_void_p(gradients[1]), b"meshes[1].positions", grad, c_size_t(3))
+    assert "one of meshes[0].positions" in missing, missing
+    assert "one a scene" in refusal(dpr.batch_backward_loss, batch, loss, gradients, c_size_t(1))
+    for kind, handle in (("gradient", gradients[0]), ("gradient", gradients[1]), ("loss", loss.value),
+                         ("batch", batch.value), ("scene", scenes[0]), ("scene", scenes[1])):
+        getattr(dpr.library, f"dpr_{kind}_destroy")(c_void_p(handle))
+
+
 def main():
     dpr = Library(sys.argv[1])
     assert dpr.library.dpr_version().startswith(b"0.")
@@ -173,6 +207,7 @@ def main():
 
     check_textures(dpr, device, camera, positions, faces)
     check_surface(dpr, device, camera, positions, faces)
+    check_instances(dpr, device, camera, positions, faces)
     assert "NULL" in refusal(dpr.scene_add_mesh, scene, None)
     assert "multiple of 3" in refusal(dpr.renderer_set_positions, renderer, c_size_t(0), moved, c_size_t(8))
     for kind, handle in (("loss", loss), ("renderer", renderer), ("scene", scene), ("device", device)):

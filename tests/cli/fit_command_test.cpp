@@ -94,11 +94,53 @@ TEST_SUITE("pipeline") {
     };
     CHECK(loss({}) > loss({"--depth", "0", "--normal", "0"}));
     CHECK(loss({"--size", "12x12"}) > 0);
-    views["views"][2].erase("normal");
-    folder.write("views.json", views.dump());
-    const auto outcome = run_command(folder, k_short);
-    CHECK(outcome.status == 1);
-    CHECK(contains(outcome.err, "normal of views[2] (shape): got none"));
+    REQUIRE(loss({"--report", "report", "--initial", "cube.ply", "--learning-rate", "1e-6"}) > 0);
+    const json report = json::parse(folder.read("report/fit.json"));
+    CHECK(report["depth_difference"].get<double>() < 1e-3);  // of the cube itself
+    CHECK(report["normal_difference"].get<double>() < 1e-3);
+    CHECK(contains(folder.read("report/index.html"), "depths off by"));
+    const auto refuse = [&](const json& wrong, const std::vector<std::string>& options, const char* part) {
+      folder.write("views.json", wrong.dump());
+      const auto outcome = run_command(folder, with(k_short, options));
+      CHECK(outcome.status == 1);
+      CAPTURE(outcome.err);
+      CHECK(contains(outcome.err, part));
+    };
+    json without = views;
+    without["views"][0].erase("normal");  // the view that lacks one is named, be it the first
+    refuse(without, {},
+           "normal of views[0] (shape): got none, expected one, because there is a normal of views[1]");
+    for (json& view : without["views"]) view.erase("normal");
+    refuse(without, {"--normal", "2"}, "--normal (command line)");
+    for (json& view : without["views"]) view.erase("depth");
+    refuse(without, {"--depth", "2"}, "--depth (command line)");
+  }
+
+  TEST_CASE("dpr fit tells of depths that cannot be meant") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    const auto fit = [&](const char* file, const dpr::Image& depth) {
+      dpr::write_image(folder / file, depth);
+      for (json& view : views["views"]) view["depth"] = file;
+      folder.write("views.json", views.dump());
+      return run_command(folder, k_short);
+    };
+    const auto bytes = fit("depth.png", dpr::Image(24, 24, glm::vec4(1)));
+    CHECK(bytes.status == 0);
+    CHECK(contains(bytes.err, "depth.png (and others, 3 in all): whole numbers"));
+    dpr::Image depth(24, 24, glm::vec4(4, 4, 4, 1));
+    CHECK(fit("depth.exr", depth).err.empty());
+    depth.pixels[7] = glm::vec4(65504, 0, 0, 1);
+    const auto far = fit("depth.exr", depth);
+    CHECK(far.status == 0);
+    CHECK(contains(far.err, "1 pixels of the depth of views[0], up to 65504, are not between"));
+    depth.pixels[7] = glm::vec4(-4, 0, 0, 1);
+    CHECK(contains(fit("depth.exr", depth).err, "depth ("));
+    CHECK(contains(fit("depth.exr", depth).err, "got -4, expected the distance"));
+    const auto nothing = fit("depth.exr", dpr::Image(24, 24, glm::vec4(0, 5, 5, 1)));
+    CHECK(nothing.status == 1);
+    CHECK(contains(nothing.err, "depth of views[0] (shape): got no pixel that counts"));
   }
 
   TEST_CASE("dpr fit says that opaque images do not tell where the object is") {

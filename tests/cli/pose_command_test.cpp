@@ -85,6 +85,39 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(contains(page, "http"));  // opens without a network
   }
 
+  TEST_CASE("dpr pose: the light that it found explains the target") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    json truth = json::parse(folder.read("truth.json"));
+    truth["lights"] = {{"ambient", {0, 0, 0}}, {"harmonics", json::array()}};
+    for (int k = 0; k < 9; ++k)
+      truth["lights"]["harmonics"].push_back(
+          {k == 0 ? 2.0 : 0.5 / k, k == 0 ? 1.5 : 0.2, k == 0 ? 1.0 : -0.1});
+    folder.write("lit.json", truth.dump());
+    REQUIRE(run(folder, "render --scene lit.json --preset rigid -o target.exr --quiet").status == 0);
+    REQUIRE(run(folder, "pose --scene scene.json --target target.exr --search -o pose.json --quiet").status ==
+            0);
+    const json pose = json::parse(folder.read("pose.json"));
+    REQUIRE(pose["light"] == "harmonics");
+    REQUIRE(pose["harmonics"].size() == 9);
+    json found = json::parse(folder.read("scene.json"));
+    found["meshes"][0]["transform"] = pose["transform"];
+    found["lights"] = {{"ambient", {0, 0, 0}}, {"harmonics", pose["harmonics"]}};
+    folder.write("found.json", found.dump());
+    REQUIRE(run(folder, "render --scene found.json --preset rigid -o found.exr --quiet").status == 0);
+    REQUIRE(run(folder, "render --scene truth.json --preset rigid -o dark.exr --quiet").status == 0);
+    const dpr::Image target = dpr::read_image(folder / "target.exr");
+    const auto difference = [&](const char* file) {
+      const dpr::Image image = dpr::read_image(folder / file);
+      double sum = 0;
+      for (std::size_t i = 0; i < target.pixels.size(); ++i)
+        sum += static_cast<double>(glm::length(glm::vec3(image.pixels[i] - target.pixels[i])));
+      return sum;
+    };
+    CHECK(difference("found.exr") < 0.2 * difference("dark.exr"));
+  }
+
   TEST_CASE("dpr pose: mask, robust loss, focal length and the grid's size") {
     if (is_skipped()) return;
     const TempDir folder;

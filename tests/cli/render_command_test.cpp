@@ -73,6 +73,20 @@ TEST_SUITE("pipeline") {
   }
 }
 
+TEST_SUITE("pipeline") {
+  TEST_CASE("dpr render: every file that was written is told") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    const std::vector<std::string> render{"render", "cube.ply", "-o",    "cube.png",
+                                          "--size", "16x16",    "--aov", "depth,face_id"};
+    const auto outcome = run_command(folder, render);
+    CHECK(outcome.status == 0);
+    CHECK(contains(outcome.out, "cube.png: 16x16"));
+    CHECK(contains(outcome.out, "\ncube.depth.exr\ncube.face_id.exr\n"));
+  }
+}
+
 TEST_SUITE("robustness") {
   TEST_CASE("dpr render: an output that cannot be written is an error before there is a device") {
     if (is_skipped()) return;

@@ -177,7 +177,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(SecondCrossing, contour),
           DPR_FIELD(SecondCrossing, reference),
           DPR_FIELD(SecondCrossing, cut),
-          DPR_FIELD(SecondCrossing, weight)};
+          DPR_FIELD(SecondCrossing, slope2)};
 }
 
 /// What the device says of every entry.

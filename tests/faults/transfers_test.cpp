@@ -50,6 +50,7 @@ class Program {
     renderer_.set_scene(scene);
     const Mesh& mesh = scene.meshes[0].mesh;
     positions_ = caller_.buffer(mesh.positions);
+    if (!mesh.materials.empty()) materials_ = caller_.buffer(std::vector<glm::vec4>{{0.8F, 0.6F, 0.4F, 9}});
     colors_ = caller_.buffer(mesh.vertex_colors);
     numbers_ = 3 * mesh.positions.size();
     pixels_ = static_cast<std::size_t>(scene.width * scene.height);
@@ -61,6 +62,7 @@ class Program {
   void step() {
     set_positions(renderer_, 0, {positions_()});
     set_colors(renderer_, 0, {colors_()});
+    if (materials_()) set_materials(renderer_, 0, {materials_()});
     cl_event rendered = nullptr;
     forward_on_device(renderer_, {.done = &rendered});
     run(loss_, pixels_, cl::Buffer(image_view(renderer_).buffer, true), target_, grad_);
@@ -68,6 +70,10 @@ class Program {
     run(step_, numbers_, gradient_of("meshes[0].positions"), 1e-7F, positions_);
     run(step_, numbers_, gradient_of("meshes[0].colors"), 1e-2F, colors_);
     clReleaseEvent(rendered);
+    if (materials_()) {
+      copy_gradient(renderer_, "meshes[0].shininess", {grad_()});
+      run(step_, 3, gradient_of("meshes[0].specular"), 1e-3F, materials_);
+    }
     if (!shows_attributes_) return;
     copy_aov(renderer_, Aov::normal, {outputs_()});
     aov_view(renderer_, Aov::face_id);
@@ -103,7 +109,7 @@ class Program {
   Renderer renderer_;
   AttributeImages depths_, normals_;
   cl::Kernel loss_, step_;
-  cl::Buffer positions_, colors_, target_, grad_, outputs_;
+  cl::Buffer positions_, colors_, materials_, target_, grad_, outputs_;
   std::size_t numbers_ = 0, pixels_ = 0;
 };
 
@@ -139,6 +145,9 @@ TEST_SUITE("pipeline") {
     Scene lit = scene_with_gradients("pixel");
     lit.lights = every_light(Shading::phong);
     lit.gradients.lights = lit.gradients.distortion = true;
+    check_step(lit);
+    lit.meshes[0].mesh.materials.resize(1);
+    lit.gradients.materials = true;
     check_step(lit);
     Scene texture = scene_with_gradients("gaussian");
     texture.meshes[0].mesh =

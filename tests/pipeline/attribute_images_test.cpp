@@ -460,6 +460,46 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("attribute images: the barrier's silhouettes have gradients as far as weights fade") {
+    Scene scene = scene_of(make_cube(), reduced(48, 16), reduced(32, 12));
+    scene.camera = orbit_camera(5, 20, 30);
+    scene.smoothing = smoothing_preset("gaussian");
+    scene.smoothing.sigma = 1e-2F;
+    const Image weights(scene.width, scene.height, glm::vec4(1, 0, 0, 0));
+    Renderer renderer(open_device());
+    AttributeImages depths(renderer.device(), Attribute::depth);
+    /// The gradient of the sum of depths by the cube's place, against differences over a step of that size.
+    const auto error = [&](float step) {
+      renderer.set_scene(scene);
+      const auto sum = [&](const glm::vec3& place) {
+        const View view{scene.camera, {glm::translate(glm::mat4(1), place)}};
+        renderer.set_views({&view, 1});
+        renderer.forward();
+        depths.forward(renderer);
+        double total = 0;
+        for (const glm::vec4& pixel : depths.image().pixels) total += static_cast<double>(pixel.x);
+        return total;
+      };
+      const glm::vec3 place(0.1F, 0.05F, -0.2F);
+      sum(place);
+      const glm::dvec3 gradient = depths.backward({&weights, 1}).views[0].transforms[0].translation;
+      glm::dvec3 difference;
+      for (int axis = 0; axis < 3; ++axis) {
+        glm::vec3 there = place, back = place;
+        there[axis] += step;
+        back[axis] -= step;
+        difference[axis] = (sum(there) - sum(back)) / static_cast<double>(there[axis] - back[axis]);
+      }
+      return glm::length(gradient - difference) / glm::length(difference);
+    };
+    const double cut = error(0.1F);
+    scene.smoothing.blur_radius = 0.5F;  // as far as the background has no weight
+    const double faded = error(1e-3F);
+    MESSAGE("off by " << cut << " where a step is left at the blur radius, by " << faded << " without");
+    CHECK(cut > 1);
+    CHECK(faded < 0.05);
+  }
+
   TEST_CASE("attribute images: the same bits again, and nothing that was not asked for") {
     const Device device = open_device();
     Renderer renderer = two_views(device, smoothing_preset("pixel"));

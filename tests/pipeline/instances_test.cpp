@@ -258,12 +258,14 @@ TEST_SUITE("pipeline") {
                           "1, an instance of mesh 0");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_texels(4, 0, {}), "instance of mesh 0");
     scene.meshes[1].instance_of = 7;
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "instance_of (meshes[1]): got 7");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene),
+                          "instance_of (meshes[1]): got 7, where there are 5 meshes");
     scene.meshes[1].instance_of = 2;  // comes later
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "an earlier one");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "got 2, a later mesh");
     scene.meshes[1].instance_of = 0;
     scene.meshes[3].instance_of = 1;  // an instance itself
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "instance_of (meshes[3])");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene),
+                          "instance_of (meshes[3]): got 1, itself an instance of 0");
     scene.meshes[3].instance_of = 2;
     scene.meshes[3].mesh = make_cube();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_scene(scene), "one of the two");

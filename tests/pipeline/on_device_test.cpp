@@ -73,6 +73,7 @@ Scene spoiled(Scene scene) {
     for (glm::vec3& c : instance.mesh.vertex_colors) c *= 0.5F;
     for (glm::vec3& c : instance.mesh.face_colors) c *= 0.5F;
     for (glm::vec3& n : instance.mesh.normals) n.x += 0.4F;
+    for (Material& m : instance.mesh.materials) m = {};
     instance.transform[3].x += 0.1F;
   }
   if (!scene.lights) scene.camera.view[3].z -= 0.3F;
@@ -100,6 +101,12 @@ void set_from_buffers(const Caller& caller, Renderer& renderer, const Scene& sce
       set_texcoords(renderer, m, {caller.buffer(packed(std::span(mesh.texcoords)))()});
     if (!mesh.face_normals.empty())
       set_normals(renderer, m, {caller.buffer(laid_out(std::span(mesh.normals), 2, 3))(), 2 * sizeof(float)});
+    std::vector<float> materials;  // a shininess that kernels cannot use is the lights'
+    for (const Material& material : mesh.materials) {
+      const glm::vec3& s = material.specular;
+      materials.insert(materials.end(), {s.x, s.y, s.z, material.shininess.value_or(-0.5F), 0});
+    }
+    if (!materials.empty()) set_materials(renderer, m, {caller.buffer(materials)(), 0, 5 * sizeof(float)});
     const std::vector<float> rows = rows_of(meshes[m].transform);
     transforms.insert(transforms.end(), rows.begin(), rows.end());
   }
@@ -121,6 +128,11 @@ std::vector<Scene> scenes() {
     normals.meshes[0].mesh.normals.push_back(p + glm::vec3(0.1F, 0.2F, 0));
   normals.meshes[0].mesh.face_normals = two.meshes[0].mesh.faces;
   normals.gradients.normals = true;
+  Mesh& soup = normals.meshes[1].mesh;  // behind a mesh without materials
+  soup.materials = {{.specular = glm::vec3(0.9F, 0.5F, 0.2F), .shininess = 7.0F},
+                    {glm::vec3(0.4F), std::nullopt}};
+  soup.face_materials = {1, 0, 0, 1, 0};
+  normals.gradients.materials = true;
   std::vector<Scene> all{test_scene(), sampled_scene(), sampled_joint_scene(), joint_scene(), texture,
                          two,          normals};
   for (Scene& scene : all) scene.gradients.camera = scene.gradients.transform = true;
@@ -414,6 +426,7 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texels(renderer, 0, 0, {buffer()}), "texture");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_texcoords(renderer, 0, {buffer()}), "without textures");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_normals(renderer, 0, {buffer()}), "without normals");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_materials(renderer, 0, {buffer()}), "without materials");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward_on_device(renderer, {buffer()}), "forward() first");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, image_view(renderer), "forward() first");
     forward_on_device(renderer);

@@ -155,7 +155,7 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
 struct Tolerance {
   double geometry, others;  // times the squared width
 };
-constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0.4}, k_cut{20, 0.4};
+constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0.4}, k_cut{16, 0.4};
 
 double tolerance_of(const Direction& d, const Tolerance& t) {
   const double width = reduced(k_width, 8);
@@ -211,8 +211,9 @@ TEST_SUITE("pipeline") {
         CAPTURE(pixels);
         CAPTURE(gamma);
         const double error = largest_difference(renderer.image(), reference::render_pixel_noise(twin));
-        // What is left is the variance of the samples' cells, so it falls with the square of the scale.
-        CHECK(error < 6e-3 / (pixels * pixels));
+        // Surfaces that mix vary between samples. What is left falls with the square of the scale.
+        const double at_one_pixel = gamma < 1e-6F && !test::is_reduced() ? 6e-4 : 4e-3;
+        CHECK(error < at_one_pixel / (pixels * pixels));
       }
     }
   }

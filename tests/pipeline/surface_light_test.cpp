@@ -324,9 +324,9 @@ TEST_SUITE("pipeline") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(1, mesh.normals), "without normals");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(1, mesh.materials), "without materials");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(0, std::span(mesh.normals).first(2)),
-                          "normals: got 2 values");
+                          "normals: got 2 vectors");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(0, std::span(mesh.materials).first(1)),
-                          "materials: got 1 values");
+                          "materials: got 1, expected");
     std::vector<glm::vec3> normals = mesh.normals;
     normals[1].z = NAN;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_normals(0, normals), "normals[1]");

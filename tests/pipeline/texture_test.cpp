@@ -139,7 +139,7 @@ TEST_SUITE("pipeline") {
       CHECK_THROWS_AS(renderer.set_texels(1, 0, mesh.textures[0].texels), InvalidArgument);
       DPR_CHECK_MESSAGE_HAS(InvalidArgument,
                             renderer.set_texels(0, 0, std::span(mesh.textures[0].texels).first(2)),
-                            "texels: got 2 values, expected 15");
+                            "texels: got 2 vectors, expected 15");
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_texcoords(1, mesh.texcoords),
                             "a mesh without textures");
       mesh.texcoords[1].x = std::numeric_limits<float>::quiet_NaN();

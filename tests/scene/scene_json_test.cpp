@@ -345,7 +345,8 @@ TEST_SUITE("robustness") {
     const auto check = [&](const std::string& second, const std::string& part) {
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text(second)), part);
     };
-    check(R"("instance_of": 1)", "instance_of (meshes[1]): got 1, expected an earlier one");
+    check(R"("instance_of": 1)",
+          "instance_of (meshes[1]): got 1, which is the instance itself, expected the number of an earlier");
     check(R"("instance_of": -1)", "meshes[1].instance_of");
     check(R"("instance_of": 0, "face_colors": [[1, 0, 0]])", "face_colors");
   }

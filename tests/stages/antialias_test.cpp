@@ -103,6 +103,32 @@ double area_of(const std::vector<glm::vec2>& corners) {
   return area;
 }
 
+/// Sectors around a point, the first of 14 degrees, each of a colour of its own.
+Mesh sectors(glm::vec2 middle, float radius, float depth, Random& random) {
+  Mesh mesh;
+  mesh.positions.emplace_back(middle, depth);
+  float angle = random(0.0F, 6.0F);
+  const float narrow = 0.25F, others = (6.2831853F - narrow) / 6;
+  for (unsigned i = 0; i < 7; ++i) {
+    mesh.positions.emplace_back(middle.x + radius * std::cos(angle), middle.y + radius * std::sin(angle),
+                                depth);
+    mesh.faces.emplace_back(0, i + 1, (i + 1) % 7 + 1);
+    mesh.face_colors.push_back(random.vector(0, 1));
+    angle += i == 0 ? narrow : others;
+  }
+  return mesh;
+}
+
+/// The integral of a mesh's colours over the image plane.
+glm::dvec3 area_by_colors(const Mesh& mesh) {
+  glm::dvec3 sum(0);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto corner = [&](int i) { return glm::vec2(mesh.positions[mesh.faces[f][i]]); };
+    sum += area_of({corner(0), corner(1), corner(2)}) * glm::dvec3(mesh.face_colors[f]);
+  }
+  return sum;
+}
+
 Mesh joined(const Mesh& a, const Mesh& b) {
   Mesh mesh = a;
   const auto first = static_cast<unsigned>(a.positions.size());
@@ -171,6 +197,35 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("antialias: colours continue to the edge as they came") {
+    const float edge = 0.33F;
+    const Mesh mesh = fan({{-3, -3}, {edge, -3}, {edge, 3}, {-3, 3}}, 5);
+    ContourFrame frame(mesh, 16, 16);
+    Samples samples = rigid_samples(frame, mesh);
+    const auto within = [](float x) { return 1 + 0.3F * x; };
+    const auto beyond = [](float x) { return 0.2F - 0.1F * x; };
+    for (std::size_t i = 0; i < samples.colors.size(); ++i) {
+      const auto x = static_cast<float>(i % 16);
+      samples.colors[i].s[0] = samples.colors[i].s[3] > 0 ? within(x) : beyond(x);
+    }
+    const std::vector<cl_float4> image = blend(frame, samples);
+    const double at = (static_cast<double>(edge) + 1) * 8 - 0.5;
+    for (int i = 2; i < 14; ++i) {
+      // The integral of the tent times the colours, by midpoints.
+      double expected = 0;
+      const int parts = 2000;
+      for (int k = 0; k < parts; ++k) {
+        const double way = (k + 0.5) * 2 / parts - 1, x = i + way;
+        const auto color =
+            static_cast<double>(x < at ? within(static_cast<float>(x)) : beyond(static_cast<float>(x)));
+        expected += (1 - std::abs(way)) * color * 2 / parts;
+      }
+      CAPTURE(i);
+      CHECK(static_cast<double>(image[static_cast<std::size_t>(8 * 16 + i)].s[0]) ==
+            doctest::Approx(expected).epsilon(1e-3));
+    }
+  }
+
   TEST_CASE("antialias: areas of polygons, wherever they lie") {
     Random random(4);
     double largest = 0, sum = 0;
@@ -189,6 +244,25 @@ TEST_SUITE("unit") {
     CHECK(std::abs(sum) / polygons < reduced(2, 40) * 0.01);
   }
 
+  TEST_CASE("antialias: areas of the sectors that meet in a point, wherever it lies, before other edges") {
+    Random random(8);
+    double largest = 0;
+    const int meshes = reduced(60, 3);
+    for (int i = 0; i < meshes; ++i) {
+      const glm::vec2 middle(random(-0.1F, 0.1F), random(-0.1F, 0.1F));
+      const Mesh front = sectors(middle, 0.6F, 5, random), behind = sectors(middle, 0.4F, 7, random);
+      Mesh mesh = joined(front, behind);
+      mesh.face_colors = front.face_colors;
+      mesh.face_colors.insert(mesh.face_colors.end(), behind.face_colors.begin(), behind.face_colors.end());
+      ContourFrame frame(mesh, 40, 40);
+      const std::vector<cl_float4> image = blend(frame, rigid_samples(frame, mesh));
+      const glm::dvec3 expected =
+          area_by_colors(front) / static_cast<double>(frame.p.pixel_size * frame.p.pixel_size);
+      for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(sum_of(image, c) - expected[c]));
+    }
+    CHECK(largest < 0.15);
+  }
+
   TEST_CASE("antialias: a contour behind a surface is hidden, one before it is not") {
     const std::vector<glm::vec2> near = circle({0, 0}, 0.8F, 24), far = circle({0.05F, 0.02F}, 0.4F, 5);
     for (const bool is_hidden : {true, false}) {
@@ -201,8 +275,10 @@ TEST_SUITE("unit") {
       if (!is_hidden) CHECK(sum_of(image, 1) == doctest::Approx(area_of(far) / unit).epsilon(2e-2));
       const std::vector<cl_uint> winners = frame.antialias.winner.download();
       const auto rim = static_cast<cl_uint>(near.size());
+      const std::vector<cl_uint4> edges = frame.edges.edges.download();
       const auto is_inner = [&](cl_uint w) {
-        return w != DPR_NO_CROSSING && frame.edges.edges.download()[w / DPR_CONTOUR_FLAGS].s[0] >= rim;
+        const std::size_t edge = w / DPR_CONTOUR_FLAGS;
+        return edge < edges.size() && edges[edge].s[0] >= rim;
       };
       CHECK(std::ranges::any_of(winners, is_inner) == !is_hidden);
     }
@@ -268,7 +344,7 @@ TEST_SUITE("gradient") {
     CHECK(dot(grad, image) != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-5));
   }
 
-  TEST_CASE("antialias: ends of edges against differences") {
+  TEST_CASE("antialias: ends of edges against differences, of colours that vary") {
     const Mesh mesh = sphere_of_edges();
     const int size = reduced(48, 16);
     ContourFrame frame(mesh, size, size - 5);

@@ -1,0 +1,19 @@
+// The light in which a scene's mesh explains images of it.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "dpr/device.hpp"
+#include "dpr/light.hpp"
+#include "dpr/scene.hpp"
+#include "dpr/shape.hpp"
+
+namespace dpr {
+
+/// find_light() for the only mesh of a scene, where it stands and with the colours and textures that it has,
+/// over the scene's background, in views of which the cameras are known. None where no image shows it.
+std::optional<Lights> find_light(const Device& device, const Scene& scene, std::span<const ShapeView> views,
+                                 float robust_scale);
+
+}  // namespace dpr
