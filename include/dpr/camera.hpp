@@ -22,9 +22,9 @@ struct Intrinsics {
 ///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y' alike with p1 and p2
 ///   exchanged.
 ///
-/// It moves vertices. Between them edges and what is on faces stay straight, so that faces should be small
-/// where the image bends: an edge of length l in tangents is off by at most about 3/4 |k1| l^2 r in its
-/// middle. From the radius on where the image would fold over (largest_radius()) points are held at it. Of
+/// It moves vertices. Between them edges and what is on faces stay straight, an edge of length l in tangents
+/// off by up to about 3/4 |k1| l^2 r: subdivide_for_lens() (dpr/subdivision.hpp) cuts faces that are too large
+/// for that. From the radius on where the image would fold over (largest_radius()) points are held at it. Of
 /// faces that cross the near plane what is left is distorted; how the lens moves the cuts is not in its own
 /// gradients, nor in those of the intrinsics beside it, but in all others.
 struct Distortion {

@@ -26,6 +26,7 @@
 #include "dpr/shape.hpp"
 #include "dpr/smoothing.hpp"
 #include "dpr/smoothing_options.hpp"
+#include "dpr/subdivision.hpp"
 #include "dpr/texture.hpp"
 #include "dpr/version.hpp"
 #include "dpr/voxels.hpp"

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "dpr/image.hpp"
 #include "dpr/scene.hpp"
 
 namespace dpr::check {

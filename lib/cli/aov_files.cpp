@@ -71,13 +71,15 @@ const SamplingError& AovFiles::sampling_error(Renderer& renderer) const {
   return *sampling_error_;
 }
 
-std::vector<std::string> AovFiles::write(Renderer& renderer) const {
+std::vector<std::string> AovFiles::write(Renderer& renderer, const Scene& scene,
+                                         const SubdividedScene& drawn) const {
   std::vector<std::string> files;
   const auto write = [&](std::string_view name, const Image& image) {
     write_image(files.emplace_back(file_name(name)), image);
   };
   if (!aovs_.empty()) {
-    const AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+    AuxiliaryOutputs outputs = auxiliary_outputs(renderer);
+    name_old_faces(scene, drawn, outputs);
     for (const Aov aov : aovs_) write(to_string(aov), aov_image(outputs, aov));
   }
   if (gradient_standard_error_ && sampling_error(renderer).pixel_gradients.empty()) {

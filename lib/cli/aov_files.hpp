@@ -7,6 +7,7 @@
 
 #include "dpr/aov.hpp"
 #include "dpr/sampling_error.hpp"
+#include "dpr/subdivision.hpp"
 
 namespace dpr::cli {
 
@@ -15,8 +16,9 @@ class AovFiles {
   /// Throws InvalidArgument for a word that names none, and for uv of a scene without texture coordinates.
   AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene);
 
-  /// Writes them, from the renderer's last forward(), to OUT.NAME.exr for the output OUT.png: these files.
-  std::vector<std::string> write(Renderer& renderer) const;
+  /// Writes them, from the last forward() of a renderer that draws `drawn`, to OUT.NAME.exr for the output
+  /// OUT.png: these files. Faces and barycentrics are the scene's.
+  std::vector<std::string> write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const;
   /// A line on the standard error of the image, if the scene is sampled.
   void print_sampling_error(Renderer& renderer) const;
 

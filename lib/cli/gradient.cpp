@@ -2,11 +2,13 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
+#include "cli/lens_options.hpp"
 #include "cli/target.hpp"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
@@ -18,6 +20,7 @@ namespace {
 
 struct GradientOptions {
   std::string scene, target, loss = "mse", output;
+  LensSubdivisionOptions lens;
 };
 
 Json array_to_json(const GradientArray& array) {
@@ -70,21 +73,23 @@ Json gradient_to_json(const Scene& scene, double loss, SceneGradient gradient) {
   return json;
 }
 
-void run(const GradientOptions& options, const CommonOptions& common) {
+void run(const CLI::App& command, const GradientOptions& options, const CommonOptions& common) {
   const Scene scene = read_scene(options.scene, common);
+  const SubdividedScene drawn = subdivide(command, scene, options.lens);
   const LossWeights weights = LossWeights::only(parse_loss(options.loss, "--loss"));
   const Image target = read_target(options.target, weights, common.encoding());
   const Device device = open_device(common);
   Renderer renderer(device);
   ImageLoss image_loss(device, weights, {&target, 1});
-  renderer.set_scene(scene);
+  renderer.set_scene(drawn.scene);
   renderer.forward();
   const double loss = image_loss.evaluate(renderer);
   if (!std::isfinite(loss)) {
     throw InvalidArgument("loss (dpr gradient)", checks::text(loss),
                           "a finite number; the image's or the target's colours are beyond single precision");
   }
-  write_json(options.output, gradient_to_json(scene, loss, renderer.backward(image_loss)));
+  SceneGradient gradient = pull_back(scene, drawn, renderer.backward(image_loss));
+  write_json(options.output, gradient_to_json(scene, loss, std::move(gradient)));
   if (!common.quiet) std::printf("%s: %s loss %.6g\n", options.output.c_str(), options.loss.c_str(), loss);
 }
 
@@ -98,9 +103,10 @@ void add_gradient_command(CLI::App& application, CommonOptions& common) {
   command->add_option("--target", options->target, "Image to compare with")->required()->type_name("T.exr");
   command->add_option("--loss", options->loss, "Which loss; mse by default")->type_name(joined(loss_names()));
   command->add_option("-o,--output", options->output, "Gradients to write")->required()->type_name("G.json");
+  add_lens_options(*command, options->lens);
   add_common_options(*command, common);
   command->footer("Example: dpr gradient --scene scene.json --target target.exr --loss l1 -o gradient.json");
-  command->callback([options, &common] { run(*options, common); });
+  command->callback([command, options, &common] { run(*command, *options, common); });
 }
 
 }  // namespace dpr::cli

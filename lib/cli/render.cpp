@@ -10,6 +10,7 @@
 #include "base/output_file.hpp"
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
+#include "cli/lens_options.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
@@ -27,6 +28,7 @@ struct RenderOptions {
   std::vector<std::string> aovs;
   bool rigid = false;
   std::optional<std::string> cull, shading;
+  LensSubdivisionOptions lens;
   float elevation = 25, azimuth = 35;  // degrees: three sides of a box are in sight
 };
 
@@ -115,36 +117,44 @@ void set_shading(Scene& scene, const std::string& word) {
   scene.lights->shading = shading;
 }
 
-void run(const RenderOptions& options, CommonOptions& common) {
+/// How many triangles there are, and what became of them.
+void print_triangles(const RenderOptions& options, const Scene& scene, const RenderStatistics& statistics) {
+  std::size_t faces = 0;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) faces += mesh_of(scene, i).faces.size();
+  std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height, faces);
+  if (statistics.faces > faces) std::printf(", cut into %zu for the lens", statistics.faces);
+  if (statistics.faces_dropped > 0) {
+    std::printf(
+        ", of which %zu cannot be seen: the back of a closed mesh, outside the image, nearer than znear, "
+        "beyond zfar, culled, or without area",
+        statistics.faces_dropped);
+  }
+  std::printf("\n");
+}
+
+void run(const CLI::App& command, const RenderOptions& options, CommonOptions& common) {
   require_writable(options.output);
   if (options.rigid) common.smoothing.preset = "rigid";
   Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
   if (options.shading) set_shading(scene, *options.shading);
   if (options.cull) scene.cull = parse_cull(*options.cull, "--cull");
   const AovFiles aovs(options.aovs, options.output, scene);
+  const SubdividedScene drawn = subdivide(command, scene, options.lens);
   Renderer renderer(open_device(common));
-  renderer.set_scene(scene);
+  renderer.set_scene(drawn.scene);
   renderer.forward();
   const Image image = renderer.image();
   const bool keeps_silhouette = std::filesystem::path(options.output).extension() == ".exr";
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
-  const std::vector<std::string> files_beside = aovs.write(renderer);
+  const std::vector<std::string> files_beside = aovs.write(renderer, scene, drawn);
   if (statistics.fragments == 0) {
     print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
                  "znear and zfar"},
                 common);
   }
   if (!common.quiet) {
-    std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height,
-                statistics.faces);
-    if (statistics.faces_dropped > 0) {
-      std::printf(
-          ", of which %zu cannot be seen: the back of a closed mesh, outside the image, nearer than znear, "
-          "beyond zfar, culled, or without area",
-          statistics.faces_dropped);
-    }
-    std::printf("\n");
+    print_triangles(options, scene, statistics);
     for (const std::string& file : files_beside) std::printf("%s\n", file.c_str());
   }
   if (common.verbose) {
@@ -198,15 +208,16 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->delimiter(',')
       ->allow_extra_args(false)  // what follows is MESH
       ->type_name("NAME[,NAME]");
+  add_lens_options(*command, options->lens);
   add_common_options(*command, common);
   command->get_option("--rigid")->excludes(command->get_option("--preset"));
   for (const char* const fitted : {"--elevation", "--azimuth"}) {
     command->get_option(fitted)->excludes(command->get_option("--scene"));
   }
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");
-  command->callback([options, &common] {
+  command->callback([command, options, &common] {
     if (options->mesh.empty() && options->scene.empty()) throw CLI::RequiredError("MESH or --scene");
-    run(*options, common);
+    run(*command, *options, common);
   });
 }
 

@@ -9,11 +9,14 @@
 #include <tuple>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "base/require.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/subdivision.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
+#include "solve/pose_space.hpp"
 
 namespace dpr {
 namespace {
@@ -169,7 +172,8 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
   scene.gradients = no_gradients();
   scene.gradients.transform = true;
   scene.gradients.smoothing = std::holds_alternative<AdaptiveSchedule>(descent.schedule);
-  Objective objective(device, scene, target, descent.loss);
+  const std::vector<View> lenses = PoseSpace(scene, initial, options).seen_through_lenses(scene.camera);
+  Objective objective(device, subdivide_for_lens(scene, {}, lenses).scene, target, descent.loss);
 
   PoseResult result;
   result.start = initial;

@@ -6,11 +6,23 @@
 
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
+#include "solve/rotation_grid.hpp"
 
 namespace dpr {
 namespace {
 
 constexpr std::size_t k_translation = 3;  // where its parameters begin
+
+/// The lens that a camera has, and where it is not known some as strong as there are.
+std::vector<Camera> possible_lenses(const Camera& camera, bool is_unknown) {
+  constexpr double k_strong = 0.3;
+  std::vector<Camera> cameras;
+  if (camera.distortion) cameras.push_back(camera);
+  if (is_unknown) {
+    for (const double k1 : {-k_strong, k_strong}) cameras.push_back(calibrated(camera, 1, {k1, 0}));
+  }
+  return cameras;
+}
 
 }  // namespace
 
@@ -26,6 +38,7 @@ Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& ra
 
 PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions& options)
     : stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+      initial_translation_(initial.translation),
       translation_(options.solve_translation),
       focal_(options.solve_focal),
       distortion_(options.solve_distortion),
@@ -100,6 +113,16 @@ double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
 View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
   return {calibrated(camera, hypothesis.focal_scale, hypothesis.radial),
           {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
+}
+
+std::vector<View> PoseSpace::seen_through_lenses(const Camera& camera) const {
+  constexpr std::size_t k_rotations = 16;
+  std::vector<View> views;
+  for (const Camera& lens : possible_lenses(camera, distortion_)) {
+    for (const glm::dmat3& rotation : rotation_grid(k_rotations))
+      views.push_back(view({{rotation, initial_translation_}}, lens));
+  }
+  return views;
 }
 
 std::vector<double> PoseSpace::to_world(std::span<const double> covariance) const {

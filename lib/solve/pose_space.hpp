@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
@@ -37,6 +38,9 @@ class PoseSpace {
   /// The same between two hypotheses, rotation and translation counted.
   double distance(const Hypothesis& a, const Hypothesis& b) const;
   View view(const Hypothesis& hypothesis, const Camera& camera) const;
+  /// Poses all around at the initial place, before the camera's lens, and such as may be found where one is
+  /// looked for: what faces are cut for. None without a lens.
+  std::vector<View> seen_through_lenses(const Camera& camera) const;
   /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
   std::vector<double> to_world(std::span<const double> covariance) const;
 
@@ -45,6 +49,7 @@ class PoseSpace {
 
  private:
   glm::dmat3 stretch_, camera_axes_;
+  glm::dvec3 initial_translation_;
   bool translation_, focal_, distortion_;
   std::size_t focal_index_, radial_index_, size_;  // where their parameters begin, and how many there are
   double radius_, distance_, radius_ndc_;

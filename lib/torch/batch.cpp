@@ -88,22 +88,6 @@ std::span<const glm::vec3> vertices_of_view(const Inputs& in, std::size_t view) 
   return in.vertices.size(0) == 1 ? all : all.subspan(view * count, count);
 }
 
-std::vector<View> make_views(const Inputs& in, const RenderSettings& settings) {
-  const auto matrices = rows<glm::vec4>(in.views);
-  std::vector<View> views;
-  for (std::size_t v = 0; v < static_cast<std::size_t>(in.views.size(0)); ++v) {
-    View view{{}, {glm::mat4(1.0F)}};
-    for (int row = 0; row < 4; ++row) {
-      const glm::vec4& values = matrices[4 * v + static_cast<std::size_t>(row)];
-      for (int column = 0; column < 4; ++column) view.camera.view[column][row] = values[column];
-    }
-    set_projection(view.camera, in.intrinsics.select(0, static_cast<std::int64_t>(v)));
-    settings.set_clipping(view.camera, vertices_of_view(in, v));
-    views.push_back(view);
-  }
-  return views;
-}
-
 /// d loss / d M of x_camera = A x_world + t, M = [A t; 0 1]: the sum over the vertices of g_camera x_world^T,
 /// where g_camera = A^-T g_world.
 at::Tensor view_gradients(const at::Tensor& views, const at::Tensor& vertices,
@@ -221,6 +205,22 @@ Topology topology_of(const Inputs& in, std::shared_ptr<const Faces> faces, const
                      bool face_colors) {
   return {std::move(faces), static_cast<std::size_t>(in.vertices.size(1)), face_colors, settings.width(),
           settings.height()};
+}
+
+std::vector<View> make_views(const Inputs& in, const RenderSettings& settings) {
+  const auto matrices = rows<glm::vec4>(in.views);
+  std::vector<View> views;
+  for (std::size_t v = 0; v < static_cast<std::size_t>(in.views.size(0)); ++v) {
+    View view{{}, {glm::mat4(1.0F)}};
+    for (int row = 0; row < 4; ++row) {
+      const glm::vec4& values = matrices[4 * v + static_cast<std::size_t>(row)];
+      for (int column = 0; column < 4; ++column) view.camera.view[column][row] = values[column];
+    }
+    set_projection(view.camera, in.intrinsics.select(0, static_cast<std::int64_t>(v)));
+    settings.set_clipping(view.camera, vertices_of_view(in, v));
+    views.push_back(view);
+  }
+  return views;
 }
 
 at::Tensor render_batch(Renderer& renderer, const Inputs& in, const BatchOptions& options) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "dpr/light.hpp"
 #include "torch/render_settings.hpp"
@@ -20,6 +21,9 @@ struct Inputs {
 
 /// The same, contiguous. Throws InvalidArgument for types, devices and shapes that do not fit.
 Inputs checked(const Inputs& in, std::int64_t faces);
+
+/// The views of checked inputs.
+std::vector<View> make_views(const Inputs& in, const RenderSettings& settings);
 
 /// How a batch is rendered.
 struct BatchOptions {

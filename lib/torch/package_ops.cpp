@@ -16,6 +16,7 @@
 #include "torch/batch.hpp"
 #include "torch/batch_renderer.hpp"
 #include "torch/errors.hpp"
+#include "torch/lens_subdivision.hpp"
 #include "torch/light_tensors.hpp"
 #include "torch/output_tensors.hpp"
 
@@ -165,6 +166,20 @@ std::vector<at::Tensor> auxiliary(const at::Tensor& frame, Words names, std::int
   });
 }
 
+/// Of dpr::_subdivide: the pieces, their faces, and the combinations of vertices with their weights.
+std::tuple<at::Tensor, at::Tensor, at::Tensor, at::Tensor> subdivide_mesh(
+    std::int64_t width, std::int64_t height, Words texts, double tolerance, const at::Tensor& faces,
+    const at::Tensor& vertices, const at::Tensor& views, const at::Tensor& intrinsics) {
+  return with_torch_errors([&] {
+    const RenderSettings settings = settings_from(width, height, texts);
+    const Faces read = read_faces(faces);
+    const Inputs in = checked({vertices, at::zeros_like(vertices), views, intrinsics, at::zeros({3})},
+                              static_cast<std::int64_t>(read.size()));
+    const CutFaces cut = cut_for_lens(in, read, settings, tolerance);
+    return std::tuple(cut.faces, cut.face_of, cut.vertices_of, cut.vertex_weights);
+  });
+}
+
 void check_settings(std::int64_t width, std::int64_t height, Words settings) {
   with_torch_errors([&] { settings_from(width, height, settings); });
 }
@@ -258,6 +273,10 @@ TORCH_LIBRARY_FRAGMENT(dpr, m) {
       "-> Tensor[]");
   m.def("_is_empty(Tensor frame) -> bool");
   m.def("_auxiliary(Tensor frame, str[] names, int views, int height, int width) -> Tensor[]");
+  m.def(
+      "_subdivide(int width, int height, str[] settings, float tolerance, Tensor faces, Tensor vertices, "
+      "Tensor views, Tensor intrinsics) -> (Tensor, Tensor, Tensor, Tensor)",
+      &subdivide_mesh);
   m.def("_check_settings(int width, int height, str[] settings) -> ()", &check_settings);
   m.def("_light_kinds() -> Dict(str, int)", &light_kinds);
   m.def("_release() -> ()", [] { RendererPools::of_process().clear(); });

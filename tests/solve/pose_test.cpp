@@ -12,6 +12,7 @@
 
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
+#include "dpr/subdivision.hpp"
 #include "support/reduced.hpp"
 
 namespace {
@@ -151,7 +152,7 @@ TEST_SUITE("pipeline") {
     scene.camera = dpr::orbit_camera(3.2F, 30, 120);  // near, so that the picture bends
     scene.camera.fov_y_degrees = 70;
     scene.camera.distortion = dpr::Distortion{-0.2F, 0.05F};
-    const dpr::Image target = rigid_target(device, scene);
+    const dpr::Image target = rigid_target(device, dpr::subdivide_for_lens(scene).scene);
     scene.camera.distortion.reset();
     scene.camera.fov_y_degrees = 74;
     const dpr::PoseSolver solver(device, scene, target,
@@ -166,6 +167,28 @@ TEST_SUITE("pipeline") {
     const dpr::Camera found = dpr::calibrated(scene.camera, result.focal_scale, result.radial);
     CHECK(static_cast<double>(found.distortion->k1) == doctest::Approx(result.radial.x));
     CHECK(static_cast<double>(found.fov_y_degrees) == doctest::Approx(70).epsilon(0.01));
+  }
+
+  TEST_CASE("both methods: faces are cut where the scene's lens bends their edges") {
+    if (is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(96);
+    scene.camera = dpr::orbit_camera(2.6F, 30, 120);  // each side fills a third of the picture
+    scene.camera.fov_y_degrees = 90;
+    scene.camera.znear = 0.5F;
+    scene.camera.distortion = dpr::Distortion{-0.3F, 0.05F};
+    const dpr::Image target =
+        rigid_target(device, dpr::subdivide_for_lens(scene, {.tolerance = 0.02F}).scene);
+    const dpr::Pose start{turned(3).rotation, {0.03, 0.02, -0.03}};
+    dpr::LeastSquares method = least_squares();
+    method.rotations = 0;
+    for (const dpr::PoseOptions& options :
+         {dpr::PoseOptions{.method = method, .solve_translation = true},
+          dpr::PoseOptions{.method = dpr::Descent{}, .solve_translation = true}}) {
+      const dpr::PoseResult result = dpr::PoseSolver(device, scene, target, options).solve(start);
+      CHECK(error_degrees(result) < 0.5);
+      CHECK(glm::length(result.pose.translation) < 0.03);  // with whole faces 0.09
+    }
   }
 
   TEST_CASE("least squares: all poses that give the image are told, the nearest one first") {

@@ -265,6 +265,40 @@ class PackageTest(unittest.TestCase):
         with self.assertRaisesRegex(RuntimeError, "outputs .* got \"shadow\", expected depth"):
             dpr.render(wall, FACES[:1], views, intrinsics, width=SIZE, height=SIZE, outputs=["shadow"])
 
+    def test_subdivision_for_a_lens(self):
+        wall = torch.tensor([[-2.0, -1.6, 2.0], [2.1, -1.5, 1.8], [2.0, 1.6, 1.7], [-2.2, 1.5, 2.1]])
+        faces, colors = torch.tensor([[0, 1, 2], [0, 2, 3]]), random(4, 3)
+        views, lens = cameras(1)[0], torch.tensor([[45.0, 45.0, 40.0, 30.0, -0.22, 0.03, 0.0, 0.0, 0.0]])
+        renderer = dpr.Renderer(80, 60)
+        cut = renderer.subdivide(wall, faces, views, lens)
+        self.assertGreater(len(cut.faces), 20)
+        self.assertEqual(cut.face_of.unique().tolist(), [0, 1])
+        self.assertEqual(cut.of_faces(random(2, 3)).shape, cut.faces.shape)
+
+        def image(vertices, colors, tolerance):
+            pieces = renderer.subdivide(vertices, faces, views, lens, tolerance=tolerance)
+            return renderer(pieces.of_vertices(vertices), pieces.faces, views, lens, colors=pieces.of_vertices(colors))
+
+        finest = image(wall, colors, 0.01)
+        error = (image(wall, colors, 0.25) - finest).abs().mean()
+        self.assertGreater((renderer(wall, faces, views, lens, colors=colors) - finest).abs().mean(), 20 * error)
+
+        given = [wall.clone().requires_grad_(), colors.clone().requires_grad_()]
+        weights = random(1, 60, 80, 4, seed=2)
+        (image(*given, 0.25) * weights).sum().backward()
+        step = 1e-2
+        way = torch.cat([random(4, 3, seed=3), random(4, 3, seed=4)]) - 0.5
+        sums = [(image(wall + s * way[:4], colors + s * way[4:], 0.02) * weights).sum() for s in (step, -step)]
+        found = sum((tensor.grad * w).sum() for tensor, w in zip(given, (way[:4], way[4:])))
+        self.assertAlmostEqual(float((sums[0] - sums[1]) / (2 * step) / found), 1, delta=0.02)
+
+        same = dpr.subdivide(wall, faces, views, lens[:, :4], width=80, height=60)
+        self.assertTrue(torch.equal(same.faces, faces))
+        self.assertTrue(torch.equal(same.of_vertices(wall), wall))
+        for wrong, message in (({"tolerance": -1.0}, "tolerance"), ({"vertices": wall[None]}, "vertices")):
+            with self.assertRaisesRegex((RuntimeError, ValueError), message):
+                renderer.subdivide(**{"vertices": wall, "faces": faces, "views": views, "intrinsics": lens, **wrong})
+
     def test_a_wanted_gradient_is_never_dropped(self):
         views, intrinsics = cameras(1)
         for name in ("shininess", "znear", "blur_radius", "sigma"):

@@ -9,5 +9,6 @@ from ._library import BUILT_FOR, load
 
 load()
 
-from ._renderer import Renderer, render, release  # noqa: E402  which need the operators
+from ._renderer import Renderer, render, release, subdivide  # noqa: E402  which need the operators
+from ._subdivision import Subdivision  # noqa: E402
 

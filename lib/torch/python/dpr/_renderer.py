@@ -4,6 +4,7 @@ import warnings
 import torch
 
 from . import _arguments
+from ._subdivision import Subdivision
 
 _LIGHT_KINDS = torch.ops.dpr._light_kinds()
 _DIFFERENTIABLE = ("sigma", "gamma", "alpha")
@@ -94,6 +95,25 @@ class Renderer:
             return self._render_each(vertices, faces, views, intrinsics, colors, face_colors, shared)
         return self._render(vertices, faces, views, intrinsics, colors, face_colors, shared, first_view=0)
 
+    def subdivide(self, vertices, faces, views, intrinsics, *, tolerance=0.25, copy=False):
+        """Cuts a mesh's faces where lenses bend their edges, which images draw straight between vertices.
+
+        vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a
+        point of one further than `tolerance` pixels from where it is drawn, for all faces at them, also between
+        vertices that only coincide. Without lenses nothing is cut. The result is right for meshes and cameras near
+        these: cut again when they have moved. With lights, normals are those of the pieces: new vertices have their
+        face's own, so that what coarse faces shade smoothly gets flat within them.
+
+        Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
+        """
+        arguments = [("vertices", vertices, [("V", 3)]), ("views", views, [("N", 4, 4)]),
+                     ("intrinsics", intrinsics, [("N", n) for n in (4, 9, 1)])]
+        vertices, views, intrinsics = (_arguments.floats(*a, copy).detach() for a in arguments)
+        tolerance = float(_arguments.number("tolerance", tolerance))
+        faces = _arguments.indices(faces, copy)
+        return Subdivision(*torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance, faces,
+                                                     vertices[None], views, intrinsics))
+
     def _render_each(self, vertices, faces, views, intrinsics, colors, face_colors, shared):
         """Meshes that differ, one a view. Sampled noise is that of the views' places in the batch."""
         views = _arguments.floats("views", views, [("N", 4, 4)], shared[-1])
@@ -171,6 +191,12 @@ def render(vertices, faces, views, intrinsics, *, width, height, colors=None, fa
     renderer = Renderer(width, height, device=device, **settings)
     return renderer(vertices, faces, views, intrinsics, colors=colors, face_colors=face_colors, background=background,
                     lights=lights, sigma=sigma, gamma=gamma, alpha=alpha, outputs=outputs, copy=copy)
+
+
+def subdivide(vertices, faces, views, intrinsics, *, width, height, tolerance=0.25, copy=False, **settings):
+    """Renderer(width, height, **settings).subdivide(): see there."""
+    return Renderer(width, height, **settings).subdivide(vertices, faces, views, intrinsics, tolerance=tolerance,
+                                                         copy=copy)
 
 
 def release():
