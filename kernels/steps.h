@@ -10,7 +10,8 @@
 
 #include "crossing.h"
 
-/// Of a step that a contour passes without counting there: one that is flat, and counts by columns.
+/// Of a step that a contour passes without counting there: a flat one, which counts by columns, or one that
+/// only one of the samples shows.
 #define DPR_PASSED (DPR_NO_CROSSING - 1)
 
 /// The steps from a sample: to the right, down, to the left, up. The sample at the other end counts a step as
