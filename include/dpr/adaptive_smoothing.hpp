@@ -18,11 +18,13 @@ struct AdaptiveSchedule {
   std::uint32_t max_samples = 128;     ///< samples double up to this; antithetic draws stay even
   float learning_rate_divisor = 1.5F;  ///< >= 1, applied with each change
   float learning_rate_floor = 1e-4F;
-  float memory = 0.9F;  ///< v <- memory v + (1 - memory) d loss / d gamma
+  float memory = 0.9F;  ///< v <- memory v + (1 - memory) derivative
 };
 
-/// Watches d loss / d gamma and shrinks sigma and gamma while less smoothing means less loss. Works with any
-/// member of the family. A blur radius given explicitly shrinks with sigma.
+/// Watches the loss's derivative by the smoothing, and shrinks sigma and gamma while less means less loss:
+/// d loss / d gamma, as published; with noise on the pixel d loss / d sigma, since gamma says nothing where
+/// surfaces do not overlap. Works with any member of the family. A blur radius given explicitly shrinks with
+/// sigma.
 class DPR_API AdaptiveSmoothing {
  public:
   /// `average` is that of the run it goes on from. Throws InvalidArgument for a schedule out of range.
@@ -30,7 +32,7 @@ class DPR_API AdaptiveSmoothing {
 
   /// To be called once an iteration. Returns true if it changed `smoothing`; then the optimizer should be
   /// restarted with `learning_rate`, which it divides too. Until the first check only the average is formed.
-  bool update(unsigned iteration, double grad_gamma, Smoothing& smoothing, double& learning_rate);
+  bool update(unsigned iteration, double derivative, Smoothing& smoothing, double& learning_rate);
 
   double average() const { return average_; }
 

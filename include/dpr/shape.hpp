@@ -57,8 +57,8 @@ DPR_API ShapeViews read_views(const std::filesystem::path& file);
 enum class ShapeSteps { large_steps, direct };
 
 /// How the smoothing shrinks in a level, from `blur` to `blur_end`. annealed: geometrically. adaptive: while
-/// less of it means less loss, by the sign of d loss / d gamma (AdaptiveSmoothing, which doubles samples
-/// too); it need not come to the end.
+/// less of it means less loss, by the sign of the derivative that AdaptiveSmoothing watches, which doubles
+/// samples too; it need not come to the end.
 enum class ShapeSchedule { annealed, adaptive };
 
 struct ShapeOptions {

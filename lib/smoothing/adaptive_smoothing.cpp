@@ -1,4 +1,4 @@
-// Smoothing that follows the sign of d loss / d gamma, eq. (17)-(18).
+// Smoothing that follows the sign of the loss's derivative by it, eq. (17)-(18).
 #include "dpr/adaptive_smoothing.hpp"
 
 #include <algorithm>
@@ -40,11 +40,11 @@ AdaptiveSmoothing::AdaptiveSmoothing(const AdaptiveSchedule& schedule, double av
           "a number in [0, 1)");
 }
 
-bool AdaptiveSmoothing::update(unsigned iteration, double grad_gamma, Smoothing& smoothing,
+bool AdaptiveSmoothing::update(unsigned iteration, double derivative, Smoothing& smoothing,
                                double& learning_rate) {
-  require(std::isfinite(grad_gamma), "d loss / d gamma (adaptive smoothing)", grad_gamma, "a finite number");
+  require(std::isfinite(derivative), "derivative (adaptive smoothing)", derivative, "a finite number");
   const double memory = static_cast<double>(schedule_.memory);
-  average_ = memory * average_ + (1 - memory) * grad_gamma;
+  average_ = memory * average_ + (1 - memory) * derivative;
 
   const bool due = iteration >= schedule_.start && (iteration - schedule_.start) % schedule_.interval == 0;
   if (!due || average_ <= 0) return false;

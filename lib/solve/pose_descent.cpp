@@ -15,6 +15,7 @@
 #include "dpr/renderer.hpp"
 #include "dpr/subdivision.hpp"
 #include "scene/gradient_table.hpp"
+#include "solve/by_smoothing.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_space.hpp"
 
@@ -91,10 +92,10 @@ class Schedule {
   }
 
   /// True if the smoothing changed.
-  bool update(unsigned iteration, double grad_gamma, Smoothing& smoothing, Optimizer& optimizer) {
+  bool update(unsigned iteration, double derivative, Smoothing& smoothing, Optimizer& optimizer) {
     double learning_rate = optimizer.learning_rate();
     if (annealed_ ? !annealed_->update(iteration, smoothing, learning_rate)
-                  : !adaptive_->update(iteration, grad_gamma, smoothing, learning_rate)) {
+                  : !adaptive_->update(iteration, derivative, smoothing, learning_rate)) {
       return false;
     }
     optimizer.set_learning_rate(learning_rate);
@@ -148,7 +149,7 @@ Found descend_from(Objective& objective, const Descent& options, bool with_trans
     const SceneGradient gradient = objective.gradient();
     descend(pose, optimizer, gradient.views.front().transforms.front(), with_translation);
     const bool is_last = i + 1 == options.iterations;  // no level without an iteration
-    if (!is_last && schedule.update(i, gradient.gamma, best.smoothing, optimizer)) {
+    if (!is_last && schedule.update(i, by_smoothing(best.smoothing, gradient), best.smoothing, optimizer)) {
       objective.set_smoothing(best.smoothing);
       best_loss = objective.evaluate(best.pose, i);  // its loss so far is of another level
     }

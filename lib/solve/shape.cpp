@@ -17,6 +17,7 @@
 #include "mesh/remesh.hpp"
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
+#include "solve/by_smoothing.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/measured_images.hpp"
 #include "solve/rigidity.hpp"
@@ -95,7 +96,7 @@ class Run {
     if (color_optimizer_) color_optimizer_->set_learning_rate(rate * options_.color_learning_rate);
     const SceneGradient gradient = evaluate(level, in_level);
     descend(gradient);
-    if (is_adaptive()) adapt(level, in_level, gradient.gamma);
+    if (is_adaptive()) adapt(level, in_level, by_smoothing(finest_, gradient));
     ++state_.iteration;
   }
 
@@ -177,7 +178,7 @@ class Run {
   }
 
   /// The published rate, at moments enough to come to the level's end. Learning rates fall by themselves.
-  void adapt(unsigned level, unsigned in_level, double grad_gamma) {
+  void adapt(unsigned level, unsigned in_level, double derivative) {
     constexpr unsigned k_settling = 10, k_moments = 40;  // parts of a level
     const Smoothing end = annealed(level, 1);
     AdaptiveSmoothing schedule({.start = options_.iterations / k_settling,
@@ -188,7 +189,7 @@ class Run {
                                state_.adaptive.average);
     Smoothing smoothing = state_.history.back().smoothing;
     double learning_rate = options_.learning_rate;
-    schedule.update(in_level, grad_gamma, smoothing, learning_rate);
+    schedule.update(in_level, derivative, smoothing, learning_rate);
     state_.adaptive = {smoothing.sigma, smoothing.gamma, smoothing.samples, schedule.average()};
   }
 
