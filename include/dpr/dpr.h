@@ -80,7 +80,8 @@ typedef struct dpr_camera {
   float fov_y_degrees;  /* full vertical field of view, in (0, 180); ignored if fx is not 0 */
   float fx, fy, cx, cy; /* intrinsics, pixels; the origin is the corner of the top-left pixel */
   float znear, zfar;    /* 0 < znear < zfar, along the view direction */
-  /* OpenCV's k1, k2, p1, p2, k3 of the lens; NULL: it does not distort. Read during the call. */
+  /* OpenCV's k1, k2, p1, p2, k3 of the lens; NULL: it does not distort. Read during the call. Vertices are
+   * moved and edges stay straight, so faces should be small. */
   const float* distortion;
   /* Not 0: orthographic, with so many world units from the lower to the upper edge; fx is 0 then, and
    * distortion NULL. */

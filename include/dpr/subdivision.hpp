@@ -23,7 +23,8 @@ struct LensSubdivisionOptions {
   std::size_t most_new_faces = std::size_t{1} << 22U;
 };
 
-/// New values as linear combinations of old ones: those that there were, in their order, then new ones.
+/// New values as linear combinations of old ones: those that there were, in their order, then new ones. Empty
+/// where nothing was cut: the new values are the old ones.
 struct DPR_API Combinations {
   std::vector<uvec3> of;      ///< [new] indices of old values
   std::vector<vec3> weights;  ///< [new] theirs: multiples of 2^-24, >= 0, sum 1
@@ -37,7 +38,8 @@ struct DPR_API Combinations {
 
 /// How the faces of a mesh were cut. All empty where none was.
 struct MeshSubdivision {
-  std::vector<std::uint32_t> face_of;  ///< [new face] the old face that it is a piece of, ascending
+  std::size_t old_positions = 0, old_faces = 0;  ///< of the mesh that was cut
+  std::vector<std::uint32_t> face_of;            ///< [new face] the old face that it is a piece of, ascending
   std::vector<std::array<vec3, 3>> barycentrics;  ///< [new face][corner] in the old face
   Combinations vertices, texcoords;
   Combinations normals;  ///< of normals of length one

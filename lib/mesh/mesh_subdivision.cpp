@@ -126,6 +126,12 @@ void require_at_least(std::size_t least, std::size_t found, const std::string& w
                         "at least " + std::to_string(least) + ", as the mesh has that was cut");
 }
 
+void require_count(std::size_t expected, std::size_t found, const std::string& what) {
+  if (found == expected) return;
+  throw InvalidArgument(what + " (subdivided mesh)", std::to_string(found),
+                        std::to_string(expected) + ", as the mesh has that was cut");
+}
+
 std::vector<glm::vec3> sum_over_pieces(const std::vector<std::uint32_t>& face_of,
                                        const std::vector<glm::vec3>& gradient, std::size_t faces) {
   require_at_least(face_of.size(), gradient.size(), "gradient of colours");
@@ -198,8 +204,8 @@ std::size_t old_count_of(const std::vector<glm::uvec3>& of) {
 }
 
 void require_same_counts(const Mesh& mesh, const MeshSubdivision& subdivision) {
-  require_at_least(std::size_t{subdivision.face_of.back()} + 1, mesh.faces.size(), "faces");
-  require_at_least(old_count_of(subdivision.vertices.of), mesh.positions.size(), "positions");
+  require_count(subdivision.old_faces, mesh.faces.size(), "faces");
+  require_count(subdivision.old_positions, mesh.positions.size(), "positions");
   require_at_least(old_count_of(subdivision.texcoords.of), mesh.texcoords.size(), "texcoords");
   if (subdivision.computed_normals == 0)
     require_at_least(old_count_of(subdivision.normals.of), mesh.normals.size(), "normals");
@@ -209,6 +215,7 @@ void require_same_counts(const Mesh& mesh, const MeshSubdivision& subdivision) {
 
 std::vector<float> Combinations::combine(std::span<const float> values, std::size_t channels) const {
   require_at_least(old_count_of(of) * channels, values.size(), "values");
+  if (of.empty()) return {values.begin(), values.end()};
   std::vector<float> result;
   result.reserve(of.size() * channels);
   for (std::size_t i = 0; i < of.size(); ++i) {
@@ -225,7 +232,9 @@ std::vector<float> Combinations::combine(std::span<const float> values, std::siz
 std::vector<float> Combinations::pull_back(std::span<const float> gradient, std::size_t old_count,
                                            std::size_t channels) const {
   require_at_least(old_count_of(of), old_count, "old_count");
-  require_at_least(of.size() * channels, gradient.size(), "gradient");
+  require_at_least((of.empty() ? old_count : of.size()) * channels, gradient.size(), "gradient");
+  if (of.empty())
+    return {gradient.begin(), gradient.begin() + static_cast<std::ptrdiff_t>(old_count * channels)};
   std::vector<double> sums(old_count * channels, 0.0);
   for (std::size_t i = 0; i < of.size(); ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -238,6 +247,8 @@ std::vector<float> Combinations::pull_back(std::span<const float> gradient, std:
 
 MeshSubdivision make_subdivision(const Mesh& mesh, std::span<const FacePiece> pieces, int computed_normals) {
   MeshSubdivision result;
+  result.old_positions = mesh.positions.size();
+  result.old_faces = mesh.faces.size();
   for (const FacePiece& piece : pieces) {
     result.face_of.push_back(piece.face);
     result.barycentrics.push_back(piece.barycentrics);

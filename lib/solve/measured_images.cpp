@@ -59,13 +59,21 @@ Image MeasuredImages::read(const std::filesystem::path& file, const Image& pictu
 
 void MeasuredImages::check_range(const ShapeView& view, const std::string& name) {
   const float znear = view.camera.znear, zfar = view.camera.zfar;
-  std::size_t beyond = 0;
+  std::size_t known = 0, beyond = 0;
   float furthest = 0;
   for (const glm::vec4& pixel : view.depth.pixels) {
-    if (!(pixel.w > 0) || (pixel.x >= znear && pixel.x <= zfar)) continue;
+    if (!(pixel.w > 0)) continue;
+    ++known;
+    if (pixel.x >= znear && pixel.x <= zfar) continue;
     if (beyond++ == 0 || pixel.x > furthest) furthest = pixel.x;
   }
   if (beyond == 0) return;
+  if (beyond == known) {
+    throw InvalidArgument("depth of " + name,
+                          "up to " + checks::text(furthest) + ", all outside its camera's range",
+                          "some from znear to zfar, " + checks::text(znear) + " to " + checks::text(zfar) +
+                              ", in the scene's units along the view direction");
+  }
   out_of_range_.add(std::to_string(beyond) + " pixels of the depth of " + name + ", up to " +
                     checks::text(furthest) + ", are not between its camera's znear and zfar, " +
                     checks::text(znear) + " and " + checks::text(zfar));

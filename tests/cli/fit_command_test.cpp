@@ -129,6 +129,9 @@ TEST_SUITE("pipeline") {
     const auto bytes = fit("depth.png", dpr::Image(24, 24, glm::vec4(1)));
     CHECK(bytes.status == 0);
     CHECK(contains(bytes.err, "depth.png (and others, 3 in all): whole numbers"));
+    const auto parts = fit("depth.png", dpr::Image(24, 24, glm::vec4(0.5F, 0.5F, 0.5F, 1)));
+    CHECK(parts.status == 1);
+    CHECK(contains(parts.err, "all outside its camera's range, expected some from znear to zfar, 1 to 8"));
     dpr::Image depth(24, 24, glm::vec4(4, 4, 4, 1));
     CHECK(fit("depth.exr", depth).err.empty());
     depth.pixels[7] = glm::vec4(65504, 0, 0, 1);

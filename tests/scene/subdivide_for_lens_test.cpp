@@ -256,6 +256,17 @@ TEST_SUITE("unit") {
     CHECK(how.vertices.combine(heat, 1) == std::vector<float>(cut.positions.size(), 0.5F));
   }
 
+  TEST_CASE("subdivision for a lens: numbers at the vertices of what was not cut stay as they are") {
+    Scene scene = lens_scene(wall());
+    scene.camera.distortion.reset();
+    const MeshSubdivision how = subdivide_for_lens(scene).meshes[0];
+    CHECK_FALSE(how.is_cut());
+    const std::vector<float> heat{1, 2, 3, 4, 5, 6, 7, 8};
+    CHECK(how.vertices.combine(heat, 2) == heat);
+    CHECK(how.vertices.pull_back(heat, 4, 2) == heat);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, how.vertices.pull_back(heat, 5, 2), "gradient");
+  }
+
   TEST_CASE("subdivision for a lens: without lights, or with flat ones, no normals are made") {
     Scene scene = lens_scene(wall());
     CHECK(subdivide_for_lens(scene).scene.meshes[0].mesh.normals.empty());
@@ -309,7 +320,7 @@ TEST_SUITE("unit") {
       CHECK(subdivide_for_lens(scene).meshes[0].face_of.size() < 200000);
       scene.camera.distortion = Distortion{k1, -1e6F, 100, -100, 1e20F};  // nothing that a lens does
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide_for_lens(scene, {.most_new_faces = 100000}),
-                            "a larger one, or more for most_new_faces");
+                            "a larger one, or more new faces allowed");
     }
     Mesh odd = wall();  // faces between equal corners
     odd.faces.insert(odd.faces.end(), {{0, 0, 2}, {1, 1, 1}});
@@ -351,7 +362,12 @@ TEST_SUITE("unit") {
     const SubdividedScene cut = subdivide_for_lens(scene);
     Mesh less = scene.meshes[0].mesh;
     less.positions.pop_back();
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide(less, cut.meshes[0]), "positions (subdivided mesh)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide(less, cut.meshes[0]),
+                          "positions (subdivided mesh): got 3, expected 4");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide(make_cube(), cut.meshes[0]),
+                          "faces (subdivided mesh): got 12, expected 2");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back(cut.scene.meshes[0].mesh, cut.meshes[0], {}),
+                          "faces (subdivided mesh): got");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.combine({}, 1), "values (subdivided mesh)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.pull_back({}, 4, 1), "gradient");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back({}, cut, {}), "meshes (subdivided scene)");
