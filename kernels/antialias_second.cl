@@ -169,21 +169,6 @@ static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
   return tile_of_sample(p, line / p.height, sample % p.width, line % p.height) == tile;
 }
 
-/// The tiles at most DPR_NEAR_TILES away from one: a rectangle, row by row.
-typedef struct {
-  uint first, columns, count;
-} NearTiles;
-
-static inline NearTiles near_tiles(const FrameParams p, uint tile) {
-  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
-             row = in_view / p.tiles_x;
-  const uint left = min(column, (uint)DPR_NEAR_TILES), above = min(row, (uint)DPR_NEAR_TILES);
-  const uint columns = 1 + left + min(p.tiles_x - 1 - column, (uint)DPR_NEAR_TILES),
-             rows = 1 + above + min(p.tiles_y - 1 - row, (uint)DPR_NEAR_TILES);
-  const NearTiles tiles = {tile - left - above * p.tiles_x, columns, columns * rows};
-  return tiles;
-}
-
 static inline uint near_tile(const FrameParams p, const NearTiles tiles, uint k) {
   return tiles.first + k / tiles.columns * p.tiles_x + k % tiles.columns;
 }
@@ -255,8 +240,8 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const NearTiles tiles = near_tiles(p, tile);
-  for (uint i = 0; i < tiles.count; ++i) {
+  const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
+  for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {
     const uint near = near_tile(p, tiles, i);
     for (uint k = 0; k < counts[near]; ++k) {
       const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
@@ -298,8 +283,8 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const NearTiles tiles = near_tiles(p, tile);
-  for (uint i = 0; i < tiles.count; ++i) {
+  const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
+  for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {
     const uint near = near_tile(p, tiles, i);
     for (uint k = 0; k < counts[near]; ++k) {
       const uint place = DPR_SECOND_CROSSINGS * near + k;

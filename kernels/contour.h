@@ -161,16 +161,27 @@ static inline int may_be_crossed(const FrameParams p, uint tile, global const ui
   return in_view >= p.tiles_x && have_contours(tile_starts, tile - p.tiles_x, tile - p.tiles_x);
 }
 
+/// The tiles at most `reach` away from one, that one among them: a rectangle, row by row.
+typedef struct {
+  uint first, columns, rows;
+} NearTiles;
+
+static inline NearTiles near_tiles(const FrameParams p, uint tile, uint reach) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
+             row = in_view / p.tiles_x;
+  const uint left = min(column, reach), above = min(row, reach);
+  const NearTiles tiles = {tile - left - above * p.tiles_x, 1 + left + min(p.tiles_x - 1 - column, reach),
+                           1 + above + min(p.tiles_y - 1 - row, reach)};
+  return tiles;
+}
+
 /// Whether a contour lies at most `reach` tiles away from a tile.
 static inline int is_near_contour(const FrameParams p, uint tile, uint reach,
                                   global const uint* tile_starts) {
-  const uint in_view = tile % (p.tiles_x * p.tiles_y), column = in_view % p.tiles_x,
-             row = in_view / p.tiles_x;
-  const uint left = min(column, reach), right = min(p.tiles_x - 1 - column, reach);
-  const uint first = tile - min(row, reach) * p.tiles_x,
-             last = tile + min(p.tiles_y - 1 - row, reach) * p.tiles_x;
-  for (uint middle = first; middle <= last; middle += p.tiles_x) {
-    if (have_contours(tile_starts, middle - left, middle + right)) return 1;
+  const NearTiles tiles = near_tiles(p, tile, reach);
+  for (uint row = 0; row < tiles.rows; ++row) {
+    const uint first = tiles.first + row * p.tiles_x;
+    if (have_contours(tile_starts, first, first + tiles.columns - 1)) return 1;
   }
   return 0;
 }

@@ -100,7 +100,7 @@ std::vector<Vector> vectors_of(const std::vector<float>& numbers) {
 
 template <typename Vector>
 std::vector<Vector> combined(const Combinations& list, const std::vector<Vector>& values) {
-  if (values.empty() || list.of.empty()) return values;
+  if (values.empty()) return values;
   return vectors_of<Vector>(list.combine(numbers_of(values), k_channels_of<Vector>));
 }
 

@@ -5,8 +5,8 @@
 
 namespace dpr {
 
-/// d loss / d gamma, as published. With noise on the pixel d loss / d sigma: the faces that a closed shape
-/// shows do not overlap, and no noise of depths changes anything where that of triangles does not mix them.
+/// d loss / d gamma, as published. With noise on the pixel d loss / d sigma: there the depths' noise changes
+/// nothing where faces do not overlap, as those that a closed shape shows.
 inline double by_smoothing(const Smoothing& smoothing, const SceneGradient& gradient) {
   return smoothing.noise == Noise::pixel ? gradient.sigma : gradient.gamma;
 }

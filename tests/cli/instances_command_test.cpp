@@ -14,6 +14,7 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::run_command;
+using dpr::test::succeed;
 using dpr::test::TempDir;
 using nlohmann::json;
 
@@ -23,13 +24,6 @@ std::string scene_text(const std::string& second) {
              "meshes": [{"file": "cube.ply", "transform": [[1,0,0,-2],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
                         {)" +
          second + R"(, "transform": [[1,0,0,2],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})";
-}
-
-dpr::test::Outcome succeed(const TempDir& folder, const std::vector<std::string>& arguments) {
-  const auto outcome = run_command(folder, arguments);
-  CAPTURE(outcome.err);
-  CHECK(outcome.status == 0);
-  return outcome;
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::run_command;
+using dpr::test::succeed;
 using dpr::test::TempDir;
 using nlohmann::json;
 
@@ -26,13 +27,6 @@ std::string scene_text(const std::string& distortion) {
          distortion +
          R"(}, "meshes": [{"positions": [[-1.3,-1,-1.6],[1.4,-0.9,-1.9],[1.3,1.2,-2.1],[-1.4,1.1,-1.8]],
              "faces": [[0,1,2],[0,2,3]], "face_colors": [[1,0,0],[0,0,1]]}]})";
-}
-
-dpr::test::Outcome succeed(const TempDir& folder, const std::vector<std::string>& arguments) {
-  const auto outcome = run_command(folder, arguments);
-  CAPTURE(outcome.err);
-  CHECK(outcome.status == 0);
-  return outcome;
 }
 
 }  // namespace

@@ -19,13 +19,6 @@ using dpr::test::reduced;
 
 namespace {
 
-Image rendered(const Scene& scene) {
-  Renderer renderer(open_device());
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
-}
-
 const glm::vec3 k_corner{-1.3F, -1.0F, -1.6F}, k_along{2.7F, 0.1F, -0.3F}, k_up{-0.1F, 2.1F, -0.2F};
 
 /// A wall of so many quads a side, textured.

@@ -5,11 +5,20 @@
 #include <vector>
 
 #include "check/scenes.hpp"
+#include "dpr/renderer.hpp"
 #include "support/priors.hpp"
 
 namespace dpr::test::pipeline {
 
 using namespace check;
+
+/// A scene's image by a renderer of its own.
+inline Image rendered(const Scene& scene) {
+  Renderer renderer(open_device());
+  renderer.set_scene(scene);
+  renderer.forward();
+  return renderer.image();
+}
 
 /// From within: faces at the camera's sides reach behind it.
 inline Scene scene_within(Mesh mesh, int width, int height) {

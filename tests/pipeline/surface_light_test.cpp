@@ -55,13 +55,6 @@ Scene surface_scene(Shading shading, int size) {
   return scene;
 }
 
-Image rendered(const Scene& scene) {
-  Renderer renderer(open_device());
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
-}
-
 SceneGradient gradient_of(const Scene& scene, const Image& weights) {
   Renderer renderer(open_device());
   renderer.set_scene(scene);

@@ -22,13 +22,6 @@ using dpr::test::reduced;
 
 namespace {
 
-Image rendered(const Scene& scene) {
-  Renderer renderer(open_device());
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
-}
-
 SceneGradient gradient_of(Renderer& renderer) {
   const Scene& scene = renderer.scene();
   const Image weights = random_image(scene.width, scene.height, -1, 1);

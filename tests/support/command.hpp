@@ -72,6 +72,14 @@ inline Outcome run_command(const TempDir& folder, const std::vector<std::string>
   return run_program(program_path("DPR_CLI"), folder, arguments, environment);
 }
 
+/// The same, of what must succeed.
+inline Outcome succeed(const TempDir& folder, const std::vector<std::string>& arguments) {
+  const Outcome outcome = run_command(folder, arguments);
+  CAPTURE(outcome.err);
+  CHECK(outcome.status == 0);
+  return outcome;
+}
+
 /// "dpr: error: WHAT (WHERE): got ..., expected ...": one line and nothing else.
 inline bool is_error_line(const std::string& text) {
   return text.starts_with("dpr: error: ") && text.size() > 13 && text.ends_with('\n') &&
