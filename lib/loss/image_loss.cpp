@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "base/checks.hpp"
@@ -73,6 +74,32 @@ Image shrink(const Image& large) {
     }
   }
   return small;
+}
+
+std::vector<Image> shrink(std::span<const Image> large) {
+  std::vector<Image> small;
+  for (const Image& image : large) small.push_back(shrink(image));
+  return small;
+}
+
+std::vector<cl_float4> rgba_of(std::span<const Image> images, std::size_t pixels) {
+  std::vector<cl_float4> result;
+  result.reserve(pixels);
+  for (const Image& image : images) {
+    for (const glm::vec4& p : image.pixels) result.push_back({{p.x, p.y, p.z, p.w}});
+  }
+  return result;
+}
+
+/// Of the pixels of all views: what their masks say, or 1 without masks.
+std::vector<float> weights_of(std::span<const Image> masks, std::size_t pixels) {
+  if (masks.empty()) return std::vector<float>(pixels, 1.0F);
+  std::vector<float> result;
+  result.reserve(pixels);
+  for (const Image& mask : masks) {
+    for (const glm::vec4& p : mask.pixels) result.push_back(p.x);
+  }
+  return result;
 }
 
 /// Throws InvalidArgument unless every level holds windows, and every mask leaves some there.
@@ -162,16 +189,13 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
     ssim_weight = options.weights.ssim / static_cast<float>(options.levels);
     set_views_of_mean(views);
   }
-  std::vector<Image> smaller(targets.begin(), targets.end()),
-      masks(options.masks.begin(), options.masks.end());
-  if (masks.empty()) masks.assign(views, Image(width, height, glm::vec4(1)));
-  for (unsigned l = 0; l < options.levels; ++l) {
-    if (l > 0) {
-      std::ranges::transform(smaller, smaller.begin(), dpr::shrink);
-      std::ranges::transform(masks, masks.begin(), dpr::shrink);
-    }
+  levels.push_back(make_level(targets, options.masks));
+  std::vector<Image> smaller, masks;
+  for (unsigned l = 1; l < options.levels; ++l) {
+    smaller = dpr::shrink(l == 1 ? targets : smaller);
+    masks = dpr::shrink(l == 1 ? options.masks : masks);
     levels.push_back(make_level(smaller, masks));
-    if (l > 0) levels[l].image.resize(device.impl(), levels[l].pixels_per_view() * views);
+    levels[l].image.resize(device.impl(), levels[l].pixels_per_view() * views);
   }
   for (const AttributeTarget& target : options.attributes)
     attributes.emplace_back(device, target, options.levels);
@@ -196,24 +220,25 @@ ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> target
   Level level;
   level.width = targets[0].width;
   level.height = targets[0].height;
-  std::vector<cl_float4> values;
-  std::vector<float> weights;
+  const std::size_t size = level.pixels_per_view(), pixels = views * size;
+  Device::Impl& d = device.impl();
+  level.target.upload(d, rgba_of(targets, pixels));
+  const std::vector<float> weights = weights_of(masks, pixels);
+  level.mask.upload(d, weights);
+  if (ssim) {
+    const std::vector<Image> whole(masks.empty() ? views : 0, Image(level.width, level.height, glm::vec4(1)));
+    level.windows.upload(d, ssim_windows(masks.empty() ? whole : masks));
+  }
   std::vector<cl_uint> starts{0};
   for (std::size_t view = 0; view < views; ++view) {
-    for (const glm::vec4& p : targets[view].pixels) values.push_back({{p.x, p.y, p.z, p.w}});
-    double sum = 0;
-    for (const glm::vec4& p : masks[view].pixels) sum += static_cast<double>(weights.emplace_back(p.x));
-    level.channels.push_back(k_channels * static_cast<float>(sum));
-    starts.push_back(static_cast<cl_uint>(values.size()));
+    const auto its = std::span(weights).subspan(view * size, size);
+    level.channels.push_back(k_channels * static_cast<float>(std::accumulate(its.begin(), its.end(), 0.0)));
+    starts.push_back(static_cast<cl_uint>((view + 1) * size));
   }
-  Device::Impl& d = device.impl();
-  level.target.upload(d, values);
-  level.mask.upload(d, weights);
-  if (ssim) level.windows.upload(d, ssim_windows(masks));
   level.device_channels.upload(d, level.channels);
   level.view_starts.upload(d, starts);
-  level.per_pixel.resize(d, sums_before(k_losses.size()) * values.size());
-  level.grad_image.resize(d, values.size());
+  level.per_pixel.resize(d, sums_before(k_losses.size()) * pixels);
+  level.grad_image.resize(d, pixels);
   return level;
 }
 
