@@ -151,8 +151,9 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
   return sum.w > 0.0f ? sum.xyz * (c.coverage / sum.w) : sum.xyz;
 }
 
-/// One work-item per pixel. Deterministic. Arguments as aggregate_forward, but a pixel's slots begin at
-/// starts[pixel], sorted by depth, and those are left that anything is seen of. A fragment alone has no slot.
+/// One work-item per pixel. Deterministic. Arguments as aggregate_forward, but there are as many slots as the
+/// lists are long: a pixel's begin at starts[pixel], sorted by depth, and those are left that anything is seen
+/// of. A fragment alone has no slot.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
                                     global const float* restrict depth,

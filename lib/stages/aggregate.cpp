@@ -65,7 +65,8 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
   if (now_.kernels->exact) {
-    slots_.resize(device_, in.rasterize.fragments + a.pixels);
+    const bool has_background_slots = now_.smoothing.composition == Composition::barrier;
+    slots_.resize(device_, in.rasterize.fragments + (has_background_slots ? a.pixels : 0));
     slot_counts_.resize(device_, a.pixels);
   }
   for (const Range& pixels : in.rasterize.pixels(in.p)) {

@@ -105,7 +105,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
                 const BufferRef<cl_float4>& grad_image);
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
 
-  Buffer<shared::Slot> slots_;   // [fragment + pixel]
+  Buffer<shared::Slot> slots_;   // [fragment], and in the barrier composition [pixel] more
   Buffer<cl_uint> slot_counts_;  // [pixel]
 };
 
