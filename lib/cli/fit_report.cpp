@@ -297,7 +297,7 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
   const MeasuredDifferences differences = measured_differences(result.mesh);
   if (differences.depth) numbers["depth_difference"] = *differences.depth;
   if (differences.normal) numbers["normal_difference"] = *differences.normal;
-  if (views_.lights) numbers["harmonics"] = to_json(views_.lights->harmonics);
+  if (views_.lights) add_found_light(numbers, *views_.lights);
   write_json(folder_ / "fit.json", numbers);
 
   Page page(source);

@@ -58,6 +58,12 @@ Json to_json(const std::vector<glm::vec2>& vectors) {
 
 Json to_json(const std::vector<double>& numbers) { return numbers; }
 
+void add_found_light(Json& json, const Lights& light) {
+  const Json harmonics = to_json(light.harmonics);
+  json["harmonics"] = harmonics;
+  json["lights"] = {{"ambient", to_json(glm::dvec3(light.ambient))}, {"harmonics", harmonics}};
+}
+
 Json to_json(const std::vector<std::vector<glm::vec3>>& lists) {
   Json all = Json::array();
   for (const std::vector<glm::vec3>& list : lists) all.push_back(to_json(list));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dpr/camera.hpp"
+#include "dpr/light.hpp"
 
 namespace dpr::cli {
 
@@ -21,6 +22,8 @@ Json to_json(const std::vector<glm::vec3>& vectors);
 Json to_json(const std::vector<glm::vec2>& vectors);
 Json to_json(const std::vector<double>& numbers);
 Json to_json(const std::vector<std::vector<glm::vec3>>& lists);
+/// Adds a distant light that was found: its "harmonics", and "lights" as a scene takes them.
+void add_found_light(Json& json, const Lights& light);
 /// A list of rows.
 Json rows_to_json(const glm::dmat3& matrix);
 Json rows_to_json(const glm::dmat4& matrix);

@@ -142,7 +142,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   Json json = pose_to_json(scene, result);
   if (result.light == PoseLight::harmonics) {
     if (const auto light = found_light(device, scene, target, result, options.least_squares))
-      json["harmonics"] = to_json(light->harmonics);
+      add_found_light(json, *light);
   }
   write_json(options.output, json);
   if (!options.report.empty()) {

@@ -72,17 +72,18 @@ void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], 
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
                      const LeastSquares& options, const PoseSpace& space, const LevelShape& shape,
-                     PoseLight light)
+                     PoseLight light, CornerNormals normals)
     : space_(space), light_(light), samples_(shape.samples), renderer_(device) {
   const Scene whole = level_scene(scene, space, options, shape, light);
   const std::vector<View> lenses = space.seen_through_lenses(whole.camera);
   scene_ = subdivide_for_lens(whole, {}, lenses).scene;
   renderer_.set_scene(scene_);
   if (light == PoseLight::harmonics) {
-    Scene normals = whole;
-    Instance& object = normals.meshes.front();
-    object.mesh = colored_by_normals(object.mesh, polar_decomposition(glm::dmat3(object.transform)).stretch);
-    normal_renderer_.emplace(device).set_scene(subdivide_for_lens(normals, {}, lenses).scene);
+    Scene colored = whole;
+    Instance& object = colored.meshes.front();
+    const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
+    object.mesh = colored_by_normals(object.mesh, stretch, normals);
+    normal_renderer_.emplace(device).set_scene(subdivide_for_lens(colored, {}, lenses).scene);
   }
   target_.background = scene.background;
   for (const glm::vec4& p : resample(target, width(), height()).pixels) {

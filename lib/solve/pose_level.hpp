@@ -28,7 +28,7 @@ struct NormalEquations {
 class PoseLevel {
  public:
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
-            const PoseSpace& space, const LevelShape& shape, PoseLight light);
+            const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals);
 
   /// The mean squared error over colour channels and pixels, or its robust version, of every hypothesis.
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);

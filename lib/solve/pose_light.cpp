@@ -148,33 +148,60 @@ float robust_deviation(std::span<float> sizes) {
   return k_normal * *middle;
 }
 
-Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch) {
-  constexpr double k_sharp = 0.7;   // cosine
-  std::vector<glm::dvec3> normals;  // of the faces, as long as twice their areas
+namespace {
+
+/// [face * 3 + corner] of any length, from the faces around the vertices.
+std::vector<glm::dvec3> normals_of_faces(const Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals) {
+  constexpr double k_sharp = 0.7;        // cosine
+  std::vector<glm::dvec3> face_normals;  // as long as twice their areas
   std::vector<std::vector<std::size_t>> faces_at(mesh.positions.size());
   for (const glm::uvec3& f : mesh.faces) {
-    const auto corner = [&](unsigned k) {
-      return stretch * glm::dvec3(mesh.positions[f[static_cast<int>(k)]]);
-    };
-    for (int k = 0; k < 3; ++k) faces_at[f[k]].push_back(normals.size());
-    normals.push_back(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+    const auto corner = [&](int k) { return stretch * glm::dvec3(mesh.positions[f[k]]); };
+    for (int k = 0; k < 3; ++k) faces_at[f[k]].push_back(face_normals.size());
+    face_normals.push_back(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
   }
-  const auto is_smooth = [&](const glm::dvec3& a, const glm::dvec3& b) {
-    return glm::dot(a, b) > k_sharp * glm::length(a) * glm::length(b);
+  const auto is_parted = [&](const glm::dvec3& a, const glm::dvec3& b) {
+    return glm::dot(a, b) <= k_sharp * glm::length(a) * glm::length(b);
   };
-  Mesh result;
+  std::vector<glm::dvec3> result;
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
+    for (int k = 0; k < 3; ++k) {
+      glm::dvec3 sum(0);
+      for (const std::size_t other : faces_at[mesh.faces[face][k]]) {
+        const bool counts = other == face || normals == CornerNormals::smooth ||
+                            !is_parted(face_normals[face], face_normals[other]);
+        if (counts) sum += face_normals[other];
+      }
+      result.push_back(sum);
+    }
+  }
+  return result;
+}
+
+/// [face * 3 + corner], of a mesh that gives them.
+std::vector<glm::dvec3> given_normals(const Mesh& mesh, const glm::dmat3& stretch) {
+  const glm::dmat3 turned = glm::transpose(glm::inverse(stretch));
+  std::vector<glm::dvec3> result;
+  for (const glm::uvec3& f : mesh.face_normals) {
+    for (int k = 0; k < 3; ++k) result.push_back(turned * glm::dvec3(mesh.normals[f[k]]));
+  }
+  return result;
+}
+
+}  // namespace
+
+Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals) {
+  const std::vector<glm::dvec3> of_corners =
+      mesh.face_normals.empty() ? normals_of_faces(mesh, stretch, normals) : given_normals(mesh, stretch);
+  Mesh result;
+  for (const glm::uvec3& f : mesh.faces) {
     const auto first = static_cast<unsigned>(result.positions.size());
     result.faces.emplace_back(first, first + 1, first + 2);
     for (int k = 0; k < 3; ++k) {
-      const unsigned vertex = mesh.faces[face][k];
-      glm::dvec3 sum(0);
-      for (const std::size_t other : faces_at[vertex]) {
-        if (other == face || is_smooth(normals[face], normals[other])) sum += normals[other];
-      }
-      const double length = glm::length(sum);
-      result.positions.push_back(mesh.positions[vertex]);
-      result.vertex_colors.emplace_back(length > 0 ? sum / length : sum);
+      const glm::dvec3& normal = of_corners[result.positions.size()];
+      const double length = glm::length(normal);
+      result.positions.push_back(mesh.positions[f[k]]);
+      result.vertex_colors.emplace_back(length > 0 ? normal / length : normal);
     }
   }
   return result;

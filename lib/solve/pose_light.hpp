@@ -77,8 +77,12 @@ class LightFit {
 /// The same of residuals' sizes, which come out in another order; 0 of none.
 float robust_deviation(std::span<float> sizes);
 
-/// The mesh with a corner of its own for each corner of each face, coloured by its normal after `stretch`:
-/// the mean over the faces at its vertex, but for those beyond a sharp edge.
-Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch);
+/// How corners have their normals where the mesh gives none: the mean over the faces at their vertex, or over
+/// those that no sharp edge parts from theirs.
+enum class CornerNormals { parted, smooth };
+
+/// The mesh with a corner of its own for each corner of each face, coloured by its unit normal after
+/// `stretch`.
+Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals);
 
 }  // namespace dpr

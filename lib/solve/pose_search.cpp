@@ -62,6 +62,7 @@ class Fit {
   std::optional<Found> descend(const std::vector<LevelShape>& shapes, const Found& found);
   void add_others(PoseLevel& level, const std::vector<Candidate>& found);
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
+  void choose_normals(const LevelShape& shape);
   LevelShape final_shape(LevelShape shape) const;
   bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
   float light_gain(PoseLevel& level, const LevelShape& shape) const;
@@ -89,6 +90,7 @@ class Fit {
   PoseSpace space_;
   std::array<glm::dmat3, 3> half_turns_;
   PoseLight light_ = PoseLight::fixed;  // tried at present
+  CornerNormals normals_ = CornerNormals::parted;
   bool goes_on_ = true;
   std::vector<Candidate> candidates_;
   double wrong_ = 0;  // loss of a pose that explains nothing, at the coarsest or the finest level
@@ -101,6 +103,7 @@ PoseResult Fit::run(bool anywhere) {
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
     light_ = method_.light;
     descend(shapes, *found);
+    choose_normals(shapes[shapes.size() - 2]);
   }
   PoseLevel level = make_level(final_shape(shapes.back()), light_);
   make_robust(level, hypotheses());
@@ -155,7 +158,7 @@ void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
-  return PoseLevel(device_, scene_, target_, method_, space_, shape, light);
+  return PoseLevel(device_, scene_, target_, method_, space_, shape, light, normals_);
 }
 
 /// Whether a further look for the pose in the scene's own light is in vain. A robust loss can't tell.
@@ -173,6 +176,23 @@ float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
   level.estimate_scale(hypotheses());
   lit.estimate_scale(hypotheses());
   return level.scale() > 0 ? lit.scale() / level.scale() : 1;
+}
+
+/// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
+/// better.
+void Fit::choose_normals(const LevelShape& shape) {
+  if (light_ != PoseLight::harmonics) return;
+  PoseLevel parted = make_level(shape, light_);
+  make_robust(parted, hypotheses());
+  const double loss = std::ranges::min(parted.losses(hypotheses()));
+  normals_ = CornerNormals::smooth;
+  PoseLevel smooth = make_level(shape, light_);
+  smooth.set_scale(parted.scale());
+  if (std::ranges::min(smooth.losses(hypotheses())) < loss) {
+    work(smooth, beam_.back());
+  } else {
+    normals_ = CornerNormals::parted;
+  }
 }
 
 /// Pictures show a sample in each pixel or, as other software makes them, the mean over its area: whichever

@@ -330,6 +330,7 @@ TEST_SUITE("robustness") {
     CHECK(dpr::read_mesh(folder / "mesh.obj").faces == dpr::make_cube().faces);
     const json data = json::parse(folder.read("report/fit.json"));
     CHECK(data["harmonics"].size() == 9);
+    CHECK(data["lights"]["harmonics"] == data["harmonics"]);
     REQUIRE(data["cameras"].size() == 1);
     CHECK(std::abs(data["cameras"][0]["fov_y_degrees"].get<double>() - 50) < 5);
     const auto refused = run_command(folder, with(arguments, {"--light", "gain"}));

@@ -51,7 +51,59 @@ double error_from_turned(const dpr::Device& device, const dpr::Scene& scene, con
 
 }  // namespace
 
+namespace {
+
+/// White, of eight vertices: its sides share their normals, where the mesh gives none.
+dpr::Mesh shared_box() {
+  dpr::Mesh mesh;
+  for (unsigned i = 0; i < 8; ++i)
+    mesh.positions.emplace_back(i & 4U ? 1.0F : -1.0F, i & 2U ? 0.8F : -0.8F, i & 1U ? 0.6F : -0.6F);
+  mesh.faces = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
+                {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
+  return mesh;
+}
+
+/// Bright from one side.
+dpr::Lights sky(dpr::Shading shading) {
+  dpr::Lights lights;
+  lights.shading = shading;
+  lights.ambient = glm::vec3(0);
+  lights.harmonics.assign(9, glm::vec3(0));
+  lights.harmonics[0] = glm::vec3(1.8F);
+  lights.harmonics[1] = glm::vec3(0.5F, 0.4F, 0.3F);
+  lights.harmonics[3] = glm::vec3(0.7F, 0.7F, 0.8F);
+  return lights;
+}
+
+}  // namespace
+
 TEST_SUITE("pipeline") {
+  TEST_CASE("the pose of a box in unknown light is found whether its sides are shaded flat or as one surface") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(96);
+    scene.meshes.front().mesh = shared_box();
+    for (const dpr::Shading shading : {dpr::Shading::flat, dpr::Shading::phong}) {
+      CAPTURE(static_cast<int>(shading));
+      dpr::Scene lit = scene;
+      lit.lights = sky(shading);
+      CHECK(error_from_turned(device, scene, rigid_image(device, lit), {}) < 0.5);
+    }
+  }
+
+  TEST_CASE("normals that the mesh gives shade it in unknown light") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(96);
+    dpr::Mesh& mesh = scene.meshes.front().mesh;
+    mesh = shared_box();
+    for (const glm::vec3 p : mesh.positions) mesh.normals.push_back(p * p * p);  // nothing like the faces'
+    mesh.face_normals = mesh.faces;
+    dpr::Scene lit = scene;
+    lit.lights = sky(dpr::Shading::phong);
+    CHECK(error_from_turned(device, scene, rigid_image(device, lit), {}) < 0.5);
+  }
+
   TEST_CASE("poses of path-traced pictures are found in light that the scene does not know") {
     if (dpr::test::is_reduced()) return;
     const dpr::Device device = dpr::open_device();
