@@ -78,7 +78,8 @@ dpr::Lights sky(dpr::Shading shading) {
 }  // namespace
 
 TEST_SUITE("pipeline") {
-  TEST_CASE("the pose of a box in unknown light is found whether its sides are shaded flat or as one surface") {
+  TEST_CASE(
+      "the pose of a box in unknown light is found whether its sides are shaded flat or as one surface") {
     if (dpr::test::is_reduced()) return;
     const dpr::Device device = dpr::open_device();
     dpr::Scene scene = cube_scene(96);
