@@ -18,18 +18,21 @@ typedef float16 pixels_n;
 #define load_pixels(pointer) vload16(0, (global const float*)(pointer))
 #define store_pixels(value, pointer) vstore16(value, 0, (global float*)(pointer))
 #define store_lanes(value, lanes) vstore16(value, 0, (float*)(lanes))
+#define join_lines(lines, k) ((float16)((lines)[0][k], (lines)[1][k], (lines)[2][k], (lines)[3][k]))
 #elif DPR_LANES == 8
 #define DPR_BLUR_PIXELS 2
 typedef float8 pixels_n;
 #define load_pixels(pointer) vload8(0, (global const float*)(pointer))
 #define store_pixels(value, pointer) vstore8(value, 0, (global float*)(pointer))
 #define store_lanes(value, lanes) vstore8(value, 0, (float*)(lanes))
+#define join_lines(lines, k) ((float8)((lines)[0][k], (lines)[1][k]))
 #else
 #define DPR_BLUR_PIXELS 1
 typedef float4 pixels_n;
 #define load_pixels(pointer) (*(pointer))
 #define store_pixels(value, pointer) (*(pointer) = (value))
 #define store_lanes(value, lanes) ((lanes)[0] = (value))
+#define join_lines(lines, k) ((lines)[0][k])
 #endif
 
 /// Where a work-item's outputs are.
@@ -192,7 +195,8 @@ kernel void blur_columns(const BlurPass p, global const float* restrict weights,
   }
 }
 
-/// Along rows. NDRange: one work-item per (row, block of vectors of output pixels).
+/// Along rows, where neighbouring outputs read neighbouring inputs. NDRange: one work-item per (row, block of
+/// vectors of output pixels).
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[row][in_length]
 /// out  out      float4[row][out_length]
@@ -204,6 +208,37 @@ kernel void blur_rows(const BlurPass p, global const float* restrict weights,
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
   for (int k = 0; k < place.steps; ++k) out[place.out + (size_t)k] = sums[k];
+}
+
+/// Along rows, where outputs or inputs are further apart. NDRange: one work-item per (DPR_BLUR_PIXELS rows,
+/// block of outputs); a lane is a row. Otherwise as blur_rows.
+kernel void blur_rows_strided(const BlurPass p, global const float* restrict weights,
+                              global const float4* restrict in, global float4* restrict out) {
+  const uint i = (uint)get_global_id(0), blocks = groups_of(p.out_length, DPR_BLUR_BLOCK);
+  if (i >= groups_of(p.lines, DPR_BLUR_PIXELS) * blocks) return;
+  const uint first = i / blocks * DPR_BLUR_PIXELS, at = i % blocks * DPR_BLUR_BLOCK;
+  global const float4* lines[DPR_BLUR_PIXELS];
+  for (uint lane = 0; lane < DPR_BLUR_PIXELS; ++lane)
+    lines[lane] = in + (size_t)min(first + lane, p.lines - 1) * p.in_length;
+  const BlurTaps t = block_taps(p, (int)at);
+  pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
+  for (int k = t.from; k < t.to; ++k) {
+    const pixels_n value = join_lines(lines, k);
+    global const float* w = weights + (t.last - k * p.in_step);
+    sum0 += w[0] * value;
+    sum1 += w[p.out_step] * value;
+    sum2 += w[2 * p.out_step] * value;
+    sum3 += w[3 * p.out_step] * value;
+  }
+  const pixels_n sums[DPR_BLUR_BLOCK] = {sum0, sum1, sum2, sum3};
+  const uint steps = min(p.out_length - at, (uint)DPR_BLUR_BLOCK),
+             count = min(p.lines - first, (uint)DPR_BLUR_PIXELS);
+  for (uint step = 0; step < steps; ++step) {
+    float4 lanes[DPR_BLUR_PIXELS];
+    store_lanes(sums[step], lanes);
+    for (uint lane = 0; lane < count; ++lane)
+      out[(size_t)(first + lane) * p.out_length + at + step] = lanes[lane];
+  }
 }
 
 /// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the

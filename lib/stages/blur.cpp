@@ -50,6 +50,7 @@ Blur::Blur(Device::Impl& device)
     : device_(device),
       columns_(device, "blur.cl", "blur_columns"),
       rows_(device, "blur.cl", "blur_rows"),
+      rows_strided_(device, "blur.cl", "blur_rows_strided"),
       columns_scale_(device, "blur.cl", "blur_columns_scale"),
       rows_scale_(device, "blur.cl", "blur_rows_scale"),
       reduce_(device) {}
@@ -122,7 +123,12 @@ void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, cons
                 Buffer<cl_float4>& out) {
   pass.lines = static_cast<cl_uint>(lines);
   out.resize(device_, lines * pass.out_length);
-  rows_(lines * row_items(pass), pass, weights, in, out);
+  if (pass.in_step == 1 && pass.out_step == 1) {
+    rows_(lines * row_items(pass), pass, weights, in, out);
+  } else {
+    const std::size_t blocks = groups(pass.out_length, k_block);
+    rows_strided_(groups(lines, pixels_of_vector(device_)) * blocks, pass, weights, in, out);
+  }
 }
 
 void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {

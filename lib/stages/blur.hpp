@@ -70,7 +70,7 @@ class Blur {
 
   Device::Impl& device_;
   Setting now_;
-  Kernel<Pass, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_;
+  Kernel<Pass, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_, rows_strided_;
   Kernel<Pass, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> columns_scale_;
   Kernel<Pass, cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> rows_scale_;
   Reduce reduce_;
