@@ -45,9 +45,10 @@ Image MeasuredImages::read(const std::filesystem::path& file, const Image& pictu
     throw InvalidArgument("size (" + file.string() + ")", checks::size(image.width, image.height),
                           checks::size(picture.width, picture.height) + ", the view's");
   }
-  if (!facts.floats) whole_numbers_.add(file.string());
+  if (!facts.floats && !(kind == Measured::depth && depth_scale_)) whole_numbers_.add(file.string());
+  const float scale = depth_scale_.value_or(1.0F);
   for (glm::vec4& pixel : image.pixels) {
-    if (kind == Measured::depth) pixel = glm::vec4(glm::vec3(pixel.x), pixel.w);
+    if (kind == Measured::depth) pixel = glm::vec4(glm::vec3(scale * pixel.x), pixel.w);
     if (glm::vec3(pixel) == glm::vec3(0)) pixel.w = 0;
     if (kind == Measured::depth && pixel.x < 0 && pixel.w > 0) {
       throw InvalidArgument("depth (" + file.string() + ")", checks::text(pixel.x),
@@ -88,8 +89,7 @@ void MeasuredImages::append_to(Notes& notes) const {
   };
   add(whole_numbers_,
       ": whole numbers, which are taken for parts of 1, where depths are lengths and normals may be "
-      "negative: "
-      "files of floats (.exr) hold both");
+      "negative: files of floats (.exr) hold both, and \"depth_scale\" says what a depth of 1 is");
   add(out_of_range_, ": the shape cannot be there; 0 says that a depth is not known");
 }
 

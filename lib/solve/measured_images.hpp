@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "dpr/notes.hpp"
@@ -16,6 +17,10 @@ enum class Measured { depth, normal };
 /// The files that were read, and a sentence about each kind of oddity in them, whatever the number of views.
 class MeasuredImages {
  public:
+  MeasuredImages() = default;
+  /// Of files whose depths are so many lengths of the scene where they are 1.
+  explicit MeasuredImages(float depth_scale) : depth_scale_(depth_scale) {}
+
   /// Pixels that are 0 do not count: alpha 0. Throws IoError, and InvalidArgument for another size than the
   /// picture's and for depths below 0.
   Image read(const std::filesystem::path& file, const Image& picture, Measured kind);
@@ -30,6 +35,7 @@ class MeasuredImages {
 
     void add(const std::string& what);
   };
+  std::optional<float> depth_scale_;
   Finding whole_numbers_, out_of_range_;
 };
 

@@ -81,6 +81,14 @@ void parse_view_camera(const JsonNode& node, ShapeView& view, const std::string&
   validate(view.camera, name + (camera ? ".camera" : ".initial_camera"));
 }
 
+MeasuredImages measured_images(const JsonNode& views) {
+  const auto node = views.find("depth_scale");
+  if (!node) return {};
+  const float scale = node->number();
+  checks::require_positive(scale, node->name());
+  return MeasuredImages(scale);
+}
+
 /// The next of the views, in what is known of all.
 ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
                      Encoding encoding, MeasuredImages& measured) {
@@ -134,14 +142,14 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
                            Encoding encoding) {
   const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
-  node.require_keys({"width", "height", "background", "views", "initial", "smoothing"});
+  node.require_keys({"width", "height", "background", "views", "initial", "smoothing", "depth_scale"});
   ViewsFile result;
   ShapeViews& views = result.views;
   views.width = parse_side(node.at("width"));
   views.height = parse_side(node.at("height"));
   if (const auto background = node.find("background")) views.background = background->vec3();
   const std::filesystem::path folder = file.parent_path();
-  MeasuredImages measured;
+  MeasuredImages measured = measured_images(node);
   for (const JsonNode& view : node.at("views").elements())
     views.views.push_back(parse_view(view, folder, views, encoding, measured));
   measured.append_to(notes);

@@ -132,6 +132,11 @@ TEST_SUITE("pipeline") {
     const auto parts = fit("depth.png", dpr::Image(24, 24, glm::vec4(0.5F, 0.5F, 0.5F, 1)));
     CHECK(parts.status == 1);
     CHECK(contains(parts.err, "all outside its camera's range, expected some from znear to zfar, 1 to 8"));
+    views["depth_scale"] = 8;
+    CHECK(fit("depth.png", dpr::Image(24, 24, glm::vec4(0.5F, 0.5F, 0.5F, 1))).err.empty());
+    views["depth_scale"] = 0;
+    CHECK(contains(fit("depth.png", dpr::Image(24, 24, glm::vec4(1))).err, "depth_scale"));
+    views.erase("depth_scale");
     dpr::Image depth(24, 24, glm::vec4(4, 4, 4, 1));
     CHECK(fit("depth.exr", depth).err.empty());
     depth.pixels[7] = glm::vec4(65504, 0, 0, 1);
