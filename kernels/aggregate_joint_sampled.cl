@@ -133,12 +133,12 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
     intn covers = (intn)(-1);
     if (!always_covers(c)) {
       const realn x = draw_distance(p, q, c, block);
-      if (place < DPR_NOISE_CACHE) cache->distance[place] = x;
+      if (is_kept(place)) cache->distance[place] = x;
       covers = c.x + x > 0.0f;
     }
     if (!any_lane(covers)) continue;
     const realn z = draw_depth(p, q, c, block);
-    if (place < DPR_NOISE_CACHE) cache->depth[place] = z;
+    if (is_kept(place)) cache->depth[place] = z;
     const intn wins = covers && c.beta + z > lead.largest;
     lead.winner = select(lead.winner, (intn)(place), wins);
     lead.largest = choose(wins, c.beta + z, lead.largest);
@@ -192,14 +192,13 @@ DPR_ALWAYS_INLINE void add_fragment(const AggregateParams p, const Pixel q, cons
   const Coordinates c = load_fragment(p, q, f, k);
   if (never_covers(c) || !any_lane(could_win(lead, c))) return;
   const intn counts = sample_counts(p.sampling, block);
-  const int is_kept = place < DPR_NOISE_CACHE;
   realn x = 0.0f;
   intn covers = (intn)(-1);
   if (!always_covers(c)) {
-    x = is_kept ? cache->distance[place] : draw_distance(p, q, c, block);
+    x = is_kept(place) ? cache->distance[place] : draw_distance(p, q, c, block);
     covers = c.x + x > 0.0f;
   }
-  const realn z = is_kept && any_lane(covers) ? cache->depth[place] : draw_depth(p, q, c, block);
+  const realn z = is_kept(place) && any_lane(covers) ? cache->depth[place] : draw_depth(p, q, c, block);
   if (!always_covers(c)) {
     const intn wins_if_it_covers = c.beta + z >= lead.largest;
     const float2 scores = add_scores(x, noise_score(DPR_OCCUPANCY_PRIOR, x), counts && wins_if_it_covers,

@@ -70,7 +70,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
     const float beta = slot_beta(q, f, slot);
     if (!could_win(lead, beta)) continue;
     const realn noise = draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
-    if (slot + 1 < DPR_NOISE_CACHE) cache[slot + 1] = noise;
+    if (is_kept(slot + 1)) cache[slot + 1] = noise;
     const realn value = beta + noise;
     lead.winner = select(lead.winner, (intn)(slot), value > lead.largest);
     lead.largest = greater(value, lead.largest);
@@ -125,7 +125,7 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
     y_sum += sum_lanes(y);
     for (int slot = -1; slot < run_length(q.run); ++slot) {
       if (!could_win(lead, slot_beta(q, f, slot))) continue;
-      const realn noise = slot + 1 < DPR_NOISE_CACHE
+      const realn noise = is_kept(slot + 1)
                               ? cache[slot + 1]
                               : draw_noise(p.sampling, DPR_PRIOR, slot_noise(p, q, f, face, slot), block);
       const realn noise_scores = noise_score(DPR_PRIOR, noise);

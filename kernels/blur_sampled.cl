@@ -22,7 +22,7 @@ static inline uint place_of(float u, uint last, global const float* restrict cum
   return low;
 }
 
-/// Draws the shifts. One work-item per (view, block of eight samples). Deterministic.
+/// Draws the shifts. One work-item per (view, block of samples). Deterministic.
 /// in   cumulative, scores  float[2 * radius + 1]  see ShiftTable
 /// out  shifts        uint2[view][sample]  along columns' and rows' numbers, plus the radius
 /// out  shift_scores  float[view][sample]  both axes'
@@ -35,7 +35,7 @@ kernel void blur_sampled_draw(const ShiftParams p, global const float* restrict 
   float u[2][DPR_WIDTH];
   for (uint axis = 0; axis < 2; ++axis) {
     const NoiseName name = name_noise(p.first_view + view, 0, axis, DPR_STAGE_OCCUPANCY);
-    vstore8(draw_uniform(p.sampling, name, block), 0, u[axis]);
+    store_n(draw_uniform(p.sampling, name, block), 0, u[axis]);
   }
   for (uint lane = 0; lane < DPR_WIDTH && DPR_WIDTH * block + lane < p.sampling.samples; ++lane) {
     const uint sample = view * p.sampling.samples + DPR_WIDTH * block + lane;

@@ -1,5 +1,5 @@
-// The noise of the Monte Carlo estimators, and their control variates. Samples are taken in blocks of eight,
-// one a lane. Noise is a pure function of (seed, view, pixel, face, sample, stage): the backward pass draws
+// The noise of the Monte Carlo estimators, and their control variates. Samples are taken in blocks, one a
+// lane. Noise is a pure function of (seed, view, pixel, face, sample, stage): the backward pass draws
 // that of the forward pass again, so nothing is stored, and memory does not depend on the number of samples.
 //
 // With M samples y_m of a function of the noise, gradients are score estimates (12), (14) with a baseline b:
@@ -21,22 +21,27 @@
 #ifndef DPR_NOISE_H
 #define DPR_NOISE_H
 
-#define DPR_WIDTH 8 /* lanes are samples */
+/// Samples of a block, one a lane: on a GPU those that one call of the generator has words for.
+#ifndef DPR_WIDTH
+#if defined(DPR_LANES) && DPR_LANES == 1
+#define DPR_WIDTH 4
+#else
+#define DPR_WIDTH 8
+#endif
+#endif
 #include "philox.h"
 #include "priors.h"
 
 /// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole
-/// launch.
+/// launch on a CPU.
 #define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
 /// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
+/// On a GPU that of all: what an index that varies reaches lies in memory there.
 #ifndef DPR_NOISE_CACHE
-#if DPR_LANES == 1
-#define DPR_NOISE_CACHE 4
-#else
 #define DPR_NOISE_CACHE 32
 #endif
-#endif
+static inline int is_kept(int slot) { return DPR_LANES != 1 && slot < DPR_NOISE_CACHE; }
 
 /// Which decision the noise is for: the last word of the counter, beside the view.
 #define DPR_STAGE_OCCUPANCY 0u
@@ -98,25 +103,36 @@ static inline uintn permute(uintn i, uint count, uint seed) {
 /// Moves independent uniform numbers into the strata of a Latin hypercube.
 static inline realn stratify(const Sampling s, const NoiseName name, uint block, realn u) {
   const uint4 counter = (uint4)(name.pixel, name.face, DPR_PERMUTATION_BLOCK, name.stream);
-  const uint8 words = philox4x32_10(counter, (uint2)(s.seed_low, s.seed_high));
-  const uintn hashed = permute(min(sample_index(block), (uintn)(s.samples - 1)), s.samples, words.s0);
-  const uintn rotated = hashed + words.s1 % s.samples;
+  const uint4 words = philox4x32_10(counter, (uint2)(s.seed_low, s.seed_high));
+  const uintn hashed = permute(min(sample_index(block), (uintn)(s.samples - 1)), s.samples, words.x);
+  const uintn rotated = hashed + words.y % s.samples;
   const uintn stratum = rotated - select((uintn)(0), (uintn)(s.samples), rotated >= s.samples);
   return clamp((convert_realn(stratum) + u) / (float)s.samples, DPR_LOWEST_UNIFORM, DPR_HIGHEST_UNIFORM);
 }
 
-/// Uniform numbers for a block of samples, each in (0, 1) and never 0 or 1.
+/// The random words of a block of samples.
 ///   independent  sample m: word m mod 4 of the counter (pixel, face, m / 4, stream)
-///   antithetic   samples 2 j and 2 j + 1: u and 1 - u, word j mod 4 of the counter (pixel, face, j / 4,
-///                stream)
-///   stratified   (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi
-///                is rotated by a word of its own, so that pi(m) is uniform whatever the hash is worth.
+///   antithetic   samples 2 j and 2 j + 1: word j mod 4 of the counter (pixel, face, j / 4, stream), and that
+///                word with all its bits turned
+DPR_ALWAYS_INLINE uintn draw_words(const Sampling s, const NoiseName name, uint block) {
+  const int is_paired = s.draws == DPR_ANTITHETIC;
+  const uint first = (is_paired ? DPR_WIDTH / 2 : DPR_WIDTH) * block / DPR_COUNTER_WORDS;
+  const uint4 counter = (uint4)(name.pixel, name.face, first, name.stream);
+  const uint2 key = (uint2)(s.seed_low, s.seed_high);
+#if DPR_WIDTH == 4
+  const uint4 words = philox4x32_10(counter, key), turned = (uint4)(0, ~0u, 0, ~0u);
+  return is_paired ? (block % 2 == 0 ? words.xxyy : words.zzww) ^ turned : words;
+#else
+  const uint8 words = philox4x32_10_twice(counter, key), turned = (uint8)(0, ~0u, 0, ~0u, 0, ~0u, 0, ~0u);
+  return is_paired ? words.s00112233 ^ turned : words;
+#endif
+}
+
+/// Uniform numbers for a block of samples, each in (0, 1) and never 0 or 1: those of its words; stratified
+/// (pi(m) + u) / M with the independent u, and a permutation pi of its own for every name. pi is rotated by a
+/// word of its own, so that pi(m) is uniform whatever the hash is worth.
 DPR_ALWAYS_INLINE realn draw_uniform(const Sampling s, const NoiseName name, uint block) {
-  const uint first = s.draws == DPR_ANTITHETIC ? block : 2 * block;
-  uint8 words =
-      philox4x32_10((uint4)(name.pixel, name.face, first, name.stream), (uint2)(s.seed_low, s.seed_high));
-  if (s.draws == DPR_ANTITHETIC) words = words.s00112233 ^ (uint8)(0, ~0u, 0, ~0u, 0, ~0u, 0, ~0u);
-  const realn u = uniform_from_bits(words);
+  const realn u = uniform_from_bits(draw_words(s, name, block));
   return s.draws == DPR_STRATIFIED ? stratify(s, name, block, u) : u;
 }
 
@@ -125,7 +141,12 @@ DPR_ALWAYS_INLINE realn draw_uniform(const Sampling s, const NoiseName name, uin
 
 /// y_m + G_m / (M - g), or y_m where there is no leave-one-out baseline. `y` is 0 in lanes without a sample.
 static inline realn add_group(const Sampling s, realn y) {
-  return mad(s.leave_out, s.draws == DPR_ANTITHETIC ? y + y.s10325476 : y, y);
+#if DPR_WIDTH == 4
+  const realn partner = y.yxwz;
+#else
+  const realn partner = y.s10325476;
+#endif
+  return mad(s.leave_out, s.draws == DPR_ANTITHETIC ? y + partner : y, y);
 }
 
 /// What a scale, sigma or gamma, collects over variables and samples: sums of (y + G / (M - g)) (nu'(Z)

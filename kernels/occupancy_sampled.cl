@@ -1,7 +1,10 @@
 // The perturbed Heaviside by Monte Carlo with a control variate: eq. (11), (12), (14), (15) for scalar noise.
 // The backward pass draws the forward pass' noise again. Where no noise can change the sign, none is drawn.
 #include "noise.h"
+
+#if DPR_LANES >= DPR_WIDTH
 #include "tile_lanes.h"
+#endif
 
 /// Below the least share of samples that is not 0.
 #define DPR_LEAST_SHARE 1e-7f

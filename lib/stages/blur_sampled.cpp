@@ -5,7 +5,8 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_samples_per_draw = 8;  // as kernels/noise.h has them
+/// Samples of a block, as kernels/noise.h has them.
+std::size_t block_samples(const Device::Impl& device) { return device.info.lanes == 1 ? 4 : 8; }
 
 }  // namespace
 
@@ -43,8 +44,8 @@ void BlurSampled::draw(const Blur::Size& size, cl_uint first_view) {
   const std::size_t samples = params_.sampling.samples;
   shifts_.resize(device_, size.views * samples);
   shift_scores_.resize(device_, size.views * samples);
-  draw_(size.views * ((samples + k_samples_per_draw - 1) / k_samples_per_draw), params_, cumulative_, scores_,
-        shifts_, shift_scores_);
+  const std::size_t blocks = (samples + block_samples(device_) - 1) / block_samples(device_);
+  draw_(size.views * blocks, params_, cumulative_, scores_, shifts_, shift_scores_);
 }
 
 void BlurSampled::forward(const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {

@@ -16,9 +16,10 @@ namespace {
 using dpr::test::device_impl;
 using dpr::test::reduced;
 
-/// The samples of faces 0, 1, ... in pixel 3 of view 1: uniform numbers, or the noise of a prior.
+/// The samples of faces 0, 1, ... in pixel 3 of view 1, drawn in blocks of `width`: uniform numbers, or the
+/// noise of a prior.
 std::vector<std::vector<float>> draw(cl_uint draws, cl_uint samples, std::size_t faces,
-                                     std::optional<dpr::Prior> prior = {}, cl_uint seed = 7) {
+                                     std::optional<dpr::Prior> prior = {}, cl_uint seed = 7, int width = 8) {
   const std::string function = prior ? "draw_noise(s, " + std::string(to_string(*prior)) + ", name, block)"
                                      : "draw_uniform(s, name, block)";
   dpr::test::Probe probe({"shared_types.h", "philox.h", "lanes.h", "priors.h", "noise.h"}, R"(
@@ -39,7 +40,7 @@ kernel void probe(const uint samples, const uint draws, const uint seed, global 
     }
   }
 })",
-                         " -DDPR_WIDTH=8");
+                         " -DDPR_WIDTH=" + std::to_string(width));
   dpr::Buffer<float> out;
   dpr::test::poison(out, faces * samples);
   probe(faces, samples, draws, seed, out);
@@ -96,6 +97,13 @@ TEST_SUITE("unit") {
       }
     }
     for (const auto& us : draw(DPR_INDEPENDENT, 20, 6)) CHECK_FALSE(is_permutation(strata(us)));
+  }
+
+  TEST_CASE("blocks of four and of eight hold the same samples") {
+    for (const cl_uint draws : {DPR_INDEPENDENT, DPR_ANTITHETIC, DPR_STRATIFIED}) {
+      CAPTURE(draws);
+      CHECK(draw(draws, 22, 4) == draw(draws, 22, 4, {}, 7, 4));
+    }
   }
 
   TEST_CASE("noise stays within the bounds that skip work") {

@@ -24,27 +24,29 @@ using RefPrior = dpr::reference::Prior;
 
 using Words = std::array<cl_uint, 4>;
 
-/// The words of a counter, and of the one that follows it.
-std::array<cl_uint, 8> philox_pair(const Words& counter, cl_uint key0, cl_uint key1) {
+/// The words of a counter by itself, then those of a call for two, itself and the next.
+std::array<cl_uint, 12> philox_calls(const Words& counter, cl_uint key0, cl_uint key1) {
   Probe probe({"philox.h"}, R"(
 kernel void probe(const uint4 counter, const uint2 key, global uint* restrict out) {
-  vstore8(philox4x32_10(counter, key), 0, out);
+  vstore4(philox4x32_10(counter, key), 0, out);
+  vstore8(philox4x32_10_twice(counter, key), 0, out + 4);
 })");
   Buffer<cl_uint> out;
-  poison(out, 8, 0xdeadbeefU);
+  poison(out, 12, 0xdeadbeefU);
   probe(1, cl_uint4{{counter[0], counter[1], counter[2], counter[3]}}, cl_uint2{{key0, key1}}, out);
-  std::array<cl_uint, 8> words{};
+  std::array<cl_uint, 12> words{};
   out.download(words);
   return words;
 }
 
-/// The words of a counter, which come in the first half of the call that names it and in the second half of
-/// the call before.
+/// The words of a counter, which come by themselves, in the first half of the call for two that names it, and
+/// in the second half of that before.
 Words philox(const Words& counter, cl_uint key0, cl_uint key1) {
-  const std::array<cl_uint, 8> named = philox_pair(counter, key0, key1);
-  const std::array<cl_uint, 8> before =
-      philox_pair({counter[0], counter[1], counter[2] - 1, counter[3]}, key0, key1);
-  CHECK(std::equal(named.begin(), named.begin() + 4, before.begin() + 4));
+  const std::array<cl_uint, 12> named = philox_calls(counter, key0, key1);
+  const std::array<cl_uint, 12> before =
+      philox_calls({counter[0], counter[1], counter[2] - 1, counter[3]}, key0, key1);
+  CHECK(std::equal(named.begin(), named.begin() + 4, &named[4]));
+  CHECK(std::equal(named.begin(), named.begin() + 4, &before[8]));
   return {named[0], named[1], named[2], named[3]};
 }
 
