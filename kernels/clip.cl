@@ -26,10 +26,11 @@ typedef struct {
   float3 corner[4];  // x, y in NDC, depth; the last is that of a triangle's first
 } Outline;
 
-static inline Outline outline_of(const ClippedFace c, const float3 ndc[3]) {
+/// From the first corner that is kept, and the one after it.
+static inline Outline outline_of(const ClippedFace c, float3 first, float3 next) {
   Outline o;
-  o.corner[0] = ndc[c.first];
-  o.corner[1] = c.corners == 4 ? ndc[(c.first + 1) % 3] : c.cut[0].xyz;
+  o.corner[0] = first;
+  o.corner[1] = c.corners == 4 ? next : c.cut[0].xyz;
   o.corner[2] = c.corners == 4 ? c.cut[0].xyz : c.cut[1].xyz;
   o.corner[3] = c.corners == 4 ? c.cut[1].xyz : o.corner[0];
   return o;
@@ -40,6 +41,7 @@ static inline Outline outline_of(const ClippedFace c, const float3 ndc[3]) {
 static inline int orientation_of_outline(const Outline o) {
   float2 reach = 0.0f;
   float sum = 0.0f;
+#pragma unroll
   for (int k = 0; k < 4; ++k) {
     reach = fmax(reach, fabs(o.corner[k].xy));
     sum += o.corner[k].x + o.corner[k].y + o.corner[k].z;
@@ -48,8 +50,8 @@ static inline int orientation_of_outline(const Outline o) {
   if (!(fabs(sum) < INFINITY && fmax(reach.x, reach.y) < DPR_MAX_NDC)) return 0;
   const float2 a = o.corner[0].xy, b = o.corner[1].xy - a, c = o.corner[2].xy - a, d = o.corner[3].xy - a;
   const int is_second = fabs(c.x * d.y - c.y * d.x) > fabs(b.x * c.y - b.y * c.x);
-  return is_second ? side_of_line(a, o.corner[2].xy, o.corner[3].xy)
-                   : side_of_line(a, o.corner[1].xy, o.corner[2].xy);
+  return side_of_line(a, is_second ? o.corner[2].xy : o.corner[1].xy,
+                      is_second ? o.corner[3].xy : o.corner[2].xy);
 }
 
 /// A triangle of an outline's first corner and two more that follow each other.
@@ -78,17 +80,16 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
-  const uint4 face = faces[i - view * p.faces];
-  const uint vertex[3] = {view * p.vertices + face.x, view * p.vertices + face.y, view * p.vertices + face.z};
+  global const uint4* const face = faces + (i - view * p.faces);
+  const uint vertex[3] = {face->x, face->y, face->z};
+  global const float4 *const view_ndc = ndc + view * p.vertices, *const view_world =
+                                                                     world + view * p.vertices;
   const float znear = views[view].znear;
   const float4 projection = views[view].projection;
   clipped[i].corners = 0;
-  float3 corner[3];
   uint lost = 0;
-  for (uint k = 0; k < 3; ++k) {
-    corner[k] = ndc[vertex[k]].xyz;
-    lost |= corner[k].z < znear ? 1u << k : 0u;
-  }
+#pragma unroll
+  for (uint k = 0; k < 3; ++k) lost |= view_ndc[vertex[k]].z < znear ? 1u << k : 0u;
   if (lost == 0 || lost == 7) return;
   ClippedFace c;
   const uint one = popcount(lost) == 1 ? lost : 7 - lost;  // the corner that is alone on its side
@@ -96,17 +97,20 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   c.first = (one == 1 ? 0 : one == 2 ? 1 : 2) + (c.corners == 4 ? 1 : 0);
   c.first %= 3;
   c.unused = 0;
+#pragma unroll
   for (uint k = 0; k < 3; ++k) {
     const float3 in_camera =
-        apply_affine(views[view].row[0], views[view].row[1], views[view].row[2], world[vertex[k]].xyz);
-    const float w = p.orthographic ? 1.0f : corner[k].z;
+        apply_affine(views[view].row[0], views[view].row[1], views[view].row[2], view_world[vertex[k]].xyz);
+    const float depth = view_ndc[vertex[k]].z, w = p.orthographic ? 1.0f : depth;
     const float2 homogeneous = in_camera.xy * projection.xy + projection.zw * w;
-    c.corner[k] = (float4)(homogeneous.x, homogeneous.y, corner[k].z, w);
+    c.corner[k] = (float4)(homogeneous.x, homogeneous.y, depth, w);
   }
+#pragma unroll
   for (uint cut = 0; cut < 2; ++cut)
-    c.cut[cut] =
-        make_cut(p, views + view, c.corner[kept_corner(c, cut)].xyz, c.corner[lost_corner(c, cut)].xyz);
-  const Outline o = outline_of(c, corner);
+    c.cut[cut] = make_cut(p, views + view, clipped_corner(c, kept_corner(c, cut)).xyz,
+                          clipped_corner(c, lost_corner(c, cut)).xyz);
+  const Outline o =
+      outline_of(c, view_ndc[corner_in(face, c.first)].xyz, view_ndc[corner_in(face, (c.first + 1) % 3)].xyz);
   const int orientation = orientation_of_outline(o);
   if (orientation == 0 || (float)orientation == p.culled) return;
   c.orientation = (float)orientation;
@@ -114,6 +118,7 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   facing[i] = facing_of(orientation);
 
   float2 lowest = o.corner[0].xy, highest = lowest;
+#pragma unroll
   for (int k = 1; k < 4; ++k) {
     lowest = fmin(lowest, o.corner[k].xy);
     highest = fmax(highest, o.corner[k].xy);
@@ -215,15 +220,21 @@ typedef struct {
   float of[4][3];
 } OutlineWeights;
 
+/// Of corner `k` of the outline: a corner that is kept, or a cut.
+static inline float weight_of(const ClippedFace c, uint k, uint corner) {
+  const uint kept = c.corners - 2;
+  if (k < kept) return corner == (c.first + k) % 3 ? 1.0f : 0.0f;
+  if (k == c.corners) return 0.0f;
+  const float part = clipped_cut(c, k - kept).w;
+  return corner == lost_corner(c, k - kept) ? part : corner == kept_corner(c, k - kept) ? 1.0f - part : 0.0f;
+}
+
 static inline OutlineWeights weights_of(const ClippedFace c) {
   OutlineWeights w;
-  for (int k = 0; k < 4; ++k) w.of[k][0] = w.of[k][1] = w.of[k][2] = 0.0f;
-  w.of[0][c.first] = 1.0f;
-  if (c.corners == 4) w.of[1][(c.first + 1) % 3] = 1.0f;
-  for (uint cut = 0; cut < 2; ++cut) {
-    const uint k = c.corners - 2 + cut;
-    w.of[k][kept_corner(c, cut)] = 1.0f - c.cut[cut].w;
-    w.of[k][lost_corner(c, cut)] = c.cut[cut].w;
+#pragma unroll
+  for (uint k = 0; k < 4; ++k) {
+#pragma unroll
+    for (uint corner = 0; corner < 3; ++corner) w.of[k][corner] = weight_of(c, k, corner);
   }
   return w;
 }
@@ -300,17 +311,23 @@ typedef struct {
 static inline void store_corners(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                  const OutlineGradients g, global float* restrict grad_corners,
                                  global float* restrict grad_clip) {
-  float3 own[3] = {0.0f, 0.0f, 0.0f}, by_cuts[3] = {0.0f, 0.0f, 0.0f};
-  own[c.first] = g.corner[0];
-  if (c.corners == 4) own[(c.first + 1) % 3] = g.corner[1];
-  for (uint cut = 0; cut < 2; ++cut) {
-    const float3 grad = cut_gradient(p, view, c, cut, g.corner[c.corners - 2 + cut].xy, g.part[cut]);
-    by_cuts[kept_corner(c, cut)] += (1.0f - c.cut[cut].w) * grad;
-    by_cuts[lost_corner(c, cut)] += c.cut[cut].w * grad;
-  }
+  const int is_quad = c.corners == 4;
+  const float3 by_cut[2] = {
+      cut_gradient(p, view, c, 0, is_quad ? g.corner[2].xy : g.corner[1].xy, g.part[0]),
+      cut_gradient(p, view, c, 1, is_quad ? g.corner[3].xy : g.corner[2].xy, g.part[1])};
+#pragma unroll
   for (uint k = 0; k < 3; ++k) {
-    vstore3(own[k], k, grad_corners);
-    vstore3(by_cuts[k], k, grad_clip);
+    const float3 none = 0.0f;
+    const int is_second = is_quad && k == (c.first + 1) % 3;
+    vstore3(k == c.first ? g.corner[0] : is_second ? g.corner[1] : none, k, grad_corners);
+    float3 sum = 0.0f;
+#pragma unroll
+    for (uint cut = 0; cut < 2; ++cut) {
+      const float part = c.cut[cut].w;
+      if (k == kept_corner(c, cut)) sum += (1.0f - part) * by_cut[cut];
+      if (k == lost_corner(c, cut)) sum += part * by_cut[cut];
+    }
+    vstore3(sum, k, grad_clip);
   }
 }
 
@@ -366,9 +383,12 @@ kernel void clip_backward(const FrameParams p, const uint last_pair, global cons
                              choose(v.in_second, h[2] - h[0], zero), choose(v.in_second, h[3] - h[0], zero),
                              &g[1]);
     outline_barycentrics(v, first, second, u);
-    const realn of_corner[3] = {zero, b1, b2};
+#pragma unroll
     for (uint cut = 0; cut < 2; ++cut) {
-      part[cut] += u[c.corners - 2 + cut] * (of_corner[lost_corner(c, cut)] - of_corner[kept_corner(c, cut)]);
+      const uint lost = lost_corner(c, cut), kept = kept_corner(c, cut);
+      const realn of_lost = lost == 0 ? zero : lost == 1 ? b1 : b2;
+      const realn of_kept = kept == 0 ? zero : kept == 1 ? b1 : b2;
+      part[cut] += (t.has_second ? u[2 + cut] : u[1 + cut]) * (of_lost - of_kept);
     }
   }
   float3 sum[2][3];

@@ -8,6 +8,12 @@
 #include "lens.h"
 #include "shared_types.h"
 
+/// A corner of a list of faces, read where it lies: an index that varies would put the face into memory. 3, that
+/// of no corner, names the last.
+static inline uint corner_in(global const uint4* face, uint corner) {
+  return ((global const uint*)face)[min(corner, 2u)];
+}
+
 /// The corner of the face that a cut lies between, on the side that is kept, and on the other.
 static inline uint kept_corner(const ClippedFace c, uint cut) {
   return (c.first + (c.corners == 4 && cut == 0 ? 1 : 0)) % 3;
@@ -30,6 +36,12 @@ static inline uint cut_between(const ClippedFace c, uint kept, uint lost) {
   return 2;
 }
 
+/// A corner or a cut by its number. Compared, because an index that varies would put the face into memory.
+static inline float4 clipped_corner(const ClippedFace c, uint k) {
+  return k == 0 ? c.corner[0] : k == 1 ? c.corner[1] : c.corner[2];
+}
+static inline float4 clipped_cut(const ClippedFace c, uint cut) { return cut == 0 ? c.cut[0] : c.cut[1]; }
+
 /// By what homogeneous coordinates on the near plane are divided.
 static inline float cut_divisor(const FrameParams p, float znear) { return p.orthographic ? 1.0f : znear; }
 
@@ -44,9 +56,10 @@ static inline float2 cut_ndc(const FrameParams p, float3 kept, float3 lost, floa
 /// d part / d z_kept = (1 - part) / (z_kept - z_lost) and d part / d z_lost = part / (z_kept - z_lost).
 static inline float3 cut_gradient(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                   uint cut, float2 grad, float grad_part) {
-  const float3 kept = c.corner[kept_corner(c, cut)].xyz, lost = c.corner[lost_corner(c, cut)].xyz;
-  const float znear = c.cut[cut].z;
-  if (view->distorts) grad = bend_ndc_backward(view, cut_ndc(p, kept, lost, c.cut[cut].w, znear), grad);
+  const float3 kept = clipped_corner(c, kept_corner(c, cut)).xyz;
+  const float3 lost = clipped_corner(c, lost_corner(c, cut)).xyz;
+  const float znear = clipped_cut(c, cut).z, part = clipped_cut(c, cut).w;
+  if (view->distorts) grad = bend_ndc_backward(view, cut_ndc(p, kept, lost, part, znear), grad);
   const float2 g = grad / cut_divisor(p, znear);
   return (float3)(g, (grad_part + dot(g, lost.xy - kept.xy)) / (kept.z - lost.z));
 }

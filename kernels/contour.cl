@@ -35,15 +35,19 @@ static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) 
   return is_same(ndc[face.x], v) ? 0 : is_same(ndc[face.y], v) ? 1 : is_same(ndc[face.z], v) ? 2 : 3;
 }
 
-static inline uint component(uint4 v, uint k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
 /// Whether the faces' colours differ at an end of the edge.
-static inline int color_jumps(const ContourScene s, uint4 edge, uint vertex) {
+DPR_ALWAYS_INLINE int color_jumps(const ContourScene s, uint4 edge) {
   const uint own = own_face(edge), other = other_face(edge);
-  const uint in_own = corner_at(s.faces[own], vertex, s.ndc),
-             in_other = corner_at(s.faces[other], vertex, s.ndc);
-  return !is_same(s.colors[component(s.face_colors[own], in_own)],
-                  s.colors[component(s.face_colors[other], in_other)]);
+#pragma unroll 1
+  for (int end = 0; end < 2; ++end) {
+    const uint vertex = end == 0 ? edge.x : edge.y;
+    const uint in_own = corner_at(s.faces[own], vertex, s.ndc),
+               in_other = corner_at(s.faces[other], vertex, s.ndc);
+    if (!is_same(s.colors[corner_in(s.face_colors + own, in_own)],
+                 s.colors[corner_in(s.face_colors + other, in_other)]))
+      return 1;
+  }
+  return 0;
 }
 
 static inline int normals_differ(const ContourScene s, uint4 edge) {
@@ -94,7 +98,7 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
   if (shading == DPR_FLAT && normals_differ(s, edge)) return DPR_CREASE;
   if (!(edge.z & DPR_EDGE_FLAG)) return DPR_NO_CONTOUR;
   if (is_split && shading != DPR_UNLIT && shading != DPR_FLAT) return DPR_CREASE;
-  return color_jumps(s, edge, edge.x) || color_jumps(s, edge, edge.y) ? DPR_CREASE : DPR_NO_CONTOUR;
+  return color_jumps(s, edge) ? DPR_CREASE : DPR_NO_CONTOUR;
 }
 
 static inline ContourScene scene_of_view(const FrameParams p, const ContourParams c, uint view,
@@ -205,8 +209,8 @@ static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
 /// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
 /// plane, the edge that is cut there, and the cuts of its faces.
 static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
-  const uint mesh_edges = c.edges.mesh_edges;
-  if (e.cut[end] == DPR_NO_CUT) {
+  const uint mesh_edges = c.edges.mesh_edges, cut = end == 0 ? e.cut[0] : e.cut[1];
+  if (cut == DPR_NO_CUT) {
     const uint vertex = end == 0 ? e.record.x : e.record.y;
     for (uint k = c.end_starts[vertex]; k < c.end_starts[vertex + 1]; ++k) {
       if (!is_long(p, c, c.ends[k] / 2)) return 0;
@@ -215,9 +219,9 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
   }
   if (edge >= mesh_edges) {
     const ClippedFace of = c.edges.clipped[e.cut_face];
-    const uint4 face = c.edges.faces[e.cut_face];
-    edge = edge_between(c, e.cut_face, component(face, kept_corner(of, e.cut[end])),
-                        component(face, lost_corner(of, e.cut[end])));
+    global const uint4* const face = c.edges.faces + e.cut_face;
+    edge = edge_between(c, e.cut_face, corner_in(face, kept_corner(of, cut)),
+                        corner_in(face, lost_corner(of, cut)));
     if (edge == mesh_edges) return 0;
   }
   const uint4 record = c.edges.edges[edge];
@@ -311,7 +315,7 @@ static inline float4 sum_of_pairs(uint contour, global const uint* pair_starts, 
 /// What the end of a contour that is a cut gives to one of the corners that it lies between.
 static inline float3 share_of_cut(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                   uint cut, int to_lost, float2 grad) {
-  const float part = c.cut[cut].w;
+  const float part = clipped_cut(c, cut).w;
   return (to_lost ? part : 1.0f - part) * cut_gradient(p, view, c, cut, grad, 0.0f);
 }
 
@@ -354,10 +358,10 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
   for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
     const uint edge = ends[k] / 2, own_end = ends[k] % 2;
     const ViewEdge e = view_edge(s, edge);
-    const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1;
-    if (!e.is_there || e.cut[end] == DPR_NO_CUT) continue;
+    const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1, cut = min(e.cut[0], e.cut[1]);
+    if (!e.is_there || cut == DPR_NO_CUT) continue;
     const float4 grad = sum_of_pairs(first_edge + edge, pair_starts, edge_pairs, grad_ends);
-    sum += share_of_cut(p, views + view, s.clipped[e.cut_face], e.cut[end], own_end == end,
+    sum += share_of_cut(p, views + view, s.clipped[e.cut_face], cut, own_end == end,
                         end == 0 ? grad.xy : grad.zw);
   }
   if (is_near) grad_ndc[i] = 0.0f;

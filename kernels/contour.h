@@ -72,7 +72,7 @@ static inline EdgeScene edges_of_view(const FrameParams p, uint view, uint mesh_
 /// An edge as a view has it.
 typedef struct {
   uint4 record;   // as in the list of edges; of the cut of a face (face, none) without vertices
-  float3 end[2];  // x, y in NDC, depth
+  float4 end[2];  // x, y in NDC, depth; w is not used
   int is_there;   // 0: all of it is nearer than the near plane
   uint cut_face;  // whose cuts the ends are
   uint cut[2];    // which of them, or DPR_NO_CUT: then the end is the vertex
@@ -81,13 +81,12 @@ typedef struct {
 /// The edge on the near plane that a face has got there, in the direction in which the face winds.
 static inline ViewEdge edge_of_cut(const EdgeScene s, uint face) {
   const int is_there = s.clipped[face].corners != 0;
-  const float3 none = 0.0f;  // zeros in the initializer itself crash Mesa 22.3's compiler
-  const ViewEdge e = {
-      (uint4)(0, 0, face, DPR_NO_FACE),
-      {is_there ? s.clipped[face].cut[0].xyz : none, is_there ? s.clipped[face].cut[1].xyz : none},
-      is_there,
-      face,
-      {0, 1}};
+  const float4 none = 0.0f;  // zeros in the initializer itself crash Mesa 22.3's compiler
+  const ViewEdge e = {(uint4)(0, 0, face, DPR_NO_FACE),
+                      {is_there ? s.clipped[face].cut[0] : none, is_there ? s.clipped[face].cut[1] : none},
+                      is_there,
+                      face,
+                      {0, 1}};
   return e;
 }
 
@@ -108,29 +107,32 @@ static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
   const int loses_first = is_lost(c, first), loses_second = is_lost(c, second);
   e->is_there = !(loses_first && loses_second);
   if (loses_first == loses_second) return;
-  // Written out, and the cut read where it lies: an index that varies would put edge and face into memory.
-  if (loses_first) {
-    e->cut[0] = cut_between(c, second, first);
-    e->end[0] = clipped->cut[e->cut[0]].xyz;
-  } else {
-    e->cut[1] = cut_between(c, first, second);
-    e->end[1] = clipped->cut[e->cut[1]].xyz;
-  }
+  // Chosen by value, and the cut read where it lies: a place that varies would put edge and face into memory.
+  const uint cut = loses_first ? cut_between(c, second, first) : cut_between(c, first, second);
+  const float4 end = clipped->cut[cut];
+  e->cut[0] = loses_first ? cut : DPR_NO_CUT;
+  e->cut[1] = loses_first ? DPR_NO_CUT : cut;
+  e->end[0] = loses_first ? end : e->end[0];
+  e->end[1] = loses_first ? e->end[1] : end;
 }
 
 static inline ViewEdge view_edge(const EdgeScene s, uint edge) {
   if (edge >= s.mesh_edges) return edge_of_cut(s, edge - s.mesh_edges);
   const uint4 record = s.edges[edge];
-  ViewEdge e = {record, {s.ndc[record.x].xyz, s.ndc[record.y].xyz}, 1, 0, {DPR_NO_CUT, DPR_NO_CUT}};
+  ViewEdge e = {record, {s.ndc[record.x], s.ndc[record.y]}, 1, 0, {DPR_NO_CUT, DPR_NO_CUT}};
   if (s.clips) clip_edge(s, &e);
   return e;
 }
 
 /// NDC to samples: the centre of column c or row r is at c or r.
+static inline float column_at(const FrameParams p, float x) {
+  return x * (1.0f / p.pixel_size) + 0.5f * (float)p.width - 0.5f;
+}
+static inline float row_at(const FrameParams p, float y) {
+  return 0.5f * (float)p.height - 0.5f - y * (1.0f / p.pixel_size);
+}
 static inline float2 to_samples(const FrameParams p, float2 ndc) {
-  const float inverse = 1.0f / p.pixel_size;
-  return (float2)(ndc.x * inverse + 0.5f * (float)p.width - 0.5f,
-                  0.5f * (float)p.height - 0.5f - ndc.y * inverse);
+  return (float2)(column_at(p, ndc.x), row_at(p, ndc.y));
 }
 
 /// The part of a tile that lies on the raster, [first, last) columns and rows.

@@ -31,11 +31,10 @@ static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
   e.a = a;
   e.b = b;
   e.is_by_rows = is_by_rows;
-  const float2 d = b - a;
-  const float across = is_by_rows ? d.y : d.x;
+  const float dx = b.x - a.x, dy = b.y - a.y, across = is_by_rows ? dy : dx;
   e.ascends = across > 0.0f;
   e.inverse = across != 0.0f ? 1.0f / across : 0.0f;
-  e.slope = (is_by_rows ? d.x : d.y) * e.inverse;
+  e.slope = (is_by_rows ? dx : dy) * e.inverse;
   return e;
 }
 
@@ -93,10 +92,8 @@ static inline int is_before_line(const FrameParams p, const RasterEdge e, float2
 /// Where the edge's line crosses a line of samples, in samples along it.
 static inline float position_on_line(const FrameParams p, const RasterEdge e, int line) {
   const float2 at = pixel_centre(p, line, line);
-  const float2 crossing = e.is_by_rows ? (float2)(e.a.x + (at.y - e.a.y) * e.slope, at.y)
-                                       : (float2)(at.x, e.a.y + (at.x - e.a.x) * e.slope);
-  const float2 in_samples = to_samples(p, crossing);
-  return e.is_by_rows ? in_samples.x : in_samples.y;
+  return e.is_by_rows ? column_at(p, e.a.x + (at.y - e.a.y) * e.slope)
+                      : row_at(p, e.a.y + (at.x - e.a.x) * e.slope);
 }
 
 /// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the
@@ -111,12 +108,14 @@ static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int l
   const float size = (float)(e.is_by_rows ? p.width : p.height);
   int first = (int)floor(clamp(c.position, -2.0f, size));
   if (c.exists) {
-    const int next = first + 1;
-    if (is_behind(e, e.is_by_rows ? pixel_centre(p, first, line) : pixel_centre(p, line, first))) {
-      --first;
-    } else if (!is_behind(e, e.is_by_rows ? pixel_centre(p, next, line) : pixel_centre(p, line, next))) {
-      ++first;
+    // Of the samples around the position, the first behind the edge ends the step.
+    int sample = first;
+#pragma unroll 1
+    while (sample < first + 2 &&
+           !is_behind(e, e.is_by_rows ? pixel_centre(p, sample, line) : pixel_centre(p, line, sample))) {
+      ++sample;
     }
+    first = sample - 1;
   }
   c.column = e.is_by_rows ? first : line;
   c.row = e.is_by_rows ? line : first;
@@ -138,9 +137,8 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
   const int is_before = is_before_line(p, e, end, x.line), towards_end = is_before ? -1 : 1;
   CornerArea c = {0.0f, 0.0f, 0.0f, 0.0f};
   if (is_before_line(p, e, end, x.line + towards_end) == is_before) return c;
-  const float2 in_samples = to_samples(p, end);
-  const float across = e.is_by_rows ? in_samples.y : in_samples.x,
-              position = e.is_by_rows ? in_samples.x : in_samples.y;
+  const float column = column_at(p, end.x), row = row_at(p, end.y);
+  const float across = e.is_by_rows ? row : column, position = e.is_by_rows ? column : row;
   const float half_step = 0.5f * (float)towards_end, lines = e.is_by_rows ? -p.pixel_size : p.pixel_size;
   c.along = x.along + half_step * lines * e.inverse;
   c.height = half_step * (across - (float)x.line - half_step);

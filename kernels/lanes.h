@@ -11,6 +11,10 @@
 #define DPR_WIDTH DPR_LANES /* the width of this file's vectors */
 #endif
 
+/// For what a call would cost more: of noise, inlined, the key's part in the generator's rounds is computed
+/// once for a whole launch on a CPU; and a structure that is handed over lies in memory.
+#define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
+
 #define DPR_CONCAT_(a, b) a##b
 #define DPR_CONCAT(a, b) DPR_CONCAT_(a, b)
 

@@ -32,10 +32,6 @@
 #include "philox.h"
 #include "priors.h"
 
-/// For what draws noise: inlined, the key's part in the generator's rounds is computed once for a whole
-/// launch on a CPU.
-#define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
-
 /// Slots of a pixel whose noise the backward pass keeps between its two uses; that of others is drawn twice.
 /// On a GPU that of all: what an index that varies reaches lies in memory there.
 #ifndef DPR_NOISE_CACHE

@@ -40,15 +40,19 @@ static int exact_side(float2 a, float2 b, float2 p) {
   p = ldexp(p, exponent);
   const float left[6] = {a.x, -a.y, b.x, -b.y, p.x, -p.y}, right[6] = {b.y, b.x, p.y, p.x, a.y, a.x};
   float parts[12];
+#pragma unroll
   for (int k = 0; k < 6; ++k) {
     const float product = left[k] * right[k];
     float low = fma(left[k], right[k], -product), high = product;
+#pragma unroll
     for (int i = 0; i < 2 * k; ++i) low = two_sum(low, parts[i], &parts[i]);
     parts[2 * k] = low;
+#pragma unroll
     for (int i = 0; i < 2 * k + 1; ++i) high = two_sum(high, parts[i], &parts[i]);
     parts[2 * k + 1] = high;
   }
   float sign_of = 0.0f;
+#pragma unroll
   for (int i = 0; i < 12; ++i) sign_of = parts[i] != 0.0f ? parts[i] : sign_of;
   return (sign_of > 0.0f) - (sign_of < 0.0f);
 }
@@ -78,9 +82,16 @@ static inline float2 pixel_centre(const FrameParams p, int column, int row) {
 }
 
 static inline int owns_sample(const Triangle t, float2 p) {
-  const float2 a = (float2)(t.x0, t.y0), b = (float2)(t.x1, t.y1), c = (float2)(t.x2, t.y2);
-  return is_owned_at(a, b, p, t.orientation) && is_owned_at(b, c, p, t.orientation) &&
-         is_owned_at(c, a, p, t.orientation);
+  float2 a = (float2)(t.x0, t.y0), b = (float2)(t.x1, t.y1), c = (float2)(t.x2, t.y2);
+#pragma unroll 1
+  for (int k = 0; k < 3; ++k) {
+    if (!is_owned_at(a, b, p, t.orientation)) return 0;
+    const float2 next = a;
+    a = b;
+    b = c;
+    c = next;
+  }
+  return 1;
 }
 
 #endif

@@ -38,7 +38,7 @@ static inline uint2 cover_tile(const FrameParams p, const Triangle t, uint view_
   const float limit = is_sliver(t) ? 0.0f : p.blur_distance * p.blur_distance;
   const uint2 rows = samples_of_tile(rows_of(t), first_row / DPR_TILE) - first_row;
   const float error = side_error(p, t);
-  uint halves[2] = {0, 0};
+  ulong mask = 0;
   for (uint row = rows.x; row <= rows.y; ++row) {
     const realn y = pixel_y(p, (realn)((float)(first_row + row)));
     for (uint part = 0; part < DPR_TILE; part += DPR_WIDTH) {
@@ -51,10 +51,10 @@ static inline uint2 cover_tile(const FrameParams p, const Triangle t, uint view_
       if (any_lane(doubtful)) {
         bits |= owned_of(lane_bits(doubtful && in_image), p, t, first_column + part, first_row + row);
       }
-      halves[row / 4] |= bits << (8 * (row & 3) + part);
+      mask |= (ulong)bits << (DPR_TILE * row + part);
     }
   }
-  return (uint2)(halves[0], halves[1]);
+  return (uint2)((uint)mask, (uint)(mask >> 32));
 }
 
 /// Whether a triangle owns a vector of samples: by the edge functions where their sign is certain, by
