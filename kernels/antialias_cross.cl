@@ -39,6 +39,12 @@ static inline int goes_before(uint before, float before_depth, uint contour, flo
   return is_crease < before_is_crease || (is_crease == before_is_crease && depth < before_depth);
 }
 
+/// The depth at which a contour crosses a line. Found again where another contests its step: a place for each
+/// step's would be in memory.
+static inline float depth_on_line(const FrameParams p, const TileContour c, int by_rows, int line) {
+  return mix_depths(p, c.depths, along_edge(p, raster_edge(c.a, c.b, by_rows), line));
+}
+
 static inline void clear_steps(const FrameParams p, const TileSamples s, uint first_pixel,
                                global uint* restrict winner) {
   const uint pixels = p.views * p.width * p.height;
@@ -79,8 +85,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
   const TileSamples s = tile_samples(p, tile);
   clear_steps(p, s, first_pixel, winner);
   const CrossingScene v = {faces, ndc, front + first_pixel, a.depth_reach / views[view].inverse_range};
-  float nearest[2 * DPR_TILE * DPR_TILE];
-  uint several[DPR_TILE_WORDS] = {0, 0, 0, 0};
+  ulong several_right = 0, several_down = 0;  // steps, a bit each
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
     const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
@@ -91,28 +96,36 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
       for (int line = lines.x; line < lines.y; ++line) {
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
-        const uint step = step_of(p, view, e, x), bit = bit_in_tile(e, x);
+        const uint step = step_of(p, view, e, x), before = winner[step];
+        const ulong bit = 1ul << bit_in_tile(e, x) % (DPR_TILE * DPR_TILE);
         const float depth = mix_depths(p, c.depths, x.along);
-        const int loses = is_contour(winner[step]) &&
-                          (only_passes || !goes_before(winner[step], nearest[bit], contour, depth));
-        if (loses && (several[bit / 32] >> bit % 32 & 1u)) continue;
+        int loses = is_contour(before);
+        if (loses && !only_passes) {
+          const TileContour other = load_contour(p, a, before, edges, faces, facing, ndc, clipped);
+          loses = !goes_before(before, depth_on_line(p, other, by_rows, line), contour, depth);
+        }
+        if (loses && ((by_rows ? several_right : several_down) & bit)) continue;
         const int hidden = hidden_from(p, v, c, e, x, (int)(contour & DPR_CONTOUR_CREASE), depth);
         if (hidden == 2) continue;
-        if (winner[step] != DPR_NO_CROSSING) several[bit / 32] |= 1u << bit % 32;
+        if (before != DPR_NO_CROSSING) {
+          several_right |= by_rows ? bit : 0;
+          several_down |= by_rows ? 0 : bit;
+        }
         if (loses) continue;
         // Where one of the samples shows what lies beyond another contour, a crease is there, but wins
         // nothing.
         if (only_passes || hidden) {
-          if (winner[step] == DPR_NO_CROSSING) winner[step] = DPR_PASSED;
+          if (before == DPR_NO_CROSSING) winner[step] = DPR_PASSED;
           continue;
         }
         winner[step] = contour;
         cut[step] = cut_of(p, c, e, x);
-        nearest[bit] = depth;
       }
     }
   }
-  for (uint word = 0; word < DPR_TILE_WORDS; ++word) crowded[DPR_TILE_WORDS * tile + word] = several[word];
+  vstore4((uint4)((uint)several_right, (uint)(several_right >> 32), (uint)several_down,
+                  (uint)(several_down >> 32)),
+          tile, crowded);
 }
 
 /// The gradient of what a contour cuts at a step of a tile, as its winner or as a second.

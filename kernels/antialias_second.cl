@@ -46,11 +46,12 @@ static inline uint find_reference(const FrameParams p, uint view, uint contour, 
                                   global const uint* restrict crowded) {
   const int is_inner = first_is_inner(c, e), across = e.is_by_rows ? x.column : x.row;
   for (int away = 1; away <= DPR_REFERENCE_LINES; ++away) {
-    for (int side = 0; side < 2; ++side) {
-      const int line = side ? x.line + away : x.line - away, other = side ? across + away : across + 1 - away;
-      uint step = own_step(p, view, contour, c, e.is_by_rows, line, is_inner, winner, crowded);
-      if (step != DPR_NO_CROSSING) return step;
-      step = own_step(p, view, contour, c, !e.is_by_rows, other, is_inner, winner, crowded);
+#pragma unroll 1
+    for (int turn = 0; turn < 4; ++turn) {
+      const int is_across = turn % 2, from = is_across ? across : x.line;
+      const int line = turn / 2 ? from + away : from - away + is_across;
+      const uint step = own_step(p, view, contour, c, is_across ? !e.is_by_rows : e.is_by_rows, line,
+                                 is_inner, winner, crowded);
       if (step != DPR_NO_CROSSING) return step;
     }
   }

@@ -71,7 +71,7 @@ typedef struct {
   int column, row;  // of the step's first sample
   float position;   // on the line, in samples
   float t;          // from the step's first sample to the next, in [0, 1]
-  float along;      // from the edge's first end to its second, in [0, 1]
+  float along;      // along_edge()
 } Crossing;
 
 /// Whether a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles
@@ -96,15 +96,20 @@ static inline float position_on_line(const FrameParams p, const RasterEdge e, in
                       : row_at(p, e.a.y + (at.x - e.a.x) * e.slope);
 }
 
+/// Where on the edge that is, from its first end to its second, in [0, 1].
+static inline float along_edge(const FrameParams p, const RasterEdge e, int line) {
+  const float2 at = pixel_centre(p, line, line);
+  return clamp((e.is_by_rows ? at.y - e.a.y : at.x - e.a.x) * e.inverse, 0.0f, 1.0f);
+}
+
 /// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the
 /// triangles have them.
 static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
   Crossing c;
-  const float2 at = pixel_centre(p, line, line);
   c.exists = is_before_line(p, e, e.a, line) != is_before_line(p, e, e.b, line);
   c.line = line;
   c.position = position_on_line(p, e, line);
-  c.along = clamp((e.is_by_rows ? at.y - e.a.y : at.x - e.a.x) * e.inverse, 0.0f, 1.0f);
+  c.along = along_edge(p, e, line);
   const float size = (float)(e.is_by_rows ? p.width : p.height);
   int first = (int)floor(clamp(c.position, -2.0f, size));
   if (c.exists) {
