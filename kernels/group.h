@@ -5,7 +5,19 @@
 
 #include "shared_types.h"
 
+#ifndef DPR_LANES
+#define DPR_LANES 8
+#endif
+
 #define DPR_GROUP_KERNEL __attribute__((reqd_work_group_size(DPR_GROUP, 1, 1)))
+
+/// Of a kernel of one work-item per element, whose work-items help each other on GPUs. It is launched by
+/// Kernel::sharing().
+#if DPR_LANES == 1
+#define DPR_SHARING_KERNEL DPR_GROUP_KERNEL
+#else
+#define DPR_SHARING_KERNEL
+#endif
 
 /// Elements of a chunk that a work-item of a group has, one after the other.
 #define DPR_EACH(chunk) ((chunk) / DPR_GROUP)
@@ -41,6 +53,17 @@ static inline void group_scan_chunk(local uint* values, uint each, local uint* s
     sum = add_sat(sum, value);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+/// Collects the `element`s of the work-items for which `is_in` holds, in order, for all of the group; returns
+/// how many. To be called by all of the group, whose next use of `sums` and `elements` a barrier has to
+/// precede.
+static inline uint group_collect(int is_in, uint element, local uint* elements, local uint* sums) {
+  const uint place = group_scan(is_in ? 1 : 0, sums);
+  if (is_in) elements[place] = element;
+  const uint count = sums[DPR_GROUP - 1];
+  barrier(CLK_LOCAL_MEM_FENCE);
+  return count;
 }
 
 #endif

@@ -3,10 +3,6 @@
 // work-group's on GPUs.
 #include "group.h"
 
-#ifndef DPR_LANES
-#define DPR_LANES 8
-#endif
-
 #if DPR_LANES == 1
 
 /// Sums of chunks. One work-group per chunk of DPR_SCAN_CHUNK elements.

@@ -1,4 +1,5 @@
 // Triangles of a view: assembled from projected vertices, culled, bounded, and the tiles of each counted.
+#include "group.h"
 #include "setup.h"
 
 /// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 where it reaches nearer than
@@ -15,33 +16,10 @@ static inline int is_in_range(float3 a, float3 b, float3 c, float zfar) {
          fmax(fmax(a.z, b.z), c.z) < INFINITY;
 }
 
-static inline uint count_tiles(const FrameParams p, const Triangle t) {
-  const uint2 columns = columns_of(t) / DPR_TILE, rows = rows_of(t) / DPR_TILE;
-  uint count = 0;
-  for (uint y = rows.x; y <= rows.y; ++y) {
-    for (uint x = columns.x; x <= columns.y; ++x) count += is_listed(p, t, x, y) ? 1 : 0;
-  }
-  return count;
-}
-
-/// Assembles the triangles, and counts the tiles of each. Dropped is what has no orientation, is culled or
-/// not in range, cannot be seen, or whose blurred bounds miss the image; what is kept has no tile where its
-/// bounds hold no sample, or it is small and owns none. One work-item per (view, face).
-/// in   views      ViewParams[view]
-/// in   faces      uint4[face]             vertex indices; w = mesh
-/// in   ndc        float4[view][vertex]
-/// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
-/// out  facing     uint[view][face]        see DPR_FACE_DROPPED; of what is not seen too
-/// out  kept       uint[view][face]        0 or 1
-/// out  counts     uint[view][face]        tiles that are listed for it
-/// out  triangles  Triangle[view][face]    not written where there is no tile
-kernel void setup_forward(const FrameParams p, global const ViewParams* restrict views,
-                          global const uint4* restrict faces, global const float4* restrict ndc,
-                          global const float* restrict hidden, global uint* restrict facing,
-                          global uint* restrict kept, global uint* restrict counts,
-                          global Triangle* restrict triangles) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= p.views * p.faces) return;
+/// Assembles a triangle; returns whether it is kept.
+static inline int set_up(const FrameParams p, uint i, global const ViewParams* restrict views,
+                         global const uint4* restrict faces, global const float4* restrict ndc,
+                         global const float* restrict hidden, global uint* restrict facing, Triangle* t) {
   const uint view = i / p.faces;
   const uint4 face = faces[i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
@@ -52,26 +30,61 @@ kernel void setup_forward(const FrameParams p, global const ViewParams* restrict
   const PixelBounds bounds = bounds_of(p, fmin(fmin(a.xy, b.xy), c.xy), fmax(fmax(a.xy, b.xy), c.xy));
   const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
                       is_in_range(a, b, c, views[view].zfar) && meets_image(p, bounds);
-  kept[i] = is_kept ? 1 : 0;
-  counts[i] = 0;
-  if (!is_kept) return;
+  if (!is_kept) return 0;
   const uint2 columns = samples_within(bounds.left, bounds.right, p.width);
   const uint2 rows = samples_within(bounds.top, bounds.bottom, p.height);
+  t->x0 = a.x;
+  t->y0 = a.y;
+  t->x1 = b.x;
+  t->y1 = b.y;
+  t->x2 = c.x;
+  t->y2 = c.y;
+  t->z0 = a.z;
+  t->z1 = b.z;
+  t->z2 = c.z;
+  t->orientation = (float)orientation;
+  t->first_sample = columns.x | rows.x << 16;
+  t->last_sample = columns.y | rows.y << 16;
+  return 1;
+}
+
+/// Assembles the triangles, and counts the tiles of each. Dropped is what has no orientation, is culled or
+/// not in range, cannot be seen, or whose blurred bounds miss the image; what is kept has no tile where its
+/// bounds hold no sample, or it is small and owns none. One work-item per (view, face); on GPUs the tiles of
+/// large ones are a group's to count.
+/// in   views      ViewParams[view]
+/// in   faces      uint4[face]             vertex indices; w = mesh
+/// in   ndc        float4[view][vertex]
+/// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
+/// out  facing     uint[view][face]        see DPR_FACE_DROPPED; of what is not seen too
+/// out  kept       uint[view][face]        0 or 1
+/// out  counts     uint[view][face]        tiles that are listed for it
+/// out  triangles  Triangle[view][face]    means nothing where there is no tile
+DPR_SHARING_KERNEL kernel void setup_forward(
+    const FrameParams p, global const ViewParams* restrict views, global const uint4* restrict faces,
+    global const float4* restrict ndc, global const float* restrict hidden, global uint* restrict facing,
+    global uint* restrict kept, global uint* restrict counts, global Triangle* restrict triangles) {
+  const uint i = (uint)get_global_id(0);
+  const int is_face = i < p.views * p.faces;
   Triangle t;
-  t.x0 = a.x;
-  t.y0 = a.y;
-  t.x1 = b.x;
-  t.y1 = b.y;
-  t.x2 = c.x;
-  t.y2 = c.y;
-  t.z0 = a.z;
-  t.z1 = b.z;
-  t.z2 = c.z;
-  t.orientation = (float)orientation;
-  t.first_sample = columns.x | rows.x << 16;
-  t.last_sample = columns.y | rows.y << 16;
-  const uint count = count_tiles(p, t);
-  if (count == 0) return;
+  const int is_kept = is_face && set_up(p, i, views, faces, ndc, hidden, facing, &t);
+  if (is_face) kept[i] = is_kept ? 1 : 0;
+#if DPR_LANES == 1
+  local uint shared[DPR_GROUP], sums[DPR_GROUP];
+  const int shares = is_kept && is_shared(t);
+  if (shares) triangles[i] = t;
+  const uint last = group_collect(shares, i, shared, sums);
+  barrier(CLK_GLOBAL_MEM_FENCE);
+  for (uint k = 0; k < last; ++k) {
+    const Triangle large = triangles[shared[k]];
+    group_scan(count_tiles(p, large, shared_rows(large)), sums);
+    if (get_local_id(0) == 0) counts[shared[k]] = sums[DPR_GROUP - 1];
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  if (shares) return;
+#endif
+  if (!is_face) return;
+  const uint count = is_kept ? count_tiles(p, t, rows_of(t) / DPR_TILE) : 0;
   counts[i] = count;
-  triangles[i] = t;
+  if (count > 0) triangles[i] = t;
 }

@@ -5,6 +5,10 @@
 #include "ownership.h"
 #include "shared_types.h"
 
+#ifndef DPR_LANES
+#define DPR_LANES 8
+#endif
+
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it
 /// can besides, of the largest coordinate.
 #define DPR_BIN_SLACK 1e-5f
@@ -75,6 +79,38 @@ static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, 
   const uint2 all_columns = columns_of(t) / DPR_TILE, all_rows = rows_of(t) / DPR_TILE;
   const int is_only = all_columns.x == all_columns.y && all_rows.x == all_rows.y;
   return is_only || tile_overlaps(p, t, tile_x, tile_y);
+}
+
+/// How many tiles a triangle's bounds hold in rows [x, y] of tiles, and in all.
+static inline uint tiles_of_rows(const Triangle t, uint2 rows) {
+  const uint2 columns = columns_of(t) / DPR_TILE;
+  return (columns.y + 1 - columns.x) * (rows.y + 1 - rows.x);
+}
+static inline uint tiles_of_bounds(const Triangle t) { return tiles_of_rows(t, rows_of(t) / DPR_TILE); }
+
+/// How many tiles of rows [x, y] are listed for a triangle.
+static inline uint count_tiles(const FrameParams p, const Triangle t, uint2 rows) {
+  const uint2 columns = columns_of(t) / DPR_TILE;
+  uint count = 0;
+  for (uint y = rows.x; y <= rows.y; ++y) {
+    for (uint x = columns.x; x <= columns.y; ++x) count += is_listed(p, t, x, y) ? 1 : 0;
+  }
+  return count;
+}
+
+/// Whether a work-group of a GPU shares a triangle's tiles, by rows: the others would wait for the one
+/// work-item that has it.
+#define DPR_SHARED_TILES 64
+static inline int is_shared(const Triangle t) {
+  return DPR_LANES == 1 && tiles_of_bounds(t) >= DPR_SHARED_TILES;
+}
+
+/// The rows of tiles [x, y] of a shared triangle that a work-item has; x = y + 1 if none.
+static inline uint2 shared_rows(const Triangle t) {
+  const uint2 rows = rows_of(t) / DPR_TILE;
+  const uint each = (rows.y - rows.x + DPR_GROUP) / DPR_GROUP, end = rows.y + 1;
+  const uint first = min(rows.x + (uint)get_local_id(0) * each, end);
+  return (uint2)(first, min(first + each, end) - 1);
 }
 
 #endif

@@ -112,6 +112,16 @@ class Kernel {
     enqueue({range.first, (range.count + local - 1) / local * local}, local, args...);
   }
 
+  /// For kernels of one work-item per element, whose work-items help each other on GPUs: in groups of
+  /// DPR_GROUP.
+  void sharing(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
+    if (device_->info.lanes == 1) {
+      enqueue((count + DPR_GROUP - 1) / DPR_GROUP * DPR_GROUP, DPR_GROUP, args...);
+    } else {
+      (*this)(count, args...);
+    }
+  }
+
   /// For kernels that are written twice: on GPUs a work-group of DPR_GROUP does what on CPUs one work-item
   /// does.
   void in_groups(std::size_t count, const typename detail::Argument<Args>::Value&... args) {

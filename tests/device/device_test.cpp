@@ -2,7 +2,6 @@
 #include <doctest/doctest.h>
 
 #include <cctype>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,29 +14,15 @@
 #include "support/caller.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
+#include "support/variable.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
 using dpr::test::reduced;
+using dpr::test::Variable;
 
 namespace {
-
-/// Sets DPR_DEVICE, and puts back what it was.
-class DeviceVariable {
- public:
-  explicit DeviceVariable(const char* value) {
-    if (const char* before = std::getenv(k_name)) before_ = before;
-    value != nullptr ? ::setenv(k_name, value, 1) : ::unsetenv(k_name);
-  }
-  ~DeviceVariable() { before_ ? ::setenv(k_name, before_->c_str(), 1) : ::unsetenv(k_name); }
-  DeviceVariable(const DeviceVariable&) = delete;
-  DeviceVariable& operator=(const DeviceVariable&) = delete;
-
- private:
-  static constexpr const char* k_name = "DPR_DEVICE";
-  std::optional<std::string> before_;
-};
 
 std::string changed_case(std::string text) {
   for (char& c : text) {
@@ -86,7 +71,7 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("device: opened by default, type, index, part of the name in any case, environment") {
-    const DeviceVariable unset(nullptr);
+    const Variable unset("DPR_DEVICE", nullptr);
     const std::vector<DeviceInfo> devices = list_devices();
     for (const DeviceInfo& info : devices) {
       CHECK(open_device(std::to_string(info.index)).info().name == info.name);
@@ -98,23 +83,23 @@ TEST_SUITE("unit") {
       if (info.is_default) CHECK(open_device("").info().index == info.index);
       if (info.type == "cpu") CHECK(open_device("cpu").info().type == "cpu");
       {
-        const DeviceVariable chosen(std::to_string(info.index).c_str());
+        const Variable chosen("DPR_DEVICE", std::to_string(info.index).c_str());
         CHECK(open_device("").info().index == info.index);
         CHECK(open_device().info().index == info.index);
       }
       {
         // What the caller asks for counts more than the environment.
-        const DeviceVariable other("no such device");
+        const Variable other("DPR_DEVICE", "no such device");
         CHECK(open_device(std::to_string(info.index)).info().index == info.index);
         CHECK_THROWS_AS(open_device(""), InvalidArgument);
       }
     }
-    const DeviceVariable empty("");
+    const Variable empty("DPR_DEVICE", "");
     CHECK(open_device("").info().is_default);
   }
 
   TEST_CASE("device: an unknown one is an error that lists those there are") {
-    const DeviceVariable unset(nullptr);
+    const Variable unset("DPR_DEVICE", nullptr);
     const std::vector<DeviceInfo> devices = list_devices();
     for (const std::string name : {"no such device", "99", "-1"}) {
       for (const DeviceInfo& info : devices) {
@@ -125,7 +110,7 @@ TEST_SUITE("unit") {
     bool has_gpu = false;
     for (const DeviceInfo& info : devices) has_gpu = has_gpu || info.type == "gpu";
     if (!has_gpu) DPR_CHECK_MESSAGE_HAS(InvalidArgument, open_device("gpu"), "'gpu'");
-    const DeviceVariable wrong("nonsense");
+    const Variable wrong("DPR_DEVICE", "nonsense");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, open_device(), "'nonsense'");
   }
 }

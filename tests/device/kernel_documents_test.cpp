@@ -35,7 +35,7 @@ std::vector<std::string> arguments_of(const std::string& list) {
 }
 
 void add_kernels(const std::string& source, Kernels& kernels) {
-  const std::regex kernel(R"rx(((?:///[^\n]*\n)*)(?:DPR_GROUP_KERNEL )?kernel void (\w+)\(([^{]*)\) \{)rx");
+  const std::regex kernel(R"rx(((?:///[^\n]*\n)*)(?:DPR_\w+_KERNEL )?kernel void (\w+)\(([^{]*)\) \{)rx");
   for (std::sregex_iterator it(source.begin(), source.end(), kernel), end; it != end; ++it) {
     Documented& found = kernels[(*it)[2]];  // there before where a kernel is written twice
     found = {found.text + (*it)[1].str(), arguments_of((*it)[3])};

@@ -8,6 +8,7 @@
 
 #include "support/ndc_triangles.hpp"
 #include "support/reduced.hpp"
+#include "support/variable.hpp"
 
 namespace {
 
@@ -94,6 +95,15 @@ NdcTriangle shifted(float x, float y) {
   return t;
 }
 
+/// All that binning leaves.
+std::vector<std::vector<cl_uint>> lists_of(const NdcFrame& frame, const std::vector<NdcTriangle>& triangles,
+                                           const dpr::Device& device) {
+  NdcStages s(frame, triangles, device.impl());
+  s.list_pairs();
+  return {s.setup.counts.download(), s.bin.pair_starts.download(), s.bin.pair_face.download(),
+          s.bin.pair_tile.download(), s.bin.face_pairs.download()};
+}
+
 }  // namespace
 
 TEST_SUITE("unit") {
@@ -173,6 +183,21 @@ TEST_SUITE("unit") {
         }
       }
     }
+  }
+
+  TEST_CASE("bin: groups that share large triangles list what single work-items do") {
+    const dpr::test::Variable one_lane("DPR_LANES", "1");
+    const dpr::Device groups = dpr::open_device();
+    const NdcFrame frame{150, 90, 0.01F};  // 19x12 tiles
+    std::vector<NdcTriangle> triangles;
+    for (const float size : {3.0F, 0.05F, 1.0F}) {
+      const auto some = dpr::test::random_triangles(static_cast<std::size_t>(reduced(50, 4)), size, 5);
+      triangles.insert(triangles.end(), some.begin(), some.end());
+    }
+    const auto lists = lists_of(frame, triangles, groups);
+    CHECK(std::ranges::count_if(lists[0], [](cl_uint tiles) { return tiles >= 64; }) > 1);
+    const dpr::test::Variable lanes("DPR_LANES", "8");
+    CHECK(lists == lists_of(frame, triangles, dpr::open_device()));
   }
 
   TEST_CASE("bin: a tile that is missing is found out") {

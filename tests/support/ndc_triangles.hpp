@@ -49,23 +49,20 @@ inline reference::NdcTriangle to_reference(const NdcTriangle& t) {
 /// The three stages on triangles of [view][face]. Every vertex belongs to one face.
 class NdcStages {
  public:
-  NdcStages(const NdcFrame& frame, const std::vector<NdcTriangle>& all)
-      : setup(device_impl()),
-        bin(device_impl()),
-        rasterize(device_impl()),
-        geometry_(device_impl(), scene_of(frame, all)) {
+  NdcStages(const NdcFrame& frame, const std::vector<NdcTriangle>& all, Device::Impl& device = device_impl())
+      : setup(device), bin(device), rasterize(device), geometry_(device, scene_of(frame, all)) {
     std::vector<cl_float4> ndc;
     for (const NdcTriangle& t : all) {
       for (const glm::vec3& v : t) ndc.push_back({{v.x, v.y, v.z, 0.0F}});
     }
-    ndc_.upload(device_impl(), ndc);
+    ndc_.upload(device, ndc);
     shared::ViewParams view{};
     view.znear = frame.znear;
     view.zfar = frame.zfar;
     view.inverse_range = 1.0F / (frame.zfar - frame.znear);
     const std::vector<shared::ViewParams> cameras(frame.views, view);
-    views_.cameras.upload(device_impl(), cameras);
-    hidden_.upload(device_impl(), std::vector<float>(frame.views));
+    views_.cameras.upload(device, cameras);
+    hidden_.upload(device, std::vector<float>(frame.views));
     params.views = static_cast<cl_uint>(frame.views);
     params.meshes = 1;
     params.vertices = static_cast<cl_uint>(geometry_.vertices);
