@@ -79,8 +79,8 @@ static inline int have_end_in_common(uint4 a, uint4 b) {
 static inline int is_second_hidden(const FrameParams p, const CrossingScene v, const TileContour winner,
                                    const TileContour c, const RasterEdge e, const Crossing x, float depth) {
   const RasterEdge of_winner = raster_edge(winner.a, winner.b, e.is_by_rows);
-  const Crossing at = cross_line(p, of_winner, x.line);
-  const int is_first = x.position < at.position, inner_first = first_is_inner(c, e);
+  const int is_first = x.position < position_on_line(p, of_winner, x.line),
+            inner_first = first_is_inner(c, e);
   if (c.flags & DPR_CONTOUR_CREASE) {
     const int column = x.column + (e.is_by_rows && !is_first), row = x.row + (!e.is_by_rows && !is_first);
     const float front = v.front[row * (int)p.width + column], slack = v.reach + DPR_DEPTH_SLACK * depth;
@@ -90,7 +90,8 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
   if (inner_first != is_first && hidden_from(p, v, c, e, x, 0, depth)) return 1;
   // What the winner bounds hides what lies behind it; contours that meet lie on one surface.
   return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
-         mix_depths(p, winner.depths, at.along) < depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
+         mix_depths(p, winner.depths, along_edge(p, of_winner, x.line)) <
+             depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
          !have_end_in_common(winner.record, c.record);
 }
 
