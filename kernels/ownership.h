@@ -8,6 +8,10 @@
 
 #include "shared_types.h"
 
+#ifndef DPR_LANES
+#define DPR_LANES 8 /* as lanes.h */
+#endif
+
 /// An edge function ex * dy - ey * dx whose factors are rounded differences is wrong by at most this times
 /// the sum of its products' sizes (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust
 /// geometric predicates", 1997: 3 + 16 u times u = 2^-24), and where these underflow by less than the floor.
@@ -28,6 +32,14 @@ static inline float two_sum(float a, float b, float* error) {
   return sum;
 }
 
+/// The parts of an exact sum: on a GPU in registers, where every index is known; on a CPU unrolling them only
+/// takes the compiler's time.
+#if DPR_LANES == 1
+#define DPR_UNROLL_PARTS _Pragma("unroll")
+#else
+#define DPR_UNROLL_PARTS
+#endif
+
 /// The sign of cross(b - a, p - a), exactly: six products without error, added to a sum of parts that do not
 /// overlap (Shewchuk's grow-expansion), whose largest has the sign.
 static int exact_side(float2 a, float2 b, float2 p) {
@@ -40,19 +52,19 @@ static int exact_side(float2 a, float2 b, float2 p) {
   p = ldexp(p, exponent);
   const float left[6] = {a.x, -a.y, b.x, -b.y, p.x, -p.y}, right[6] = {b.y, b.x, p.y, p.x, a.y, a.x};
   float parts[12];
-#pragma unroll
+  DPR_UNROLL_PARTS
   for (int k = 0; k < 6; ++k) {
     const float product = left[k] * right[k];
     float low = fma(left[k], right[k], -product), high = product;
-#pragma unroll
+    DPR_UNROLL_PARTS
     for (int i = 0; i < 2 * k; ++i) low = two_sum(low, parts[i], &parts[i]);
     parts[2 * k] = low;
-#pragma unroll
+    DPR_UNROLL_PARTS
     for (int i = 0; i < 2 * k + 1; ++i) high = two_sum(high, parts[i], &parts[i]);
     parts[2 * k + 1] = high;
   }
   float sign_of = 0.0f;
-#pragma unroll
+  DPR_UNROLL_PARTS
   for (int i = 0; i < 12; ++i) sign_of = parts[i] != 0.0f ? parts[i] : sign_of;
   return (sign_of > 0.0f) - (sign_of < 0.0f);
 }

@@ -5,10 +5,6 @@
 #include "ownership.h"
 #include "shared_types.h"
 
-#ifndef DPR_LANES
-#define DPR_LANES 8
-#endif
-
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it
 /// can besides, of the largest coordinate.
 #define DPR_BIN_SLACK 1e-5f
