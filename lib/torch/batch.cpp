@@ -13,17 +13,10 @@
 
 #include "scene/light_table.hpp"
 #include "torch/errors.hpp"
+#include "torch/tensor_rows.hpp"
 
 namespace dpr::torch_op {
 namespace {
-
-/// The memory of a contiguous tensor whose rows are vectors.
-template <typename Vector>
-std::span<const Vector> rows(const at::Tensor& tensor) {
-  static_assert(sizeof(Vector) == Vector::length() * sizeof(float));
-  return {reinterpret_cast<const Vector*>(tensor.data_ptr<float>()),
-          static_cast<std::size_t>(tensor.numel() / Vector::length())};
-}
 
 /// The gradients of the views' own vectors, [view, n, 3], or, if there are none, of those they share, [1, n,
 /// 3]: a tensor that owns them, no copy.
@@ -147,6 +140,7 @@ void upload(Renderer& renderer, const Inputs& in, const BatchOptions& options) {
   upload_settings(renderer, make_views(in, options.settings), options);
   renderer.set_cull(options.settings.cull());
   renderer.set_background(rows<glm::vec3>(in.background)[0]);
+  upload_surface(renderer, in.surface);
   const bool own_shapes = count > 1 && (options.separate_shapes || in.vertices.size(0) > 1);
   const bool own_colors = count > 1 && in.colors.size(0) > 1;
   if (!own_shapes) renderer.set_positions(0, rows<glm::vec3>(in.vertices));
@@ -167,6 +161,9 @@ GradientRequest request_of(const Wanted& wanted, bool is_lit) {
   request.lights = wanted.lights;
   request.smoothing = wanted.smoothing;
   request.transform = false;
+  request.texture = wanted.surface.texels;
+  request.texcoords = wanted.surface.texcoords;
+  request.materials = wanted.surface.specular || wanted.surface.shininess;
   return request;
 }
 
@@ -198,13 +195,16 @@ Inputs checked(const Inputs& in, std::int64_t faces) {
                           std::to_string(vertices) + ", one a vertex, or " + std::to_string(faces) +
                               ", one a face, in the second dimension");
   }
+  out.surface = checked(in.surface);
   return out;
 }
 
-Topology topology_of(const Inputs& in, std::shared_ptr<const Faces> faces, const RenderSettings& settings,
-                     bool face_colors) {
-  return {std::move(faces), static_cast<std::size_t>(in.vertices.size(1)), face_colors, settings.width(),
-          settings.height()};
+Topology topology_of(const Inputs& in, MeshForm form, const RenderSettings& settings) {
+  const std::int64_t vertices = in.vertices.size(1);
+  Surface surface = make_surface(form.surface, in.surface, *form.faces, vertices);
+  return {std::move(form.faces), static_cast<std::size_t>(vertices),
+          form.face_colors,      settings.width(),
+          settings.height(),     std::move(surface)};
 }
 
 std::vector<View> make_views(const Inputs& in, const RenderSettings& settings) {
@@ -255,6 +255,7 @@ Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const a
   if (wanted.lights) grad.lights = light_gradients(gradient);
   if (wanted.smoothing)
     grad.smoothing = at::tensor({gradient.sigma, gradient.gamma, gradient.alpha}, at::kFloat);
+  grad.surface = surface_gradients(renderer.scene().meshes[0].mesh, gradient.meshes[0], wanted.surface);
   return grad;
 }
 

@@ -26,6 +26,20 @@ void require_own_process() {
                         "the start method \"spawn\", or a parent that renders nothing before it forks");
 }
 
+/// Numbers are yet to come.
+void add_surface(Mesh& mesh, const Surface& surface) {
+  mesh.texcoords.resize(surface.texcoords);
+  mesh.face_texcoords = surface.face_texcoords;
+  for (const TextureForm& form : surface.textures) {
+    const std::size_t texels = static_cast<std::size_t>(form.width) * static_cast<std::size_t>(form.height);
+    mesh.textures.push_back(
+        {form.width, form.height, std::vector<glm::vec3>(texels), form.wrap, form.filter});
+  }
+  mesh.face_textures = surface.face_textures;
+  mesh.materials.resize(surface.materials);
+  mesh.face_materials = surface.face_materials;
+}
+
 Scene scene_of(const Topology& topology) {
   Scene scene;
   scene.width = topology.width;
@@ -35,6 +49,7 @@ Scene scene_of(const Topology& topology) {
   mesh.faces = *topology.faces;
   (topology.face_colors ? mesh.face_colors : mesh.vertex_colors)
       .resize(topology.face_colors ? mesh.faces.size() : topology.vertices);
+  add_surface(mesh, topology.surface);
   scene.meshes.push_back({std::move(mesh)});
   return scene;
 }
@@ -43,7 +58,8 @@ Scene scene_of(const Topology& topology) {
 
 bool Topology::operator==(const Topology& other) const {
   return vertices == other.vertices && face_colors == other.face_colors && width == other.width &&
-         height == other.height && (faces == other.faces || *faces == *other.faces);
+         height == other.height && surface == other.surface &&
+         (faces == other.faces || *faces == *other.faces);
 }
 
 Device open_device_of_process(const std::string& selector) {

@@ -1,19 +1,16 @@
 // Renderers of a device, lent to frames and kept for frames to come.
 #pragma once
 
-#include <glm/glm.hpp>
 #include <list>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <vector>
 
 #include "dpr/renderer.hpp"
+#include "torch/surface.hpp"
 
 namespace dpr::torch_op {
-
-using Faces = std::vector<glm::uvec3>;
 
 /// What a renderer keeps on the device from one batch to the next.
 struct Topology {
@@ -21,6 +18,7 @@ struct Topology {
   std::size_t vertices = 0;
   bool face_colors = false;
   int width = 0, height = 0;
+  Surface surface;
 
   bool operator==(const Topology& other) const;
 };
