@@ -151,22 +151,6 @@ void upload(Renderer& renderer, const Inputs& in, const BatchOptions& options) {
   renderer.set_shapes(rows<glm::vec3>(shapes), rows<glm::vec3>(colors));
 }
 
-GradientRequest request_of(const Wanted& wanted, bool is_lit) {
-  GradientRequest request{};
-  request.positions = wanted.vertices || wanted.views_by_vertices(is_lit);
-  request.colors = wanted.colors;
-  request.camera = wanted.intrinsics || (wanted.views && is_lit);
-  request.distortion = wanted.intrinsics;
-  request.background = wanted.background;
-  request.lights = wanted.lights;
-  request.smoothing = wanted.smoothing;
-  request.transform = false;
-  request.texture = wanted.surface.texels;
-  request.texcoords = wanted.surface.texcoords;
-  request.materials = wanted.surface.specular || wanted.surface.shininess;
-  return request;
-}
-
 at::Tensor light_gradients(SceneGradient& gradient) {
   std::vector<float> numbers;
   for_each_light_number(
@@ -233,22 +217,35 @@ at::Tensor render_batch(Renderer& renderer, const Inputs& in, const BatchOptions
   return image;
 }
 
-Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,
-                         const Wanted& wanted, const at::Tensor& grad_image) {
-  const bool is_lit = renderer.scene().lights.has_value();
-  renderer.set_gradients(request_of(wanted, is_lit));
-  const at::Tensor pixels = grad_image.contiguous();
-  SceneGradient gradient = renderer.backward_pixels(rows<glm::vec4>(pixels));
+GradientRequest request_of(const Wanted& wanted, ViewMotion motion) {
+  GradientRequest request{};
+  request.positions = wanted.vertices || (wanted.views && motion == ViewMotion::affine);
+  request.colors = wanted.colors;
+  request.camera = wanted.intrinsics || (wanted.views && motion == ViewMotion::rigid);
+  request.distortion = wanted.intrinsics;
+  request.background = wanted.background;
+  request.lights = wanted.lights;
+  request.smoothing = wanted.smoothing;
+  request.transform = false;
+  request.texture = wanted.surface.texels;
+  request.texcoords = wanted.surface.texcoords;
+  request.materials = wanted.surface.specular || wanted.surface.shininess;
+  return request;
+}
+
+Gradients gather_gradients(const Renderer& renderer, SceneGradient& gradient, const at::Tensor& vertices,
+                           const at::Tensor& views, const Wanted& wanted, ViewMotion motion) {
   const std::int64_t count = views.size(0);
+  const bool is_affine = wanted.views && motion == ViewMotion::affine;
   Gradients grad;
-  if (wanted.vertices || wanted.views_by_vertices(is_lit)) {
+  if (wanted.vertices || is_affine) {
     const at::Tensor each = adopt(gradient.shapes.positions, gradient.meshes[0].positions, count);
-    if (!is_lit && wanted.views) grad.views = view_gradients(views, vertices, each);
+    if (is_affine) grad.views = view_gradients(views, vertices, each);
     if (wanted.vertices)
       grad.vertices = each.size(0) == vertices.size(0) ? each : each.sum(0, /*keepdim=*/true);
   }
   if (wanted.colors) grad.colors = adopt(gradient.shapes.colors, gradient.meshes[0].colors, count);
-  if (is_lit && wanted.views) grad.views = rigid_view_gradients(renderer.views(), gradient);
+  if (wanted.views && !is_affine) grad.views = rigid_view_gradients(renderer.views(), gradient);
   if (wanted.intrinsics) grad.intrinsics = projection_gradients(renderer.views().front().camera, gradient);
   const glm::dvec3& background = gradient.background;
   if (wanted.background) grad.background = at::tensor({background.x, background.y, background.z}, at::kFloat);
@@ -257,6 +254,15 @@ Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const a
     grad.smoothing = at::tensor({gradient.sigma, gradient.gamma, gradient.alpha}, at::kFloat);
   grad.surface = surface_gradients(renderer.scene().meshes[0].mesh, gradient.meshes[0], wanted.surface);
   return grad;
+}
+
+Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,
+                         const Wanted& wanted, const at::Tensor& grad_image) {
+  const ViewMotion motion = renderer.scene().lights ? ViewMotion::rigid : ViewMotion::affine;
+  renderer.set_gradients(request_of(wanted, motion));
+  const at::Tensor pixels = grad_image.contiguous();
+  SceneGradient gradient = renderer.backward_pixels(rows<glm::vec4>(pixels));
+  return gather_gradients(renderer, gradient, vertices, views, wanted, motion);
 }
 
 void require_first_derivative() {

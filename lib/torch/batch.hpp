@@ -55,11 +55,14 @@ struct Wanted {
   bool vertices = false, colors = false, views = false, intrinsics = false, background = false,
        lights = false, smoothing = false;
   WantedOfSurface surface = {};
-
-  /// Whether the matrices' gradients are computed from those of every view's vertices: those of any affine
-  /// matrices. Lights stay in the world, so that with them the gradients are those of rigid motions.
-  bool views_by_vertices(bool is_lit) const { return views && !is_lit; }
 };
+
+/// Which motions the gradients of the views' matrices are right for. Those of any affine matrices are
+/// computed from those of every view's vertices, where nothing else depends on the views. Lights, and what is
+/// measured in world space, stay where they are: with them the gradients are those of rigid motions.
+enum class ViewMotion { affine, rigid };
+
+GradientRequest request_of(const Wanted& wanted, ViewMotion motion);
 
 /// Undefined where not wanted. float32, of the tensors' shapes.
 struct Gradients {
@@ -68,6 +71,10 @@ struct Gradients {
   at::Tensor smoothing;  ///< [3]: sigma, gamma, alpha
   SurfaceNumbers surface;
 };
+
+/// From what a backward pass of a renderer with these vertices and views has found.
+Gradients gather_gradients(const Renderer& renderer, SceneGradient& gradient, const at::Tensor& vertices,
+                           const at::Tensor& views, const Wanted& wanted, ViewMotion motion);
 
 /// Of the renderer's last frame, of these vertices and views. Throws the library's errors.
 Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,

@@ -1,16 +1,13 @@
 // What the Python package calls: operators that are functions of tensors, numbers and words alone, so that
 // compilers of graphs can move and repeat them. A frame passes through a graph as a tensor that owns it.
-#include <ATen/core/dispatch/Dispatcher.h>
 #include <torch/csrc/autograd/custom_function.h>
 #include <torch/library.h>
 
-#include <array>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "base/name_list.hpp"
 #include "dpr/aov.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "torch/batch.hpp"
@@ -19,13 +16,13 @@
 #include "torch/index_tensors.hpp"
 #include "torch/light_tensors.hpp"
 #include "torch/output_tensors.hpp"
+#include "torch/package_calls.hpp"
 
 namespace dpr::torch_op {
 namespace {
 
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
-using Words = std::vector<std::string>;
 
 /// What dpr::_render takes beside the tensors with gradients.
 struct Call {
@@ -58,11 +55,6 @@ enum Input : std::size_t {
   shininess,
   input_count
 };
-
-void require_count(std::size_t count, std::size_t expected, const char* name) {
-  if (count == expected) return;
-  throw InvalidArgument(name, std::to_string(count) + " elements", std::to_string(expected));
-}
 
 /// Sets what the tensor has a number of, by its name.
 void set_numbers(RenderSettings& settings, const Words& names, const at::Tensor& tensor) {
@@ -105,17 +97,6 @@ std::tuple<at::Tensor, at::Tensor> render_call(const Call& call, at::TensorList 
                       separate_shapes, static_cast<std::size_t>(call.first_view)});
     return std::tuple(image, tensor_of(std::move(frame)));
   });
-}
-
-/// The names' gradients out of those of sigma, gamma and alpha.
-at::Tensor select_smoothing(const at::Tensor& gradients, const Words& names) {
-  constexpr std::array<std::string_view, 3> k_order{"sigma", "gamma", "alpha"};
-  std::vector<at::Tensor> parts{at::empty({0}, at::kFloat)};
-  for (const std::string& name : names) {
-    const auto place = static_cast<std::int64_t>(position_of(name, k_order, "smoothing (dpr.render)"));
-    parts.push_back(gradients.narrow(0, place, 1));
-  }
-  return at::cat(parts);
 }
 
 /// Of dpr::_gradients: those of the tensors in their order, empty where not wanted.
@@ -187,14 +168,6 @@ std::tuple<at::Tensor, at::Tensor> render_on_cpu(
                       std::move(light_counts), std::move(texture_sizes), std::move(wraps), std::move(filters),
                       std::move(smoothing_names), first_view, face_colors},
                      inputs, separate_shapes);
-}
-
-/// Calls an operator below the derivatives, whatever computes it there: the renderer, or what traces a graph.
-template <typename Function, typename... Arguments>
-auto call_operator(const char* name, Function*, Arguments&&... arguments) {
-  at::AutoDispatchBelowADInplaceOrView below;
-  return c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Function>().call(
-      std::forward<Arguments>(arguments)...);
 }
 
 struct PackageRender : public torch::autograd::Function<PackageRender> {

@@ -48,7 +48,22 @@ struct Description {
   std::int64_t first_view = 0;
 };
 
-/// Those tensors, in the order in which torch has them.
+/// Those tensors' order, as torch has them.
+struct OfBatch {
+  enum Input : std::size_t {
+    vertices,
+    colors,
+    views,
+    intrinsics,
+    background,
+    light_numbers,
+    texcoords,
+    texels,
+    specular,
+    shininess
+  };
+};
+
 variable_list tensors_of(const Inputs& in, const at::Tensor& light_numbers) {
   return {in.vertices,          in.colors,         in.views,
           in.intrinsics,        in.background,     light_numbers,
@@ -57,19 +72,26 @@ variable_list tensors_of(const Inputs& in, const at::Tensor& light_numbers) {
 }
 
 struct RenderFunction : public torch::autograd::Function<RenderFunction> {
+  using In = OfBatch;
+
   static at::Tensor forward(AutogradContext* ctx, const c10::intrusive_ptr<BatchRenderer>& batch,
                             const Description& described, const at::TensorList& t) {
     const Timer timer(*batch);
     return with_torch_errors([&] {
       const RenderSettings& settings = batch->settings();
-      const Inputs in = checked({t[0], t[1], t[2], t[3], t[4], {t[6], t[7], t[8], t[9]}},
+      const Inputs in = checked({t[In::vertices],
+                                 t[In::colors],
+                                 t[In::views],
+                                 t[In::intrinsics],
+                                 t[In::background],
+                                 {t[In::texcoords], t[In::texels], t[In::specular], t[In::shininess]}},
                                 static_cast<std::int64_t>(batch->faces()->size()));
       const bool face_colors = in.colors.size(1) != in.vertices.size(1);
       auto lease = c10::make_intrusive<Lease>(
           batch->pool(), topology_of(in, {batch->faces(), face_colors, described.surface}, settings));
       BatchOptions options{settings};
-      if (described.lights) options.lights = unpack(*described.lights, t[5]);
-      options.separate_shapes = in.views.requires_grad() && !described.lights;
+      if (described.lights) options.lights = unpack(*described.lights, t[In::light_numbers]);
+      options.separate_shapes = t[In::views].requires_grad() && !described.lights;
       options.first_view = static_cast<std::size_t>(described.first_view);
       const at::Tensor image = render_batch(lease->frame.renderer(), in, options);
       c10::List<bool> wanted;
@@ -90,7 +112,14 @@ struct RenderFunction : public torch::autograd::Function<RenderFunction> {
       auto& lease = static_cast<Lease&>(*ctx->saved_data["lease"].toCapsule());
       const variable_list saved = ctx->get_saved_variables();
       const c10::List<bool> w = ctx->saved_data["wanted"].toBoolList();
-      const Wanted wanted{w[0], w[1], w[2], w[3], w[4], w[5], false, {w[6], w[7], w[8], w[9]}};
+      const Wanted wanted{w[In::vertices],
+                          w[In::colors],
+                          w[In::views],
+                          w[In::intrinsics],
+                          w[In::background],
+                          w[In::light_numbers],
+                          false,
+                          {w[In::texcoords], w[In::texels], w[In::specular], w[In::shininess]}};
       const Gradients grad =
           backward_batch(lease.frame.renderer(), saved[0], saved[1], wanted, grad_outputs[0]);
       variable_list all(2);  // of the renderer and the description

@@ -73,7 +73,7 @@ RendererPool::~RendererPool() {
   if (is_forked()) (void)state_.release();  // which is the parent's to release
 }
 
-Renderer RendererPool::take(const Topology& topology) {
+PooledRenderer RendererPool::take(const Topology& topology) {
   require_own_process();
   {
     const std::lock_guard lock(mutex_);
@@ -81,20 +81,20 @@ Renderer RendererPool::take(const Topology& topology) {
     const auto found = std::find_if(state.free.rbegin(), state.free.rend(),
                                     [&](const Free& free) { return free.topology == topology; });
     if (found != state.free.rend()) {
-      Renderer renderer = std::move(found->renderer);
+      PooledRenderer renderer = std::move(found->renderer);
       state.free.erase(std::next(found).base());
       state.most_lent = std::max(state.most_lent, ++state.lent);
       return renderer;
     }
   }
-  Renderer renderer(state_->device);
-  renderer.set_scene(scene_of(topology));
+  PooledRenderer renderer{Renderer(state_->device)};
+  renderer.renderer.set_scene(scene_of(topology));
   const std::lock_guard lock(mutex_);
   state_->most_lent = std::max(state_->most_lent, ++state_->lent);
   return renderer;
 }
 
-void RendererPool::put_back(Renderer renderer, Topology topology) {
+void RendererPool::put_back(PooledRenderer renderer, Topology topology) {
   std::list<Free> dropped;  // which outlives the lock: releasing buffers takes its time
   const std::lock_guard lock(mutex_);
   State& state = *state_;
@@ -132,15 +132,15 @@ void RendererPools::clear() {
 Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
     : pool_(std::move(pool)),
       topology_(std::move(topology)),
-      renderer_(std::make_unique<Renderer>(pool_->take(topology_))) {}
+      pooled_(std::make_unique<PooledRenderer>(pool_->take(topology_))) {}
 
 Frame::~Frame() {
   if (is_forked()) {
-    (void)renderer_.release();
+    (void)pooled_.release();
     return;
   }
   try {
-    pool_->put_back(std::move(*renderer_), std::move(topology_));
+    pool_->put_back(std::move(*pooled_), std::move(topology_));
   } catch (...) {
     // Without memory to keep the renderer it is let go.
   }
@@ -148,7 +148,11 @@ Frame::~Frame() {
 
 Renderer& Frame::renderer() {
   require_own_process();
-  return *renderer_;
+  return pooled_->renderer;
+}
+
+AttributeImages& Frame::attribute_images(Attribute attribute) {
+  return pooled_->attributes.try_emplace(attribute, renderer().device(), attribute).first->second;
 }
 
 }  // namespace dpr::torch_op

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 
+#include "dpr/attribute_images.hpp"
 #include "dpr/renderer.hpp"
 #include "torch/surface.hpp"
 
@@ -27,6 +28,12 @@ struct Topology {
 /// the one that opened a device this throws InvalidArgument, as RendererPool::take() does.
 Device open_device_of_process(const std::string& selector);
 
+/// A renderer, and those of the attributes that were asked of its frames.
+struct PooledRenderer {
+  Renderer renderer;
+  std::map<Attribute, AttributeImages> attributes = {};
+};
+
 /// Lends renderers whose scene is of a topology. Kept are those given back last: as many as were ever lent at
 /// once, but at least k_least. Safe to use from several threads.
 class RendererPool {
@@ -36,8 +43,8 @@ class RendererPool {
   RendererPool(const RendererPool&) = delete;
   RendererPool& operator=(const RendererPool&) = delete;
 
-  Renderer take(const Topology& topology);
-  void put_back(Renderer renderer, Topology topology);
+  PooledRenderer take(const Topology& topology);
+  void put_back(PooledRenderer renderer, Topology topology);
   /// Forgets the renderers that are kept, with what they hold on the device.
   void clear();
 
@@ -45,7 +52,7 @@ class RendererPool {
   static constexpr std::size_t k_least = 8;
 
   struct Free {
-    Renderer renderer;
+    PooledRenderer renderer;
     Topology topology;
   };
   struct State {
@@ -86,11 +93,13 @@ class Frame {
 
   /// Throws InvalidArgument in a process that was forked.
   Renderer& renderer();
+  /// Images of that renderer's device, made when first asked for. Throws as renderer().
+  AttributeImages& attribute_images(Attribute attribute);
 
  private:
   std::shared_ptr<RendererPool> pool_;
   Topology topology_;
-  std::unique_ptr<Renderer> renderer_;
+  std::unique_ptr<PooledRenderer> pooled_;
 };
 
 }  // namespace dpr::torch_op

@@ -406,6 +406,15 @@ TEST_SUITE("pipeline") {
     strided.views = in.views.transpose(1, 2).contiguous().transpose(1, 2);
     REQUIRE_FALSE(strided.vertices.is_contiguous());
     CHECK(render(renderer, strided).equal(image));
+    // Also for the gradients of the views, which need every view's vertices.
+    strided.vertices = strided.vertices.slice(0, 0, 1);
+    Inputs plain = strided;
+    plain.views = in.views.clone();
+    for (Inputs* each : {&strided, &plain}) {
+      each->views.requires_grad_();
+      render(renderer, *each).square().sum().backward();
+    }
+    CHECK(strided.views.grad().equal(plain.views.grad()));
   }
 }
 

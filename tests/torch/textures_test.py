@@ -296,6 +296,8 @@ class TexturesTest(RenderTest):
              {"materials": None, "face_materials": torch.zeros(5).long()}),
             (RuntimeError, "wrap .* got \"tile\", expected repeat, mirror or clamp", {"wrap": "tile"}),
             (RuntimeError, "filter .* got 3 words, expected one", {"filter": ["nearest"] * 3}),
+            (TypeError, "materials .* got Tensor, expected a dictionary", {"materials": torch.ones(1, 3)}),
+            (TypeError, "lights .* got list, expected a dictionary", {"lights": [torch.ones(3)]}),
             (ValueError, "materials .* got 'diffuse', expected specular", {"materials": {"diffuse": torch.ones(1, 3)}}),
             (ValueError, r"materials.shininess .* got \[3\], expected \[2\]",
              {"materials": {"specular": torch.ones(2, 3), "shininess": torch.ones(3)}}),

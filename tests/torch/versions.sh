@@ -24,7 +24,7 @@ test_version() {
   package=$(cd "$work" && "$environment/bin/python" -c 'import dpr, pathlib; print(pathlib.Path(dpr.__file__).parent)')
   "$environment/bin/python" "$root/tests/torch/render_python_test.py" "$package/libdpr_torch.so"
   local name
-  for name in package textures; do "$environment/bin/python" "$root/tests/torch/${name}_test.py"; done
+  for name in package textures outputs; do "$environment/bin/python" "$root/tests/torch/${name}_test.py"; done
 }
 
 mkdir -p "$work"

@@ -43,6 +43,13 @@ def indices(name, tensor, shape, copy):
     return tensor.long()
 
 
+def dictionary(name, given):
+    """The dictionary, or an empty one for None."""
+    if given is not None and not isinstance(given, dict):
+        fail(TypeError, name, type(given).__name__, "a dictionary")
+    return given or {}
+
+
 def number(name, value):
     """A setting's value, which has no gradient."""
     if not isinstance(value, torch.Tensor):

@@ -3,7 +3,7 @@ import warnings
 
 import torch
 
-from . import _arguments, _surface, _views
+from . import _arguments, _outputs, _surface, _views
 from ._subdivision import Subdivision
 
 _LIGHT_KINDS = torch.ops.dpr._light_kinds()
@@ -73,29 +73,36 @@ class Renderer:
                      out), "shininess" [M] (the lights' if left out)
         face_materials  [F], int64 or int32: the faces' materials; all have the first unless given
         background   [3], linear RGB; black unless given
-        lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point" [L, 9]
-                     (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot" [L, 14]
-                     (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading N of
-                     each view by itself. Without a dictionary colours are as they are.
+        lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
+                     [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"
+                     [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading
+                     N of each view by itself. Without a dictionary colours are as they are.
         sigma, gamma, alpha   instead of the settings': numbers, or tensors of one number
-        outputs      names of "depth", "normal", "face_id", "barycentrics", "uv", "effective_faces". Depth and normal are those of
-                     what may cover a pixel, at full size wherever alpha is above 0: weigh them by alpha
+        outputs      names of "depth", "position", "normal", "texcoords", "face_id", "barycentrics", "uv",
+                     "effective_faces". The first four are those of what may cover a pixel, at full size wherever alpha
+                     is above 0: weigh them by alpha
         copy         whether tensors on other devices are copied to the CPU, and the images back
 
         Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and likewise of their
-        colours, textures (each a tensor or a list) and materials, with None for a mesh without; or padded, faces
-        [N, F, 3] with -1 behind a mesh's last face and vertices [N, V, 3]. They are rendered one after the other, each
-        with a node of its own in the graph; so are views that have textures or lights by themselves.
+        colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
+        may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices
+        [N, V, 3]. They are rendered one after the other, each with a node of its own in the graph; so are views that
+        have textures or lights by themselves.
 
         Returns the images [N, height, width, 4]: linear RGB over the background, which is not to be blended by alpha
         again, and alpha, the silhouette. With outputs, (images, {name: tensor}): depth [N, height, width] along the
-        view direction, world units; normal [N, height, width, 3], world space; face_id, int64, -1 on the background;
-        barycentrics [N, height, width, 3]; uv [N, height, width, 2], texture coordinates; effective_faces, how many faces share a pixel.
+        view direction, world units; position and normal [N, height, width, 3], world space; texcoords
+        [N, height, width, 2]; all of these the mean by the faces' weights (the normal at length 1), 0 where these sum
+        to less than 1e-12. face_id [N, height, width], int64, of the face that weighs most, -1 on the background;
+        barycentrics [N, height, width, 3] and uv [N, height, width, 2] of that face; effective_faces, how many faces
+        share a pixel.
 
         The images have first derivatives with respect to every float tensor above: those of the views are of any affine
-        matrices, with lights of rigid motions. The outputs have none. Errors name the argument: TypeError and
-        ValueError of tensors, RuntimeError of what they hold. A UserWarning tells that every triangle was dropped,
-        but not from within torch.compile.
+        matrices, with lights of rigid motions. Depth, position, normal and texcoords have those of vertices, views (of
+        rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how
+        much of it is seen, and cost about an image each. The other outputs have none. Errors name the argument:
+        TypeError and ValueError of tensors, RuntimeError of what they hold. A UserWarning tells that every triangle
+        was dropped, but not from within torch.compile.
         """
         smoothing = {"sigma": sigma, "gamma": gamma, "alpha": alpha}
         background = torch.zeros(3) if background is None else background
@@ -174,8 +181,9 @@ class Renderer:
             images = images.to(home)
         if not outputs:
             return images
-        found = torch.ops.dpr._auxiliary(frame, list(outputs), views.shape[0], self.height, self.width)
-        return images, {name: tensor.to(home) for name, tensor in zip(outputs, found)}
+        found = _outputs.of_frame(frame, list(outputs), [vertices, views, intrinsics, numbers, of_surface[0]], names,
+                                  (views.shape[0], self.height, self.width))
+        return images, {name: tensor.to(home) for name, tensor in found.items()}
 
     def _colors(self, vertices, faces, colors, face_colors, copy):
         """[1 or N, V, 3], or of faces [1 or N, F, 3]."""

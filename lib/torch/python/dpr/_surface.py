@@ -31,7 +31,7 @@ def _textures(given, copy):
 
 
 def listed(given):
-    """A texture as a list of one."""
+    """A texture, or a word, as a list of one."""
     if given is None:
         return []
     return list(given) if isinstance(given, (list, tuple)) else [given]
@@ -39,7 +39,7 @@ def listed(given):
 
 def _materials(given, copy):
     """(specular [M, 3], shininess [M] or none)."""
-    given = given or {}
+    given = _arguments.dictionary("materials", given)
     for name in given:
         if name not in ("specular", "shininess"):
             _arguments.fail(ValueError, "materials", repr(name), "specular or shininess")
@@ -54,11 +54,12 @@ def _materials(given, copy):
 
 
 def pack(mesh, faces, vertex_count, copy):
-    """A mesh's numbers [texcoords, texels, specular, shininess], its indices, and its textures' sizes, wraps, filters."""
+    """A mesh's numbers [texcoords, texels, specular, shininess], its indices, and (sizes, wraps, filters) of its
+    textures."""
     texcoords, face_texcoords = _texcoords(mesh, faces, vertex_count, copy)
     texels, sizes = _textures(mesh["textures"], copy)
     of_faces = [torch.empty(0, dtype=torch.int64) if mesh[name] is None else
                 _arguments.indices(name, mesh[name], (faces.shape[0],), copy)
                 for name in ("face_textures", "face_materials")]
-    words = [[mesh[name]] if isinstance(mesh[name], str) else list(mesh[name]) for name in ("wrap", "filter")]
+    words = [listed(mesh[name]) for name in ("wrap", "filter")]
     return [texcoords, texels, *_materials(mesh["materials"], copy)], [face_texcoords, *of_faces], (sizes, *words)

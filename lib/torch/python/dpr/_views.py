@@ -3,6 +3,7 @@ import torch
 
 from . import _arguments, _surface
 
+
 def _light_dimensions(name):
     return 1 if name == "ambient" else 2
 
@@ -23,14 +24,16 @@ def _of_each(name, tensor, dimensions, count):
 def are_own(textures, lights):
     """Whether views have textures or lights of their own."""
     return any(_has_views(texture, 3) for texture in _surface.listed(textures)) or \
-        any(_has_views(tensor, _light_dimensions(name)) for name, tensor in (lights or {}).items())
+        any(_has_views(tensor, _light_dimensions(name))
+            for name, tensor in _arguments.dictionary("lights", lights).items())
 
 
 def lights_of_each(lights, count):
     """A dictionary a view."""
     if lights is None:
         return [None] * count
-    parts = {name: _of_each(f"lights.{name}", tensor, _light_dimensions(name), count) for name, tensor in lights.items()}
+    parts = {name: _of_each(f"lights.{name}", tensor, _light_dimensions(name), count)
+             for name, tensor in _arguments.dictionary("lights", lights).items()}
     return [{name: tensors[i] for name, tensors in parts.items()} for i in range(count)]
 
 
@@ -76,7 +79,8 @@ def lists_of_padded(meshes):
         if not isinstance(padded, torch.Tensor):
             return padded
         if len(padded) != len(counts):
-            _arguments.fail(ValueError, name, f"{len(padded)} in the first dimension", f"{len(counts)}, as faces are padded")
+            _arguments.fail(ValueError, name, f"{len(padded)} in the first dimension",
+                            f"{len(counts)}, as faces are padded")
         return [mesh[:count] for mesh, count in zip(padded, counts)]
 
     lists = {**meshes, "faces": of_faces}
