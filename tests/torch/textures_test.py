@@ -179,6 +179,12 @@ class TexturesTest(RenderTest):
         renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH, estimator="monte_carlo", samples=4)
         shared = renderer(*MESH, views, intrinsics, lights={"ambient": torch.ones(3)})
         self.assert_same(renderer(*MESH, views, intrinsics, lights={"ambient": torch.ones(2, 3)}), shared)
+        raw = torch.classes.dpr.Renderer(SQUARE_FACES, SIZE, SIZE, SMOOTH["preset"], "")
+        for name, value in renderer.settings.items():
+            raw.set(name, value)
+        image = torch.ops.dpr.render_lit(raw, SQUARE[None], torch.ones(1, 5, 3), views, intrinsics, torch.zeros(3),
+                                         {"ambient": torch.ones(2, 3)})
+        self.assert_same(image, shared)
 
     def test_meshes_that_differ(self):
         views, intrinsics = cameras(3)
