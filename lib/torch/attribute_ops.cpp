@@ -125,13 +125,11 @@ std::vector<at::Tensor> attributes_with_derivatives(const at::Tensor& frame, Wor
 TORCH_LIBRARY_FRAGMENT(dpr, m) {
   // inputs: vertices, views, intrinsics, smoothing's numbers, texcoords.
   m.def(
-      "_attributes(Tensor frame, str[] names, Tensor[] inputs, str[] smoothing_names, bool[] wanted, int "
-      "views, "
-      "int height, int width) -> Tensor[]");
+      "_attributes(Tensor frame, str[] names, Tensor[] inputs, str[] smoothing_names, bool[] wanted, "
+      "int views, int height, int width) -> Tensor[]");
   m.def(
-      "_attribute_gradients(Tensor frame, str[] names, Tensor[] grad_images, Tensor[] images, Tensor[] "
-      "inputs, "
-      "str[] smoothing_names, bool[] wanted) -> Tensor[]");
+      "_attribute_gradients(Tensor frame, str[] names, Tensor[] grad_images, Tensor[] images, "
+      "Tensor[] inputs, str[] smoothing_names, bool[] wanted) -> Tensor[]");
 }
 
 TORCH_LIBRARY_IMPL(dpr, CPU, m) {
