@@ -2,6 +2,7 @@
 #include "base/require.hpp"
 #include "dpr/error.hpp"
 #include "renderer/attribute_images_impl.hpp"
+#include "renderer/frame.hpp"
 #include "renderer/on_device.hpp"
 
 namespace dpr {

@@ -13,17 +13,10 @@
 
 #include "scene/light_table.hpp"
 #include "torch/errors.hpp"
+#include "torch/tensor_rows.hpp"
 
 namespace dpr::torch_op {
 namespace {
-
-/// The memory of a contiguous tensor whose rows are vectors.
-template <typename Vector>
-std::span<const Vector> rows(const at::Tensor& tensor) {
-  static_assert(sizeof(Vector) == Vector::length() * sizeof(float));
-  return {reinterpret_cast<const Vector*>(tensor.data_ptr<float>()),
-          static_cast<std::size_t>(tensor.numel() / Vector::length())};
-}
 
 /// The gradients of the views' own vectors, [view, n, 3], or, if there are none, of those they share, [1, n,
 /// 3]: a tensor that owns them, no copy.
@@ -147,6 +140,7 @@ void upload(Renderer& renderer, const Inputs& in, const BatchOptions& options) {
   upload_settings(renderer, make_views(in, options.settings), options);
   renderer.set_cull(options.settings.cull());
   renderer.set_background(rows<glm::vec3>(in.background)[0]);
+  upload_surface(renderer, in.surface);
   const bool own_shapes = count > 1 && (options.separate_shapes || in.vertices.size(0) > 1);
   const bool own_colors = count > 1 && in.colors.size(0) > 1;
   if (!own_shapes) renderer.set_positions(0, rows<glm::vec3>(in.vertices));
@@ -155,19 +149,6 @@ void upload(Renderer& renderer, const Inputs& in, const BatchOptions& options) {
       own_shapes ? in.vertices.expand({count, -1, -1}).contiguous() : at::empty({0, 3}, at::kFloat);
   const at::Tensor colors = own_colors ? in.colors : at::empty({0, 3}, at::kFloat);
   renderer.set_shapes(rows<glm::vec3>(shapes), rows<glm::vec3>(colors));
-}
-
-GradientRequest request_of(const Wanted& wanted, bool is_lit) {
-  GradientRequest request{};
-  request.positions = wanted.vertices || wanted.views_by_vertices(is_lit);
-  request.colors = wanted.colors;
-  request.camera = wanted.intrinsics || (wanted.views && is_lit);
-  request.distortion = wanted.intrinsics;
-  request.background = wanted.background;
-  request.lights = wanted.lights;
-  request.smoothing = wanted.smoothing;
-  request.transform = false;
-  return request;
 }
 
 at::Tensor light_gradients(SceneGradient& gradient) {
@@ -198,13 +179,16 @@ Inputs checked(const Inputs& in, std::int64_t faces) {
                           std::to_string(vertices) + ", one a vertex, or " + std::to_string(faces) +
                               ", one a face, in the second dimension");
   }
+  out.surface = checked(in.surface);
   return out;
 }
 
-Topology topology_of(const Inputs& in, std::shared_ptr<const Faces> faces, const RenderSettings& settings,
-                     bool face_colors) {
-  return {std::move(faces), static_cast<std::size_t>(in.vertices.size(1)), face_colors, settings.width(),
-          settings.height()};
+Topology topology_of(const Inputs& in, MeshForm form, const RenderSettings& settings) {
+  const std::int64_t vertices = in.vertices.size(1);
+  Surface surface = make_surface(form.surface, in.surface, *form.faces, vertices);
+  return {std::move(form.faces), static_cast<std::size_t>(vertices),
+          form.face_colors,      settings.width(),
+          settings.height(),     std::move(surface)};
 }
 
 std::vector<View> make_views(const Inputs& in, const RenderSettings& settings) {
@@ -233,29 +217,52 @@ at::Tensor render_batch(Renderer& renderer, const Inputs& in, const BatchOptions
   return image;
 }
 
-Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,
-                         const Wanted& wanted, const at::Tensor& grad_image) {
-  const bool is_lit = renderer.scene().lights.has_value();
-  renderer.set_gradients(request_of(wanted, is_lit));
-  const at::Tensor pixels = grad_image.contiguous();
-  SceneGradient gradient = renderer.backward_pixels(rows<glm::vec4>(pixels));
+GradientRequest request_of(const Wanted& wanted, ViewMotion motion) {
+  GradientRequest request{};
+  request.positions = wanted.vertices || (wanted.views && motion == ViewMotion::affine);
+  request.colors = wanted.colors;
+  request.camera = wanted.intrinsics || (wanted.views && motion == ViewMotion::rigid);
+  request.distortion = wanted.intrinsics;
+  request.background = wanted.background;
+  request.lights = wanted.lights;
+  request.smoothing = wanted.smoothing;
+  request.transform = false;
+  request.texture = wanted.surface.texels;
+  request.texcoords = wanted.surface.texcoords;
+  request.materials = wanted.surface.specular || wanted.surface.shininess;
+  return request;
+}
+
+Gradients gather_gradients(const Renderer& renderer, SceneGradient& gradient, const at::Tensor& vertices,
+                           const at::Tensor& views, const Wanted& wanted, ViewMotion motion) {
   const std::int64_t count = views.size(0);
+  const bool is_affine = wanted.views && motion == ViewMotion::affine;
   Gradients grad;
-  if (wanted.vertices || wanted.views_by_vertices(is_lit)) {
+  if (wanted.vertices || is_affine) {
     const at::Tensor each = adopt(gradient.shapes.positions, gradient.meshes[0].positions, count);
-    if (!is_lit && wanted.views) grad.views = view_gradients(views, vertices, each);
+    if (is_affine) grad.views = view_gradients(views, vertices, each);
     if (wanted.vertices)
       grad.vertices = each.size(0) == vertices.size(0) ? each : each.sum(0, /*keepdim=*/true);
   }
   if (wanted.colors) grad.colors = adopt(gradient.shapes.colors, gradient.meshes[0].colors, count);
-  if (is_lit && wanted.views) grad.views = rigid_view_gradients(renderer.views(), gradient);
+  if (wanted.views && !is_affine) grad.views = rigid_view_gradients(renderer.views(), gradient);
   if (wanted.intrinsics) grad.intrinsics = projection_gradients(renderer.views().front().camera, gradient);
   const glm::dvec3& background = gradient.background;
   if (wanted.background) grad.background = at::tensor({background.x, background.y, background.z}, at::kFloat);
   if (wanted.lights) grad.lights = light_gradients(gradient);
   if (wanted.smoothing)
     grad.smoothing = at::tensor({gradient.sigma, gradient.gamma, gradient.alpha}, at::kFloat);
+  grad.surface = surface_gradients(renderer.scene().meshes[0].mesh, gradient.meshes[0], wanted.surface);
   return grad;
+}
+
+Gradients backward_batch(Renderer& renderer, const at::Tensor& vertices, const at::Tensor& views,
+                         const Wanted& wanted, const at::Tensor& grad_image) {
+  const ViewMotion motion = renderer.scene().lights ? ViewMotion::rigid : ViewMotion::affine;
+  renderer.set_gradients(request_of(wanted, motion));
+  const at::Tensor pixels = grad_image.contiguous();
+  SceneGradient gradient = renderer.backward_pixels(rows<glm::vec4>(pixels));
+  return gather_gradients(renderer, gradient, vertices, views, wanted, motion);
 }
 
 void require_first_derivative() {

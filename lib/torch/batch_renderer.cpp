@@ -1,10 +1,10 @@
 // Faces, settings and device from Python's values.
 #include "torch/batch_renderer.hpp"
 
-#include <limits>
 #include <utility>
 
 #include "torch/errors.hpp"
+#include "torch/index_tensors.hpp"
 
 namespace dpr::torch_op {
 namespace {
@@ -30,26 +30,6 @@ RenderSettings with_preset(RenderSettings settings, const std::string& preset) {
 
 }  // namespace
 
-Faces read_faces(const at::Tensor& faces) {
-  if (faces.scalar_type() != at::kLong || faces.dim() != 2 || faces.size(1) != 3 ||
-      !faces.device().is_cpu()) {
-    throw InvalidArgument("faces (dpr::Renderer)", faces.toString() + " " + shape_text(faces),
-                          "an int64 tensor [face, 3] on the CPU");
-  }
-  const at::Tensor values = faces.contiguous();
-  const auto* index = values.data_ptr<std::int64_t>();
-  Faces result(static_cast<std::size_t>(faces.size(0)));
-  for (glm::uvec3& face : result) {
-    for (int corner = 0; corner < 3; ++corner, ++index) {
-      if (*index < 0 || *index > std::numeric_limits<std::uint32_t>::max()) {
-        throw InvalidArgument("faces (dpr::Renderer)", std::to_string(*index), "indices of vertices");
-      }
-      face[corner] = static_cast<std::uint32_t>(*index);
-    }
-  }
-  return result;
-}
-
 BatchRenderer::BatchRenderer(Faces faces, int width, int height, const Smoothing& smoothing,
                              const Device& device)
     : faces_(std::make_shared<const Faces>(std::move(faces))),
@@ -60,7 +40,8 @@ BatchRenderer::BatchRenderer(Faces faces, int width, int height, const Smoothing
 
 BatchRenderer::BatchRenderer(const at::Tensor& faces, std::int64_t width, std::int64_t height,
                              const std::string& preset, const std::string& device)
-    : faces_(with_torch_errors([&] { return std::make_shared<const Faces>(read_faces(faces)); })),
+    : faces_(with_torch_errors(
+          [&] { return std::make_shared<const Faces>(read_faces(faces, "faces (dpr::Renderer)")); })),
       settings_(with_torch_errors([&] {
         return with_preset(with_default_clipping({width, height}), preset);
       })),

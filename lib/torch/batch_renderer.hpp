@@ -12,9 +12,6 @@
 
 namespace dpr::torch_op {
 
-/// Faces of a tensor int64 [face, 3] on the CPU. Throws InvalidArgument.
-Faces read_faces(const at::Tensor& faces);
-
 /// Faces, image size, smoothing and device of the batches that render() renders: torch.classes.dpr.Renderer.
 /// One thread at a time renders with it.
 class BatchRenderer : public torch::CustomClassHolder {

@@ -13,6 +13,9 @@
 namespace dpr::torch_op {
 namespace {
 
+/// Of the tensor of a key, if all views have the same.
+std::int64_t shared_dimensions(const std::string& key) { return key == "ambient" ? 1 : 2; }
+
 void require_known(const LightTensors& given) {
   std::vector<std::string_view> keys{"ambient", "harmonics"};
   for_each_light_kind([&](auto kind) { keys.push_back(kind.key); });
@@ -74,6 +77,22 @@ PackedLights pack(const LightTensors& given, const Lights& model) {
   });
   packed.numbers = at::cat(parts);
   return packed;
+}
+
+bool is_of_views(const LightTensors& given) {
+  for (const auto& entry : given) {
+    if (entry.value().dim() == shared_dimensions(entry.key()) + 1) return true;
+  }
+  return false;
+}
+
+LightTensors of_view(const LightTensors& given, const ViewOfBatch& view) {
+  LightTensors lights;
+  for (const auto& entry : given) {
+    const std::string& key = entry.key();
+    lights.insert(key, of_view(entry.value(), shared_dimensions(key), view, "lights." + key));
+  }
+  return lights;
 }
 
 Lights unpack(Lights lights, const at::Tensor& numbers) {

@@ -9,6 +9,7 @@
 #include "dpr/light.hpp"
 #include "scene/light_table.hpp"
 #include "torch/render.hpp"
+#include "torch/view_tensors.hpp"
 
 namespace dpr::torch_op {
 
@@ -32,6 +33,11 @@ struct PackedLights {
 /// By torch's own operations, which differentiate the packing. What is not given is the model's. Throws
 /// InvalidArgument for kinds that there are not, and tensors of other shapes.
 PackedLights pack(const LightTensors& given, const Lights& model);
+
+/// Whether lights have a leading dimension of views.
+bool is_of_views(const LightTensors& given);
+/// What a view has of them. Throws InvalidArgument for leading dimensions of another size.
+LightTensors of_view(const LightTensors& given, const ViewOfBatch& view);
 
 /// The lights with their numbers, which are as many as the lights have.
 Lights unpack(Lights lights, const at::Tensor& numbers);

@@ -36,7 +36,9 @@ at::Tensor stack_outputs(const std::vector<AuxiliaryOutputs>& views, Aov aov) {
     case Aov::uv:
       break;
   }
-  throw InvalidArgument("outputs (dpr.render)", "uv", "an output of meshes without texture coordinates");
+  if (views.front().uv.empty())
+    throw InvalidArgument("outputs (dpr.render)", "uv", "an output of meshes without texture coordinates");
+  return copy(&AuxiliaryOutputs::uv, {2});
 }
 
 }  // namespace dpr::torch_op

@@ -1,79 +1,60 @@
 // What the Python package calls: operators that are functions of tensors, numbers and words alone, so that
 // compilers of graphs can move and repeat them. A frame passes through a graph as a tensor that owns it.
-#include <ATen/core/dispatch/Dispatcher.h>
 #include <torch/csrc/autograd/custom_function.h>
 #include <torch/library.h>
 
-#include <array>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "base/name_list.hpp"
 #include "dpr/aov.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "torch/batch.hpp"
-#include "torch/batch_renderer.hpp"
 #include "torch/errors.hpp"
-#include "torch/lens_subdivision.hpp"
+#include "torch/frame_tensors.hpp"
+#include "torch/index_tensors.hpp"
 #include "torch/light_tensors.hpp"
 #include "torch/output_tensors.hpp"
+#include "torch/package_calls.hpp"
 
 namespace dpr::torch_op {
 namespace {
 
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
-using Words = std::vector<std::string>;
-
-RenderSettings settings_from(std::int64_t width, std::int64_t height, const Words& texts) {
-  RenderSettings settings(width, height);
-  for (const std::string& text : texts) set_from_text(settings, text);
-  return settings;
-}
-
-/// Owned by a tensor of one byte.
-struct FrameOwner {
-  Frame frame;
-  unsigned char byte = 0;
-};
-
-void delete_frame_owner(void* owner) { delete static_cast<FrameOwner*>(owner); }
-
-at::Tensor tensor_of(std::unique_ptr<FrameOwner> owner) {
-  FrameOwner* const raw = owner.release();
-  return at::for_blob(&raw->byte, {1}).context(raw, delete_frame_owner).options(at::kByte).make_tensor();
-}
-
-Frame& frame_of(const at::Tensor& tensor) {
-  const c10::Storage& storage = tensor.storage();
-  if (storage.data_ptr().get_deleter() != delete_frame_owner) {
-    throw InvalidArgument("frame (dpr::render)", "a copy of it", "the tensor that dpr::_render returned");
-  }
-  return static_cast<FrameOwner*>(storage.data_ptr().get_context())->frame;
-}
 
 /// What dpr::_render takes beside the tensors with gradients.
 struct Call {
   std::string device;
   std::int64_t width, height;
   Words settings;
-  at::Tensor faces;
+  /// int64: faces, and face_texcoords, face_textures, face_materials, empty where there are none.
+  std::vector<at::Tensor> indices;
   /// Coefficients of harmonics, then lights of each kind; empty: unlit.
   std::vector<std::int64_t> light_counts;
+  std::vector<std::int64_t> texture_sizes;  ///< height and width of each
+  Words wraps, filters;
   Words smoothing_names;
   std::int64_t first_view;
   bool face_colors;  ///< or of vertices
 };
 
 /// Those tensors' order in the operators.
-enum Input : std::size_t { vertices, colors, views, intrinsics, background, lights, smoothing, input_count };
-
-void require_each_input(std::size_t count, const char* name) {
-  if (count == input_count) return;
-  throw InvalidArgument(name, std::to_string(count) + " elements", std::to_string(input_count));
-}
+enum Input : std::size_t {
+  vertices,
+  colors,
+  views,
+  intrinsics,
+  background,
+  lights,
+  smoothing,
+  texcoords,
+  texels,
+  specular,
+  shininess,
+  input_count
+};
 
 /// Sets what the tensor has a number of, by its name.
 void set_numbers(RenderSettings& settings, const Words& names, const at::Tensor& tensor) {
@@ -87,51 +68,52 @@ void set_numbers(RenderSettings& settings, const Words& names, const at::Tensor&
 }
 
 Inputs inputs_of(at::TensorList tensors) {
-  return {tensors[vertices], tensors[colors], tensors[views], tensors[intrinsics], tensors[background]};
+  return {tensors[vertices],   tensors[colors],
+          tensors[views],      tensors[intrinsics],
+          tensors[background], {tensors[texcoords], tensors[texels], tensors[specular], tensors[shininess]}};
+}
+
+MeshForm mesh_form(const Call& call) {
+  constexpr std::size_t k_indices = 4;
+  require_count(call.indices.size(), k_indices, "indices (dpr::_render)");
+  return {std::make_shared<const Faces>(read_faces(call.indices[0], "faces (dpr::Renderer)")),
+          call.face_colors,
+          {call.indices[1], call.indices[2], call.indices[3], call.texture_sizes, call.wraps, call.filters}};
 }
 
 std::tuple<at::Tensor, at::Tensor> render_call(const Call& call, at::TensorList tensors,
                                                bool separate_shapes) {
   return with_torch_errors([&] {
-    require_each_input(tensors.size(), "inputs (dpr::_render)");
-    RenderSettings settings = settings_from(call.width, call.height, call.settings);
+    require_count(tensors.size(), input_count, "inputs (dpr::_render)");
+    RenderSettings settings = settings_from_texts(call.width, call.height, call.settings);
     set_numbers(settings, call.smoothing_names, tensors[smoothing]);
-    const auto faces = std::make_shared<const Faces>(read_faces(call.faces));
-    const Inputs in = checked(inputs_of(tensors), static_cast<std::int64_t>(faces->size()));
-    std::unique_ptr<FrameOwner> owner(new FrameOwner{
-        {RendererPools::of_process().get(call.device), topology_of(in, faces, settings, call.face_colors)}});
-    Renderer& renderer = owner->frame.renderer();
+    MeshForm form = mesh_form(call);
+    const Inputs in = checked(inputs_of(tensors), static_cast<std::int64_t>(form.faces->size()));
+    auto frame = std::make_unique<Frame>(RendererPools::of_process().get(call.device),
+                                         topology_of(in, std::move(form), settings));
     const at::Tensor image =
-        render_batch(renderer, in,
+        render_batch(frame->renderer(), in,
                      {settings, unpack_counted(tensors[lights], call.light_counts, settings.lights()),
                       separate_shapes, static_cast<std::size_t>(call.first_view)});
-    return std::tuple(image, tensor_of(std::move(owner)));
+    return std::tuple(image, tensor_of(std::move(frame)));
   });
-}
-
-/// The names' gradients out of those of sigma, gamma and alpha.
-at::Tensor select_smoothing(const at::Tensor& gradients, const Words& names) {
-  constexpr std::array<std::string_view, 3> k_order{"sigma", "gamma", "alpha"};
-  std::vector<at::Tensor> parts{at::empty({0}, at::kFloat)};
-  for (const std::string& name : names) {
-    const auto place = static_cast<std::int64_t>(position_of(name, k_order, "smoothing (dpr.render)"));
-    parts.push_back(gradients.narrow(0, place, 1));
-  }
-  return at::cat(parts);
 }
 
 /// Of dpr::_gradients: those of the tensors in their order, empty where not wanted.
 std::vector<at::Tensor> gradients(const at::Tensor& frame, const at::Tensor& grad_image,
                                   at::TensorList tensors, Words smoothing_names, c10::List<bool> w) {
   return with_torch_errors([&] {
-    require_each_input(tensors.size(), "inputs (dpr::_gradients)");
-    require_each_input(w.size(), "wanted (dpr::_gradients)");
-    const Wanted wanted{w[vertices],   w[colors], w[views],    w[intrinsics],
-                        w[background], w[lights], w[smoothing]};
+    require_count(tensors.size(), input_count, "inputs (dpr::_gradients)");
+    require_count(w.size(), input_count, "wanted (dpr::_gradients)");
+    const Wanted wanted{
+        w[vertices],   w[colors], w[views],     w[intrinsics],
+        w[background], w[lights], w[smoothing], {w[texcoords], w[texels], w[specular], w[shininess]}};
     const Gradients grad =
         backward_batch(frame_of(frame).renderer(), tensors[vertices], tensors[views], wanted, grad_image);
-    std::vector<at::Tensor> all{grad.vertices,   grad.colors, grad.views,    grad.intrinsics,
-                                grad.background, grad.lights, grad.smoothing};
+    const SurfaceNumbers& surface = grad.surface;
+    std::vector<at::Tensor> all{grad.vertices,   grad.colors,      grad.views,       grad.intrinsics,
+                                grad.background, grad.lights,      grad.smoothing,   surface.texcoords,
+                                surface.texels,  surface.specular, surface.shininess};
     if (wanted.smoothing) all[smoothing] = select_smoothing(grad.smoothing, smoothing_names);
     for (at::Tensor& tensor : all) {
       if (!tensor.defined()) tensor = at::empty({0}, at::kFloat);
@@ -166,22 +148,8 @@ std::vector<at::Tensor> auxiliary(const at::Tensor& frame, Words names, std::int
   });
 }
 
-/// Of dpr::_subdivide: the pieces, their faces, and the combinations of vertices with their weights.
-std::tuple<at::Tensor, at::Tensor, at::Tensor, at::Tensor> subdivide_mesh(
-    std::int64_t width, std::int64_t height, Words texts, double tolerance, const at::Tensor& faces,
-    const at::Tensor& vertices, const at::Tensor& views, const at::Tensor& intrinsics) {
-  return with_torch_errors([&] {
-    const RenderSettings settings = settings_from(width, height, texts);
-    const Faces read = read_faces(faces);
-    const Inputs in = checked({vertices, at::zeros_like(vertices), views, intrinsics, at::zeros({3})},
-                              static_cast<std::int64_t>(read.size()));
-    const CutFaces cut = cut_for_lens(in, read, settings, tolerance);
-    return std::tuple(cut.faces, cut.face_of, cut.vertices_of, cut.vertex_weights);
-  });
-}
-
 void check_settings(std::int64_t width, std::int64_t height, Words settings) {
-  with_torch_errors([&] { settings_from(width, height, settings); });
+  with_torch_errors([&] { settings_from_texts(width, height, settings); });
 }
 
 /// The names of the kinds of lights, in their order, and how many numbers a light has.
@@ -191,36 +159,28 @@ c10::Dict<std::string, std::int64_t> light_kinds() {
   return kinds;
 }
 
-std::tuple<at::Tensor, at::Tensor> render_on_cpu(std::string device, std::int64_t width, std::int64_t height,
-                                                 Words settings, const at::Tensor& faces,
-                                                 at::TensorList tensors,
-                                                 std::vector<std::int64_t> light_counts,
-                                                 Words smoothing_names, std::int64_t first_view,
-                                                 bool face_colors, bool separate_shapes) {
-  return render_call({std::move(device), width, height, std::move(settings), faces, std::move(light_counts),
+std::tuple<at::Tensor, at::Tensor> render_on_cpu(
+    std::string device, std::int64_t width, std::int64_t height, Words settings, at::TensorList indices,
+    at::TensorList inputs, std::vector<std::int64_t> light_counts, std::vector<std::int64_t> texture_sizes,
+    Words wraps, Words filters, Words smoothing_names, std::int64_t first_view, bool face_colors,
+    bool separate_shapes) {
+  return render_call({std::move(device), width, height, std::move(settings), indices.vec(),
+                      std::move(light_counts), std::move(texture_sizes), std::move(wraps), std::move(filters),
                       std::move(smoothing_names), first_view, face_colors},
-                     tensors, separate_shapes);
-}
-
-/// Calls an operator below the derivatives, whatever computes it there: the renderer, or what traces a graph.
-template <typename Function, typename... Arguments>
-auto call_operator(const char* name, Function*, Arguments&&... arguments) {
-  at::AutoDispatchBelowADInplaceOrView below;
-  return c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Function>().call(
-      std::forward<Arguments>(arguments)...);
+                     inputs, separate_shapes);
 }
 
 struct PackageRender : public torch::autograd::Function<PackageRender> {
-  static variable_list forward(AutogradContext* ctx, const Call& call, bool separate_shapes, at::Tensor v,
-                               at::Tensor c, at::Tensor m, at::Tensor k, at::Tensor b, at::Tensor l,
-                               at::Tensor s) {
-    variable_list tensors{v, c, m, k, b, l, s};
+  static variable_list forward(AutogradContext* ctx, const Call& call, bool separate_shapes,
+                               const at::TensorList& inputs) {
     c10::List<bool> wanted;
-    for (const at::Tensor& tensor : tensors) wanted.push_back(tensor.requires_grad());
+    for (const at::Tensor& tensor : inputs) wanted.push_back(tensor.requires_grad());
     if (wanted[views] && call.light_counts.empty()) separate_shapes = true;
-    auto [image, frame] = call_operator(
-        "dpr::_render", &render_on_cpu, call.device, call.width, call.height, call.settings, call.faces,
-        tensors, call.light_counts, call.smoothing_names, call.first_view, call.face_colors, separate_shapes);
+    auto [image, frame] =
+        call_operator("dpr::_render", &render_on_cpu, call.device, call.width, call.height, call.settings,
+                      call.indices, inputs, call.light_counts, call.texture_sizes, call.wraps, call.filters,
+                      call.smoothing_names, call.first_view, call.face_colors, separate_shapes);
+    variable_list tensors = inputs.vec();
     ctx->saved_data["wanted"] = wanted;
     ctx->saved_data["smoothing_names"] = call.smoothing_names;
     tensors.push_back(frame);
@@ -245,38 +205,41 @@ struct PackageRender : public torch::autograd::Function<PackageRender> {
 };
 
 /// A compiled graph, which has its own derivatives, comes here again with the flag that its tracing found.
-std::tuple<at::Tensor, at::Tensor> render_with_derivatives(std::string device, std::int64_t width,
-                                                           std::int64_t height, Words settings,
-                                                           const at::Tensor& faces, at::TensorList t,
-                                                           std::vector<std::int64_t> light_counts,
-                                                           Words smoothing_names, std::int64_t first_view,
-                                                           bool face_colors, bool separate_shapes) {
-  with_torch_errors([&] { require_each_input(t.size(), "inputs (dpr::_render)"); });
-  const Call call{std::move(device),          width,      height,
-                  std::move(settings),        faces,      std::move(light_counts),
-                  std::move(smoothing_names), first_view, face_colors};
-  const variable_list outputs = PackageRender::apply(call, separate_shapes, t[vertices], t[colors], t[views],
-                                                     t[intrinsics], t[background], t[lights], t[smoothing]);
+std::tuple<at::Tensor, at::Tensor> render_with_derivatives(
+    std::string device, std::int64_t width, std::int64_t height, Words settings, at::TensorList indices,
+    at::TensorList inputs, std::vector<std::int64_t> light_counts, std::vector<std::int64_t> texture_sizes,
+    Words wraps, Words filters, Words smoothing_names, std::int64_t first_view, bool face_colors,
+    bool separate_shapes) {
+  with_torch_errors([&] { require_count(inputs.size(), input_count, "inputs (dpr::_render)"); });
+  const Call call{std::move(device),
+                  width,
+                  height,
+                  std::move(settings),
+                  indices.vec(),
+                  std::move(light_counts),
+                  std::move(texture_sizes),
+                  std::move(wraps),
+                  std::move(filters),
+                  std::move(smoothing_names),
+                  first_view,
+                  face_colors};
+  const variable_list outputs = PackageRender::apply(call, separate_shapes, inputs);
   return {outputs[0], outputs[1]};
 }
 
 }  // namespace
 
 TORCH_LIBRARY_FRAGMENT(dpr, m) {
-  // inputs: vertices, colors, views, intrinsics, background, lights' numbers, smoothing's numbers.
+  // indices: as Call has them. inputs: as Input has them, of lights and smoothing the numbers.
   m.def(
-      "_render(str device, int width, int height, str[] settings, Tensor faces, Tensor[] inputs, "
-      "int[] light_counts, str[] smoothing_names, int first_view, bool face_colors, bool separate_shapes) "
-      "-> (Tensor image, Tensor frame)");
+      "_render(str device, int width, int height, str[] settings, Tensor[] indices, Tensor[] inputs, "
+      "int[] light_counts, int[] texture_sizes, str[] wraps, str[] filters, str[] smoothing_names, "
+      "int first_view, bool face_colors, bool separate_shapes) -> (Tensor image, Tensor frame)");
   m.def(
       "_gradients(Tensor frame, Tensor grad_image, Tensor[] inputs, str[] smoothing_names, bool[] wanted) "
       "-> Tensor[]");
   m.def("_is_empty(Tensor frame) -> bool");
   m.def("_auxiliary(Tensor frame, str[] names, int views, int height, int width) -> Tensor[]");
-  m.def(
-      "_subdivide(int width, int height, str[] settings, float tolerance, Tensor faces, Tensor vertices, "
-      "Tensor views, Tensor intrinsics) -> (Tensor, Tensor, Tensor, Tensor)",
-      &subdivide_mesh);
   m.def("_check_settings(int width, int height, str[] settings) -> ()", &check_settings);
   m.def("_light_kinds() -> Dict(str, int)", &light_kinds);
   m.def("_release() -> ()", [] { RendererPools::of_process().clear(); });

@@ -1,5 +1,8 @@
-// The renderer as a libtorch operator, torch.ops.dpr.render and render_lit, with gradients.
+// The renderer as a libtorch operator, torch.ops.dpr.render, render_lit and render_textured, with gradients.
 #pragma once
+
+#include <string>
+#include <vector>
 
 #include "torch/batch_renderer.hpp"
 
@@ -25,15 +28,37 @@ at::Tensor render(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::T
                   const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
                   const at::Tensor& background);
 
-/// Tensors by the keys of a scene's "lights".
-using LightTensors = c10::Dict<std::string, at::Tensor>;
+using NamedTensors = c10::Dict<std::string, at::Tensor>;
+/// By the keys of a scene's "lights".
+using LightTensors = NamedTensors;
 
 /// The same in the light of a scene file: ambient [3], harmonics [9, 3], and for every kind of light [light,
 /// number], the members one after the other as the README has them; what is left out is as in a scene file.
-/// Differentiable with respect to them too, and to the matrices of the views as rigid motions: with lights,
-/// which stay in the world, an image does not depend on the vertices in camera space alone.
+/// With a leading dimension of views a tensor is of each view by itself; then these are rendered one after
+/// the other, and a graph keeps a frame of each. Differentiable with respect to them too, and to the matrices
+/// of the views as rigid motions: with lights, which stay in the world, an image does not depend on the
+/// vertices in camera space alone.
 at::Tensor render_lit(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
                       const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
                       const at::Tensor& background, const LightTensors& lights);
+
+struct TextureTensors {
+  std::vector<at::Tensor>
+      textures;  ///< [height, width, 3] linear RGB, row 0 on top; or [view, height, width, 3]
+  /// texcoords: [vertex, 2], [face, 3, 2] of corners, or [texcoord, 2] and int64 face_texcoords [face, 3];
+  /// face_textures: int64 [face], -1 for none, the first unless given; of materials specular [material, 3],
+  /// shininess [material] (that of the lights unless given), and int64 face_materials [face], the first
+  /// unless given. All but textures are the same for all views.
+  NamedTensors surface;
+  std::vector<std::string> wraps, filters;  ///< one of each texture, or of all; none: "repeat", "bilinear"
+};
+
+/// The same with textures and materials, and lights unless their dictionary is empty. Differentiable with
+/// respect to texels, texture coordinates and materials too. Textures of each view by itself are rendered as
+/// such lights.
+at::Tensor render_textured(const c10::intrusive_ptr<BatchRenderer>& renderer, const at::Tensor& vertices,
+                           const at::Tensor& colors, const at::Tensor& views, const at::Tensor& intrinsics,
+                           const at::Tensor& background, const LightTensors& lights,
+                           const TextureTensors& textures);
 
 }  // namespace dpr::torch_op

@@ -125,4 +125,11 @@ void set_from_text(RenderSettings& settings, const std::string& text) {
   }
 }
 
+RenderSettings settings_from_texts(std::int64_t width, std::int64_t height,
+                                   const std::vector<std::string>& texts) {
+  RenderSettings settings(width, height);
+  for (const std::string& text : texts) set_from_text(settings, text);
+  return settings;
+}
+
 }  // namespace dpr::torch_op

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "dpr/camera.hpp"
 #include "dpr/scene.hpp"
@@ -49,5 +50,7 @@ class RenderSettings {
 
 /// Sets by "sigma=1e-3": a whole number, a number, or else a word.
 void set_from_text(RenderSettings& settings, const std::string& text);
+RenderSettings settings_from_texts(std::int64_t width, std::int64_t height,
+                                   const std::vector<std::string>& texts);
 
 }  // namespace dpr::torch_op

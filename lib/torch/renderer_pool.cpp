@@ -26,6 +26,20 @@ void require_own_process() {
                         "the start method \"spawn\", or a parent that renders nothing before it forks");
 }
 
+/// Numbers are yet to come.
+void add_surface(Mesh& mesh, const Surface& surface) {
+  mesh.texcoords.resize(surface.texcoords);
+  mesh.face_texcoords = surface.face_texcoords;
+  for (const TextureForm& form : surface.textures) {
+    const std::size_t texels = static_cast<std::size_t>(form.width) * static_cast<std::size_t>(form.height);
+    mesh.textures.push_back(
+        {form.width, form.height, std::vector<glm::vec3>(texels), form.wrap, form.filter});
+  }
+  mesh.face_textures = surface.face_textures;
+  mesh.materials.resize(surface.materials);
+  mesh.face_materials = surface.face_materials;
+}
+
 Scene scene_of(const Topology& topology) {
   Scene scene;
   scene.width = topology.width;
@@ -35,6 +49,7 @@ Scene scene_of(const Topology& topology) {
   mesh.faces = *topology.faces;
   (topology.face_colors ? mesh.face_colors : mesh.vertex_colors)
       .resize(topology.face_colors ? mesh.faces.size() : topology.vertices);
+  add_surface(mesh, topology.surface);
   scene.meshes.push_back({std::move(mesh)});
   return scene;
 }
@@ -43,7 +58,8 @@ Scene scene_of(const Topology& topology) {
 
 bool Topology::operator==(const Topology& other) const {
   return vertices == other.vertices && face_colors == other.face_colors && width == other.width &&
-         height == other.height && (faces == other.faces || *faces == *other.faces);
+         height == other.height && surface == other.surface &&
+         (faces == other.faces || *faces == *other.faces);
 }
 
 Device open_device_of_process(const std::string& selector) {
@@ -57,7 +73,7 @@ RendererPool::~RendererPool() {
   if (is_forked()) (void)state_.release();  // which is the parent's to release
 }
 
-Renderer RendererPool::take(const Topology& topology) {
+PooledRenderer RendererPool::take(const Topology& topology) {
   require_own_process();
   {
     const std::lock_guard lock(mutex_);
@@ -65,20 +81,20 @@ Renderer RendererPool::take(const Topology& topology) {
     const auto found = std::find_if(state.free.rbegin(), state.free.rend(),
                                     [&](const Free& free) { return free.topology == topology; });
     if (found != state.free.rend()) {
-      Renderer renderer = std::move(found->renderer);
+      PooledRenderer renderer = std::move(found->renderer);
       state.free.erase(std::next(found).base());
       state.most_lent = std::max(state.most_lent, ++state.lent);
       return renderer;
     }
   }
-  Renderer renderer(state_->device);
-  renderer.set_scene(scene_of(topology));
+  PooledRenderer renderer{Renderer(state_->device)};
+  renderer.renderer.set_scene(scene_of(topology));
   const std::lock_guard lock(mutex_);
   state_->most_lent = std::max(state_->most_lent, ++state_->lent);
   return renderer;
 }
 
-void RendererPool::put_back(Renderer renderer, Topology topology) {
+void RendererPool::put_back(PooledRenderer renderer, Topology topology) {
   std::list<Free> dropped;  // which outlives the lock: releasing buffers takes its time
   const std::lock_guard lock(mutex_);
   State& state = *state_;
@@ -116,15 +132,15 @@ void RendererPools::clear() {
 Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
     : pool_(std::move(pool)),
       topology_(std::move(topology)),
-      renderer_(std::make_unique<Renderer>(pool_->take(topology_))) {}
+      pooled_(std::make_unique<PooledRenderer>(pool_->take(topology_))) {}
 
 Frame::~Frame() {
   if (is_forked()) {
-    (void)renderer_.release();
+    (void)pooled_.release();
     return;
   }
   try {
-    pool_->put_back(std::move(*renderer_), std::move(topology_));
+    pool_->put_back(std::move(*pooled_), std::move(topology_));
   } catch (...) {
     // Without memory to keep the renderer it is let go.
   }
@@ -132,7 +148,11 @@ Frame::~Frame() {
 
 Renderer& Frame::renderer() {
   require_own_process();
-  return *renderer_;
+  return pooled_->renderer;
+}
+
+AttributeImages& Frame::attribute_images(Attribute attribute) {
+  return pooled_->attributes.try_emplace(attribute, renderer().device(), attribute).first->second;
 }
 
 }  // namespace dpr::torch_op

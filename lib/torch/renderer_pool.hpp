@@ -1,19 +1,17 @@
 // Renderers of a device, lent to frames and kept for frames to come.
 #pragma once
 
-#include <glm/glm.hpp>
 #include <list>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <vector>
 
+#include "dpr/attribute_images.hpp"
 #include "dpr/renderer.hpp"
+#include "torch/surface.hpp"
 
 namespace dpr::torch_op {
-
-using Faces = std::vector<glm::uvec3>;
 
 /// What a renderer keeps on the device from one batch to the next.
 struct Topology {
@@ -21,6 +19,7 @@ struct Topology {
   std::size_t vertices = 0;
   bool face_colors = false;
   int width = 0, height = 0;
+  Surface surface;
 
   bool operator==(const Topology& other) const;
 };
@@ -28,6 +27,12 @@ struct Topology {
 /// Opens a device, as dpr::open_device(). OpenCL does not survive fork(): in a process that was forked from
 /// the one that opened a device this throws InvalidArgument, as RendererPool::take() does.
 Device open_device_of_process(const std::string& selector);
+
+/// A renderer, and those of the attributes that were asked of its frames.
+struct PooledRenderer {
+  Renderer renderer;
+  std::map<Attribute, AttributeImages> attributes = {};
+};
 
 /// Lends renderers whose scene is of a topology. Kept are those given back last: as many as were ever lent at
 /// once, but at least k_least. Safe to use from several threads.
@@ -38,8 +43,8 @@ class RendererPool {
   RendererPool(const RendererPool&) = delete;
   RendererPool& operator=(const RendererPool&) = delete;
 
-  Renderer take(const Topology& topology);
-  void put_back(Renderer renderer, Topology topology);
+  PooledRenderer take(const Topology& topology);
+  void put_back(PooledRenderer renderer, Topology topology);
   /// Forgets the renderers that are kept, with what they hold on the device.
   void clear();
 
@@ -47,7 +52,7 @@ class RendererPool {
   static constexpr std::size_t k_least = 8;
 
   struct Free {
-    Renderer renderer;
+    PooledRenderer renderer;
     Topology topology;
   };
   struct State {
@@ -88,11 +93,13 @@ class Frame {
 
   /// Throws InvalidArgument in a process that was forked.
   Renderer& renderer();
+  /// Images of that renderer's device, made when first asked for. Throws as renderer().
+  AttributeImages& attribute_images(Attribute attribute);
 
  private:
   std::shared_ptr<RendererPool> pool_;
   Topology topology_;
-  std::unique_ptr<Renderer> renderer_;
+  std::unique_ptr<PooledRenderer> pooled_;
 };
 
 }  // namespace dpr::torch_op

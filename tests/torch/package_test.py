@@ -79,11 +79,44 @@ class Images(torch.utils.data.Dataset):
         return image_of(self.renderer)[0] + index
 
 
-class PackageTest(unittest.TestCase):
+def nested(arguments):
+    """"lights.ambient" as an entry of a dictionary, "textures.0" of a list."""
+    found = {}
+    for name, value in arguments.items():
+        outer, _, inner = name.partition(".")
+        if inner.isdigit():
+            found.setdefault(outer, []).append(value)
+        elif inner:
+            found.setdefault(outer, {})[inner] = value
+        else:
+            found[outer] = value
+    return found
+
+
+class RenderTest(unittest.TestCase):
     def assert_same(self, found, expected, tolerance=0.0):
         self.assertEqual(found.shape, expected.shape)
         self.assertLessEqual((found - expected).abs().max().item(), tolerance)
 
+    def check_gradients(self, settings, tensors, constants):
+        """In double precision outside, single inside: the step is as large as that needs."""
+        settings = dict(settings)
+        renderer = dpr.Renderer(SIZE, SIZE, **settings)
+        names = list(tensors)
+        last = torch.tensor([0.0, 0.0, 0.0, 1.0])
+        weights = random(2, SIZE, SIZE, 4, seed=3).double() - 0.5
+
+        def loss(*values):
+            given = {name: value.float() for name, value in zip(names, values)}
+            if "rows" in given:  # of the matrices, whose last ones are fixed
+                given["views"] = torch.cat((given.pop("rows"), last.expand(2, 1, 4)), 1)
+            return (renderer(**nested({"faces": FACES, **given, **constants})).double() * weights).sum()
+
+        doubles = [tensor.double().requires_grad_() for tensor in tensors.values()]
+        self.assertTrue(torch.autograd.gradcheck(loss, doubles, eps=1e-3, atol=5e-3, rtol=1e-3))
+
+
+class PackageTest(RenderTest):
     def test_refuses_another_torch(self):
         dpr._library.check(torch.__version__, torch._C._GLIBCXX_USE_CXX11_ABI)
         has_strings = torch._C._GLIBCXX_USE_CXX11_ABI
@@ -101,40 +134,22 @@ class PackageTest(unittest.TestCase):
         self.assertNotEqual(run.returncode, 0)
         self.assertIn("expected 9.8.7, which this dpr was built for", run.stderr.splitlines()[-1])
 
-    def check_gradients(self, settings, tensors, **constants):
-        """In double precision outside, single inside: the step is as large as that needs."""
-        settings = dict(settings)
-        renderer = dpr.Renderer(SIZE, SIZE, **settings)
-        names = list(tensors)
-        last = torch.tensor([0.0, 0.0, 0.0, 1.0])
-        weights = random(2, SIZE, SIZE, 4, seed=3).double() - 0.5
-
-        def loss(*values):
-            given = {name: value.float() for name, value in zip(names, values)}
-            if "rows" in given:  # of the matrices, whose last ones are fixed
-                given["views"] = torch.cat((given.pop("rows"), last.expand(2, 1, 4)), 1)
-            given["lights"] = {name: given.pop(name) for name in ("ambient", "point") if name in given} or None
-            return (renderer(faces=FACES, **given, **constants).double() * weights).sum()
-
-        doubles = [tensor.double().requires_grad_() for tensor in tensors.values()]
-        self.assertTrue(torch.autograd.gradcheck(loss, doubles, eps=1e-3, atol=5e-3, rtol=1e-3))
-
     def test_gradients(self):
         views, intrinsics = cameras(2)
         self.check_gradients(SMOOTH, {"vertices": TETRAHEDRON.repeat(2, 1, 1), "colors": random(2, 4, 3),
                                       "rows": views[:, :3], "intrinsics": intrinsics,
-                                      "background": torch.tensor([0.1, 0.2, 0.3])})
-        lights = {"ambient": torch.tensor([0.2, 0.3, 0.4]), "point": random(2, 9, seed=4) + 2}
-        self.check_gradients(SMOOTH, {"face_colors": random(4, 3), **lights}, vertices=TETRAHEDRON, views=views,
-                             intrinsics=intrinsics)
+                                      "background": torch.tensor([0.1, 0.2, 0.3])}, {})
+        lights = {"lights.ambient": torch.tensor([0.2, 0.3, 0.4]), "lights.point": random(2, 9, seed=4) + 2}
+        self.check_gradients(SMOOTH, {"face_colors": random(4, 3), **lights},
+                             {"vertices": TETRAHEDRON, "views": views, "intrinsics": intrinsics})
 
     def test_gradients_of_the_smoothing(self):
         views, intrinsics = cameras(2)
         constants = {"vertices": TETRAHEDRON, "colors": random(4, 3), "views": views, "intrinsics": intrinsics}
         scale = {"sigma": 0.05, "gamma": 0.3, "alpha": 1.0}  # for steps of 1e-3
         barrier = {**SMOOTH, "preset": "gaussian"}
-        self.check_gradients(barrier, {name: torch.tensor(value) for name, value in scale.items()}, **constants)
-        self.check_gradients({"znear": 1, "zfar": 10}, {"sigma": torch.tensor(0.05)}, **constants)
+        self.check_gradients(barrier, {name: torch.tensor(value) for name, value in scale.items()}, constants)
+        self.check_gradients({"znear": 1, "zfar": 10}, {"sigma": torch.tensor(0.05)}, constants)
 
     def test_numbers_of_a_call_are_the_settings(self):
         views, intrinsics = cameras(1)
@@ -254,7 +269,7 @@ class PackageTest(unittest.TestCase):
         self.assertEqual(outputs["face_id"][0, 8, 8], 0)
         self.assertAlmostEqual(outputs["barycentrics"][0, 8, 8].sum().item(), 1, places=5)
         self.assertAlmostEqual(outputs["effective_faces"][0, 8, 8].item(), 1, places=5)
-        self.assertFalse(any(tensor.requires_grad for tensor in outputs.values()))
+        self.assertEqual([name for name in names if outputs[name].requires_grad], ["depth", "normal"])
         images.square().sum().backward()  # after them as without them
         found, wall.grad = wall.grad, None
         dpr.render(wall, FACES[:1], views, intrinsics, width=SIZE, height=SIZE).square().sum().backward()
@@ -262,7 +277,7 @@ class PackageTest(unittest.TestCase):
         _, listed = dpr.render([TETRAHEDRON, SQUARE], [FACES, SQUARE_FACES], views, intrinsics, width=SIZE, height=SIZE,
                                outputs=["face_id"])
         self.assertEqual(list(listed["face_id"].shape), [2, SIZE, SIZE])
-        with self.assertRaisesRegex(RuntimeError, "outputs .* got \"shadow\", expected depth"):
+        with self.assertRaisesRegex(ValueError, "outputs .* got 'shadow', expected depth, position"):
             dpr.render(wall, FACES[:1], views, intrinsics, width=SIZE, height=SIZE, outputs=["shadow"])
 
     def test_subdivision_for_a_lens(self):
@@ -354,14 +369,18 @@ class PackageTest(unittest.TestCase):
 
     def test_wrong_arguments_of_the_operators(self):
         views, intrinsics = cameras(1)
-        inputs = [TETRAHEDRON[None], random(1, 4, 3), views, intrinsics, torch.zeros(3), torch.empty(0), torch.empty(0)]
+        inputs = [TETRAHEDRON[None], random(1, 4, 3), views, intrinsics, torch.zeros(3)] + 6 * [torch.empty(0)]
+        no_indices = 3 * [torch.empty(0, dtype=torch.int64)]
 
-        def render(inputs, light_counts=(), names=()):
-            return torch.ops.dpr._render("", SIZE, SIZE, ["preset=pixel"], FACES, inputs, list(light_counts),
-                                         list(names), 0, False, False)
+        def render(inputs, light_counts=(), names=(), sizes=(), indices=(FACES, *no_indices)):
+            return torch.ops.dpr._render("", SIZE, SIZE, ["preset=pixel"], list(indices), inputs, list(light_counts),
+                                         list(sizes), [], [], list(names), 0, False, False)
 
         def with_lights(count, *light_counts):
-            return render(inputs[:5] + [torch.ones(count), inputs[6]], light_counts)
+            return render(inputs[:5] + [torch.ones(count), *inputs[6:]], light_counts)
+
+        def with_textures(*sizes):
+            return render(inputs[:7] + [torch.ones(4, 2), torch.ones(6, 3), *inputs[9:]], sizes=sizes)
 
         with_lights(12, 0, 1, 0, 0)
         for words, call in [
@@ -372,14 +391,20 @@ class PackageTest(unittest.TestCase):
                 (r"lights .* got 3 numbers, expected 12", lambda: with_lights(3, 0, 1, 0, 0)),
                 (r"lights .* got 13 numbers, expected 12", lambda: with_lights(13, 0, 1, 0, 0)),
                 (r"smoothing_names .* got 1 names, expected 0", lambda: render(inputs, names=["sigma"])),
-                (r"smoothing_names .* got 0 names, expected 2", lambda: render(inputs[:6] + [torch.ones(2)])),
-                (r"inputs .* got 6 elements, expected 7", lambda: render(inputs[:6])),
+                (r"smoothing_names .* got 0 names, expected 2",
+                 lambda: render(inputs[:6] + [torch.ones(2), *inputs[7:]])),
+                (r"inputs .* got 6 elements, expected 11", lambda: render(inputs[:6])),
+                (r"indices .* got 1 elements, expected 4", lambda: render(inputs, indices=[FACES])),
+                (r"textures .* got 6 texels, expected 4", lambda: with_textures(2, 2)),
+                (r"texture_sizes .* got 3 numbers, expected height and width", lambda: with_textures(2, 3, 1)),
+                (r"textures .* got -3, expected 1 to 16384", lambda: with_textures(-2, -3)),
+                (r"textures .* got 4611686018427387904", lambda: with_textures(1 << 62, 4)),
         ]:
             with self.subTest(words), self.assertRaisesRegex(RuntimeError, words):
                 call()
         image, frame = render(inputs)
-        for count, wanted, words in [(6, 7, "inputs"), (7, 6, "wanted")]:
-            with self.subTest(words), self.assertRaisesRegex(RuntimeError, words + " .* got 6 elements, expected 7"):
+        for count, wanted, words in [(6, 11, "inputs"), (11, 6, "wanted")]:
+            with self.subTest(words), self.assertRaisesRegex(RuntimeError, words + " .* got 6 elements, expected 11"):
                 torch.ops.dpr._gradients(frame, image, inputs[:count], [], [True] * wanted)
 
     def test_no_call_depends_on_the_last_one(self):
@@ -502,8 +527,7 @@ class PackageTest(unittest.TestCase):
         self.assertLess(losses[-1], 0.1 * losses[0])
 
 
-@unittest.skipIf(RELEASE < (2, 4), "no torch.library.register_fake")
-class CompileTest(unittest.TestCase):
+class CompiledTest(unittest.TestCase):
     def setUp(self):
         torch._dynamo.reset()
 
@@ -520,6 +544,9 @@ class CompileTest(unittest.TestCase):
             for found, expected in zip(*results):
                 self.assertLessEqual((found - expected).abs().max(), 1e-5 * expected.abs().max())
 
+
+@unittest.skipIf(RELEASE < (2, 4), "no torch.library.register_fake")
+class CompileTest(CompiledTest):
     def test_render(self):
         def loss(vertices, views, intrinsics, sigma):
             image = dpr.render(2 * vertices, FACES, views, intrinsics, width=SIZE, height=SIZE, sigma=sigma, gamma=0.05,
@@ -545,9 +572,10 @@ class CompileTest(unittest.TestCase):
     def test_operator(self):
         views, intrinsics = cameras(2)
         inputs = [TETRAHEDRON[None].clone().requires_grad_(), random(1, 4, 3), views.requires_grad_(), intrinsics,
-                  torch.zeros(3), torch.empty(0), torch.empty(0)]
+                  torch.zeros(3)] + 6 * [torch.empty(0)]
+        indices = [FACES] + 3 * [torch.empty(0, dtype=torch.int64)]
         torch.library.opcheck(torch.ops.dpr._render.default,
-                              ("", SIZE, SIZE, ["preset=pixel"], FACES, inputs, [], [], 0, False, False),
+                              ("", SIZE, SIZE, ["preset=pixel"], indices, inputs, [], [], [], [], [], 0, False, False),
                               test_utils=("test_schema", "test_autograd_registration", "test_faketensor"))
 
 

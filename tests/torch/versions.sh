@@ -23,7 +23,8 @@ test_version() {
   local package
   package=$(cd "$work" && "$environment/bin/python" -c 'import dpr, pathlib; print(pathlib.Path(dpr.__file__).parent)')
   "$environment/bin/python" "$root/tests/torch/render_python_test.py" "$package/libdpr_torch.so"
-  "$environment/bin/python" "$root/tests/torch/package_test.py"
+  local name
+  for name in package textures outputs; do "$environment/bin/python" "$root/tests/torch/${name}_test.py"; done
 }
 
 mkdir -p "$work"
@@ -37,7 +38,7 @@ for version in "${versions[@]}"; do
   wait $! || status=$?
   found=$("$work/env-$version/bin/python" -c 'import torch; print(torch.__version__)' 2>/dev/null || echo "none")
   if ((status == 0)); then
-    echo "PyTorch $version ($found): $(grep -E '^Ran [0-9]+ tests' "$log" | tail -1), $(tail -1 "$log")"
+    echo "PyTorch $version ($found): $(grep -oE '^Ran [0-9]+ tests' "$log" | paste -sd,), $(tail -1 "$log")"
   else
     echo "PyTorch $version ($found): FAILED, see $log"
     failures=$((failures + 1))

@@ -32,14 +32,22 @@ def floats(name, tensor, shapes, copy):
     return tensor
 
 
-def indices(faces, copy):
-    """int64 faces [F, 3] on the CPU."""
-    faces = _on_cpu("faces", faces, copy)
-    if faces.dtype not in (torch.int64, torch.int32):
-        fail(TypeError, "faces", str(faces.dtype).replace("torch.", ""), "int64 or int32, indices of vertices")
-    if not _fits(faces.shape, ("F", 3)):
-        fail(ValueError, "faces", list(faces.shape), "[F, 3], a list of such, or [N, F, 3] padded with -1")
-    return faces.long()
+def indices(name, tensor, shape, copy):
+    """int64 on the CPU, of a shape in which words stand for any size."""
+    tensor = _on_cpu(name, tensor, copy)
+    if tensor.dtype not in (torch.int64, torch.int32):
+        fail(TypeError, name, str(tensor.dtype).replace("torch.", ""), "int64 or int32, indices")
+    if not _fits(tensor.shape, shape):
+        expected = "[" + ", ".join(str(size) for size in shape) + "]"
+        fail(ValueError, name, list(tensor.shape), f"{expected}, a list of such, or padded ones with -1 behind")
+    return tensor.long()
+
+
+def dictionary(name, given):
+    """The dictionary, or an empty one for None."""
+    if given is not None and not isinstance(given, dict):
+        fail(TypeError, name, type(given).__name__, "a dictionary")
+    return given or {}
 
 
 def number(name, value):
@@ -72,22 +80,3 @@ def lights(given, kinds, copy):
         counts.append(tensor.shape[0])
         parts.append(tensor.flatten())
     return torch.cat(parts), counts
-
-
-def lists_of_padded(vertices, faces, colors, face_colors):
-    """A padded batch as lists: views of the tensors, through which gradients flow."""
-    face_counts = [int((mesh[:, 0] >= 0).sum()) for mesh in faces]
-    meshes = [mesh[:count] for mesh, count in zip(faces, face_counts)]
-    if any(bool((mesh < 0).any()) for mesh in meshes):
-        fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
-    vertex_counts = [int(mesh.max()) + 1 if len(mesh) else 0 for mesh in meshes]
-
-    def cut(name, padded, counts):
-        if padded is None:
-            return None
-        if len(padded) != len(counts):
-            fail(ValueError, name, f"{len(padded)} in the first dimension", f"{len(counts)}, as faces are padded")
-        return [mesh[:count] for mesh, count in zip(padded, counts)]
-
-    return (cut("vertices", vertices, vertex_counts), meshes, cut("colors", colors, vertex_counts),
-            cut("face_colors", face_colors, face_counts))

@@ -33,8 +33,8 @@ def _register_shapes():
     if register is None:
         return
 
-    def render(device, width, height, settings, faces, inputs, light_counts, smoothing_names, first_view, face_colors,
-               separate_shapes):
+    def render(device, width, height, settings, indices, inputs, light_counts, texture_sizes, wraps, filters,
+               smoothing_names, first_view, face_colors, separate_shapes):
         vertices, views = inputs[0], inputs[2]
         return vertices.new_empty((views.shape[0], height, width, 4)), vertices.new_empty((1,), dtype=torch.uint8)
 
@@ -42,11 +42,19 @@ def _register_shapes():
         return [x.new_empty(x.shape if is_wanted else (0,)) for x, is_wanted in zip(inputs, wanted)]
 
     def auxiliary(frame, names, views, height, width):
-        channels = {"normal": (3,), "barycentrics": (3,)}
+        channels = {"barycentrics": (3,), "uv": (2,)}
         types = {"face_id": torch.int64}
         return [frame.new_empty((views, height, width, *channels.get(name, ())), dtype=types.get(name, torch.float32))
                 for name in names]
 
+    def attributes(frame, names, inputs, smoothing_names, wanted, views, height, width):
+        return [frame.new_empty((views, height, width, 4), dtype=torch.float32) for _ in names]
+
+    def attribute_gradients(frame, names, grad_images, images, inputs, smoothing_names, wanted):
+        return [x.new_empty(x.shape if is_wanted else (0,)) for x, is_wanted in zip(inputs, wanted)]
+
     register("dpr::_render")(render)
     register("dpr::_gradients")(gradients)
     register("dpr::_auxiliary")(auxiliary)
+    register("dpr::_attributes")(attributes)
+    register("dpr::_attribute_gradients")(attribute_gradients)
