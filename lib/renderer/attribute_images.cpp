@@ -156,7 +156,6 @@ void AttributeImages::Impl::follow(Renderer::Impl& source) {
   const Scene& scene = source.scene;
   if (!shows_faces_of(scene)) show_faces_of(source);
   if (renderer.scene().cull != scene.cull) renderer.set_cull(scene.cull);
-  if (renderer.scene().smoothing != scene.smoothing) renderer.set_smoothing(scene.smoothing);
   follow_views(source);
   has_own_shapes_ = source.frame.position_stride != 0;
   has_own_shapes_ ? follow_shapes(source) : follow_positions(source);
@@ -172,9 +171,13 @@ void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
     of_passes.insert(of_passes.end(), source.views.begin(), source.views.end());
   const bool has_left_device = (r.has_device_poses && !source.has_device_poses) ||
                                (r.has_device_cameras && !source.has_device_cameras);
+  const Smoothing& smoothing = source.scene.smoothing;
   if (of_passes != r.views || has_left_device) {
-    renderer.set_views(of_passes);
+    // Together: the new smoothing need not suit the old views, nor the old one the new views.
+    r.set_views(of_passes, 0, smoothing, r.scene.lights);
     fold_.reset();
+  } else if (r.scene.smoothing != smoothing) {
+    renderer.set_smoothing(smoothing);
   }
   for (std::size_t pass = 0; source.has_device_poses && pass < passes(); ++pass) {
     const DeviceViews& from = source.device_views;

@@ -10,19 +10,6 @@
 namespace dpr::torch_op {
 namespace {
 
-/// Images whose renderer remembers another batch may refuse this one's smoothing or views, one of which is
-/// set before the other: new ones take it.
-AttributeImages& rendered_images(Frame& frame, Attribute attribute) {
-  AttributeImages& images = frame.attribute_images(attribute);
-  try {
-    images.forward(frame.renderer());
-  } catch (const InvalidArgument&) {
-    images = AttributeImages(frame.renderer().device(), attribute);
-    images.forward(frame.renderer());
-  }
-  return images;
-}
-
 Wanted wanted_of(Attribute attribute, const Wanted& wanted) {
   Wanted result;
   result.vertices = wanted.vertices;
@@ -38,7 +25,8 @@ Wanted wanted_of(Attribute attribute, const Wanted& wanted) {
 at::Tensor render_attribute(Frame& frame, Attribute attribute, const Wanted& wanted) {
   Renderer& renderer = frame.renderer();
   renderer.set_gradients(request_of(wanted_of(attribute, wanted), ViewMotion::rigid));
-  const AttributeImages& images = rendered_images(frame, attribute);
+  AttributeImages& images = frame.attribute_images(attribute);
+  images.forward(renderer);
   const Scene& scene = renderer.scene();
   const auto views = static_cast<std::int64_t>(renderer.views().size());
   at::Tensor tensor = at::empty({views, scene.height, scene.width, 4}, at::kFloat);

@@ -519,6 +519,24 @@ TEST_SUITE("pipeline") {
     CHECK(none.sigma == a.sigma);
   }
 
+  TEST_CASE("attribute images: views and smoothing that go together only with each other") {
+    const Device device = open_device();
+    Renderer renderer(device);
+    AttributeImages images(device, Attribute::depth);
+    Scene near = soup_scene(8, 6, Composition::barrier), far = near;
+    near.smoothing.gamma = 1e-20F;  // too small for planes as far away as the other's
+    far.camera.znear = 1e10F;
+    far.camera.zfar = 2e10F;
+    for (const Scene* scene : {&near, &far, &near}) {
+      renderer.set_scene(*scene);
+      renderer.forward();
+      images.forward(renderer);
+      AttributeImages fresh(device, Attribute::depth);
+      fresh.forward(renderer);
+      CHECK(images.image().pixels == fresh.image().pixels);
+    }
+  }
+
   TEST_CASE("attribute images: gradients add up") {
     const Device device = open_device();
     Renderer renderer = two_views(device, smoothing_preset("pixel"));
