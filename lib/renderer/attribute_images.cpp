@@ -166,12 +166,12 @@ void AttributeImages::Impl::follow(Renderer::Impl& source) {
 
 void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
   Renderer::Impl& r = renderer.impl();
+  const Smoothing& smoothing = source.scene.smoothing;
   std::vector<View> of_passes;
-  for (std::size_t pass = 0; pass < passes(); ++pass)
+  for (std::size_t pass = 0; pass < passes(smoothing); ++pass)
     of_passes.insert(of_passes.end(), source.views.begin(), source.views.end());
   const bool has_left_device = (r.has_device_poses && !source.has_device_poses) ||
                                (r.has_device_cameras && !source.has_device_cameras);
-  const Smoothing& smoothing = source.scene.smoothing;
   if (of_passes != r.views || has_left_device) {
     // Together: the new smoothing need not suit the old views, nor the old one the new views.
     r.set_views(of_passes, 0, smoothing, r.scene.lights);

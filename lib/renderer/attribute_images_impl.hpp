@@ -26,8 +26,10 @@ struct AttributeImages::Impl {
   /// Of three channels.
   std::size_t groups() const { return (channels + 2) / 3; }
   /// Alpha is the sum of the weights but in the barrier composition. There one more group shows it.
-  bool shows_weights() const { return renderer.scene().smoothing.composition == Composition::barrier; }
-  std::size_t passes() const { return groups() + (shows_weights() ? 1 : 0); }
+  static bool shows_weights(const Smoothing& s) { return s.composition == Composition::barrier; }
+  bool shows_weights() const { return shows_weights(renderer.scene().smoothing); }
+  std::size_t passes(const Smoothing& s) const { return groups() + (shows_weights(s) ? 1 : 0); }
+  std::size_t passes() const { return passes(renderer.scene().smoothing); }
 
   /// Throws InvalidArgument, which names the caller, unless there are images.
   void require_forward(const char* caller) const;

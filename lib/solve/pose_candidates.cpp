@@ -37,7 +37,7 @@ void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const 
                    double wrong_loss) {
   const double least = std::ranges::min_element(candidates, by_loss)->equations.loss;
   const auto is_hopeless = [&](const Candidate& c) {
-    return c.equations.loss > hope.ratio * least + hope.part * wrong_loss;
+    return !c.is_initial && c.equations.loss > hope.ratio * least + hope.part * wrong_loss;
   };
   const auto begin = candidates.begin() + static_cast<std::ptrdiff_t>(first);
   candidates.erase(std::remove_if(begin, candidates.end(), is_hopeless), candidates.end());

@@ -27,7 +27,8 @@ struct Hope {
   double ratio, part;
 };
 
-/// Gives up those from the `first` on. At least one candidate.
+/// Gives up those from the `first` on, but not the initial one: coarse levels that tell little of the light may
+/// judge it wrong. At least one candidate.
 void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const Hope& hope,
                    double wrong_loss);
 

@@ -523,11 +523,13 @@ TEST_SUITE("pipeline") {
     const Device device = open_device();
     Renderer renderer(device);
     AttributeImages images(device, Attribute::depth);
-    Scene near = soup_scene(8, 6, Composition::barrier), far = near;
+    Scene near = soup_scene(8, 6, Composition::barrier), far = near, joint = near, of_pixel = near;
     near.smoothing.gamma = 1e-20F;  // too small for planes as far away as the other's
     far.camera.znear = 1e10F;
     far.camera.zfar = 2e10F;
-    for (const Scene* scene : {&near, &far, &near}) {
+    joint.smoothing.composition = Composition::joint;
+    of_pixel.smoothing = smoothing_preset("pixel", 8, 6);
+    for (const Scene* scene : {&near, &far, &near, &joint, &near, &of_pixel, &far, &of_pixel, &joint}) {
       renderer.set_scene(*scene);
       renderer.forward();
       images.forward(renderer);

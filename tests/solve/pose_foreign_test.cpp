@@ -92,6 +92,26 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("of poses that light of their own explains equally well the one at the start is the result") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(128);
+    scene.camera = dpr::orbit_camera(3.7F, 30, 120);
+    scene.camera.fov_y_degrees = 60;
+    scene.lights.emplace();
+    scene.lights->point.push_back(
+        {.position = {3, 5, -4}, .diffuse = glm::vec3(0.5F), .specular = glm::vec3(0.1F)});
+    dpr::Scene lit = scene;
+    lit.lights.emplace();
+    lit.lights->ambient = {0.2F, 0.2F, 0.25F};
+    lit.lights->directional.push_back(
+        {.direction = {-1, -0.5F, -0.6F}, .diffuse = {0.7F, 0.6F, 0.4F}, .specular = glm::vec3(0)});
+    const dpr::Image target = rigid_image(device, lit);
+    scene.meshes.front().transform = glm::mat4(glm::mat3(dpr::rotation_from_vector({0.1, -0.8, 0.2})));
+    const dpr::PoseResult result = dpr::PoseSolver(device, scene, target).solve({glm::dmat3(1.0), {}});
+    CHECK(dpr::angle_degrees(result.pose.rotation, glm::dmat3(1.0)) < 0.5);
+  }
+
   TEST_CASE("normals that the mesh gives shade it in unknown light") {
     if (dpr::test::is_reduced()) return;
     const dpr::Device device = dpr::open_device();

@@ -310,9 +310,21 @@ class PackageTest(RenderTest):
         same = dpr.subdivide(wall, faces, views, lens[:, :4], width=80, height=60)
         self.assertTrue(torch.equal(same.faces, faces))
         self.assertTrue(torch.equal(same.of_vertices(wall), wall))
+        for of, rows in ((cut.of_vertices, 5), (cut.of_faces, 3), (cut.of_faces, 1)):
+            with self.assertRaisesRegex(ValueError, "values .* expected"):
+                of(random(rows, 3))
         for wrong, message in (({"tolerance": -1.0}, "tolerance"), ({"vertices": wall[None]}, "vertices")):
             with self.assertRaisesRegex((RuntimeError, ValueError), message):
                 renderer.subdivide(**{"vertices": wall, "faces": faces, "views": views, "intrinsics": lens, **wrong})
+
+    def test_another_default_type(self):
+        renderer, (views, intrinsics) = dpr.Renderer(SIZE, SIZE), cameras(1)
+        expected = renderer(TETRAHEDRON, FACES, views, intrinsics)
+        torch.set_default_dtype(torch.float64)
+        try:
+            self.assertTrue(torch.equal(renderer(TETRAHEDRON, FACES, views, intrinsics), expected))
+        finally:
+            torch.set_default_dtype(torch.float32)
 
     def test_a_wanted_gradient_is_never_dropped(self):
         views, intrinsics = cameras(1)

@@ -301,6 +301,7 @@ class TexturesTest(RenderTest):
             (RuntimeError, "face_materials.* got material 0",
              {"materials": None, "face_materials": torch.zeros(5).long()}),
             (RuntimeError, "wrap .* got \"tile\", expected repeat, mirror or clamp", {"wrap": "tile"}),
+            (TypeError, "wrap .* got 1, expected a word", {"wrap": ["repeat", 1]}),
             (RuntimeError, "filter .* got 3 words, expected one", {"filter": ["nearest"] * 3}),
             (TypeError, "materials .* got Tensor, expected a dictionary", {"materials": torch.ones(1, 3)}),
             (TypeError, "lights .* got list, expected a dictionary", {"lights": [torch.ones(3)]}),

@@ -25,7 +25,8 @@ def floats(name, tensor, shapes, copy):
     """The tensor on the CPU, if it is float32 and has one of the shapes, in which words stand for any size."""
     tensor = _on_cpu(name, tensor, copy)
     if tensor.dtype != torch.float32:
-        fail(TypeError, name, str(tensor.dtype).replace("torch.", ""), f"float32; {name}.float() has its gradients too")
+        hint = f"; {name}.float() has its gradients too" if tensor.is_floating_point() else ""
+        fail(TypeError, name, str(tensor.dtype).replace("torch.", ""), "float32" + hint)
     if not any(_fits(tensor.shape, shape) for shape in shapes):
         texts = ["[" + ", ".join(str(size) for size in shape) + "]" for shape in shapes]
         fail(ValueError, name, list(tensor.shape), " or ".join(texts))
@@ -63,7 +64,7 @@ def number(name, value):
 def lights(given, kinds, copy):
     """(all numbers in one tensor, the count of harmonics and of each kind's lights); no counts without lights."""
     if given is None:
-        return torch.empty(0), []
+        return torch.empty(0, dtype=torch.float32), []
     names = ["ambient", "harmonics", *kinds]
     for name in given:
         if name not in names:

@@ -100,12 +100,12 @@ class Renderer:
         The images have first derivatives with respect to every float tensor above: those of the views are of any affine
         matrices, with lights of rigid motions. Depth, position, normal and texcoords have those of vertices, views (of
         rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how
-        much of it is seen, and cost about an image each. The other outputs have none. Errors name the argument:
-        TypeError and ValueError of tensors, RuntimeError of what they hold. A UserWarning tells that every triangle
-        was dropped, but not from within torch.compile.
+        much of it is seen, and cost about an image each, normals four. The other outputs have none. Errors name the
+        argument: TypeError and ValueError of tensors, RuntimeError of what they hold. A UserWarning tells that every
+        triangle was dropped, but not from within torch.compile.
         """
         smoothing = {"sigma": sigma, "gamma": gamma, "alpha": alpha}
-        background = torch.zeros(3) if background is None else background
+        background = torch.zeros(3, dtype=torch.float32) if background is None else background
         if colors is not None and face_colors is not None:
             _arguments.fail(ValueError, "colors", "colors and face_colors", "one of them")
         mesh = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors,
@@ -137,8 +137,9 @@ class Renderer:
         vertices, views, intrinsics = (_arguments.floats(*a, copy).detach() for a in arguments)
         tolerance = float(_arguments.number("tolerance", tolerance))
         faces = _arguments.indices("faces", faces, ("F", 3), copy)
-        return Subdivision(*torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance, faces,
-                                                     vertices[None], views, intrinsics))
+        pieces = torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance, faces, vertices[None],
+                                          views, intrinsics)
+        return Subdivision(*pieces, of=(vertices.shape[0], faces.shape[0]))
 
     def _render_each(self, as_lists, mesh, views, intrinsics, lights, shared):
         """Views that differ, each by itself. Sampled noise is that of their places in the batch."""
@@ -190,13 +191,13 @@ class Renderer:
         count, vertex_count = faces.shape[0], vertices.shape[1]
         if face_colors is None:
             if colors is None:
-                return torch.ones(1, vertex_count, 3)
+                return torch.ones(1, vertex_count, 3, dtype=torch.float32)
             return _batched(_arguments.floats("colors", colors, [(vertex_count, 3), ("N", vertex_count, 3)], copy))
         return _batched(_arguments.floats("face_colors", face_colors, [(count, 3), ("N", count, 3)], copy))
 
     def _smoothing(self, given, copy):
         """(settings, names of the tensors, their numbers)."""
-        texts, names, numbers = list(self._texts), [], [torch.empty(0)]
+        texts, names, numbers = list(self._texts), [], [torch.empty(0, dtype=torch.float32)]
         for name, value in given.items():
             if isinstance(value, torch.Tensor):
                 names.append(name)

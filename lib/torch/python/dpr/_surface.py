@@ -11,7 +11,7 @@ def _texcoords(mesh, faces, vertex_count, copy):
     if given is None:
         if of_faces is not None:
             _arguments.fail(ValueError, "face_texcoords", "them alone", "them beside texcoords")
-        return torch.empty(0), nothing
+        return torch.empty(0, dtype=torch.float32), nothing
     count = faces.shape[0]
     if of_faces is not None:
         of_faces = _arguments.indices("face_texcoords", of_faces, (count, 3), copy)
@@ -27,7 +27,7 @@ def _textures(given, copy):
     given = listed(given)
     images = [_arguments.floats(f"textures[{i}]", texture, [("H", "W", 3)], copy) for i, texture in enumerate(given)]
     sizes = [size for image in images for size in image.shape[:2]]
-    return torch.cat([torch.empty(0, 3)] + [image.reshape(-1, 3) for image in images]), sizes
+    return torch.cat([torch.empty(0, 3, dtype=torch.float32)] + [image.reshape(-1, 3) for image in images]), sizes
 
 
 def listed(given):
@@ -35,6 +35,14 @@ def listed(given):
     if given is None:
         return []
     return list(given) if isinstance(given, (list, tuple)) else [given]
+
+
+def _words(name, given):
+    words = listed(given)
+    for word in words:
+        if not isinstance(word, str):
+            _arguments.fail(TypeError, name, repr(word), "a word, or a list of one a texture")
+    return words
 
 
 def _materials(given, copy):
@@ -48,9 +56,12 @@ def _materials(given, copy):
         specular = _arguments.floats("materials.specular", specular, [("M", 3)], copy)
     count = "M" if specular is None else specular.shape[0]
     if shininess is None:
-        return torch.empty(0) if specular is None else specular, torch.empty(0)
+        nothing = torch.empty(0, dtype=torch.float32)
+        return nothing if specular is None else specular, nothing
     shininess = _arguments.floats("materials.shininess", shininess, [(count,)], copy)
-    return torch.ones(shininess.shape[0], 3) if specular is None else specular, shininess
+    if specular is None:
+        specular = torch.ones(shininess.shape[0], 3, dtype=torch.float32)
+    return specular, shininess
 
 
 def pack(mesh, faces, vertex_count, copy):
@@ -61,5 +72,5 @@ def pack(mesh, faces, vertex_count, copy):
     of_faces = [torch.empty(0, dtype=torch.int64) if mesh[name] is None else
                 _arguments.indices(name, mesh[name], (faces.shape[0],), copy)
                 for name in ("face_textures", "face_materials")]
-    words = [listed(mesh[name]) for name in ("wrap", "filter")]
+    words = [_words(name, mesh[name]) for name in ("wrap", "filter")]
     return [texcoords, texels, *_materials(mesh["materials"], copy)], [face_texcoords, *of_faces], (sizes, *words)
