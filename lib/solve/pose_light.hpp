@@ -77,8 +77,8 @@ class LightFit {
 /// The same of residuals' sizes, which come out in another order; 0 of none.
 float robust_deviation(std::span<float> sizes);
 
-/// How corners have their normals where the mesh gives none: the mean over the faces at their vertex, or over
-/// those that no sharp edge parts from theirs.
+/// How corners have their normals where the mesh gives none: the mean over those faces at their vertex that no
+/// sharp edge parts from theirs, or over all.
 enum class CornerNormals { parted, smooth };
 
 /// The mesh with a corner of its own for each corner of each face, coloured by its unit normal after
