@@ -179,9 +179,10 @@ float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
 }
 
 /// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
-/// better.
+/// better. A mesh's own normals leave nothing to choose.
 void Fit::choose_normals(const LevelShape& shape) {
-  if (light_ != PoseLight::harmonics) return;
+  const bool are_given = !scene_.meshes.front().mesh.face_normals.empty();
+  if (light_ != PoseLight::harmonics || are_given) return;
   PoseLevel parted = make_level(shape, light_);
   make_robust(parted, hypotheses());
   const double loss = std::ranges::min(parted.losses(hypotheses()));
