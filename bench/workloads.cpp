@@ -175,10 +175,12 @@ std::vector<Variant> make_variants(const Definition& d, const Smoothing& publish
   }
   if (d.pixel_sigma > 0 && d.own && d.scenery == Scenery::plain) {
     const float half_a_pixel = 1.0F / static_cast<float>(d.size);  // NDC, of which sigma is the square
-    Smoothing smoothing;
-    smoothing.noise = Noise::triangle;
-    smoothing.sigma = half_a_pixel * half_a_pixel;
-    list.push_back({"sharp", smoothing});
+    for (const Composition composition : {Composition::barrier, Composition::joint}) {
+      Smoothing smoothing = smoothing_preset("gaussian");
+      smoothing.sigma = half_a_pixel * half_a_pixel;
+      smoothing.composition = composition;
+      list.push_back({"sharp", smoothing});
+    }
   }
   return list;
 }
