@@ -3,13 +3,19 @@
 // The order of additions is fixed.
 #include "shared_types.h"
 
-/// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each
-/// other.
-#define DPR_BLUR_BLOCK 4
-
 #ifndef DPR_LANES
 #define DPR_LANES 8 /* the device's width; the host chooses it */
 #endif
+
+/// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each
+/// other. Along rows, where they are vectors, they are fewer: the first and the last of a row, which read
+/// beyond its ends, are slow.
+#if DPR_LANES == 1
+#define DPR_BLUR_BLOCK 4
+#else
+#define DPR_BLUR_BLOCK 8
+#endif
+#define DPR_BLUR_ROW_BLOCK 4
 
 /// Neighbours of a row in one vector.
 #if DPR_LANES == 16
@@ -51,10 +57,10 @@ typedef struct {
 
 static inline int blur_padding(const BlurPass p) { return (DPR_BLUR_BLOCK - 1) * max(p.out_step, p.in_step); }
 
-static inline BlurTaps block_taps(const BlurPass p, int at) {
+static inline BlurTaps block_taps(const BlurPass p, int at, int block) {
   BlurTaps t;
   t.last = at * p.out_step + p.offset;
-  const int before = t.last - p.taps + 1, highest = t.last + (DPR_BLUR_BLOCK - 1) * p.out_step;
+  const int before = t.last - p.taps + 1, highest = t.last + (block - 1) * p.out_step;
   t.from = before > 0 ? (before + p.in_step - 1) / p.in_step : 0;
   t.to = highest < 0 ? 0 : min(highest / p.in_step + 1, (int)p.in_length);
   t.last += blur_padding(p);
@@ -80,7 +86,7 @@ static inline BlurPlace column_place(const BlurPass p, uint i) {
 }
 
 /// One work-item per (row, block of vectors of output pixels).
-#define DPR_BLUR_ROW (DPR_BLUR_BLOCK * DPR_BLUR_PIXELS)
+#define DPR_BLUR_ROW (DPR_BLUR_ROW_BLOCK * DPR_BLUR_PIXELS)
 static inline uint row_items_per_line(const BlurPass p) { return groups_of(p.out_length, DPR_BLUR_ROW); }
 static inline BlurPlace row_place(const BlurPass p, uint i) {
   const uint blocks = row_items_per_line(p), row = i / blocks;
@@ -93,24 +99,28 @@ static inline BlurPlace row_place(const BlurPass p, uint i) {
   return place;
 }
 
+/// The sums of a block of outputs. Loops over them are unrolled, so that they stay in registers.
+static inline void clear_sums(pixels_n* sums) {
+#pragma unroll
+  for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] = 0.0f;
+}
+
+/// Adds an input to them all, whose weights are `step` apart.
+static inline void add_to_sums(global const float* weights, int step, pixels_n value, pixels_n* sums) {
+#pragma unroll
+  for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] += weights[k * step] * value;
+}
+
 /// Sums of a block of rows. Lanes from the place's count on hold nothing of use, as do rows from its steps
 /// on.
 static inline void column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
                                global const float4* restrict in, pixels_n* sums) {
-  const BlurTaps t = block_taps(p, place.at);
-  pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
+  const BlurTaps t = block_taps(p, place.at, DPR_BLUR_BLOCK);
+  clear_sums(sums);
   for (int k = t.from; k < t.to; ++k) {
-    const pixels_n value = load_pixels(in + place.in + (size_t)k * p.width);
-    global const float* w = weights + (t.last - k * p.in_step);
-    sum0 += w[0] * value;
-    sum1 += w[p.out_step] * value;
-    sum2 += w[2 * p.out_step] * value;
-    sum3 += w[3 * p.out_step] * value;
+    add_to_sums(weights + (t.last - k * p.in_step), p.out_step,
+                load_pixels(in + place.in + (size_t)k * p.width), sums);
   }
-  sums[0] = sum0;
-  sums[1] = sum1;
-  sums[2] = sum2;
-  sums[3] = sum3;
 }
 
 /// Sums of DPR_BLUR_ROW pixels of a row, by blocks that share what they read. Those from the place's steps on
@@ -118,8 +128,8 @@ static inline void column_sums(const BlurPass p, const BlurPlace place, global c
 static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place,
                                      global const float* restrict weights, global const float4* restrict in,
                                      float4* sums) {
-  for (int first = 0; first < place.steps; first += DPR_BLUR_BLOCK) {
-    const BlurTaps t = block_taps(p, place.at + first);
+  for (int first = 0; first < place.steps; first += DPR_BLUR_ROW_BLOCK) {
+    const BlurTaps t = block_taps(p, place.at + first, DPR_BLUR_ROW_BLOCK);
     float4 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
     for (int k = t.from; k < t.to; ++k) {
       const float4 value = in[place.in + (size_t)k];
@@ -220,17 +230,11 @@ kernel void blur_rows_strided(const BlurPass p, global const float* restrict wei
   global const float4* lines[DPR_BLUR_PIXELS];
   for (uint lane = 0; lane < DPR_BLUR_PIXELS; ++lane)
     lines[lane] = in + (size_t)min(first + lane, p.lines - 1) * p.in_length;
-  const BlurTaps t = block_taps(p, (int)at);
-  pixels_n sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
-  for (int k = t.from; k < t.to; ++k) {
-    const pixels_n value = join_lines(lines, k);
-    global const float* w = weights + (t.last - k * p.in_step);
-    sum0 += w[0] * value;
-    sum1 += w[p.out_step] * value;
-    sum2 += w[2 * p.out_step] * value;
-    sum3 += w[3 * p.out_step] * value;
-  }
-  const pixels_n sums[DPR_BLUR_BLOCK] = {sum0, sum1, sum2, sum3};
+  const BlurTaps t = block_taps(p, (int)at, DPR_BLUR_BLOCK);
+  pixels_n sums[DPR_BLUR_BLOCK];
+  clear_sums(sums);
+  for (int k = t.from; k < t.to; ++k)
+    add_to_sums(weights + (t.last - k * p.in_step), p.out_step, join_lines(lines, k), sums);
   const uint steps = min(p.out_length - at, (uint)DPR_BLUR_BLOCK),
              count = min(p.lines - first, (uint)DPR_BLUR_PIXELS);
   for (uint step = 0; step < steps; ++step) {

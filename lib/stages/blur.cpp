@@ -6,17 +6,19 @@
 namespace dpr {
 namespace {
 
-/// As kernels/blur.cl has them: outputs of a work-item along its pass, pixels of a vector.
-constexpr std::size_t k_block = 4;
+/// As kernels/blur.cl has them: outputs of a work-item along its pass, in vectors along rows; pixels of a
+/// vector.
+std::size_t block_of(const Device::Impl& device) { return device.info.lanes == 1 ? 4 : 8; }
+constexpr std::size_t k_row_block = 4;
 std::size_t pixels_of_vector(const Device::Impl& device) {
   return std::max<std::size_t>(1, device.info.lanes / 4);
 }
 
 std::size_t groups(std::size_t items, std::size_t group) { return (items + group - 1) / group; }
 
-/// Zeros beyond the taps, for the block's other outputs; the steps are at most `step`.
-std::vector<float> padded(const std::vector<float>& weights, int step) {
-  const std::size_t padding = (k_block - 1) * static_cast<std::size_t>(step);
+/// Zeros beyond the taps, for the other outputs of a block; the steps are at most `step`.
+std::vector<float> padded(const std::vector<float>& weights, int step, std::size_t block) {
+  const std::size_t padding = (block - 1) * static_cast<std::size_t>(step);
   std::vector<float> result(weights.size() + 2 * padding);
   std::copy(weights.begin(), weights.end(), result.begin() + static_cast<std::ptrdiff_t>(padding));
   return result;
@@ -58,10 +60,12 @@ Blur::Blur(Device::Impl& device)
 Blur::Setting Blur::prepare(BlurKernel kernel) const {
   Setting setting;
   const int step = kernel.decimation > 1 ? 1 : kernel.supersampling;
-  setting.weights.upload(device_, padded(kernel.weights, step));
-  setting.weights_by_scale.upload(device_, padded(kernel.weights_by_scale, step));
-  setting.reduce.upload(device_, padded(kernel.reduce, kernel.decimation));
-  setting.expand.upload(device_, padded(kernel.expand, std::max(kernel.decimation, kernel.supersampling)));
+  const std::size_t block = block_of(device_);
+  setting.weights.upload(device_, padded(kernel.weights, step, block));
+  setting.weights_by_scale.upload(device_, padded(kernel.weights_by_scale, step, block));
+  setting.reduce.upload(device_, padded(kernel.reduce, kernel.decimation, block));
+  setting.expand.upload(device_,
+                        padded(kernel.expand, std::max(kernel.decimation, kernel.supersampling), block));
   setting.kernel = std::move(kernel);
   return setting;
 }
@@ -104,11 +108,11 @@ shared::BlurPass Blur::expansion(const Axis& axis) const {
 }
 
 std::size_t Blur::column_items(const Pass& pass, std::size_t width) const {
-  return groups(pass.out_length, k_block) * groups(width, pixels_of_vector(device_));
+  return groups(pass.out_length, block_of(device_)) * groups(width, pixels_of_vector(device_));
 }
 
 std::size_t Blur::row_items(const Pass& pass) const {
-  return groups(pass.out_length, k_block * pixels_of_vector(device_));
+  return groups(pass.out_length, k_row_block * pixels_of_vector(device_));
 }
 
 void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
@@ -126,7 +130,7 @@ void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, cons
   if (pass.in_step == 1 && pass.out_step == 1) {
     rows_(lines * row_items(pass), pass, weights, in, out);
   } else {
-    const std::size_t blocks = groups(pass.out_length, k_block);
+    const std::size_t blocks = groups(pass.out_length, block_of(device_));
     rows_strided_(groups(lines, pixels_of_vector(device_)) * blocks, pass, weights, in, out);
   }
 }
