@@ -176,11 +176,14 @@ static inline void row_sums(const BlurPass p, const BlurPlace place, global cons
   }
 }
 
-static inline float dot_pixels(const float4* a, global const float4* restrict b, int count) {
-  float sum = 0.0f;
-  for (int k = 0; k < count; ++k) sum += dot(a[k], b[k]);
+/// By channels.
+static inline float4 product_of_pixels(const float4* a, global const float4* restrict b, int count) {
+  float4 sum = 0.0f;
+  for (int k = 0; k < count; ++k) sum += a[k] * b[k];
   return sum;
 }
+
+static inline float sum_of_channels(float4 v) { return v.x + v.y + v.z + v.w; }
 
 /// Along columns. NDRange: one work-item per (image, block of output rows, vector of pixels).
 /// in   weights  float[tap], between zeros (BlurTaps)
@@ -258,13 +261,13 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
   const BlurPlace place = column_place(p, i);
   pixels_n sums[DPR_BLUR_BLOCK];
   column_sums(p, place, weights, in, sums);
-  float product = 0.0f;
+  float4 product = 0.0f;
   for (int row = 0; row < place.steps; ++row) {
     float4 lanes[DPR_BLUR_PIXELS];
     store_lanes(sums[row], lanes);
-    product += dot_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count);
+    product += product_of_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count);
   }
-  products[i / items * stride + first + i % items] = product;
+  products[i / items * stride + first + i % items] = sum_of_channels(product);
 }
 
 /// The same along rows, of which each image has `rows`: as blur_columns_scale, with the NDRange of blur_rows.
@@ -276,5 +279,6 @@ kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint firs
   const BlurPlace place = row_place(p, i);
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
-  products[i / items * stride + first + i % items] = dot_pixels(sums, grad + place.out, place.steps);
+  products[i / items * stride + first + i % items] =
+      sum_of_channels(product_of_pixels(sums, grad + place.out, place.steps));
 }
