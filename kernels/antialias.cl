@@ -3,24 +3,50 @@
 // contour, and its derivative by what is cut is the jump across it. What crosses, and how much it cuts,
 // antialias_cross.cl finds.
 //
-// Few steps are crossed: a work-item takes a row of a tile, and copies it where no contour is near.
+// Few steps are crossed: samples are blended where they lie, and only those near a contour are kept as they
+// were. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all of its rows.
 #include "steps.h"
 
-/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view; none below the
-/// raster.
+#ifndef DPR_LANES
+#define DPR_LANES 8 /* the device's width; the host chooses it */
+#endif
+
+/// Rows of a work-item.
+#if DPR_LANES == 1
+#define DPR_ROWS 1
+#else
+#define DPR_ROWS DPR_TILE
+#endif
+
+/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view.
 typedef struct {
-  uint tile, first, count;
+  uint first, count;
   uint2 at;
 } TileRow;
 
-static inline TileRow tile_row(const FrameParams p, uint i) {
-  TileRow r;
-  r.tile = i / DPR_TILE;
+/// The rows of a tile that are a work-item's: [first, last) of its view.
+typedef struct {
+  uint tile, view;
+  uint first_column, columns, first, last;
+} TileRows;
+
+/// None beyond the last tile.
+static inline TileRows tile_rows(const FrameParams p, uint item) {
+  const uint items = DPR_TILE / DPR_ROWS;
+  TileRows r;
+  r.tile = item / items;
+  r.view = r.tile / (p.tiles_x * p.tiles_y);
   const TileSamples s = tile_samples(p, r.tile);
-  const uint view = r.tile / (p.tiles_x * p.tiles_y);
-  r.at = (uint2)((uint)s.first_column, (uint)s.first_row + i % DPR_TILE);
-  r.first = (view * p.height + r.at.y) * p.width + r.at.x;
-  r.count = view < p.views && r.at.y < p.height ? (uint)(s.last_column - s.first_column) : 0;
+  r.first_column = (uint)s.first_column;
+  r.columns = (uint)(s.last_column - s.first_column);
+  r.first = (uint)s.first_row + item % items * DPR_ROWS;
+  r.last = r.view < p.views ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
+  return r;
+}
+
+static inline TileRow row_of(const FrameParams p, const TileRows rows, uint row) {
+  const TileRow r = {(rows.view * p.height + row) * p.width + rows.first_column, rows.columns,
+                     (uint2)(rows.first_column, row)};
   return r;
 }
 
@@ -29,15 +55,24 @@ static inline Sample sample_of(TileRow r, uint k) {
   return s;
 }
 
-static inline void copy_row(TileRow r, global const float4* restrict from, global float4* restrict to) {
-  if (r.count == DPR_TILE) {
-    global const float* first = (global const float*)(from + r.first);
-    const float16 low = vload16(0, first), high = vload16(1, first);
-    vstore16(low, 0, (global float*)(to + r.first));
-    vstore16(high, 1, (global float*)(to + r.first));
-    return;
+/// Keeps the samples near contours, or their gradients, which the blending changes. One work-item per row of
+/// a tile. in   tile_starts  uint[view * tile + 1]  runs of contours' pairs in   from         float4[pixel]
+/// out  kept         float4[pixel]  not written in tiles further than one from a contour
+kernel void antialias_keep(const FrameParams p, global const uint* restrict tile_starts,
+                           global const float4* restrict from, global float4* restrict kept) {
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
+  for (uint row = rows.first; row < rows.last; ++row) {
+    const TileRow r = row_of(p, rows, row);
+    if (r.count == DPR_TILE) {
+      global const float* first = (global const float*)(from + r.first);
+      const float16 low = vload16(0, first), high = vload16(1, first);
+      vstore16(low, 0, (global float*)(kept + r.first));
+      vstore16(high, 1, (global float*)(kept + r.first));
+      continue;
+    }
+    for (uint k = 0; k < r.count; ++k) kept[r.first + k] = from[r.first + k];
   }
-  for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
 /// Whether anything is at a step from a sample, or, with a reach of 2, at the next in the same direction.
@@ -103,26 +138,23 @@ static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
   return sum / fmax(total, 1.0f);
 }
 
-/// Blends the samples. One work-item per row of a tile. Deterministic.
-/// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
-/// in   winner, cut  as antialias_cross leaves them
-/// in   raster       float4[pixel]  the samples
-/// out  blended      float4[pixel]
+/// Blends the samples. One work-item per DPR_ROWS of a tile. Deterministic.
+/// in      tile_starts  as antialias_keep has it
+/// in      winner, cut  as antialias_cross leaves them
+/// in      raster       float4[pixel]  the samples, as antialias_keep has kept them
+/// in out  blended      float4[pixel]  the samples
 kernel void antialias_forward(const FrameParams p, global const uint* restrict tile_starts,
                               global const uint* restrict winner, global const float2* restrict cut,
                               global const float4* restrict raster, global float4* restrict blended) {
-  const TileRow r = tile_row(p, (uint)get_global_id(0));
-  if (r.count == 0) return;
-  if (!may_be_crossed(p, r.tile, tile_starts)) {
-    copy_row(r, raster, blended);
-    return;
-  }
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.first >= rows.last || !may_be_crossed(p, rows.tile, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const uint touched = touched_in_row(p, steps, r, 1);
-  for (uint k = 0; k < r.count; ++k) {
-    const Sample s = sample_of(r, k);
-    const float4 own = raster[s.index];
-    blended[s.index] = touched >> k & 1u ? own + added_to(p, steps, s, raster) : own;
+  for (uint row = rows.first; row < rows.last; ++row) {
+    const TileRow r = row_of(p, rows, row);
+    for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
+      const Sample s = sample_of(r, lowest_bit(touched));
+      blended[s.index] = raster[s.index] + added_to(p, steps, s, raster);
+    }
   }
 }
 
@@ -162,38 +194,43 @@ static inline float4 gradient_through(const FrameParams p, const Steps steps, Sa
   return (first.x - first.y) * grad[other.index] - second.y * grad[beyond.index];
 }
 
+/// Adds to a sample's gradient what it has given to others, less what others have of its colour. Writes the
+/// gradients of the cuts of its steps to the right and down.
+static inline void differentiate_sample(const FrameParams p, const Steps steps, Sample s,
+                                        global const float4* restrict raster,
+                                        global const float4* restrict grad_blended,
+                                        global float2* restrict grad_cut,
+                                        global float4* restrict grad_raster) {
+  const float total = total_taken(p, steps, s);
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    grad_raster[s.index] += gradient_through(p, steps, s, k, total, grad_blended);
+    if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
+    const Sample other = sample_beside(p, s, k);
+    grad_cut[place_of(p, steps, s, k)] =
+        gradient_at_end(p, steps, s, k, total, raster, grad_blended[s.index]) +
+        gradient_at_end(p, steps, other, DPR_OPPOSITE(k), total_taken(p, steps, other), raster,
+                        grad_blended[other.index]);
+  }
+}
+
 /// The gradients of the cuts, and those of the samples: what each has kept of its own colour, and given to
-/// others. One work-item per row of a tile; a step's cut is its first sample's to write. Deterministic.
+/// others. One work-item per DPR_ROWS of a tile; a step's cut is its first sample's to write. Deterministic.
 /// Inputs as antialias_forward, and
-/// in   grad_blended   float4[pixel]
-/// out  grad_cut       Cut[2][pixel]  not written where nothing crosses
-/// out  grad_raster    float4[pixel]
+/// in      grad_blended  float4[pixel]  kept as the samples are
+/// out     grad_cut      Cut[2][pixel]  not written where nothing crosses
+/// in out  grad_raster   float4[pixel]  the gradients of the blended samples
 kernel void antialias_backward(const FrameParams p, global const uint* restrict tile_starts,
                                global const uint* restrict winner, global const float2* restrict cut,
                                global const float4* restrict raster,
                                global const float4* restrict grad_blended, global float2* restrict grad_cut,
                                global float4* restrict grad_raster) {
-  const TileRow r = tile_row(p, (uint)get_global_id(0));
-  if (r.count == 0) return;
-  if (!is_near_contour(p, r.tile, 1, tile_starts)) {
-    copy_row(r, grad_blended, grad_raster);
-    return;
-  }
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const uint touched = touched_in_row(p, steps, r, 2);
-  for (uint i = 0; i < r.count; ++i) {
-    const Sample s = sample_of(r, i);
-    grad_raster[s.index] = grad_blended[s.index];
-    if (!(touched >> i & 1u)) continue;
-    const float total = total_taken(p, steps, s);
-    for (int k = 0; k < DPR_STEPS; ++k) {
-      grad_raster[s.index] += gradient_through(p, steps, s, k, total, grad_blended);
-      if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
-      const Sample other = sample_beside(p, s, k);
-      grad_cut[place_of(p, steps, s, k)] =
-          gradient_at_end(p, steps, s, k, total, raster, grad_blended[s.index]) +
-          gradient_at_end(p, steps, other, DPR_OPPOSITE(k), total_taken(p, steps, other), raster,
-                          grad_blended[other.index]);
-    }
+  for (uint row = rows.first; row < rows.last; ++row) {
+    const TileRow r = row_of(p, rows, row);
+    for (uint touched = touched_in_row(p, steps, r, 2); touched != 0; touched &= touched - 1)
+      differentiate_sample(p, steps, sample_of(r, lowest_bit(touched)), raster, grad_blended, grad_cut,
+                           grad_raster);
   }
 }

@@ -47,12 +47,15 @@ static inline float depth_on_line(const FrameParams p, const TileContour c, int 
 
 static inline void clear_steps(const FrameParams p, const TileSamples s, uint first_pixel,
                                global uint* restrict winner) {
-  const uint pixels = p.views * p.width * p.height;
+  const uint pixels = p.views * p.width * p.height, columns = (uint)(s.last_column - s.first_column);
   for (int row = s.first_row; row < s.last_row; ++row) {
-    for (int column = s.first_column; column < s.last_column; ++column) {
-      const uint pixel = first_pixel + (uint)row * p.width + (uint)column;
-      winner[pixel] = winner[pixels + pixel] = DPR_NO_CROSSING;
+    global uint* right = winner + first_pixel + (uint)row * p.width + (uint)s.first_column;
+    if (columns == DPR_TILE) {
+      vstore8((uint8)(DPR_NO_CROSSING), 0, right);
+      vstore8((uint8)(DPR_NO_CROSSING), 0, right + pixels);
+      continue;
     }
+    for (uint k = 0; k < columns; ++k) right[k] = right[pixels + k] = DPR_NO_CROSSING;
   }
 }
 

@@ -231,16 +231,19 @@ static inline void add_to_end(const FrameParams p, const Steps steps, uint tile,
 }
 
 /// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
+/// in      tile_starts      as antialias_cross has it: seconds are where contours are
 /// in      counts, seconds  as antialias_second_find leaves them
 /// in      winner, cut      as antialias_cross does
 /// in      raster           float4[pixel]    the samples
 /// in out  blended          float4[pixel]
-kernel void antialias_second_forward(const FrameParams p, global const uint* restrict counts,
+kernel void antialias_second_forward(const FrameParams p, global const uint* restrict tile_starts,
+                                     global const uint* restrict counts,
                                      global const SecondCrossing* restrict seconds,
                                      global const uint* restrict winner, global const float2* restrict cut,
                                      global const float4* restrict raster, global float4* restrict blended) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  if (!is_near_contour(p, tile, DPR_NEAR_TILES, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
   for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {
@@ -275,7 +278,8 @@ static inline void add_to_reference(const FrameParams p, const Steps steps, uint
 /// in out  grad_cut      Cut[2][pixel]
 /// in out  grad_raster   float4[pixel]
 /// out     grad_seconds  Cut[tile][DPR_SECOND_CROSSINGS]
-kernel void antialias_second_backward(const FrameParams p, global const uint* restrict counts,
+kernel void antialias_second_backward(const FrameParams p, global const uint* restrict tile_starts,
+                                      global const uint* restrict counts,
                                       global const SecondCrossing* restrict seconds,
                                       global const uint* restrict winner, global const float2* restrict cut,
                                       global const float4* restrict raster,
@@ -284,6 +288,7 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
                                       global float2* restrict grad_seconds) {
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * p.tiles_x * p.tiles_y) return;
+  if (!is_near_contour(p, tile, DPR_NEAR_TILES, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
   for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {

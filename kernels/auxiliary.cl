@@ -66,15 +66,15 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
 /// Auxiliary outputs as what noise on the pixel can blend and blur: times the sample's alpha, by which to
 /// divide after. One work-item per pixel. Deterministic.
 /// in   outputs   float[DPR_AUXILIARY_CHANNELS][pixel]
-/// in   image     float4[pixel]  whose w is alpha
+/// in   channels  as auxiliary_forward has them
 /// out  surface   float4[pixel]  depth and normal
 /// out  coverage  float4[pixel]  1 and the effective number of faces
 kernel void auxiliary_weigh(const FrameParams p, global const float* restrict outputs,
-                            global const float4* restrict image, global float4* restrict surface,
+                            global const float* restrict channels, global float4* restrict surface,
                             global float4* restrict coverage) {
   const uint pixel = (uint)get_global_id(0), pixels = p.views * p.width * p.height;
   if (pixel >= pixels) return;
-  const float alpha = image[pixel].w;
+  const float alpha = 1.0f - channels[DPR_CHANNEL_BACKGROUND * pixels + pixel];
   surface[pixel] = alpha * (float4)(outputs[DPR_AUXILIARY_DEPTH * pixels + pixel],
                                     outputs[DPR_AUXILIARY_NORMAL * pixels + pixel],
                                     outputs[(DPR_AUXILIARY_NORMAL + 1) * pixels + pixel],

@@ -5,8 +5,6 @@
 
 #include "geometry.h"
 
-static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
-
 static inline ulong whole_mask(uint2 mask) { return (ulong)mask.y << 32 | mask.x; }
 
 /// Lanes of truth as bits.

@@ -42,14 +42,34 @@ DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, globa
 
 #else
 
+/// The sum of eight counts.
+static inline uint sum_of_eight(uint8 v) {
+  const uint4 half_sums = add_sat(v.lo, v.hi);
+  const uint2 sums = add_sat(half_sums.lo, half_sums.hi);
+  return add_sat(sums.x, sums.y);
+}
+
+/// Exclusive prefix sums of eight counts, by doubling; `sum` is that of all before, and then of these too.
+static inline uint8 scan_eight(uint8 v, uint* sum) {
+  v = add_sat(v, (uint8)(0, v.s012, v.s3456));
+  v = add_sat(v, (uint8)(0, 0, v.s01, v.s2345));
+  v = add_sat(v, (uint8)(0, 0, 0, 0, v.s0123));
+  const uint8 before = add_sat((uint8)(0, v.s012, v.s3456), (uint8)(*sum));
+  *sum = add_sat(*sum, v.s7);
+  return before;
+}
+
 /// As above. One work-item per chunk.
 kernel void scan_sum(const uint count, global const uint* restrict values, global uint* restrict sums) {
   const uint chunk = (uint)get_global_id(0);
   const uint first = chunk * DPR_SCAN_CHUNK;
   if (first >= count) return;
   const uint last = min(count, first + DPR_SCAN_CHUNK);
-  uint sum = 0;
-  for (uint i = first; i < last; ++i) sum = add_sat(sum, values[i]);
+  uint8 eight = 0;
+  uint i = first;
+  for (; last - i >= 8; i += 8) eight = add_sat(eight, vload8(0, values + i));
+  uint sum = sum_of_eight(eight);
+  for (; i < last; ++i) sum = add_sat(sum, values[i]);
   sums[chunk] = sum;
 }
 
@@ -61,7 +81,9 @@ kernel void scan_apply(const uint count, const uint size, global const uint* res
   if (first >= count && chunk != 0) return;
   const uint last = min(count, first + size);
   uint sum = bases[chunk];
-  for (uint i = first; i < last; ++i) {
+  uint i = first;
+  for (; last - i >= 8; i += 8) vstore8(scan_eight(vload8(0, values + i), &sum), 0, offsets + i);
+  for (; i < last; ++i) {
     offsets[i] = sum;
     sum = add_sat(sum, values[i]);
   }

@@ -5,6 +5,9 @@
 #include "ownership.h"
 #include "shared_types.h"
 
+/// The place of the lowest bit that is set.
+static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
 /// Slack of the overlap test, NDC: what rounding can move a pixel centre across a blurred edge; and what it
 /// can besides, of the largest coordinate.
 #define DPR_BIN_SLACK 1e-5f

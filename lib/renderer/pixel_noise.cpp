@@ -37,13 +37,13 @@ float depth_reach(const Smoothing& smoothing) {
 PixelNoise::PixelNoise(Device::Impl& device)
     : contour(device), antialias(device), blur(device), device_(device) {}
 
-void PixelNoise::forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                          float reach) {
   antialias.cross(in, contour, reach);
-  antialias.forward(in.p, contour, raster, blended_);
+  antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;
   if (sampled) sampled->draw(size, in.p.first_view);
-  blur_forward(size, blended_, image);
+  blur_forward(size, raster, image);
   blur_holds_image_ = true;
 }
 
@@ -57,35 +57,35 @@ void PixelNoise::blur_forward(const Blur::Size& size, const Buffer<cl_float4>& b
   }
 }
 
-void PixelNoise::smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
+void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
                         Buffer<cl_float4>& pixels) {
-  antialias.forward(in.p, contour, samples, other_blended_);
-  blur_forward(size, other_blended_, pixels);
+  antialias.forward(in.p, contour, samples, other_kept_);
+  blur_forward(size, samples, pixels);
   blur_holds_image_ = false;
 }
 
-void PixelNoise::backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                           const BufferRef<cl_float4>& grad_image, bool by_scale) {
-  if (by_scale && !is_blended_) antialias.forward(in.p, contour, raster, blended_);
+  if (by_scale && !is_blended_) antialias.forward(in.p, contour, raster, kept_);
+  is_blended_ = is_blended_ || by_scale;
   if (sampled) {
-    sampled->backward(grad_image, grad_blended_);
-    if (by_scale) sampled->backward_scale(blended_, grad_image);
+    sampled->backward(grad_image, grad_raster_);
+    if (by_scale) sampled->backward_scale(raster, grad_image);
   } else {
-    blur.backward(size, grad_image, grad_blended_);
+    blur.backward(size, grad_image, grad_raster_);
   }
   if (by_scale && !sampled) {
-    if (!blur_holds_image_) blur.forward(size, blended_, image);
+    if (!blur_holds_image_) blur.forward(size, raster, image);
     blur_holds_image_ = true;
-    blur.backward_scale(size, blended_, grad_image);
+    blur.backward_scale(size, raster, grad_image);
   }
-  antialias.backward(in, contour, raster, grad_blended_, blended_);
-  is_blended_ = false;
+  antialias.backward(in, contour, kept_, grad_raster_);
 }
 
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
-         (edges ? edges->bytes() : 0) + image.capacity_bytes() + blended_.capacity_bytes() +
-         grad_blended_.capacity_bytes() + other_blended_.capacity_bytes();
+         (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.capacity_bytes() +
+         other_kept_.capacity_bytes() + grad_raster_.capacity_bytes();
 }
 
 }  // namespace dpr

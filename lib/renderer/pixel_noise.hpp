@@ -39,30 +39,33 @@ class PixelNoise {
   std::optional<Edges> edges;            // of the scene; made for its first frame
   BackFaces back_faces;                  // of the edges' meshes
 
-  /// From samples to the image, after the antialiasing's find_front() of all bands.
-  void forward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
+  /// From samples, which are blended in place, to the image; after the antialiasing's find_front() of all
+  /// bands.
+  void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
+  /// The raster holds samples as they were before forward(): bands have been rendered again.
+  void unblend() { is_blended_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale.
-  void backward(const ContourInputs& in, const Buffer<cl_float4>& raster, const Blur::Size& size,
+  void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                 const BufferRef<cl_float4>& grad_image, bool by_scale);
 
   /// Samples other than those of forward() the same way, to [view][height][width].
-  void smooth(const ContourInputs& in, const Buffer<cl_float4>& samples, const Blur::Size& size,
+  void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
               Buffer<cl_float4>& pixels);
 
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
   Buffer<cl_float4> image;  ///< [view][height][width] RGBA
   /// Of the samples, after backward().
-  const Buffer<cl_float4>& grad_raster() const { return blended_; }
+  const Buffer<cl_float4>& grad_raster() const { return grad_raster_; }
 
   std::size_t bytes() const;
 
  private:
   void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
 
-  Buffer<cl_float4> blended_;  // the samples; from backward() on their gradient, which comes where they go
-  Buffer<cl_float4> grad_blended_, other_blended_;
-  bool is_blended_ = false;        // blended_ holds samples
+  Buffer<cl_float4> kept_, other_kept_;  // samples near contours before they were blended
+  Buffer<cl_float4> grad_raster_;
+  bool is_blended_ = false;        // the raster is
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;
 };

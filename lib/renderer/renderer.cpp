@@ -236,7 +236,9 @@ void Renderer::Impl::shade_and_aggregate() {
   shade.forward(shade_inputs());
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
-  if (pixel_noise) pixel_noise->antialias.find_front(frame, rasterize);
+  if (!pixel_noise) return;
+  pixel_noise->antialias.find_front(frame, rasterize);
+  pixel_noise->unblend();
 }
 
 SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,

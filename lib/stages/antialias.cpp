@@ -9,6 +9,11 @@ std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.view
 
 std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
 
+/// As kernels/antialias.cl has them: a row of a tile on a GPU, all of its rows on a CPU.
+std::size_t row_items(const Device::Impl& device, const shared::FrameParams& p) {
+  return device.info.lanes == 1 ? tiles_of(p) * DPR_TILE : tiles_of(p);
+}
+
 shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
   shared::AntialiasParams a{};
   a.edges = static_cast<cl_uint>(edges_of_view(in));
@@ -24,6 +29,7 @@ Antialias::Antialias(Device::Impl& device)
       front_(device, "antialias_cross.cl", "antialias_front"),
       cross_(device, "antialias_cross.cl", "antialias_cross"),
       second_find_(device, "antialias_second.cl", "antialias_second_find"),
+      keep_(device, "antialias.cl", "antialias_keep"),
       forward_(device, "antialias.cl", "antialias_forward"),
       backward_(device, "antialias.cl", "antialias_backward"),
       second_forward_(device, "antialias_second.cl", "antialias_second_forward"),
@@ -52,32 +58,35 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
                contour.pair_contour, front, winner, crowded_, second_counts, seconds);
 }
 
-void Antialias::forward(const shared::FrameParams& p, const Contour& contour, const Buffer<cl_float4>& raster,
-                        Buffer<cl_float4>& blended) {
-  blended.resize(device_, samples_of(p));
-  forward_(tiles_of(p) * DPR_TILE, p, contour.tile_starts, winner, cut, raster, blended);
-  second_forward_(tiles_of(p), p, second_counts, seconds, winner, cut, raster, blended);
+void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
+                        Buffer<cl_float4>& kept) {
+  const std::size_t rows = row_items(device_, p);
+  kept.resize(device_, samples_of(p));
+  keep_(rows, p, contour.tile_starts, samples, kept);
+  forward_(rows, p, contour.tile_starts, winner, cut, kept, samples);
+  second_forward_(tiles_of(p), p, contour.tile_starts, second_counts, seconds, winner, cut, kept, samples);
 }
 
-void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
-                         const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster) {
-  const std::size_t samples = samples_of(in.p);
+void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
+                         Buffer<cl_float4>& grad) {
+  const std::size_t samples = samples_of(in.p), rows = row_items(device_, in.p);
   grad_cut_.resize(device_, 2 * samples);
   grad_seconds_.resize(device_, seconds.size());
-  grad_raster.resize(device_, samples);
+  kept_grad_.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
-  backward_(tiles_of(in.p) * DPR_TILE, in.p, contour.tile_starts, winner, cut, raster, grad_blended,
-            grad_cut_, grad_raster);
-  second_backward_(tiles_of(in.p), in.p, second_counts, seconds, winner, cut, raster, grad_blended, grad_cut_,
-                   grad_raster, grad_seconds_);
+  keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
+  backward_(rows, in.p, contour.tile_starts, winner, cut, kept, kept_grad_, grad_cut_, grad);
+  second_backward_(tiles_of(in.p), in.p, contour.tile_starts, second_counts, seconds, winner, cut, kept,
+                   kept_grad_, grad_cut_, grad, grad_seconds_);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
                   contour.pair_tile, winner, grad_cut_, second_counts, seconds, grad_seconds_, grad_ends);
 }
 
 std::size_t Antialias::bytes() const {
-  std::size_t bytes = winner.capacity_bytes() + crowded_.capacity_bytes() + second_counts.capacity_bytes() +
-                      seconds.capacity_bytes() + grad_ends.capacity_bytes() + front.capacity_bytes();
+  std::size_t bytes = kept_grad_.capacity_bytes() + winner.capacity_bytes() + crowded_.capacity_bytes() +
+                      second_counts.capacity_bytes() + seconds.capacity_bytes() + grad_ends.capacity_bytes() +
+                      front.capacity_bytes();
   for (const Buffer<cl_float2>* buffer : {&cut, &grad_cut_, &grad_seconds_})
     bytes += buffer->capacity_bytes();
   return bytes;

@@ -16,12 +16,13 @@ class Antialias {
   /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces `depth_reach`
   /// (normalised depth) behind the nearest count as seen.
   void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
-  /// Blends the samples of [view][height][width].
-  void forward(const shared::FrameParams& p, const Contour& contour, const Buffer<cl_float4>& raster,
-               Buffer<cl_float4>& blended);
-  /// From the gradients of the blended samples to those of the samples, and to `grad_ends`.
-  void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& raster,
-                const Buffer<cl_float4>& grad_blended, Buffer<cl_float4>& grad_raster);
+  /// Blends the samples of [view][height][width] in place; `kept` gets those near contours as they were.
+  void forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
+               Buffer<cl_float4>& kept);
+  /// From the gradients of the blended samples to those of the samples, in place, and to `grad_ends`. `kept`
+  /// as forward() leaves it.
+  void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
+                Buffer<cl_float4>& grad);
 
   Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is
   Buffer<cl_uint> winner;         ///< [2][view][height][width] what crosses the steps to the right, and down;
@@ -44,16 +45,17 @@ class Antialias {
          In<cl_uint>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
       second_find_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_float4>, Out<cl_float4>> keep_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>>
       forward_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
          Out<cl_float2>, Out<cl_float4>>
       backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>, In<cl_float2>,
-         In<cl_float4>, Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
+         In<cl_float2>, In<cl_float4>, Out<cl_float4>>
       second_forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>, In<cl_float2>,
-         In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
+         In<cl_float2>, In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
       second_backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uint>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
@@ -62,6 +64,7 @@ class Antialias {
   Buffer<cl_uint> crowded_;         // [tile] of four words
   Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
   Buffer<cl_float2> grad_seconds_;  // [tile][DPR_SECOND_CROSSINGS]
+  Buffer<cl_float4> kept_grad_;     // [view][height][width] near contours
 };
 
 }  // namespace dpr

@@ -29,7 +29,7 @@ void Auxiliary::weigh(const shared::FrameParams& p, const Aggregate& aggregate) 
   const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
   surface.resize(device_, pixels);
   coverage.resize(device_, pixels);
-  weigh_(pixels, p, outputs, aggregate.image, surface, coverage);
+  weigh_(pixels, p, outputs, aggregate.channels, surface, coverage);
 }
 
 void Auxiliary::finish(const shared::FrameParams& p, const Raster& raster,

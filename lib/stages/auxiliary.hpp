@@ -51,7 +51,7 @@ class Auxiliary {
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
          In<float>, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
       forward_;
-  Kernel<shared::FrameParams, In<float>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>> weigh_;
+  Kernel<shared::FrameParams, In<float>, In<float>, Out<cl_float4>, Out<cl_float4>> weigh_;
   Kernel<shared::FrameParams, cl_uint4, cl_uint, cl_uint, In<float>, In<cl_uint>, In<cl_float4>,
          In<cl_float4>, In<cl_uint>, In<cl_float2>, Out<cl_float4>, Out<cl_float4>, Out<cl_float2>,
          Out<cl_uint>>

@@ -4,10 +4,9 @@
 
 namespace dpr {
 
-std::size_t serial_elements(const Device::Impl& device) {
-  constexpr std::size_t k_of_a_cpu = 16384;  // 20 microseconds; a launch takes 5 to 10
-  constexpr std::size_t k_of_a_gpu = 256;    // whose work-items are slow by themselves
-  return device.info.lanes == 1 ? k_of_a_gpu : k_of_a_cpu;
+std::size_t scanned_at_once(const Device::Impl& device) {
+  constexpr std::size_t k_by_a_work_item = 65536;  // 20 microseconds; a launch takes 5 to 10
+  return device.info.lanes == 1 ? DPR_SCAN_CHUNK : k_by_a_work_item;
 }
 
 Scan::Scan(Device::Impl& device)
@@ -25,8 +24,7 @@ void Scan::operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uin
 void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
                       std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
-  const std::size_t at_once = device_.info.lanes == 1 ? DPR_SCAN_CHUNK : serial_elements(device_);
-  if (count <= at_once) {
+  if (count <= scanned_at_once(device_)) {
     apply_.in_groups(1, n, n, values, zero_, offsets);
     return;
   }

@@ -7,9 +7,8 @@
 
 namespace dpr {
 
-/// So many elements one work-item sorts, and one of a CPU scans, sooner than the many that share them can be
-/// launched.
-std::size_t serial_elements(const Device::Impl& device);
+/// So many counts are scanned by one launch, sooner than by the three of more.
+std::size_t scanned_at_once(const Device::Impl& device);
 
 class Scan {
  public:

@@ -3,6 +3,13 @@
 #include <utility>
 
 namespace dpr {
+
+std::size_t sorted_at_once(const Device::Impl& device) {
+  constexpr std::size_t k_of_a_cpu = 16384;  // 20 microseconds; a launch takes 5 to 10
+  constexpr std::size_t k_of_a_gpu = 256;    // whose work-items are slow by themselves
+  return device.info.lanes == 1 ? k_of_a_gpu : k_of_a_cpu;
+}
+
 Sort::Sort(Device::Impl& device)
     : device_(device),
       scan_(device),
@@ -21,7 +28,7 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     std::swap(keys, other_keys_);
     std::swap(values, other_values_);
   };
-  if (capacity > 0 && capacity + key_count <= serial_elements(device_)) {
+  if (capacity > 0 && capacity + key_count <= sorted_at_once(device_)) {
     serial_(1, last_key, count, keys, values, other_keys_, other_values_, starts);
     exchange();
     return;

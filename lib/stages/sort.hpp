@@ -6,6 +6,9 @@
 
 namespace dpr {
 
+/// So many elements one work-item sorts, sooner than the many that share them can be launched.
+std::size_t sorted_at_once(const Device::Impl& device);
+
 class Sort {
  public:
   explicit Sort(Device::Impl& device);

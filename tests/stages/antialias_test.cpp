@@ -53,18 +53,26 @@ Samples rigid_samples(const ContourFrame& frame, const Mesh& mesh) {
   return samples;
 }
 
+struct Blended {
+  std::vector<cl_float4> image;
+  Buffer<cl_float4> kept;  // the samples near contours
+};
+
 /// `unknown` is in the steps before they are looked at.
-std::vector<cl_float4> blend(ContourFrame& frame, const Samples& samples, cl_uint unknown = 0xdeadbeefU) {
+Blended blend_and_keep(ContourFrame& frame, const Samples& samples, cl_uint unknown = 0xdeadbeefU) {
   frame.contour.forward(frame.inputs());
   frame.antialias.front.upload(device_impl(), samples.front);
   test::poison(frame.antialias.winner, 2 * frame.samples(), unknown);
   frame.antialias.cross(frame.inputs(), frame.contour, 0.0F);
-  const Buffer<cl_float4> raster(device_impl(), samples.colors);
-  Buffer<cl_float4> blended;
-  test::poison(blended, frame.samples(),
+  Buffer<cl_float4> raster(device_impl(), samples.colors), kept;
+  test::poison(kept, frame.samples(),
                cl_float4{{test::k_poison, test::k_poison, test::k_poison, test::k_poison}});
-  frame.antialias.forward(frame.p, frame.contour, raster, blended);
-  return blended.download();
+  frame.antialias.forward(frame.p, frame.contour, raster, kept);
+  return {raster.download(), std::move(kept)};
+}
+
+std::vector<cl_float4> blend(ContourFrame& frame, const Samples& samples) {
+  return blend_and_keep(frame, samples).image;
 }
 
 bool has_same_bits(const std::vector<cl_float4>& a, const std::vector<cl_float4>& b) {
@@ -302,13 +310,12 @@ TEST_SUITE("unit") {
       const Mesh mesh = fan(circle(middle, random(0.02F, 0.3F), 5), 5);
       ContourFrame frame(mesh, 75, 60);
       const Samples samples = rigid_samples(frame, mesh);
-      const Buffer<cl_float4> raster(device_impl(), samples.colors),
-          grad_blended(device_impl(), smooth_values(frame, 1));
       const auto passes = [&](cl_uint unknown) {
-        std::vector<std::vector<cl_float4>> results{blend(frame, samples, unknown)};
-        Buffer<cl_float4> grad_raster;
-        frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
-        results.push_back(grad_raster.download());
+        const Blended blended = blend_and_keep(frame, samples, unknown);
+        std::vector<std::vector<cl_float4>> results{blended.image};
+        Buffer<cl_float4> grad(device_impl(), smooth_values(frame, 1));
+        frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad);
+        results.push_back(grad.download());
         results.push_back(frame.antialias.grad_ends.download());
         return results;
       };
@@ -335,13 +342,13 @@ TEST_SUITE("gradient") {
     ContourFrame frame(mesh, size, size - 5);
     Samples samples = rigid_samples(frame, mesh);
     samples.colors = smooth_values(frame, 0);
-    const std::vector<cl_float4> image = blend(frame, samples), grad = smooth_values(frame, 1);
-    const Buffer<cl_float4> raster(device_impl(), samples.colors), grad_blended(device_impl(), grad);
-    Buffer<cl_float4> grad_raster;
-    test::poison(grad_raster, frame.samples(), cl_float4{{test::k_poison, 0, 0, 0}});
-    frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
-    CHECK(dot(grad, image) == doctest::Approx(dot(grad_raster.download(), samples.colors)).epsilon(1e-5));
-    CHECK(dot(grad, image) != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-5));
+    const Blended blended = blend_and_keep(frame, samples);
+    const std::vector<cl_float4> grad = smooth_values(frame, 1);
+    Buffer<cl_float4> grad_raster(device_impl(), grad);
+    frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad_raster);
+    const double sum = dot(grad, blended.image);
+    CHECK(sum == doctest::Approx(dot(grad_raster.download(), samples.colors)).epsilon(1e-5));
+    CHECK(sum != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-5));
   }
 
   TEST_CASE("antialias: ends of edges against differences, of colours that vary") {
@@ -350,11 +357,10 @@ TEST_SUITE("gradient") {
     ContourFrame frame(mesh, size, size - 5);
     const Samples samples = rigid_samples(frame, mesh);
     const std::vector<cl_float4> grad = smooth_values(frame, 1);
-    static_cast<void>(blend(frame, samples));
-    const Buffer<cl_float4> raster(device_impl(), samples.colors), grad_blended(device_impl(), grad);
-    Buffer<cl_float4> grad_raster, grad_ndc, no_clip;
+    const Blended blended = blend_and_keep(frame, samples);
+    Buffer<cl_float4> grad_raster(device_impl(), grad), grad_ndc, no_clip;
     test::poison(grad_ndc, mesh.positions.size(), cl_float4{});
-    frame.antialias.backward(frame.inputs(), frame.contour, raster, grad_blended, grad_raster);
+    frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad_raster);
     frame.contour.gather(frame.inputs(), frame.antialias.grad_ends, grad_ndc, no_clip);
     const std::vector<cl_float4> found = grad_ndc.download();
     const float step = 1e-4F;

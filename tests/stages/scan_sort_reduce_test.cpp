@@ -56,7 +56,7 @@ std::vector<cl_uint> serial_scan(const std::vector<cl_uint>& values) {
 
 /// Around a chunk of 1024, its square, what one work-item takes, and more; under a simulator few of them.
 std::vector<std::size_t> sizes() {
-  const std::size_t serial = dpr::serial_elements(device_impl());
+  const std::size_t serial = dpr::scanned_at_once(device_impl());
   if (dpr::test::is_reduced()) return {0, 1, 1025, serial + 1};
   return {0, 1, 2, 63, 256, 1023, 1024, 1025, 2047, serial, serial + 1, 1U << 20, (1U << 20) + 1, 5000000};
 }
@@ -205,7 +205,7 @@ TEST_SUITE("unit") {
   TEST_CASE("sort: one work-item sorts as many do") {
     const auto count = static_cast<std::size_t>(reduced(3000, 40));
     const std::vector<cl_uint> keys = random_values(count, 500, 7);
-    const Sorted serial = sort(keys, 500), parallel = sort(keys, 500, dpr::serial_elements(device_impl()));
+    const Sorted serial = sort(keys, 500), parallel = sort(keys, 500, dpr::sorted_at_once(device_impl()));
     CHECK(serial.keys == parallel.keys);
     CHECK(serial.values == parallel.values);
     CHECK(serial.starts == parallel.starts);
