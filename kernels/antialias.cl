@@ -6,43 +6,13 @@
 // Few steps are crossed: samples are blended where they lie, and only those near a contour are kept as they
 // were. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all of its rows.
 #include "steps.h"
-
-#ifndef DPR_LANES
-#define DPR_LANES 8 /* the device's width; the host chooses it */
-#endif
-
-/// Rows of a work-item.
-#if DPR_LANES == 1
-#define DPR_ROWS 1
-#else
-#define DPR_ROWS DPR_TILE
-#endif
+#include "tile_rows.h"
 
 /// A row of a tile: `count` samples from `first` on, at column and row `at` of its view.
 typedef struct {
   uint first, count;
   uint2 at;
 } TileRow;
-
-/// The rows of a tile that are a work-item's: [first, last) of its view.
-typedef struct {
-  uint tile, view;
-  uint first_column, columns, first, last;
-} TileRows;
-
-/// None beyond the last tile.
-static inline TileRows tile_rows(const FrameParams p, uint item) {
-  const uint items = DPR_TILE / DPR_ROWS;
-  TileRows r;
-  r.tile = item / items;
-  r.view = r.tile / (p.tiles_x * p.tiles_y);
-  const TileSamples s = tile_samples(p, r.tile);
-  r.first_column = (uint)s.first_column;
-  r.columns = (uint)(s.last_column - s.first_column);
-  r.first = (uint)s.first_row + item % items * DPR_ROWS;
-  r.last = r.view < p.views ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
-  return r;
-}
 
 static inline TileRow row_of(const FrameParams p, const TileRows rows, uint row) {
   const TileRow r = {(rows.view * p.height + row) * p.width + rows.first_column, rows.columns,

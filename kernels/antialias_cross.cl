@@ -15,22 +15,30 @@
 // the contour on that side alone has a contour of its own in the same step, which is nearer.
 //
 // What crosses a step that another contour wins is left to antialias_second.cl.
+#include "tile_rows.h"
 #include "visibility.h"
 
-/// The depth of the front-most fragment of every sample, INFINITY where there is none. One work-item per
-/// pixel, up to `last_pixel`. Deterministic.
-/// in   starts  uint[pixel + 1]  runs of `list`
-/// in   list    uint[...]        fragments, by pixel
-/// in   depth   float[fragment]  view depth
-/// out  front   float[pixel]
-kernel void antialias_front(const uint last_pixel, global const uint* restrict starts,
+/// The depth of the front-most fragment of samples near contours, INFINITY where there is none. One work-item
+/// per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), last_tile). Deterministic.
+/// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
+/// in   starts       uint[pixel + 1]        runs of `list`
+/// in   list         uint[...]              fragments, by pixel
+/// in   depth        float[fragment]        view depth
+/// out  front        float[pixel]           not written in tiles further than one from a contour
+kernel void antialias_front(const FrameParams p, const uint last_tile,
+                            global const uint* restrict tile_starts, global const uint* restrict starts,
                             global const uint* restrict list, global const float* restrict depth,
                             global float* restrict front) {
-  const uint pixel = (uint)get_global_id(0);
-  if (pixel >= last_pixel) return;
-  float nearest = INFINITY;
-  for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) nearest = fmin(nearest, depth[list[i]]);
-  front[pixel] = nearest;
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.tile >= last_tile || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
+  for (uint row = rows.first; row < rows.last; ++row) {
+    const uint first = (rows.view * p.height + row) * p.width + rows.first_column;
+    for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
+      float nearest = INFINITY;
+      for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) nearest = fmin(nearest, depth[list[i]]);
+      front[pixel] = nearest;
+    }
+  }
 }
 
 /// Whether a contour goes before the one that a step has.

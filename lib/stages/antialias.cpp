@@ -9,10 +9,8 @@ std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.view
 
 std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
 
-/// As kernels/antialias.cl has them: a row of a tile on a GPU, all of its rows on a CPU.
-std::size_t row_items(const Device::Impl& device, const shared::FrameParams& p) {
-  return device.info.lanes == 1 ? tiles_of(p) * DPR_TILE : tiles_of(p);
-}
+/// Work-items of a tile, as kernels/tile_rows.h has them.
+std::size_t row_items(const Device::Impl& device) { return device.info.lanes == 1 ? DPR_TILE : 1; }
 
 shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
   shared::AntialiasParams a{};
@@ -36,11 +34,12 @@ Antialias::Antialias(Device::Impl& device)
       second_backward_(device, "antialias_second.cl", "antialias_second_backward"),
       cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
 
-void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize) {
+void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour) {
   front.resize(device_, samples_of(p));
-  for (const Range& run : rasterize.pixels(p)) {
-    front_(run, run.last(), rasterize.pixel_starts, rasterize.list, rasterize.depth, front);
-  }
+  const Range tiles = rasterize.tiles(p);
+  const std::size_t rows = row_items(device_);
+  front_(Range{tiles.first * rows, tiles.count * rows}, p, to_uint(tiles.last()), contour.tile_starts,
+         rasterize.pixel_starts, rasterize.list, rasterize.depth, front);
 }
 
 void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
@@ -60,7 +59,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
 
 void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
                         Buffer<cl_float4>& kept) {
-  const std::size_t rows = row_items(device_, p);
+  const std::size_t rows = tiles_of(p) * row_items(device_);
   kept.resize(device_, samples_of(p));
   keep_(rows, p, contour.tile_starts, samples, kept);
   forward_(rows, p, contour.tile_starts, winner, cut, kept, samples);
@@ -69,7 +68,7 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
                          Buffer<cl_float4>& grad) {
-  const std::size_t samples = samples_of(in.p), rows = row_items(device_, in.p);
+  const std::size_t samples = samples_of(in.p), rows = tiles_of(in.p) * row_items(device_);
   grad_cut_.resize(device_, 2 * samples);
   grad_seconds_.resize(device_, seconds.size());
   kept_grad_.resize(device_, samples);

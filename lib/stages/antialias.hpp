@@ -11,8 +11,8 @@ class Antialias {
  public:
   explicit Antialias(Device::Impl& device);
 
-  /// The front-most depths of the samples of the rasterizer's band.
-  void find_front(const shared::FrameParams& p, const Rasterize& rasterize);
+  /// The front-most depths of the samples near contours of the rasterizer's band.
+  void find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour);
   /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces `depth_reach`
   /// (normalised depth) behind the nearest count as seen.
   void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
@@ -24,7 +24,8 @@ class Antialias {
   void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
                 Buffer<cl_float4>& grad);
 
-  Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is
+  Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is; only near
+                                  ///< contours
   Buffer<cl_uint> winner;         ///< [2][view][height][width] what crosses the steps to the right, and down;
                                   ///< only near contours
   Buffer<cl_float2> cut;          ///< [2][view][height][width] what it cuts: Cut of kernels/crossing.h
@@ -36,7 +37,7 @@ class Antialias {
 
  private:
   Device::Impl& device_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
+  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
          In<cl_uint>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          Out<cl_uint>, Out<cl_float2>, Out<cl_uint>>

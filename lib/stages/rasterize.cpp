@@ -160,6 +160,10 @@ std::vector<Range> Rasterize::pixels(const shared::FrameParams& p) const {
   return rows;
 }
 
+Range Rasterize::tiles(const shared::FrameParams& p) const {
+  return band ? band->tiles : Range(tiles_of(p));
+}
+
 /// The runs of a band, counted from its first element.
 void Rasterize::rebase(const Band& next) {
   if (!in_bands_) {

@@ -101,6 +101,7 @@ class Rasterize {
   /// What the stages behind this one work on: the band, or everything where none was cut.
   Range pairs(const Bin& bin) const { return band ? band->pairs : Range(bin.pairs); }
   std::vector<Range> pixels(const shared::FrameParams& p) const;
+  Range tiles(const shared::FrameParams& p) const;
 
   PairGroups pair_groups(const Bin& bin) const { return PairGroups(device_, pairs(bin)); }
 

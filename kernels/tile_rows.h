@@ -1,0 +1,39 @@
+// Work on the rows of tiles: one of them is a GPU's work-item's, all of a tile's a CPU's, whose lanes are a
+// row's samples.
+#ifndef DPR_TILE_ROWS_H
+#define DPR_TILE_ROWS_H
+
+#include "contour.h"
+
+#ifndef DPR_LANES
+#define DPR_LANES 8 /* the device's width; the host chooses it */
+#endif
+
+/// Rows of a work-item.
+#if DPR_LANES == 1
+#define DPR_ROWS 1
+#else
+#define DPR_ROWS DPR_TILE
+#endif
+
+/// The rows of a tile that are a work-item's: [first, last) of its view.
+typedef struct {
+  uint tile, view;
+  uint first_column, columns, first, last;
+} TileRows;
+
+/// None beyond the last tile.
+static inline TileRows tile_rows(const FrameParams p, uint item) {
+  const uint items = DPR_TILE / DPR_ROWS;
+  TileRows r;
+  r.tile = item / items;
+  r.view = r.tile / (p.tiles_x * p.tiles_y);
+  const TileSamples s = tile_samples(p, r.tile);
+  r.first_column = (uint)s.first_column;
+  r.columns = (uint)(s.last_column - s.first_column);
+  r.first = (uint)s.first_row + item % items * DPR_ROWS;
+  r.last = r.view < p.views ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
+  return r;
+}
+
+#endif
