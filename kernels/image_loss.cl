@@ -3,6 +3,17 @@
 // between.
 #include "image_losses.h"
 
+#ifndef DPR_LANES
+#define DPR_LANES 8 /* the device's width; the host chooses it */
+#endif
+
+/// Pixels of a work-item, one after the other: what they have in common is read once.
+#if DPR_LANES == 1
+#define DPR_PIXEL_RUN 1
+#else
+#define DPR_PIXEL_RUN 16
+#endif
+
 static inline LossPixel make_pixel(float4 image, float4 target, float inverse_scale_squared) {
   LossPixel p;
   p.image = image;
@@ -14,7 +25,7 @@ static inline LossPixel make_pixel(float4 image, float4 target, float inverse_sc
 /// Whether a loss is one of the `used`; their sums lie one behind the other, in the order of the losses.
 #define DPR_IS_USED(used, name) (((used) >> name##_number & 1u) != 0)
 
-/// What every pixel adds to the sums of its view. One work-item per pixel.
+/// What every pixel adds to the sums of its view. One work-item per run of pixels.
 /// in   pixels         of all views
 /// in   used           bit k: loss k counts
 /// in   inverse_scale_squared  of the robust loss
@@ -24,21 +35,43 @@ static inline LossPixel make_pixel(float4 image, float4 target, float inverse_sc
 kernel void image_loss_forward(const uint pixels, const uint used, const float inverse_scale_squared,
                                global const float4* restrict image, global const float4* restrict target,
                                global const float* restrict mask, global float* restrict channels) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= pixels) return;
-  const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
-  const float weight = mask[i];
-  uint place = i;
+  const uint first = (uint)get_global_id(0) * DPR_PIXEL_RUN, last = min(first + DPR_PIXEL_RUN, pixels);
+  for (uint i = first; i < last; ++i) {
+    const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
+    const float weight = mask[i];
+    uint place = i;
 #define DPR_ADD_PIXEL(name)                                                                     \
   if (DPR_IS_USED(used, name)) {                                                                \
     float sums[name##_sums];                                                                    \
     name##_add(pixel, sums);                                                                    \
     for (uint k = 0; k < name##_sums; ++k, place += pixels) channels[place] = weight * sums[k]; \
   }
-  DPR_IMAGE_LOSSES(DPR_ADD_PIXEL)
+    DPR_IMAGE_LOSSES(DPR_ADD_PIXEL)
+  }
 }
 
-/// d loss / d image of the mean over the views and levels. One work-item per pixel.
+/// What the gradients of a view's pixels have in common.
+typedef struct {
+  global const float *sums, *weights;
+  uint views;
+  float of_colors, of_alpha;  // what they are scaled by, but for the mask
+} ViewGradient;
+
+static inline float4 pixel_gradient(const ViewGradient v, const uint used, const LossPixel pixel) {
+  uint place = 0;
+  float4 grad = 0.0f;
+#define DPR_ADD_GRADIENT(name)                                                                               \
+  if (DPR_IS_USED(used, name)) {                                                                             \
+    float of_view[name##_sums];                                                                              \
+    for (uint k = 0; k < name##_sums; ++k, place += v.views) of_view[k] = v.sums[place];                     \
+    if (v.weights[name##_number] != 0.0f) grad += name##_gradient(v.weights[name##_number], pixel, of_view); \
+  }
+  DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
+  return (float4)(v.of_colors * grad.xyz, v.of_alpha * grad.w);
+}
+
+/// d loss / d image of the mean over the views and levels. One work-item per run
+/// of pixels.
 /// in   views, pixels_per_view
 /// in   images         that the mean is over: levels times views, which may be more than these
 /// in   used, inverse_scale_squared, image, target, mask  as image_loss_forward
@@ -52,22 +85,18 @@ kernel void image_loss_backward(const uint views, const uint pixels_per_view, co
                                 global const float* restrict mask, global const float* restrict sums,
                                 global const float* restrict weights, global const float* restrict channels,
                                 global float4* restrict grad_image) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= views * pixels_per_view) return;
-  const uint view = i / pixels_per_view;
-  const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
-  global const float* weight = weights + view * DPR_LOSS_COUNT;
-  uint place = view;
-  float4 grad = 0.0f;
-#define DPR_ADD_GRADIENT(name)                                                                         \
-  if (DPR_IS_USED(used, name)) {                                                                       \
-    float of_view[name##_sums];                                                                        \
-    for (uint k = 0; k < name##_sums; ++k, place += views) of_view[k] = sums[place];                   \
-    if (weight[name##_number] != 0.0f) grad += name##_gradient(weight[name##_number], pixel, of_view); \
+  const uint first = (uint)get_global_id(0) * DPR_PIXEL_RUN,
+             last = min(first + DPR_PIXEL_RUN, views * pixels_per_view);
+  for (uint i = first; i < last;) {
+    const uint view = i / pixels_per_view, end = min(last, (view + 1) * pixels_per_view);
+    const float of_alpha = 1.0f / (float)images;
+    const ViewGradient v = {sums + view, weights + view * DPR_LOSS_COUNT, views, of_alpha / channels[view],
+                            of_alpha};
+    for (; i < end; ++i) {
+      const LossPixel pixel = make_pixel(image[i], target[i], inverse_scale_squared);
+      grad_image[i] = mask[i] * pixel_gradient(v, used, pixel);
+    }
   }
-  DPR_IMAGE_LOSSES(DPR_ADD_GRADIENT)
-  const float mean = 1.0f / channels[view];
-  grad_image[i] = (float4)(mean * grad.xyz, grad.w) * (mask[i] / (float)images);
 }
 
 /// A level of a pyramid from the one before: means of blocks of 2x2 pixels, at the border of those that are

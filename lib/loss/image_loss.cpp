@@ -62,6 +62,9 @@ void check_masks(std::span<const Image> masks, std::span<const Image> targets) {
   for (const Image& mask : masks) require_mask(mask, targets[0], "mask (loss)");
 }
 
+/// Pixels of a work-item, as kernels/image_loss.cl has them.
+std::size_t pixel_run(const Device::Impl& device) { return device.info.lanes == 1 ? 1 : 16; }
+
 /// The next level of a pyramid, as image_loss_shrink makes it.
 Image shrink(const Image& large) {
   Image small((large.width + 1) / 2, (large.height + 1) / 2);
@@ -314,12 +317,13 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
       continue;
     }
     const Buffer<cl_float4>& image = l == 0 ? full : level.image;
-    forward(pixels, static_cast<cl_uint>(pixels), used, inverse_scale_squared, image, level.target,
-            level.mask, level.per_pixel);
+    const std::size_t run = pixel_run(device.impl()), runs = (pixels + run - 1) / run;
+    forward(runs, static_cast<cl_uint>(pixels), used, inverse_scale_squared, image, level.target, level.mask,
+            level.per_pixel);
     if (ssim)
       ssim->forward(windowed(level, image), sums_before(shared::ssim_number) * pixels, level.per_pixel);
     reduce({pixels, sums_before(k_losses.size()), views, 1, level.view_starts, level.per_pixel}, level.sums);
-    backward(pixels, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
+    backward(runs, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
              static_cast<cl_uint>(views_of_mean * levels.size()), used, inverse_scale_squared, image,
              level.target, level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
     if (ssim) ssim->backward(windowed(level, image), ssim_weights, level.grad_image);
