@@ -189,29 +189,32 @@ static inline realn outline_distance2(const View3 v, int left_out) {
   return least;
 }
 
+/// Negative at the samples whose barycentrics are those of the second triangle: on its side of the diagonal.
+/// A sliver has no barycentrics, and the other triangle reaches where it would.
+static inline realn side_of_diagonal(const ClippedTriangles t, const Edge diagonal) {
+  if (!t.has_second) return 1.0f;
+  const realn side = diagonal.side * t.triangle[0].orientation;
+  return is_sliver(t.triangle[0]) ? (realn)(-1.0f) : is_sliver(t.triangle[1]) ? (realn)(1.0f) : side;
+}
+
 /// A clipped face seen from samples.
 typedef struct {
   View3 first, second;
   realn distance2;     // to the outline
   intn nearer_second;  // by an edge of the second triangle
-  intn in_second;      // whose barycentrics count: on its side of the diagonal
 } ViewedClip;
 
 static inline ViewedClip view_clipped(const ClippedTriangles t, realn x, realn y) {
   ViewedClip v;
   v.first = v.second = view_triangle(t.triangle[0], x, y);
   v.distance2 = triangle_distance2(v.first);
-  v.nearer_second = v.in_second = 0;
+  v.nearer_second = 0;
   if (!t.has_second) return v;
   v.second = view_triangle(t.triangle[1], x, y);
   const realn to_first = outline_distance2(v.first, DPR_FIRST_DIAGONAL);
   const realn to_second = outline_distance2(v.second, DPR_SECOND_DIAGONAL);
   v.nearer_second = to_second < to_first;
   v.distance2 = lesser(to_first, to_second);
-  // A sliver has no barycentrics, and the other triangle reaches where it would.
-  const realn side = v.first.edge[DPR_FIRST_DIAGONAL].side * t.triangle[0].orientation;
-  const realn decisive = is_sliver(t.triangle[0]) ? -1.0f : is_sliver(t.triangle[1]) ? 1.0f : side;
-  v.in_second = decisive < 0.0f;
   return v;
 }
 
@@ -240,18 +243,18 @@ static inline OutlineWeights weights_of(const ClippedFace c) {
 }
 
 /// The clipped barycentrics of a sample in its triangle, by the outline's corners.
-static inline void outline_barycentrics(const ViewedClip v, const BarycentricScale first,
+static inline void outline_barycentrics(const ViewedClip v, intn in_second, const BarycentricScale first,
                                         const BarycentricScale second, realn u[4]) {
   realn n[3], m[3];
   raw_barycentrics(v.first, first, n);
   raw_barycentrics(v.second, second, m);
-  const realn in_first = inverse_of_clipped(n), in_second = inverse_of_clipped(m);
-  const realn n1 = greater(n[1], 0.0f) * in_first, n2 = greater(n[2], 0.0f) * in_first;
-  const realn m1 = greater(m[1], 0.0f) * in_second, m2 = greater(m[2], 0.0f) * in_second;
-  u[0] = choose(v.in_second, 1.0f - m1 - m2, 1.0f - n1 - n2);
-  u[1] = choose(v.in_second, (realn)(0.0f), n1);
-  u[2] = choose(v.in_second, m1, n2);
-  u[3] = choose(v.in_second, m2, (realn)(0.0f));
+  const realn of_first = inverse_of_clipped(n), of_second = inverse_of_clipped(m);
+  const realn n1 = greater(n[1], 0.0f) * of_first, n2 = greater(n[2], 0.0f) * of_first;
+  const realn m1 = greater(m[1], 0.0f) * of_second, m2 = greater(m[2], 0.0f) * of_second;
+  u[0] = choose(in_second, 1.0f - m1 - m2, 1.0f - n1 - n2);
+  u[1] = choose(in_second, (realn)(0.0f), n1);
+  u[2] = choose(in_second, m1, n2);
+  u[3] = choose(in_second, m2, (realn)(0.0f));
 }
 
 /// Distances, depths and barycentrics of the fragments of clipped faces. One work-item per pair, up to
@@ -288,7 +291,8 @@ kernel void clip_fragments(const FrameParams p, const uint last_pair,
       store_run(with_sign(p, v.distance2, inside), i, last, distance);
     }
     realn u[4], b1 = 0.0f, b2 = 0.0f, d = z[0];
-    outline_barycentrics(v, first, second, u);
+    const intn in_second = side_of_diagonal(t, v.first.edge[DPR_FIRST_DIAGONAL]) < 0.0f;
+    outline_barycentrics(v, in_second, first, second, u);
     for (int k = 0; k < 4; ++k) {
       b1 += w.of[k][1] * u[k];
       b2 += w.of[k][2] * u[k];
@@ -331,6 +335,82 @@ static inline void store_corners(const FrameParams p, global const ViewParams* v
   }
 }
 
+/// A pair's fragments, [first, last).
+typedef struct {
+  uint first, last;
+  global const uint* pixels;
+} ClippedRun;
+
+/// The samples of the vector of fragments at `i`.
+static inline void load_samples(const FrameParams p, const ClippedRun run, intn in_run, uint i, realn* x,
+                                realn* y) {
+  const uintn packed = load_pixels(in_run, i, run.pixels);
+  *x = pixel_x(p, convert_realn(packed & 0xffffu));
+  *y = pixel_y(p, convert_realn(packed >> 16));
+}
+
+/// Adds what comes by the distance to the outline.
+static inline void add_outline_distances(const FrameParams p, const ClippedTriangles t, const ClippedRun run,
+                                         global const float* distance, global const float* grad_distance,
+                                         CornerGradients g[2]) {
+  const realn zero = 0.0f;
+  for (uint i = run.first; i < run.last; i += DPR_WIDTH) {
+    const intn in_run = lanes_before(run.last, i);
+    realn x, y;
+    load_samples(p, run, in_run, i, &x, &y);
+    const ViewedClip v = view_clipped(t, x, y);
+    const intn inside = as_intn(load_run(in_run, i, distance)) >= 0;
+    const realn grad = load_run(in_run, i, grad_distance);
+    add_distance_gradient(v.first, t.has_second ? DPR_FIRST_DIAGONAL : DPR_NO_EDGE, inside, p.euclidean,
+                          choose(v.nearer_second, zero, grad), &g[0]);
+    add_distance_gradient(v.second, DPR_SECOND_DIAGONAL, inside, p.euclidean,
+                          choose(v.nearer_second, grad, zero), &g[1]);
+  }
+}
+
+/// What a cut's part changes by barycentrics with these gradients.
+static inline realn between_corners(const ClippedFace c, uint cut, realn grad_bary1, realn grad_bary2) {
+  const uint lost = lost_corner(c, cut), kept = kept_corner(c, cut);
+  const realn zero = 0.0f;
+  const realn of_lost = lost == 0 ? zero : lost == 1 ? grad_bary1 : grad_bary2;
+  const realn of_kept = kept == 0 ? zero : kept == 1 ? grad_bary1 : grad_bary2;
+  return of_lost - of_kept;
+}
+
+/// Adds what comes by depths and barycentrics of the samples in one of the triangles: in the first, of
+/// corners 0, 1 and 2 of the outline, or the second, of 0, 2 and 3.
+static inline void add_outline_barycentrics(const FrameParams p, const ClippedFace c,
+                                            const ClippedTriangles t, int is_second, const ClippedRun run,
+                                            global const float* grad_depth, global const float* grad_bary1,
+                                            global const float* grad_bary2, CornerGradients* g,
+                                            realn part[2]) {
+  const Triangle triangle = t.triangle[is_second];
+  const BarycentricScale scale = barycentric_scale(triangle, p.perspective_correct);
+  const uint k = is_second ? 2 : 1;
+  const int are_cuts = is_second == t.has_second;  // both; else corner k + 1 is the first cut
+  // Of corners k and k + 1, relative to corner 0.
+  const float2 weight1 = (float2)(weight_of(c, k, 1), weight_of(c, k + 1, 1)) - weight_of(c, 0, 1);
+  const float2 weight2 = (float2)(weight_of(c, k, 2), weight_of(c, k + 1, 2)) - weight_of(c, 0, 2);
+  for (uint i = run.first; i < run.last; i += DPR_WIDTH) {
+    const intn in_run = lanes_before(run.last, i);
+    realn x, y;
+    load_samples(p, run, in_run, i, &x, &y);
+    const realn side = side_of_diagonal(t, view_triangle(t.triangle[0], x, y).edge[DPR_FIRST_DIAGONAL]);
+    const intn is_in = in_run && (is_second ? side < 0.0f : !(side < 0.0f));
+    if (!any_lane(is_in)) continue;
+    const View3 v = view_triangle(triangle, x, y);
+    const realn b1 = load_run(is_in, i, grad_bary1), b2 = load_run(is_in, i, grad_bary2);
+    add_barycentric_gradient(v, triangle, scale, load_run(is_in, i, grad_depth),
+                             weight1.x * b1 + weight2.x * b2, weight1.y * b1 + weight2.y * b2, g);
+    realn n[3];
+    raw_barycentrics(v, scale, n);
+    const realn inverse = inverse_of_clipped(n);
+    const realn u1 = greater(n[1], 0.0f) * inverse, u2 = greater(n[2], 0.0f) * inverse;
+    part[0] += (are_cuts ? u1 : u2) * between_corners(c, 0, b1, b2);
+    if (are_cuts) part[1] += u2 * between_corners(c, 1, b1, b2);
+  }
+}
+
 /// Gradients of the corners of clipped faces, summed over a pair's fragments. One work-item per pair, up to
 /// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward.
 /// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
@@ -350,47 +430,15 @@ kernel void clip_backward(const FrameParams p, const uint last_pair, global cons
   if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;
   const ClippedFace c = clipped[face];
   const ClippedTriangles t = load_clipped(triangles[face], c);
-  const BarycentricScale first = barycentric_scale(t.triangle[0], p.perspective_correct);
-  const BarycentricScale second = barycentric_scale(t.triangle[1], p.perspective_correct);
-  const OutlineWeights w = weights_of(c);
   CornerGradients g[2];
   realn part[2];
   for (int k = 0; k < 3; ++k) g[0].x[k] = g[0].y[k] = g[0].z[k] = g[1].x[k] = g[1].y[k] = g[1].z[k] = 0.0f;
   part[0] = part[1] = 0.0f;
-  for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
-    const intn in_run = lanes_before(last, i);
-    const uintn packed = load_pixels(in_run, i, pixels);
-    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
-    const ViewedClip v = view_clipped(t, x, y);
-    const realn zero = 0.0f;
-    if (!p.sharp) {
-      const intn inside = as_intn(load_run(in_run, i, distance)) >= 0;
-      const realn grad = load_run(in_run, i, grad_distance);
-      add_distance_gradient(v.first, t.has_second ? DPR_FIRST_DIAGONAL : DPR_NO_EDGE, inside, p.euclidean,
-                            choose(v.nearer_second, zero, grad), &g[0]);
-      add_distance_gradient(v.second, DPR_SECOND_DIAGONAL, inside, p.euclidean,
-                            choose(v.nearer_second, grad, zero), &g[1]);
-    }
-    const realn to_depth = load_run(in_run, i, grad_depth);
-    const realn b1 = load_run(in_run, i, grad_bary1), b2 = load_run(in_run, i, grad_bary2);
-    // Of the outline's corners, as if they had weights of their own.
-    realn h[4], u[4];
-    for (int k = 0; k < 4; ++k) h[k] = w.of[k][1] * b1 + w.of[k][2] * b2;
-    add_barycentric_gradient(v.first, t.triangle[0], first, choose(v.in_second, zero, to_depth),
-                             choose(v.in_second, zero, h[1] - h[0]), choose(v.in_second, zero, h[2] - h[0]),
-                             &g[0]);
-    add_barycentric_gradient(v.second, t.triangle[1], second, choose(v.in_second, to_depth, zero),
-                             choose(v.in_second, h[2] - h[0], zero), choose(v.in_second, h[3] - h[0], zero),
-                             &g[1]);
-    outline_barycentrics(v, first, second, u);
-#pragma unroll
-    for (uint cut = 0; cut < 2; ++cut) {
-      const uint lost = lost_corner(c, cut), kept = kept_corner(c, cut);
-      const realn of_lost = lost == 0 ? zero : lost == 1 ? b1 : b2;
-      const realn of_kept = kept == 0 ? zero : kept == 1 ? b1 : b2;
-      part[cut] += (t.has_second ? u[2 + cut] : u[1 + cut]) * (of_lost - of_kept);
-    }
-  }
+  const ClippedRun run = {fragment_starts[pair], last, pixels};
+  if (!p.sharp) add_outline_distances(p, t, run, distance, grad_distance, g);
+  add_outline_barycentrics(p, c, t, 0, run, grad_depth, grad_bary1, grad_bary2, &g[0], part);
+  if (t.has_second)
+    add_outline_barycentrics(p, c, t, 1, run, grad_depth, grad_bary1, grad_bary2, &g[1], part);
   float3 sum[2][3];
   for (int k = 0; k < 2; ++k) {
     for (int j = 0; j < 3; ++j)

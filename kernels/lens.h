@@ -50,18 +50,13 @@ static inline float2 bend_tangent_backward(global const ViewParams* view, float2
   return held.part < 1.0f ? held.part * (g - dot(t, g) / r2 * t) : g;
 }
 
-/// The gradients of k1, k2, p1, p2, k3. How the radius from which on points are held moves does not count: r
-/// R is at its maximum there.
-static inline void coefficients_backward(global const ViewParams* view, float2 tangent, float2 grad,
-                                         float grad_coefficient[5]) {
+/// The gradients of k1, k2, p1, p2, k3, and zeros. How the radius from which on points are held moves does
+/// not count: r R is at its maximum there.
+static inline float8 coefficients_gradient(global const ViewParams* view, float2 tangent, float2 grad) {
   const HeldTangent held = hold_tangent(view, tangent);
   const float r2 = held.radius2, along = dot(held.tangent, grad);
   const float2 grad_q = 2.0f * along * held.tangent + r2 * grad;
-  grad_coefficient[0] = along * r2;
-  grad_coefficient[1] = along * r2 * r2;
-  grad_coefficient[2] = -grad_q.y;
-  grad_coefficient[3] = grad_q.x;
-  grad_coefficient[4] = along * r2 * r2 * r2;
+  return (float8)(along * r2, along * r2 * r2, -grad_q.y, grad_q.x, along * r2 * r2 * r2, 0.0f, 0.0f, 0.0f);
 }
 
 /// The NDC of a point of camera space.

@@ -1,16 +1,85 @@
 // What nothing is seen of, because something opaque lies in front of it, further away than the noise of
 // depths reaches: taken out of the coverage before there are fragments of it. For triangles that cover what
-// they own and nothing else: all of them are opaque.
+// they own and nothing else: all of them are opaque. A tile is a work-item's on CPUs, a work-group's on
+// GPUs.
+#include "group.h"
 #include "rasterize.h"
 
 /// Of a depth: rounding puts fragments that much beside the range of their triangle's corners.
 #define DPR_DEPTH_ROUNDING 1e-6f
 
+/// The depth behind which nothing is seen of what a triangle covers.
+static inline float hides_from(global const Triangle* t, float reach) {
+  return fmax(fmax(t->z0, t->z1), t->z2) * (1.0f + DPR_DEPTH_ROUNDING) + reach;
+}
+static inline float nearest_depth(global const Triangle* t) { return fmin(fmin(t->z0, t->z1), t->z2); }
+
+/// What the pairs of a tile are read and written by.
+typedef struct {
+  global const Triangle* triangles;
+  global const uint *face, *places;
+  global uint2* masks;
+  global uint *counts, *face_pairs;
+} TilePairs;
+
+/// Leaves a pair, which covers `whole`, what is not hidden of it.
+static inline void take_hidden(const TilePairs pairs, uint pair, ulong whole, ulong hidden) {
+  const ulong seen = whole & ~hidden;
+  if (seen == whole) return;
+  pairs.masks[pair] = (uint2)((uint)seen, (uint)(seen >> 32));
+  pairs.counts[pair] = (uint)popcount(seen);
+  if (seen == 0) pairs.face_pairs[pairs.places[pair]] = DPR_NO_PAIR;
+}
+
+#if DPR_LANES == 1
+
+#if DPR_GROUP != DPR_TILE * DPR_TILE
+#error "a work-item has a sample of a tile"
+#endif
+
+/// The depth behind which nothing is seen of the work-item's sample: that of the pair whose furthest corner
+/// is nearest. The group reads as many pairs at once as it has work-items.
+static inline float hiding_depth(const TilePairs pairs, uint first, uint last, float reach,
+                                 local uint2* masks, local float* depths) {
+  const uint item = (uint)get_local_id(0);
+  float end = INFINITY;
+  for (uint chunk = first; chunk < last; chunk += DPR_GROUP) {
+    const uint count = min(last - chunk, (uint)DPR_GROUP);
+    if (item < count) {
+      masks[item] = pairs.masks[chunk + item];
+      depths[item] = hides_from(pairs.triangles + pairs.face[chunk + item], reach);
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint k = 0; k < count; ++k) end = whole_mask(masks[k]) >> item & 1 ? lesser(end, depths[k]) : end;
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  return end;
+}
+
+/// Takes what is hidden out of the pairs of a tile. To be called by all of a group.
+static inline void hide(const TilePairs pairs, uint first, uint last, float reach, local uint2* masks,
+                        local float* depths) {
+  const uint item = (uint)get_local_id(0);
+  const float end = hiding_depth(pairs, first, last, reach, masks, depths);
+  depths[item] = end;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint pair = first + item; pair < last; pair += DPR_GROUP) {
+    const ulong whole = whole_mask(pairs.masks[pair]);
+    const float nearest = nearest_depth(pairs.triangles + pairs.face[pair]);
+    ulong hidden = 0;
+    for (ulong rest = whole; rest != 0; rest &= rest - 1)
+      hidden |= nearest > depths[63 - clz(rest & -rest)] ? rest & -rest : 0;
+    take_hidden(pairs, pair, whole, hidden);
+  }
+}
+
+#else
+
 /// Vectors of samples in a tile.
 #define DPR_TILE_VECTORS (DPR_TILE * DPR_TILE / DPR_WIDTH)
 
 /// The samples of a tile that several pairs cover.
-static inline ulong shared_samples(uint first, uint last, global const uint2* restrict masks) {
+static inline ulong shared_samples(uint first, uint last, global const uint2* masks) {
   ulong covered = 0, several = 0;
   for (uint pair = first; pair < last; ++pair) {
     const ulong mask = whole_mask(masks[pair]);
@@ -35,10 +104,41 @@ static inline intn bit_lanes(uint bits) {
   return -convert_intn(((uintn)(bits) >> convert_uintn(DPR_LANE_INDEX)) & 1u);
 }
 
+/// Takes what is hidden out of the pairs of a tile: few tiles have samples that several pairs cover.
+static inline void hide(const TilePairs pairs, uint first, uint last, float reach) {
+  const ulong several = shared_samples(first, last, pairs.masks);
+  if (several == 0) return;
+  // The depth behind which nothing is seen of a sample: that of the pair whose furthest corner is nearest.
+  realn end[DPR_TILE_VECTORS];
+  for (uint v = 0; v < DPR_TILE_VECTORS; ++v) end[v] = INFINITY;
+  for (uint pair = first; pair < last; ++pair) {
+    const ulong mask = whole_mask(pairs.masks[pair]) & several;
+    if (mask == 0) continue;
+    const float depth = hides_from(pairs.triangles + pairs.face[pair], reach);
+    for (ulong rest = mask; rest != 0;) {
+      const uint v = next_vector(&rest);
+      end[v] = choose(bit_lanes(vector_bits(mask, v)), lesser(end[v], depth), end[v]);
+    }
+  }
+  for (uint pair = first; pair < last; ++pair) {
+    const ulong whole = whole_mask(pairs.masks[pair]), mask = whole & several;
+    if (mask == 0) continue;
+    const float nearest = nearest_depth(pairs.triangles + pairs.face[pair]);
+    ulong hidden = 0;
+    for (ulong rest = mask; rest != 0;) {
+      const uint v = next_vector(&rest);
+      hidden |= (ulong)lane_bits(nearest > end[v]) << (v * DPR_WIDTH);
+    }
+    take_hidden(pairs, pair, whole, hidden & mask);
+  }
+}
+
+#endif
+
 /// Takes the samples at which a pair is hidden out of its mask. A fragment's depth is not beyond those of its
 /// triangle's corners, nor is that of what is left of a clipped one; so the corners' say what lies behind
-/// what. The front of a sample is never hidden. One work-item per tile of all views: few tiles have samples
-/// that several pairs cover. Deterministic.
+/// what. The front of a sample is never hidden. One work-item per tile of all views; on GPUs a work-group.
+/// Deterministic.
 /// in      reach        normalised depth: what lies further behind something opaque is not seen
 /// in      views        ViewParams[view]
 /// in      tile_starts  uint[view * tile + 1]  runs of pairs
@@ -47,45 +147,22 @@ static inline intn bit_lanes(uint bits) {
 /// in out  masks, counts  as rasterize_cover and clip_cover leave them
 /// in out  face_pairs   uint[place]            the pairs of every face; DPR_NO_PAIR where nothing is seen of
 ///                                             one: what is gathered need not look at it
-kernel void rasterize_hide(const FrameParams p, const float reach, global const ViewParams* restrict views,
-                           global const uint* restrict tile_starts, global const Triangle* restrict triangles,
-                           global const uint* restrict pair_face, global const uint* restrict places,
-                           global uint2* restrict masks, global uint* restrict counts,
-                           global uint* restrict face_pairs) {
-  const uint tile = (uint)get_global_id(0), tiles = p.tiles_x * p.tiles_y;
+DPR_SHARING_KERNEL kernel void rasterize_hide(
+    const FrameParams p, const float reach, global const ViewParams* restrict views,
+    global const uint* restrict tile_starts, global const Triangle* restrict triangles,
+    global const uint* restrict pair_face, global const uint* restrict places, global uint2* restrict masks,
+    global uint* restrict counts, global uint* restrict face_pairs) {
+  const TilePairs pairs = {triangles, pair_face, places, masks, counts, face_pairs};
+  const uint tiles = p.tiles_x * p.tiles_y;
+#if DPR_LANES == 1
+  local uint2 covered[DPR_GROUP];
+  local float depths[DPR_GROUP];
+  const uint tile = (uint)get_group_id(0);
+  hide(pairs, tile_starts[tile], tile_starts[tile + 1], reach / views[tile / tiles].inverse_range, covered,
+       depths);
+#else
+  const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * tiles) return;
-  const uint first = tile_starts[tile], last = tile_starts[tile + 1];
-  const ulong several = shared_samples(first, last, masks);
-  if (several == 0) return;
-  // The depth behind which nothing is seen of a sample: that of the pair whose furthest corner is nearest.
-  const float reach_in_view = reach / views[tile / tiles].inverse_range;
-  realn end[DPR_TILE_VECTORS];
-  for (uint v = 0; v < DPR_TILE_VECTORS; ++v) end[v] = INFINITY;
-  for (uint pair = first; pair < last; ++pair) {
-    const ulong mask = whole_mask(masks[pair]) & several;
-    if (mask == 0) continue;
-    global const Triangle* t = triangles + pair_face[pair];
-    const float furthest = fmax(fmax(t->z0, t->z1), t->z2);
-    const float hides_from = furthest * (1.0f + DPR_DEPTH_ROUNDING) + reach_in_view;
-    for (ulong rest = mask; rest != 0;) {
-      const uint v = next_vector(&rest);
-      end[v] = choose(bit_lanes(vector_bits(mask, v)), lesser(end[v], hides_from), end[v]);
-    }
-  }
-  for (uint pair = first; pair < last; ++pair) {
-    const ulong whole = whole_mask(masks[pair]), mask = whole & several;
-    if (mask == 0) continue;
-    global const Triangle* t = triangles + pair_face[pair];
-    const float nearest = fmin(fmin(t->z0, t->z1), t->z2);
-    ulong hidden = 0;
-    for (ulong rest = mask; rest != 0;) {
-      const uint v = next_vector(&rest);
-      hidden |= (ulong)lane_bits(nearest > end[v]) << (v * DPR_WIDTH);
-    }
-    const ulong seen = whole & ~(hidden & mask);
-    if (seen == whole) continue;
-    masks[pair] = (uint2)((uint)seen, (uint)(seen >> 32));
-    counts[pair] = (uint)popcount(seen);
-    if (seen == 0) face_pairs[places[pair]] = DPR_NO_PAIR;
-  }
+  hide(pairs, tile_starts[tile], tile_starts[tile + 1], reach / views[tile / tiles].inverse_range);
+#endif
 }

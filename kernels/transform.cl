@@ -35,8 +35,8 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   ndc[i] = (float4)(xy.x, xy.y, depth, 0.0f);
 }
 
-/// What a vertex adds to the gradients of its poses and its camera, channel by channel, DPR_LENS_CHANNELS.
-#define DPR_CHANNEL_VECTORS 3 /* of 8 */
+/// What a vertex adds to the gradients of its poses and its camera, channel by channel, DPR_POSE_CHANNELS.
+#define DPR_CHANNEL_VECTORS 2 /* of 8 */
 typedef struct {
   float3 world;  // d loss / d world position
   float8 channels[DPR_CHANNEL_VECTORS];
@@ -52,11 +52,9 @@ static inline VertexGradient vertex_gradient(const FrameParams p, global const V
   const float2 tangent = used ? c.xy * inverse_depth : (float2)(0.0f);
   const float2 g_seen = g.xy * camera->projection.xy;
   float2 seen = tangent, g_tangent = g_seen;
-  float g_coefficients[5] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
   if (camera->distorts && used) {
     seen = bend_tangent(camera, tangent);
     g_tangent = bend_tangent_backward(camera, tangent, g_seen);
-    coefficients_backward(camera, tangent, g_seen, g_coefficients);
   }
   const float g_depth = p.orthographic ? g.z : g.z - dot(g_tangent, tangent) * inverse_depth;
   float3 g_camera = (float3)(g_tangent.x * inverse_depth, g_tangent.y * inverse_depth, -g_depth);
@@ -81,15 +79,30 @@ static inline VertexGradient vertex_gradient(const FrameParams p, global const V
                            v.world.z, view_rotation.x, view_rotation.y);
   v.channels[1] = (float8)(view_rotation.z, g_camera.x, g_camera.y, g_camera.z, g_scale.x, g_scale.y,
                            g_offset.x, g_offset.y);
-  v.channels[2] = (float8)(g_coefficients[0], g_coefficients[1], g_coefficients[2], g_coefficients[3],
-                           g_coefficients[4], 0.0f, 0.0f, 0.0f);
   return v;
+}
+
+/// The vertices [x, y) of a slot: slot k has the k-th run of a segment's, all as long.
+static inline uint2 run_of_slot(global const uint* starts, uint segment, uint slot, uint slots) {
+  const uint begin = starts[segment], end = starts[segment + 1], run = (end - begin + slots - 1) / slots;
+  const uint first = begin + slot * run;
+  return (uint2)(first, min(end, first + run));
+}
+
+/// Stores the first `count` channels of a slot, sums and their compensations, from channel `first` on.
+static inline void store_sums(float8 sum, float8 error, uint first, uint count, uint segments, uint segment,
+                              uint slots, uint slot, global float* partial) {
+#pragma unroll
+  for (uint c = 0; c < count; ++c) {
+    global float* out = partial + (size_t)2 * slots * ((first + c) * segments + segment) + slot;
+    out[0] = ((const float*)&sum)[c];
+    out[slots] = ((const float*)&error)[c];
+  }
 }
 
 /// Gradients at the world positions, and the sums over the vertices of a mesh of what they add to the
 /// gradients of its pose and of the camera. A vertex that no kept triangle uses has zero gradient, wherever
-/// it lies. Slot k sums the k-th run of a mesh's vertices, all as long. One work-item per (view, mesh, slot).
-/// Deterministic.
+/// it lies. One work-item per (view, mesh, slot). Deterministic.
 /// in      views, models, world  as transform_forward
 /// in      starts      uint[view * mesh + 1]  of the vertices, [view][vertex]
 /// in      grad_ndc    float4[view][vertex]   d loss / d (x, y, depth)
@@ -100,8 +113,7 @@ static inline VertexGradient vertex_gradient(const FrameParams p, global const V
 /// in      lit         0: nothing was lit, grad_world is only written
 /// in      slots       of a segment
 /// in out  grad_world  float4[view][vertex]   in: what shading adds; out: the whole d loss / d world position
-/// out     partial     float[DPR_POSE_CHANNELS][view][mesh][2][slot]  sums, and their compensations;
-///                     DPR_LENS_CHANNELS where p.distorts is set
+/// out     partial     float[DPR_POSE_CHANNELS][view][mesh][2][slot]  sums, and their compensations
 kernel void transform_backward(const FrameParams p, const uint lit, const uint slots,
                                global const ViewParams* restrict views, global const float4* restrict models,
                                global const uint* restrict starts, global const float4* restrict world,
@@ -110,29 +122,44 @@ kernel void transform_backward(const FrameParams p, const uint lit, const uint s
                                global float* restrict partial) {
   const uint i = (uint)get_global_id(0), segments = p.views * p.meshes;
   if (i >= segments * slots) return;
-  const uint segment = i / slots, slot = i % slots, begin = starts[segment], end = starts[segment + 1];
-  const uint run = (end - begin + slots - 1) / slots, first = begin + slot * run,
-             last = min(end, first + run);
-  const uint channels = p.distorts ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
-  float8 sums[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f, 0.0f}, errors[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f, 0.0f};
-  for (uint k = first; k < last; ++k) {
+  const uint segment = i / slots, slot = i % slots;
+  const uint2 run = run_of_slot(starts, segment, slot, slots);
+  float8 sums[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f}, errors[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f};
+  for (uint k = run.x; k < run.y; ++k) {
     const float3 clip = p.clips ? grad_clip[k].xyz : (float3)(0.0f);
     const float3 of_light = lit ? grad_world[k].xyz : (float3)(0.0f);
     const VertexGradient v = vertex_gradient(p, views + segment / p.meshes, models + 3 * segment,
                                              world[k].xyz, grad_ndc[k].xyz, clip, of_light);
     grad_world[k] = (float4)(v.world, 0.0f);
 #pragma unroll
-    for (uint c = 0; c < DPR_CHANNEL_VECTORS; ++c) {
-      if (8 * c < channels) add_channels(&sums[c], &errors[c], v.channels[c]);
-    }
+    for (uint c = 0; c < DPR_CHANNEL_VECTORS; ++c) add_channels(&sums[c], &errors[c], v.channels[c]);
   }
 #pragma unroll
-  for (uint c = 0; c < DPR_LENS_CHANNELS; ++c) {
-    if (c >= channels) continue;
-    global float* out = partial + (size_t)2 * slots * (c * segments + segment) + slot;
-    out[0] = ((const float*)sums)[c];
-    out[slots] = ((const float*)errors)[c];
+  for (uint c = 0; c < DPR_CHANNEL_VECTORS; ++c)
+    store_sums(sums[c], errors[c], 8 * c, 8, segments, segment, slots, slot, partial);
+}
+
+/// The sums of what vertices add to the gradients of the lens, where some view distorts. One work-item per
+/// (view, mesh, slot). Deterministic. Inputs as transform_backward, and
+/// out  partial  its channels from DPR_POSE_CHANNELS to DPR_LENS_CHANNELS
+kernel void transform_backward_lens(const FrameParams p, const uint slots,
+                                    global const ViewParams* restrict views,
+                                    global const uint* restrict starts, global const float4* restrict world,
+                                    global const float4* restrict grad_ndc, global float* restrict partial) {
+  const uint i = (uint)get_global_id(0), segments = p.views * p.meshes;
+  if (i >= segments * slots) return;
+  const uint segment = i / slots, slot = i % slots;
+  const uint2 run = run_of_slot(starts, segment, slot, slots);
+  global const ViewParams* camera = views + segment / p.meshes;
+  float8 sum = 0.0f, error = 0.0f;
+  for (uint k = run.x; k < run.y && camera->distorts; ++k) {
+    const float2 grad = grad_ndc[k].xy;
+    if (!any(grad != 0.0f)) continue;
+    const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], world[k].xyz);
+    add_channels(&sum, &error, coefficients_gradient(camera, c.xy / -c.z, grad * camera->projection.xy));
   }
+  store_sums(sum, error, DPR_POSE_CHANNELS, DPR_LENS_CHANNELS - DPR_POSE_CHANNELS, segments, segment, slots,
+             slot, partial);
 }
 
 /// Gradients of the object-space positions: the views' contributions in order, or, where every view has a

@@ -73,8 +73,8 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
   if (clip != nullptr) clip->cover(p, triangles, bin, masks, counts_);
   if (hiding) {
-    hide_(tiles_of(p), p, hiding->reach, hiding->cameras, bin.tile_starts, triangles, bin.pair_face,
-          bin.places, masks, counts_, bin.face_pairs);
+    hide_.in_groups(tiles_of(p), p, hiding->reach, hiding->cameras, bin.tile_starts, triangles, bin.pair_face,
+                    bin.places, masks, counts_, bin.face_pairs);
   }
   scan_(length(pairs), counts_, fragment_starts);
   count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, counts_);

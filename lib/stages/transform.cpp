@@ -8,6 +8,7 @@ Transform::Transform(Device::Impl& device)
     : device_(device),
       forward_(device, "transform.cl", "transform_forward"),
       backward_(device, "transform.cl", "transform_backward"),
+      backward_lens_(device, "transform.cl", "transform_backward_lens"),
       backward_positions_(device, "transform.cl", "transform_backward_positions") {}
 
 void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry) {
@@ -28,6 +29,9 @@ void Transform::backward(const shared::FrameParams& p, const DeviceViews& views,
                       (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * segments * 2 * slots);
   backward_(segments * slots, p, lit ? 1 : 0, to_uint(slots), views.cameras, views.models,
             views.vertex_starts, world, grad_ndc, grad_clip, grad_world, partial_sums);
+  if (p.distorts == 0) return;
+  backward_lens_(segments * slots, p, to_uint(slots), views.cameras, views.vertex_starts, world, grad_ndc,
+                 partial_sums);
 }
 
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,

@@ -48,6 +48,9 @@ class Transform {
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>,
          In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
       backward_;
+  Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
+         Out<float>>
+      backward_lens_;
   Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>, In<cl_float4>,
          Out<cl_float4>>
       backward_positions_;
