@@ -15,6 +15,9 @@
 #define DPR_LIGHTS 0
 #endif
 
+/// Where the highlight's base is below this its logarithm stays finite.
+#define DPR_LEAST_BASE 1e-30f
+
 /// One light at a point: everything that value and gradient share.
 typedef struct {
   Vec3n to_light, to_eye;
@@ -22,6 +25,7 @@ typedef struct {
   realn inverse_light, inverse_eye, inverse_halfway;  // 1 / length
   realn lambert;                                      // max(n.l, 0)
   realn base, highlight;  // max(v.r, 0) or max(n.h, 0), and its power; 0 on the side away from the light
+  realn log_base;         // of the base, or of DPR_LEAST_BASE if that is more
   realn edge, cone;       // where in the cone's edge, 0 outside to 1 inside, and what comes through
 } LightTerm;
 
@@ -46,7 +50,8 @@ static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, glo
   }
   t.lambert = max(cosine, 0.0f);
   t.base = choose(cosine > 0.0f, max(towards, 0.0f), (realn)(0.0f));
-  t.highlight = choose(t.base > 0.0f, exp(shininess * log(max(t.base, 1e-30f))), (realn)(0.0f));
+  t.log_base = log(max(t.base, DPR_LEAST_BASE));
+  t.highlight = choose(t.base > 0.0f, exp(shininess * t.log_base), (realn)(0.0f));
   if (DPR_LIGHTS & DPR_LIGHTS_CONES) {
     const realn along = -dot3n(splat3(light->axis), t.to_light);
     t.edge = clamp((along - light->cos_outer) * light->inverse_edge, 0.0f, 1.0f);
@@ -81,28 +86,35 @@ static inline Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS
                     g[2] + n.y * g[5] + n.x * g[7] + 2.0f * n.z * (g[6] + g[6]));
 }
 
-/// factor = ambient + environment + sum diffuse * lambert, specular = sum specular * highlight, RGB each.
-static inline void light_point(const LightingParams lp, global const Light* restrict lights, float shininess,
-                               Vec3n position, Vec3n normal, float4 eye, Vec3n* factor, Vec3n* specular) {
-  *factor = splat3(lp.ambient);
-  *specular = zero3n();
+/// The light at a point, RGB: colour = base * factor + coefficient * specular.
+typedef struct {
+  Vec3n factor;        // ambient + environment + sum diffuse * lambert
+  Vec3n specular;      // sum specular * highlight
+  Vec3n by_shininess;  // d specular / d shininess
+} Lit;
+
+static inline Lit light_point(const LightingParams lp, global const Light* restrict lights, float shininess,
+                              Vec3n position, Vec3n normal, float4 eye) {
+  Lit lit = {splat3(lp.ambient), zero3n(), zero3n()};
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
     realn basis[DPR_HARMONICS];
     harmonic_basis(normal, basis);
 #pragma unroll
-    for (int k = 0; k < DPR_HARMONICS; ++k) *factor = mad3n(splat3(lp.harmonics[k]), basis[k], *factor);
+    for (int k = 0; k < DPR_HARMONICS; ++k) lit.factor = mad3n(splat3(lp.harmonics[k]), basis[k], lit.factor);
   }
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
-    *factor = mad3n(splat3(lights[l].diffuse), through_cone(t, t.lambert), *factor);
-    *specular = mad3n(splat3(lights[l].specular), through_cone(t, t.highlight), *specular);
+    const realn highlight = through_cone(t, t.highlight);
+    lit.factor = mad3n(splat3(lights[l].diffuse), through_cone(t, t.lambert), lit.factor);
+    lit.specular = mad3n(splat3(lights[l].specular), highlight, lit.specular);
+    lit.by_shininess = mad3n(splat3(lights[l].specular), highlight * t.log_base, lit.by_shininess);
   }
+  return lit;
 }
 
 /// Gradients of a point in the light.
 typedef struct {
   Vec3n position, normal, eye;  // of the unit normal
-  realn shininess;
 } PointGradient;
 
 /// Gradients of what is known of a light: of the unit axis.
@@ -130,9 +142,8 @@ static inline void light_term_backward(const LightTerm t, float4 eye, global con
   const realn by_diffuse = dot3n(grad_factor, splat3(light->diffuse)),
               by_specular = dot3n(grad_specular, splat3(light->specular));
   const realn grad_highlight = through_cone(t, by_specular);
-  const realn grad_base =
-      choose(t.base > 0.0f, grad_highlight * shininess * t.highlight / max(t.base, 1e-30f), (realn)(0.0f));
-  point->shininess += grad_highlight * t.highlight * log(max(t.base, 1e-30f));
+  const realn grad_base = choose(
+      t.base > 0.0f, grad_highlight * shininess * t.highlight / max(t.base, DPR_LEAST_BASE), (realn)(0.0f));
   realn grad_cosine = choose(cosine > 0.0f, through_cone(t, by_diffuse), (realn)(0.0f));
   Vec3n grad_to_light, grad_to_eye;
   if (DPR_SHADING == DPR_BLINN) {
@@ -172,7 +183,6 @@ static inline LightGradient zero_light_gradient(void) {
 static inline PointGradient zero_point_gradient(void) {
   PointGradient g;
   g.position = g.normal = g.eye = zero3n();
-  g.shininess = 0.0f;
   return g;
 }
 

@@ -12,7 +12,7 @@
 
 /// A triangle's corners: colours, world positions, normals; and for Gouraud the light there.
 typedef struct {
-  Vec3n color[3], position[3], normal[3], factor[3], specular[3];
+  Vec3n color[3], position[3], normal[3], factor[3], specular[3], by_shininess[3];
   float4 eye, material;  // RGB of the specular coefficient, shininess
 } Surface;
 
@@ -50,7 +50,10 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
       s.normal[k] = splat3(normals[view * p.normals + normal[k]]);
     }
     if (DPR_SHADING == DPR_GOURAUD) {
-      light_point(lp, lights, s.material.w, s.position[k], s.normal[k], s.eye, &s.factor[k], &s.specular[k]);
+      const Lit lit = light_point(lp, lights, s.material.w, s.position[k], s.normal[k], s.eye);
+      s.factor[k] = lit.factor;
+      s.specular[k] = lit.specular;
+      s.by_shininess[k] = lit.by_shininess;
     }
   }
   return s;
@@ -60,40 +63,56 @@ static inline Vec3n interpolate3(const Vec3n corner[3], realn c1, realn c2) {
   return mad3n(sub3n(corner[2], corner[0]), c2, mad3n(sub3n(corner[1], corner[0]), c1, corner[0]));
 }
 
-/// Value at a fragment, with what the gradient needs again.
+/// A surface at fragments.
 typedef struct {
-  Vec3n base, factor, specular, position, normal;
+  Vec3n base, position, normal;
   realn inverse_normal;  // 1 / length of the interpolated normal
-} Shaded;
+} SurfacePoint;
 
-/// `base` is read where base colours come from fragments.
-static inline Shaded shade_fragment(const Surface s, const LightingParams lp,
-                                    global const Light* restrict lights, realn c1, realn c2, Vec3n base) {
-  Shaded f;
+/// `base` is taken where base colours come from fragments.
+static inline SurfacePoint point_on(const Surface s, realn c1, realn c2, Vec3n base) {
+  SurfacePoint f;
   f.base = DPR_BASE == DPR_BASE_OF_CORNERS ? interpolate3(s.color, c1, c2) : base;
   f.position = interpolate3(s.position, c1, c2);
   f.normal = interpolate3(s.normal, c1, c2);
   f.inverse_normal = normalize3n(&f.normal);
+  return f;
+}
+
+/// The same, and the light there.
+typedef struct {
+  SurfacePoint at;
+  Lit lit;
+} Shaded;
+
+static inline Shaded shade_fragment(const Surface s, const LightingParams lp,
+                                    global const Light* restrict lights, realn c1, realn c2, Vec3n base) {
+  Shaded f;
+  f.at = point_on(s, c1, c2, base);
   if (DPR_SHADING == DPR_GOURAUD) {
-    f.factor = interpolate3(s.factor, c1, c2);
-    f.specular = interpolate3(s.specular, c1, c2);
+    f.lit.factor = interpolate3(s.factor, c1, c2);
+    f.lit.specular = interpolate3(s.specular, c1, c2);
+    f.lit.by_shininess = interpolate3(s.by_shininess, c1, c2);
   } else {
-    light_point(lp, lights, s.material.w, f.position, f.normal, s.eye, &f.factor, &f.specular);
+    f.lit = light_point(lp, lights, s.material.w, f.at.position, f.at.normal, s.eye);
   }
   return f;
 }
 
-/// RGB of the fragments from `first` on that are in the run; 0 in the other lanes.
-static inline Vec3n load_rgb(intn in_run, uint first, global const float* red, global const float* green,
-                             global const float* blue) {
-  return make_vec3n(load_run(in_run, first, red), load_run(in_run, first, green),
-                    load_run(in_run, first, blue));
+/// RGB of fragments.
+typedef struct {
+  global const float *red, *green, *blue;
+} RgbPlanes;
+
+/// Those from `first` on that are in the run; 0 in the other lanes.
+static inline Vec3n load_rgb(intn in_run, uint first, const RgbPlanes from) {
+  return make_vec3n(load_run(in_run, first, from.red), load_run(in_run, first, from.green),
+                    load_run(in_run, first, from.blue));
 }
 
-/// Their base colours; 0 where those are interpolated here.
-static inline Vec3n load_base(intn in_run, uint first, global const float* red, global const float* green,
-                              global const float* blue) {
-  return DPR_BASE == DPR_BASE_OF_CORNERS ? zero3n() : load_rgb(in_run, first, red, green, blue);
+/// Base colours; 0 where those are interpolated here.
+static inline Vec3n load_base(intn in_run, uint first, const RgbPlanes from) {
+  return DPR_BASE == DPR_BASE_OF_CORNERS ? zero3n() : load_rgb(in_run, first, from);
 }
 
 /// One work-item per pair, up to `last_pair`. Deterministic. Pairs, fragments and colours as shade_forward,
@@ -105,7 +124,8 @@ static inline Vec3n load_base(intn in_run, uint first, global const float* red, 
 /// in   world   float4[view][vertex]
 /// in   face_normals  uint4[face]      normals of the corners
 /// in   normals  float4[view][normal]; not read by flat shading
-/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, below 1: that of the lights
+/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, or that of the lights
+///      where it is below 1
 /// in   base_red, base_green, base_blue  float[fragment]  read where DPR_BASE says so; the colours are not,
 ///      then
 /// out  red, green, blue  float[fragment]
@@ -125,25 +145,53 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
   if (pair >= last_pair) return;
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
                                  face_normals, normals, materials);
+  const RgbPlanes bases = {base_red, base_green, base_blue};
   const uint last = fragment_starts[pair + 1];
   for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
-    const Vec3n base = load_base(lanes_before(last, i), i, base_red, base_green, base_blue);
-    const Shaded f = shade_fragment(s, lp, lights, load_n(i, bary1), load_n(i, bary2), base);
-    store_run(f.base.x * f.factor.x + s.material.x * f.specular.x, i, last, red);
-    store_run(f.base.y * f.factor.y + s.material.y * f.specular.y, i, last, green);
-    store_run(f.base.z * f.factor.z + s.material.z * f.specular.z, i, last, blue);
+    const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
+    const Vec3n base = load_base(lanes_before(last, i), i, bases);
+    const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
+    store_run(f.at.base.x * f.lit.factor.x + s.material.x * f.lit.specular.x, i, last, red);
+    store_run(f.at.base.y * f.lit.factor.y + s.material.y * f.lit.specular.y, i, last, green);
+    store_run(f.at.base.z * f.lit.factor.z + s.material.z * f.lit.specular.z, i, last, blue);
   }
 }
 
-/// Gradients of a surface's corners, as sums over lanes.
+/// The fragments [first, last) of a pair, and their gradients.
 typedef struct {
-  Vec3n color[3], position[3], normal[3], factor[3], specular[3], eye, coefficient;
-  realn shininess;
-} SurfaceGradients;
+  uint first, last;
+  global const float *bary1, *bary2;
+  RgbPlanes base, grad;
+} LitRun;
 
-static inline void add_corners(Vec3n grad[3], Vec3n g, const realn c[3]) {
-#pragma unroll
-  for (int k = 0; k < 3; ++k) grad[k] = mad3n(g, c[k], grad[k]);
+/// A vector of them; 0 in the lanes that are not in the run.
+typedef struct {
+  realn c1, c2;
+  Vec3n base, grad;
+} LitFragment;
+
+static inline LitFragment load_fragment(const LitRun run, uint i) {
+  const intn in_run = lanes_before(run.last, i);
+  const LitFragment f = {load_run(in_run, i, run.bary1), load_run(in_run, i, run.bary2),
+                         load_base(in_run, i, run.base), load_rgb(in_run, i, run.grad)};
+  return f;
+}
+
+/// Gradients of what a surface is made of, and for Gouraud of the light at its corners, as sums over lanes.
+typedef struct {
+  Vec3n color[3], factor[3], specular[3], coefficient;
+  realn shininess;
+} MaterialGradients;
+
+/// Gradients of where a surface lies, as sums over lanes.
+typedef struct {
+  Vec3n position[3], normal[3], eye;
+} PlaceGradients;
+
+static inline void add_corners(Vec3n grad[3], Vec3n g, realn c1, realn c2) {
+  grad[0] = mad3n(g, 1.0f - c1 - c2, grad[0]);
+  grad[1] = mad3n(g, c1, grad[1]);
+  grad[2] = mad3n(g, c2, grad[2]);
 }
 
 /// What moving weight from corner 0 to corner k does to an interpolated quantity with gradient g.
@@ -151,42 +199,47 @@ static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
   return dot3n(sub3n(corner[k], corner[0]), g);
 }
 
-/// One fragment's share of everything: the gradients of its base colour, and of the barycentrics, relative to
-/// corner 0's.
-static inline void shade_fragment_backward(const Surface s, const LightingParams lp,
-                                           global const Light* restrict lights, realn c1, realn c2,
-                                           Vec3n base, Vec3n grad, SurfaceGradients* g, Vec3n* grad_base,
-                                           realn* grad_bary1, realn* grad_bary2) {
-  const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
-  const realn c[3] = {1.0f - c1 - c2, c1, c2};
-  const Vec3n grad_factor = mul3n(grad, f.base), grad_specular = mul3n(grad, splat3(s.material));
-  g->coefficient = mad3n(mul3n(grad, f.specular), (realn)(1.0f), g->coefficient);
-  *grad_base = mul3n(grad, f.factor);
+/// One fragment's share in what the surface is made of, its part of the gradients of the barycentrics,
+/// relative to corner 0's, and the gradient of its base colour, which is returned.
+static inline Vec3n material_backward(const Surface s, const LightingParams lp,
+                                      global const Light* restrict lights, const LitFragment f,
+                                      MaterialGradients* g, realn* grad_bary1, realn* grad_bary2) {
+  const Shaded shaded = shade_fragment(s, lp, lights, f.c1, f.c2, f.base);
+  const Vec3n grad_base = mul3n(f.grad, shaded.lit.factor), grad_specular = mul3n(f.grad, splat3(s.material));
+  g->coefficient = mad3n(mul3n(f.grad, shaded.lit.specular), (realn)(1.0f), g->coefficient);
+  g->shininess += dot3n(grad_specular, shaded.lit.by_shininess);
   *grad_bary1 = *grad_bary2 = 0.0f;
   if (DPR_BASE == DPR_BASE_OF_CORNERS) {
-    add_corners(g->color, *grad_base, c);
-    *grad_bary1 = along_corner(s.color, 1, *grad_base);
-    *grad_bary2 = along_corner(s.color, 2, *grad_base);
+    add_corners(g->color, grad_base, f.c1, f.c2);
+    *grad_bary1 = along_corner(s.color, 1, grad_base);
+    *grad_bary2 = along_corner(s.color, 2, grad_base);
   }
   if (DPR_SHADING == DPR_GOURAUD) {
-    add_corners(g->factor, grad_factor, c);
-    add_corners(g->specular, grad_specular, c);
+    const Vec3n grad_factor = mul3n(f.grad, shaded.at.base);
+    add_corners(g->factor, grad_factor, f.c1, f.c2);
+    add_corners(g->specular, grad_specular, f.c1, f.c2);
     *grad_bary1 += along_corner(s.factor, 1, grad_factor) + along_corner(s.specular, 1, grad_specular);
     *grad_bary2 += along_corner(s.factor, 2, grad_factor) + along_corner(s.specular, 2, grad_specular);
-    return;
   }
+  return grad_base;
+}
+
+/// Its share in where the surface lies, by the light at the fragment: adds to the gradients of the
+/// barycentrics.
+static inline void place_backward(const Surface s, const LightingParams lp,
+                                  global const Light* restrict lights, const LitFragment f, PlaceGradients* g,
+                                  realn* grad_bary1, realn* grad_bary2) {
+  const SurfacePoint at = point_on(s, f.c1, f.c2, f.base);
   PointGradient point = zero_point_gradient();
   point.eye = g->eye;
-  point.shininess = g->shininess;
-  light_point_backward(lp, lights, s.material.w, s.eye, f.position, f.normal, grad_factor, grad_specular,
-                       &point);
+  light_point_backward(lp, lights, s.material.w, s.eye, at.position, at.normal, mul3n(f.grad, at.base),
+                       mul3n(f.grad, splat3(s.material)), &point);
   g->eye = point.eye;
-  g->shininess = point.shininess;
-  const Vec3n grad_normal = normalize3n_backward(f.normal, f.inverse_normal, point.normal);
-  add_corners(g->position, point.position, c);
-  add_corners(g->normal, grad_normal, c);
-  *grad_bary1 += along_corner(s.position, 1, point.position) + along_corner(s.normal, 1, grad_normal);
-  *grad_bary2 += along_corner(s.position, 2, point.position) + along_corner(s.normal, 2, grad_normal);
+  const Vec3n grad_normal = normalize3n_backward(at.normal, at.inverse_normal, point.normal);
+  add_corners(g->position, point.position, f.c1, f.c2);
+  add_corners(g->normal, grad_normal, f.c1, f.c2);
+  *grad_bary1 = along_corner(s.position, 1, point.position) + along_corner(s.normal, 1, grad_normal);
+  *grad_bary2 = along_corner(s.position, 2, point.position) + along_corner(s.normal, 2, grad_normal);
 }
 
 static inline float4 sum_vec3n(Vec3n v) {
@@ -204,23 +257,34 @@ static inline void flat_normal_backward(const float4 world[3], float4 grad_unit,
   }
 }
 
-/// The light was evaluated at the corners: all lanes hold the same, and lane sums have been taken before.
+/// Stores a pair's.
+static inline void store_material(const MaterialGradients g, uint pair, global float* grad_colors,
+                                  global float* grad_materials) {
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    if (DPR_BASE == DPR_BASE_OF_CORNERS)
+      vstore3(sum_vec3n(g.color[k]).xyz, 0, grad_colors + 9 * pair + 3 * k);
+  }
+  vstore4((float4)(sum_vec3n(g.coefficient).xyz, sum_lanes(g.shininess)), pair, grad_materials);
+}
+
+/// Where the light was evaluated at the corners: all lanes hold the same, and lane sums have been taken
+/// before.
 static inline void corners_backward(const Surface s, const LightingParams lp,
-                                    global const Light* restrict lights, SurfaceGradients* g) {
+                                    global const Light* restrict lights, const MaterialGradients of,
+                                    PlaceGradients* g) {
   const realn share = 1.0f / DPR_WIDTH;  // each lane carries its part of the sum
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    const Vec3n grad_factor = scale3n(splat3(sum_vec3n(g->factor[k])), share);
-    const Vec3n grad_specular = scale3n(splat3(sum_vec3n(g->specular[k])), share);
+    const Vec3n grad_factor = scale3n(splat3(sum_vec3n(of.factor[k])), share);
+    const Vec3n grad_specular = scale3n(splat3(sum_vec3n(of.specular[k])), share);
     PointGradient point = zero_point_gradient();
     point.eye = g->eye;
-    point.shininess = g->shininess;
     light_point_backward(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], grad_factor,
                          grad_specular, &point);
     g->position[k] = point.position;
     g->normal[k] = point.normal;
     g->eye = point.eye;
-    g->shininess = point.shininess;
   }
 }
 
@@ -255,21 +319,18 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
   if (pair >= last_pair) return;
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
                                  face_normals, normals, materials);
-  SurfaceGradients g;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  const LitRun run = {
+      first, last, bary1, bary2, {base_red, base_green, base_blue}, {grad_red, grad_green, grad_blue}};
+  MaterialGradients of_material;
 #pragma unroll
   for (int k = 0; k < 3; ++k)
-    g.color[k] = g.position[k] = g.normal[k] = g.factor[k] = g.specular[k] = zero3n();
-  g.eye = g.coefficient = zero3n();
-  g.shininess = 0.0f;
-  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    of_material.color[k] = of_material.factor[k] = of_material.specular[k] = zero3n();
+  of_material.coefficient = zero3n();
+  of_material.shininess = 0.0f;
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn in_run = lanes_before(last, i);
-    const Vec3n grad = load_rgb(in_run, i, grad_red, grad_green, grad_blue);
-    const Vec3n base = load_base(in_run, i, base_red, base_green, base_blue);
-    Vec3n grad_base;
     realn b1, b2;
-    shade_fragment_backward(s, lp, lights, load_run(in_run, i, bary1), load_run(in_run, i, bary2), base, grad,
-                            &g, &grad_base, &b1, &b2);
+    const Vec3n grad_base = material_backward(s, lp, lights, load_fragment(run, i), &of_material, &b1, &b2);
     store_run(b1, i, last, grad_bary1);
     store_run(b2, i, last, grad_bary2);
     if (DPR_BASE == DPR_BASE_OF_CORNERS) continue;
@@ -277,7 +338,18 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
     store_run(grad_base.y, i, last, grad_base_green);
     store_run(grad_base.z, i, last, grad_base_blue);
   }
-  if (DPR_SHADING == DPR_GOURAUD) corners_backward(s, lp, lights, &g);
+  store_material(of_material, pair, grad_colors, grad_materials);
+  PlaceGradients g;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) g.position[k] = g.normal[k] = zero3n();
+  g.eye = zero3n();
+  if (DPR_SHADING == DPR_GOURAUD) corners_backward(s, lp, lights, of_material, &g);
+  for (uint i = first; DPR_SHADING != DPR_GOURAUD && i < last; i += DPR_WIDTH) {
+    realn b1, b2;
+    place_backward(s, lp, lights, load_fragment(run, i), &g, &b1, &b2);
+    store_run(load_own_run(last, i, grad_bary1) + b1, i, last, grad_bary1);
+    store_run(load_own_run(last, i, grad_bary2) + b2, i, last, grad_bary2);
+  }
   float4 position[3];
 #pragma unroll
   for (int k = 0; k < 3; ++k) position[k] = sum_vec3n(g.position[k]);
@@ -290,13 +362,9 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
   }
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    if (DPR_BASE == DPR_BASE_OF_CORNERS)
-      vstore3(sum_vec3n(g.color[k]).xyz, 0, grad_colors + 9 * pair + 3 * k);
     vstore3(position[k].xyz, 0, grad_positions + 9 * pair + 3 * k);
     if (DPR_SHADING != DPR_FLAT) vstore3(sum_vec3n(g.normal[k]).xyz, 0, grad_normals + 9 * pair + 3 * k);
   }
-  const float4 coefficient = sum_vec3n(g.coefficient);
-  vstore4((float4)(coefficient.xyz, sum_lanes(g.shininess)), pair, grad_materials);
   const float4 eye = sum_vec3n(g.eye);
   grad_eye[pair] = eye.x;
   grad_eye[pairs + pair] = eye.y;
@@ -371,20 +439,20 @@ kernel void shade_lit_backward_lights(
                                  face_normals, normals, materials);
   LightSums sums = zero_light_sums();
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  const LitRun run = {
+      first, last, bary1, bary2, {base_red, base_green, base_blue}, {grad_red, grad_green, grad_blue}};
   for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn in_run = lanes_before(last, i);
-    const Vec3n grad = load_rgb(in_run, i, grad_red, grad_green, grad_blue);
-    const realn c1 = load_run(in_run, i, bary1), c2 = load_run(in_run, i, bary2);
-    const Vec3n base = load_base(in_run, i, base_red, base_green, base_blue);
-    const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
-    const Vec3n grad_factor = mul3n(grad, f.base), grad_specular = mul3n(grad, splat3(s.material));
+    const LitFragment f = load_fragment(run, i);
+    // point_on() is enough, but inlined here it takes CPUs twice as long.
+    const SurfacePoint at = shade_fragment(s, lp, lights, f.c1, f.c2, f.base).at;
+    const Vec3n grad_factor = mul3n(f.grad, at.base), grad_specular = mul3n(f.grad, splat3(s.material));
     sums.ambient = mad3n(grad_factor, (realn)(1.0f), sums.ambient);
     if (DPR_SHADING != DPR_GOURAUD) {
-      add_light_sums(lp, light, lights, s.material.w, s.eye, f.position, f.normal, grad_factor, grad_specular,
-                     &sums);
+      add_light_sums(lp, light, lights, s.material.w, s.eye, at.position, at.normal, grad_factor,
+                     grad_specular, &sums);
       continue;
     }
-    const realn c[3] = {1.0f - c1 - c2, c1, c2};
+    const realn c[3] = {1.0f - f.c1 - f.c2, f.c1, f.c2};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
       add_light_sums(lp, light, lights, s.material.w, s.eye, s.position[k], s.normal[k],
