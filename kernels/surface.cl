@@ -57,7 +57,8 @@ kernel void surface_forward(const FrameParams p, const uint last_pair, global co
 }
 
 /// Gradients of a level of detail's barycentrics, relative to corner 0's, and of the corners' places, q_k and
-/// depths, from that of the place's step, which is the sum of c_k' place_k.
+/// depths, from that of the place's step, which is the sum of c_k' place_k. Depths change q_k too:
+/// depths_by_steps().
 typedef struct {
   float bary1, bary2;
   float3 along;  // of place_k by the gradient of the step: c_k'
@@ -67,17 +68,27 @@ typedef struct {
 static inline DetailGradient detail_backward(const TexturedFace* f, const Detail d, float c1, float c2,
                                              float2 grad_step) {
   const float along1 = dot(grad_step, f->place1), along2 = dot(grad_step, f->place2);
+  // Not by ?:, which would choose between two places and so put them into memory.
+  const float3 q = select(f->steps.q_x, f->steps.q_y, (int3)(-d.along_y));
+  const float sum_q = q.x + q.y + q.z;
   const float3 depth = f->steps.depth, c = (float3)(1.0f - c1 - c2, c1, c2);
   const float mean = c1 * along1 + c2 * along2;
-  const float by_depth = along1 * d.q.y + along2 * d.q.z - mean * d.sum_q;
+  const float by_depth = along1 * q.y + along2 * q.z - mean * sum_q;
   DetailGradient g;
-  g.bary1 = (depth.y - depth.x) * by_depth - d.depth * along1 * d.sum_q;
-  g.bary2 = (depth.z - depth.x) * by_depth - d.depth * along2 * d.sum_q;
-  g.along = d.depth * (d.q - c * d.sum_q);
+  g.bary1 = (depth.y - depth.x) * by_depth - d.depth * along1 * sum_q;
+  g.bary2 = (depth.z - depth.x) * by_depth - d.depth * along2 * sum_q;
+  g.along = d.depth * (q - c * sum_q);
   g.along.x = -(g.along.y + g.along.z);
   g.q = d.depth * ((float3)(0.0f, along1, along2) - mean);
-  g.depth = c * by_depth - (f->is_clipped ? (float3)(0.0f) : g.q * d.q / depth);
+  g.depth = c * by_depth;
   return g;
+}
+
+/// Of a triangle on the screen q_k is divided by the depth z_k: what the gradients of q_k along x and y are
+/// to those of depths. A clipped face has q_k of its homogeneous corners.
+static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float3 grad_y) {
+  if (f->is_clipped) return 0.0f;
+  return -(grad_x * f->steps.q_x + grad_y * f->steps.q_y) / f->steps.depth;
 }
 
 /// One work-item per pair, up to `last_pair`. Deterministic. Inputs as surface_forward, and
@@ -141,6 +152,7 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
     place[1] += c1 * grad_place;
     place[2] += c2 * grad_place;
   }
+  if (face.texture.levels > 1) steps[2] += depths_by_steps(&face, steps[0], steps[1]);
   for (int k = 0; k < 3; ++k) {
     vstore3(color[k], 0, grad_colors + 9 * pair + 3 * k);
     vstore3((float3)(place[k].x, -place[k].y, 0.0f), 0, grad_texcoords + 9 * pair + 3 * k);

@@ -24,10 +24,8 @@ typedef struct {
 /// an axis of the image, where q_k = g_k / z_k, Q = sum q_k, z = sum c_k z_k, z_k is a corner's depth, or 1
 /// without perspective, and g_k is the step of the barycentric on the screen. NDC.
 typedef struct {
-  float3 depth;             // z_k
-  float3 q_x, q_y;          // q_k along either axis
-  float sum_x, sum_y;       // Q
-  float2 along_x, along_y;  // q_1 place1 + q_2 place2
+  float3 depth;     // z_k
+  float3 q_x, q_y;  // q_k along either axis
 } Steps;
 
 /// A triangle's corners: colours, and places in its texture. Places are in units of the whole texture, from
@@ -54,31 +52,21 @@ static inline float3 cofactor(const ClippedFace c, int k) {
 }
 static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyw, cofactor(c, 0)); }
 
-static inline Steps make_steps(float3 depth, float3 q_x, float3 q_y, float2 place1, float2 place2) {
-  Steps s;
-  s.depth = depth;
-  s.q_x = q_x;
-  s.q_y = q_y;
-  s.sum_x = q_x.x + q_x.y + q_x.z;
-  s.sum_y = q_y.x + q_y.y + q_y.z;
-  s.along_x = q_x.y * place1 + q_x.z * place2;
-  s.along_y = q_y.y * place1 + q_y.z * place2;
+/// Of a face that is not clipped, and of one that is: in perspective always, as without it the plane has no
+/// steps where it passes the camera.
+static inline Steps triangle_steps(const FrameParams p, const Triangle t) {
+  const float3 depth = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
+  const float3 scale = 1.0f / (doubled_area(t) * depth);
+  const Steps s = {depth, screen_steps(t, 0) * scale, screen_steps(t, 1) * scale};
   return s;
 }
 
-/// Of a face that is not clipped, and of one that is: in perspective always, as without it the plane has no
-/// steps where it passes the camera.
-static inline Steps triangle_steps(const FrameParams p, const Triangle t, float2 place1, float2 place2) {
-  const float3 depth = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
-  const float3 scale = 1.0f / (doubled_area(t) * depth);
-  return make_steps(depth, screen_steps(t, 0) * scale, screen_steps(t, 1) * scale, place1, place2);
-}
-
-static inline Steps clipped_steps(const ClippedFace c, float2 place1, float2 place2) {
+static inline Steps clipped_steps(const ClippedFace c) {
   const float inverse = 1.0f / determinant(c);
   const float3 a = cofactor(c, 0), b = cofactor(c, 1), d = cofactor(c, 2);
-  return make_steps((float3)(c.corner[0].w, c.corner[1].w, c.corner[2].w), inverse * (float3)(a.x, b.x, d.x),
-                    inverse * (float3)(a.y, b.y, d.y), place1, place2);
+  const Steps s = {(float3)(c.corner[0].w, c.corner[1].w, c.corner[2].w), inverse * (float3)(a.x, b.x, d.x),
+                   inverse * (float3)(a.y, b.y, d.y)};
+  return s;
 }
 
 static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0f - texcoord.y); }
@@ -101,8 +89,7 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   if (f.texture.wrap == DPR_REPEAT) f.place -= floor(f.place);
   if (f.texture.wrap == DPR_MIRROR) f.place -= 2.0f * floor(0.5f * f.place);
   if (f.texture.levels > 1) {
-    f.steps = f.is_clipped ? clipped_steps(s.clipped[view_face], f.place1, f.place2)
-                           : triangle_steps(p, s.triangles[view_face], f.place1, f.place2);
+    f.steps = f.is_clipped ? clipped_steps(s.clipped[view_face]) : triangle_steps(p, s.triangles[view_face]);
   }
   return f;
 }
@@ -179,9 +166,14 @@ typedef struct {
   int along_y;        // which step is the longer
   int varies;         // whether the level follows it
   float2 by_step;     // derivative by the place's step
-  float3 q;           // of that axis, as are the sum of them
-  float sum_q, depth;
+  float depth;
 } Detail;
+
+/// How the place changes from sample to sample along an axis, over z, at `way` from corner 0: sum q_k
+/// place_k, less Q times its mean by the c_k.
+static inline float2 place_step(const TexturedFace* f, float3 q, float2 way) {
+  return q.y * f->place1 + q.z * f->place2 - (q.x + q.y + q.z) * way;
+}
 
 static inline Detail find_detail(const FrameParams p, const TexturedFace* f, float c1, float c2) {
   Detail d;
@@ -192,11 +184,9 @@ static inline Detail find_detail(const FrameParams p, const TexturedFace* f, flo
   const float2 way = c1 * f->place1 + c2 * f->place2;
   d.depth = s->depth.x + c1 * (s->depth.y - s->depth.x) + c2 * (s->depth.z - s->depth.x);
   const float2 scale = p.pixel_size * (float2)((float)f->texture.width, (float)f->texture.height);
-  const float2 x = scale * d.depth * (s->along_x - s->sum_x * way),
-               y = scale * d.depth * (s->along_y - s->sum_y * way);
+  const float2 x = scale * d.depth * place_step(f, s->q_x, way),
+               y = scale * d.depth * place_step(f, s->q_y, way);
   d.along_y = dot(y, y) > dot(x, x);
-  d.q = d.along_y ? s->q_y : s->q_x;
-  d.sum_q = d.along_y ? s->sum_y : s->sum_x;
   const float2 step = d.along_y ? y : x;
   const float length2 = dot(step, step), most = (float)(f->texture.levels - 1);
   const float detail = 0.5f * log2(length2);
