@@ -1,5 +1,5 @@
-// Exclusive prefix sums of counts, in chunks, level by level. Sums saturate, so that a total that does not
-// fit is seen as the largest number instead of wrapping around. A chunk is a work-item's on CPUs, a
+// Exclusive prefix sums of counts, in place, in chunks, level by level. Sums saturate, so that a total that
+// does not fit is seen as the largest number instead of wrapping around. A chunk is a work-item's on CPUs, a
 // work-group's on GPUs.
 #include "group.h"
 
@@ -21,12 +21,11 @@ DPR_GROUP_KERNEL kernel void scan_sum(const uint count, global const uint* restr
 
 /// The scan itself, given the scan of the chunks' sums. One work-group per chunk; one where there is nothing
 /// to scan.
-/// in   size     elements of a chunk, at most DPR_SCAN_CHUNK
-/// in   values   uint[count]
-/// in   bases    uint[chunk]      exclusive scan of the chunks' sums
-/// out  offsets  uint[count + 1]  exclusive scan; the last is the total
-DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, global const uint* restrict values,
-                                        global const uint* restrict bases, global uint* restrict offsets) {
+/// in      size    elements of a chunk, at most DPR_SCAN_CHUNK
+/// in      bases   uint[chunk]      exclusive scan of the chunks' sums
+/// in out  values  uint[count + 1]  counts, then their exclusive scan, whose last is the total
+DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, global const uint* restrict bases,
+                                        global uint* restrict values) {
   const uint each = DPR_EACH(DPR_SCAN_CHUNK);
   local uint places[DPR_LOCAL_PLACES(DPR_SCAN_CHUNK)], group_sums[DPR_GROUP];
   const uint chunk = (uint)get_group_id(0), item = (uint)get_local_id(0);
@@ -36,8 +35,8 @@ DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, globa
   barrier(CLK_LOCAL_MEM_FENCE);
   group_scan_chunk(places, each, group_sums);
   for (uint i = item; i < here; i += DPR_GROUP)
-    offsets[first + i] = add_sat(base, places[local_place(i, each)]);
-  if (item == 0 && first + here == count) offsets[count] = add_sat(base, group_sums[DPR_GROUP - 1]);
+    values[first + i] = add_sat(base, places[local_place(i, each)]);
+  if (item == 0 && first + here == count) values[count] = add_sat(base, group_sums[DPR_GROUP - 1]);
 }
 
 #else
@@ -74,20 +73,21 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
 }
 
 /// As above, but the only chunk may have any size. One work-item per chunk.
-kernel void scan_apply(const uint count, const uint size, global const uint* restrict values,
-                       global const uint* restrict bases, global uint* restrict offsets) {
+kernel void scan_apply(const uint count, const uint size, global const uint* restrict bases,
+                       global uint* restrict values) {
   const uint chunk = (uint)get_global_id(0);
   const uint first = chunk * size;
   if (first >= count && chunk != 0) return;
   const uint last = min(count, first + size);
   uint sum = bases[chunk];
   uint i = first;
-  for (; last - i >= 8; i += 8) vstore8(scan_eight(vload8(0, values + i), &sum), 0, offsets + i);
+  for (; last - i >= 8; i += 8) vstore8(scan_eight(vload8(0, values + i), &sum), 0, values + i);
   for (; i < last; ++i) {
-    offsets[i] = sum;
-    sum = add_sat(sum, values[i]);
+    const uint value = values[i];
+    values[i] = sum;
+    sum = add_sat(sum, value);
   }
-  if (last == count) offsets[count] = sum;
+  if (last == count) values[count] = sum;
 }
 
 #endif

@@ -1,5 +1,7 @@
 #include "stages/bin.hpp"
 
+#include <utility>
+
 namespace dpr {
 
 Bin::Bin(Device::Impl& device)
@@ -9,17 +11,22 @@ Bin::Bin(Device::Impl& device)
       scan_(device),
       sort_(device) {}
 
-void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
-  const std::size_t faces = setup.counts.size();
-  scan_(faces, setup.counts, pair_starts);
+void Bin::forward(const shared::FrameParams& p, Setup& setup) {
+  scan(setup);
+  const std::size_t faces = pair_starts.size() - 1;
   const std::size_t found = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
   list(p, setup, found);
   settle(found);
 }
 
-void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
-  scan_(setup.counts.size(), setup.counts, pair_starts);
+void Bin::forward(const shared::FrameParams& p, Setup& setup, std::size_t capacity) {
+  scan(setup);
   list(p, setup, capacity);
+}
+
+void Bin::scan(Setup& setup) {
+  std::swap(setup.counts, pair_starts);
+  scan_(pair_starts.size() - 1, pair_starts);
 }
 
 void Bin::settle(std::size_t known_pairs) {
@@ -34,8 +41,8 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
-  fill_.sharing(setup.counts.size(), p, n, setup.triangles, pair_starts, pair_count, place_face_, pair_tile,
-                places);
+  fill_.sharing(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face_,
+                pair_tile, places);
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
   link_(pairs, n, pair_count, places, place_face_, pair_face, face_pairs);
 }

@@ -13,10 +13,10 @@ class Bin {
  public:
   explicit Bin(Device::Impl& device);
 
-  /// Blocks to read the number of pairs.
-  void forward(const shared::FrameParams& p, const Setup& setup);
+  /// Takes the setup's counts for `pair_starts`. Blocks to read the number of pairs.
+  void forward(const shared::FrameParams& p, Setup& setup);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
-  void forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
+  void forward(const shared::FrameParams& p, Setup& setup, std::size_t capacity);
   /// Says how many pairs there are, after a forward() that did not wait for it.
   void settle(std::size_t known_pairs);
 
@@ -32,6 +32,7 @@ class Bin {
   std::size_t bytes() const;
 
  private:
+  void scan(Setup& setup);
   void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
 
   Device::Impl& device_;

@@ -173,11 +173,11 @@ void Contour::count(const ContourInputs& in) {
     throw InvalidArgument("edges (frame)", std::to_string(view_edges(in)),
                           "fewer, so that they can be counted");
   }
-  counts_.resize(device_, view_edges(in));
+  pair_starts.resize(device_, view_edges(in) + 1);
   count_(view_edges(in), in.p, params(in), in.edges.edges, in.facing, in.transform.ndc, in.transform.world,
          in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
-         counts_);
-  scan_(view_edges(in), counts_, pair_starts);
+         pair_starts);
+  scan_(view_edges(in), pair_starts);
 }
 
 void Contour::list(const ContourInputs& in, std::size_t capacity) {
@@ -208,8 +208,8 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
 
 std::size_t Contour::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
-  for (const Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &tile_starts, &counts_, &pair_count,
-                                        &pair_starts, &edge_pairs_, &place_contour_, &places_}) {
+  for (const Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &tile_starts, &pair_count, &pair_starts,
+                                        &edge_pairs_, &place_contour_, &places_}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

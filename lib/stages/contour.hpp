@@ -94,7 +94,6 @@ class Contour {
       gather_cuts_;
   Scan scan_;
   Sort sort_;
-  Buffer<cl_uint> counts_;                  // [view * edge]
   Buffer<cl_uint> edge_pairs_;              // the pairs of every edge
   Buffer<cl_uint> place_contour_, places_;  // [pair] before sorting
 };

@@ -69,16 +69,17 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = pixels_of(p);
   masks.resize(device_, length(pairs));
-  counts_.resize(device_, std::max<std::size_t>(pairs, pixels));
-  cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, counts_);
-  if (clip != nullptr) clip->cover(p, triangles, bin, masks, counts_);
+  fragment_starts.resize(device_, length(std::size_t{pairs} + 1));
+  cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts);
+  if (clip != nullptr) clip->cover(p, triangles, bin, masks, fragment_starts);
   if (hiding) {
     hide_.in_groups(tiles_of(p), p, hiding->reach, hiding->cameras, bin.tile_starts, triangles, bin.pair_face,
-                    bin.places, masks, counts_, bin.face_pairs);
+                    bin.places, masks, fragment_starts, bin.face_pairs);
   }
-  scan_(length(pairs), counts_, fragment_starts);
-  count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, counts_);
-  scan_(pixels, counts_, pixel_starts);
+  scan_(pairs, fragment_starts);
+  pixel_starts.resize(device_, pixels + 1);
+  count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, pixel_starts);
+  scan_(pixels, pixel_starts);
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
@@ -160,9 +161,7 @@ std::vector<Range> Rasterize::pixels(const shared::FrameParams& p) const {
   return rows;
 }
 
-Range Rasterize::tiles(const shared::FrameParams& p) const {
-  return band ? band->tiles : Range(tiles_of(p));
-}
+Range Rasterize::tiles(const shared::FrameParams& p) const { return band ? band->tiles : Range(tiles_of(p)); }
 
 /// The runs of a band, counted from its first element.
 void Rasterize::rebase(const Band& next) {
@@ -278,9 +277,8 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
 std::size_t Rasterize::bytes() const {
   std::size_t bytes =
       scan_.bytes() + masks.capacity_bytes() + device_rows_.capacity_bytes() + history_.capacity_bytes();
-  for (const Buffer<cl_uint>* buffer :
-       {&fragment_starts, &pixel_starts, &list, &fragment_pair, &fragment_pixel, &counts_,
-        &frame_fragment_starts_, &frame_pixel_starts_}) {
+  for (const Buffer<cl_uint>* buffer : {&fragment_starts, &pixel_starts, &list, &fragment_pair,
+                                        &fragment_pixel, &frame_fragment_starts_, &frame_pixel_starts_}) {
     bytes += buffer->capacity_bytes();
   }
   for (const Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2, &grad_corners}) {

@@ -164,7 +164,6 @@ class Rasterize {
          In<float>, In<float>, In<float>, In<float>, Out<float>>
       backward_;
   Scan scan_;
-  Buffer<cl_uint> counts_;
   Buffer<cl_uint4> device_rows_, history_;
   PendingRead<cl_uint4> last_row_;
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]

@@ -13,33 +13,28 @@ Scan::Scan(Device::Impl& device)
     : device_(device), sum_(device, "scan.cl", "scan_sum"), apply_(device, "scan.cl", "scan_apply") {
   const cl_uint zero = 0;
   zero_.upload(device, std::span(&zero, 1));
-  levels_.resize(4);  // 1024^4 > 2^32 counts
+  bases_.resize(4);  // 1024^4 > 2^32 counts
 }
 
-void Scan::operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets) {
-  offsets.resize(device_, count.is_known ? Length(count.count + 1) : Length::at_most(count.count + 1));
-  scan_level(count.count, values, offsets, 0);
-}
+void Scan::operator()(std::size_t count, Buffer<cl_uint>& values) { scan_level(count, values, 0); }
 
-void Scan::scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
-                      std::size_t level) {
+void Scan::scan_level(std::size_t count, Buffer<cl_uint>& values, std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
   if (count <= scanned_at_once(device_)) {
-    apply_.in_groups(1, n, n, values, zero_, offsets);
+    apply_.in_groups(1, n, n, zero_, values);
     return;
   }
   const std::size_t chunks = (count + DPR_SCAN_CHUNK - 1) / DPR_SCAN_CHUNK;
-  Level& next = levels_[level];
-  next.sums.resize(device_, chunks);
-  next.bases.resize(device_, chunks + 1);
-  sum_.in_groups(chunks, n, values, next.sums);
-  scan_level(chunks, next.sums, next.bases, level + 1);
-  apply_.in_groups(chunks, n, DPR_SCAN_CHUNK, values, next.bases, offsets);
+  Buffer<cl_uint>& bases = bases_[level];
+  bases.resize(device_, chunks + 1);
+  sum_.in_groups(chunks, n, values, bases);
+  scan_level(chunks, bases, level + 1);
+  apply_.in_groups(chunks, n, DPR_SCAN_CHUNK, bases, values);
 }
 
 std::size_t Scan::bytes() const {
   std::size_t bytes = zero_.capacity_bytes();
-  for (const Level& level : levels_) bytes += level.sums.capacity_bytes() + level.bases.capacity_bytes();
+  for (const Buffer<cl_uint>& bases : bases_) bytes += bases.capacity_bytes();
   return bytes;
 }
 

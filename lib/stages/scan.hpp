@@ -1,4 +1,4 @@
-// Exclusive prefix sums on the device.
+// Exclusive prefix sums on the device, in place.
 #pragma once
 
 #include <vector>
@@ -14,25 +14,20 @@ class Scan {
  public:
   explicit Scan(Device::Impl& device);
 
-  /// offsets[i] = values[0] + ... + values[i - 1] for i in [0, count]; sums saturate at 2^32 - 1.
-  void operator()(Length count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets);
+  /// Makes `count` values, of a buffer of one more, the sums of those before each, and the last the sum of
+  /// all. Sums saturate at 2^32 - 1.
+  void operator()(std::size_t count, Buffer<cl_uint>& values);
 
   std::size_t bytes() const;
 
  private:
-  void scan_level(std::size_t count, const Buffer<cl_uint>& values, Buffer<cl_uint>& offsets,
-                  std::size_t level);
-
-  /// The sums of a level's chunks, and their scan.
-  struct Level {
-    Buffer<cl_uint> sums, bases;
-  };
+  void scan_level(std::size_t count, Buffer<cl_uint>& values, std::size_t level);
 
   Device::Impl& device_;
   Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> apply_;
+  Kernel<cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> apply_;
   Buffer<cl_uint> zero_;
-  std::vector<Level> levels_;
+  std::vector<Buffer<cl_uint>> bases_;  // [level][chunk + 1] the scan of the chunks' sums
 };
 
 /// Throws InvalidArgument if a sum saturated: `what` were too many.

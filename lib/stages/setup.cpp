@@ -9,7 +9,7 @@ void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, cons
   const std::size_t count = std::size_t{p.views} * p.faces;
   facing.resize(device_, count);
   kept.resize(device_, count);
-  counts.resize(device_, count);
+  counts.resize(device_, count + 1);
   triangles.resize(device_, count);
   forward_.sharing(count, p, views.cameras, geometry.face_vertices, ndc, hidden, facing, kept, counts,
                    triangles);

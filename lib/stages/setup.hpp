@@ -15,9 +15,9 @@ class Setup {
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                const Buffer<cl_float4>& ndc, const Buffer<float>& hidden);
 
-  Buffer<cl_uint> facing;              ///< [view][face] DPR_FACE_FRONT, ...
-  Buffer<cl_uint> kept;                ///< [view][face] 0 where a triangle is dropped, 1 where not
-  Buffer<cl_uint> counts;              ///< [view][face] tiles that are listed for a triangle
+  Buffer<cl_uint> facing;  ///< [view][face] DPR_FACE_FRONT, ...
+  Buffer<cl_uint> kept;    ///< [view][face] 0 where a triangle is dropped, 1 where not
+  Buffer<cl_uint> counts;  ///< [view][face] tiles that are listed for a triangle, and room for their sum
   Buffer<shared::Triangle> triangles;  ///< [view][face] of those that have tiles
 
   std::size_t bytes() const {

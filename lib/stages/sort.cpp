@@ -46,14 +46,14 @@ void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& cou
   const std::size_t blocks = (capacity + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
   const auto n = static_cast<cl_uint>(capacity);
   const std::size_t digits = std::size_t{1} << DPR_SORT_BITS(device_.info.lanes);
-  counts_.resize(device_, digits * blocks);
-  histogram_.in_groups(blocks, n, shift, count, keys, counts_);
-  scan_(digits * blocks, counts_, offsets_);
+  offsets_.resize(device_, digits * blocks + 1);
+  histogram_.in_groups(blocks, n, shift, count, keys, offsets_);
+  scan_(digits * blocks, offsets_);
   scatter_.in_groups(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
 }
 
 std::size_t Sort::bytes() const {
-  return scan_.bytes() + counts_.capacity_bytes() + offsets_.capacity_bytes() + other_keys_.capacity_bytes() +
+  return scan_.bytes() + offsets_.capacity_bytes() + other_keys_.capacity_bytes() +
          other_values_.capacity_bytes();
 }
 

@@ -32,7 +32,7 @@ class Sort {
       scatter_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> ranges_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> serial_;
-  Buffer<cl_uint> counts_, offsets_, other_keys_, other_values_;
+  Buffer<cl_uint> offsets_, other_keys_, other_values_;
 };
 
 }  // namespace dpr

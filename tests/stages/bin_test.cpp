@@ -100,8 +100,8 @@ std::vector<std::vector<cl_uint>> lists_of(const NdcFrame& frame, const std::vec
                                            const dpr::Device& device) {
   NdcStages s(frame, triangles, device.impl());
   s.list_pairs();
-  return {s.setup.counts.download(), s.bin.pair_starts.download(), s.bin.pair_face.download(),
-          s.bin.pair_tile.download(), s.bin.face_pairs.download()};
+  return {s.bin.pair_starts.download(), s.bin.pair_face.download(), s.bin.pair_tile.download(),
+          s.bin.face_pairs.download()};
 }
 
 }  // namespace

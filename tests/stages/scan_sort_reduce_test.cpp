@@ -37,13 +37,16 @@ Buffer<cl_uint> on_device(const std::vector<cl_uint>& values) {
   return buffer;
 }
 
+Buffer<cl_uint> with_room_for_sum(std::vector<cl_uint> values) {
+  values.push_back(k_poison);
+  return on_device(values);
+}
+
 std::vector<cl_uint> scan(const std::vector<cl_uint>& values) {
   dpr::Scan operation(device_impl());
-  const Buffer<cl_uint> in = on_device(values);
-  Buffer<cl_uint> out;
-  poison(out, values.size() + 1, k_poison);
-  operation(values.size(), in, out);
-  return out.download();
+  Buffer<cl_uint> scanned = with_room_for_sum(values);
+  operation(values.size(), scanned);
+  return scanned.download();
 }
 
 std::vector<cl_uint> serial_scan(const std::vector<cl_uint>& values) {
@@ -141,13 +144,13 @@ TEST_SUITE("unit") {
 
   TEST_CASE("scan: one operation serves sizes that grow and shrink") {
     dpr::Scan operation(device_impl());
-    Buffer<cl_uint> out;
     for (const std::size_t count :
          {std::size_t{300}, std::size_t{3}, static_cast<std::size_t>(reduced(70000, 600))}) {
       const std::vector<cl_uint> values = random_values(count, 5, 3);
-      operation(count, on_device(values), out);
-      CHECK(out.download() == serial_scan(values));
-      CHECK(dpr::read_total(out, count, "items") == serial_scan(values).back());
+      Buffer<cl_uint> scanned = with_room_for_sum(values);
+      operation(count, scanned);
+      CHECK(scanned.download() == serial_scan(values));
+      CHECK(dpr::read_total(scanned, count, "items") == serial_scan(values).back());
     }
   }
 
