@@ -100,25 +100,25 @@ static inline void store_sums(float8 sum, float8 error, uint first, uint count, 
   }
 }
 
-/// Gradients at the world positions, and the sums over the vertices of a mesh of what they add to the
-/// gradients of its pose and of the camera. A vertex that no kept triangle uses has zero gradient, wherever
-/// it lies. One work-item per (view, mesh, slot). Deterministic.
-/// in      views, models, world  as transform_forward
-/// in      starts      uint[view * mesh + 1]  of the vertices, [view][vertex]
-/// in      grad_ndc    float4[view][vertex]   d loss / d (x, y, depth)
-/// in      grad_clip   float4[view][vertex]   what clipped faces add, of homogeneous coordinates: x and y in
+/// From the gradients of what transform_forward leaves to those of the world positions, in place, and the
+/// sums over the vertices of a mesh of what they add to the gradients of its pose and of the camera. A vertex
+/// that no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, mesh, slot).
+/// Deterministic. in      views, models, world  as transform_forward in      starts      uint[view * mesh +
+/// 1]  of the vertices, [view][vertex] in      grad_clip   float4[view][vertex]   what clipped faces add, of
+/// homogeneous coordinates: x and y in
 ///                     NDC, times depth, and depth; orthographic: x, y, depth. Where the lens distorts,
 ///                     without its distortion: what it does to cuts is left out of its own gradients. Read
 ///                     where p.clips is set
-/// in      lit         0: nothing was lit, grad_world is only written
+/// in      lit         0: nothing was lit, grad_lit is not read
+/// in      grad_lit    float4[view][vertex]   what shading adds to d loss / d world position
 /// in      slots       of a segment
-/// in out  grad_world  float4[view][vertex]   in: what shading adds; out: the whole d loss / d world position
+/// in out  grad        float4[view][vertex]   d loss / d (x, y, depth), then d loss / d world position
 /// out     partial     float[DPR_POSE_CHANNELS][view][mesh][2][slot]  sums, and their compensations
 kernel void transform_backward(const FrameParams p, const uint lit, const uint slots,
                                global const ViewParams* restrict views, global const float4* restrict models,
                                global const uint* restrict starts, global const float4* restrict world,
-                               global const float4* restrict grad_ndc,
-                               global const float4* restrict grad_clip, global float4* restrict grad_world,
+                               global const float4* restrict grad_clip,
+                               global const float4* restrict grad_lit, global float4* restrict grad,
                                global float* restrict partial) {
   const uint i = (uint)get_global_id(0), segments = p.views * p.meshes;
   if (i >= segments * slots) return;
@@ -127,10 +127,10 @@ kernel void transform_backward(const FrameParams p, const uint lit, const uint s
   float8 sums[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f}, errors[DPR_CHANNEL_VECTORS] = {0.0f, 0.0f};
   for (uint k = run.x; k < run.y; ++k) {
     const float3 clip = p.clips ? grad_clip[k].xyz : (float3)(0.0f);
-    const float3 of_light = lit ? grad_world[k].xyz : (float3)(0.0f);
+    const float3 of_light = lit ? grad_lit[k].xyz : (float3)(0.0f);
     const VertexGradient v = vertex_gradient(p, views + segment / p.meshes, models + 3 * segment,
-                                             world[k].xyz, grad_ndc[k].xyz, clip, of_light);
-    grad_world[k] = (float4)(v.world, 0.0f);
+                                             world[k].xyz, grad[k].xyz, clip, of_light);
+    grad[k] = (float4)(v.world, 0.0f);
 #pragma unroll
     for (uint c = 0; c < DPR_CHANNEL_VECTORS; ++c) add_channels(&sums[c], &errors[c], v.channels[c]);
   }
@@ -140,7 +140,8 @@ kernel void transform_backward(const FrameParams p, const uint lit, const uint s
 }
 
 /// The sums of what vertices add to the gradients of the lens, where some view distorts. One work-item per
-/// (view, mesh, slot). Deterministic. Inputs as transform_backward, and
+/// (view, mesh, slot). Deterministic. Inputs as transform_backward, before it, and
+/// in   grad_ndc  float4[view][vertex]  d loss / d (x, y, depth)
 /// out  partial  its channels from DPR_POSE_CHANNELS to DPR_LENS_CHANNELS
 kernel void transform_backward_lens(const FrameParams p, const uint slots,
                                     global const ViewParams* restrict views,

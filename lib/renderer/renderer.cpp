@@ -283,23 +283,24 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
   }
   if (is_geometric(wanted)) {
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
-                    grad_ndc);
+                    grad_vertices);
     if (frame.clips != 0) {
       gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, clip.grad_corners, clip.grad);
     }
     if (pixel_noise)
-      pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_ndc, clip.grad);
-    if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_world);
+      pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_vertices,
+                                  clip.grad);
+    if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_lit);
     if (shade.lit()) shade.backward_given_normals(shade_inputs());
     if (geometry_colors) {
       gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                       grad_colors);
       // Where vertices may lie behind the camera their depth goes the way of homogeneous coordinates.
       geometry_colors->backward(frame, *geometry, transform, grad_colors,
-                                frame.clips != 0 ? clip.grad : grad_ndc, grad_world);
+                                frame.clips != 0 ? clip.grad : grad_vertices, grad_lit);
     }
-    const bool has_grad_world = shade.lit() || geometry_colors;
-    transform.backward(frame, device_views, has_grad_world, grad_ndc, clip.grad, grad_world);
+    const bool is_lit = shade.lit() || geometry_colors;
+    transform.backward(frame, device_views, is_lit, clip.grad, grad_lit, grad_vertices);
   }
   if (wanted.texture && textured) texels->finish(geometry->textures);
   gather_mesh_gradients(add_to_positions);
@@ -346,10 +347,10 @@ std::size_t Renderer::Impl::bytes() const {
          (texels ? texels->bytes() : 0) + reduce.bytes() + (aov ? aov->bytes() : 0) +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() + grad_ndc.capacity_bytes() +
-         grad_world.capacity_bytes() + grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() +
-         material_channels.capacity_bytes() + grad_materials.capacity_bytes() +
-         grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() +
+         grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
+         grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
+         grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
          (gradient_map ? gradient_map->bytes() : 0);
 }
 

@@ -45,7 +45,7 @@ bool Renderer::Impl::wants_materials() const {
 }
 
 void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions) {
-  if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_world);
+  if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_vertices);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
   if (wants_colors() && frame.color_stride != 0) {
     gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,

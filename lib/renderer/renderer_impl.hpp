@@ -166,14 +166,16 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::shared_ptr<CornerTexcoords> corner_texcoords;  // of the scene, made when first asked for
   Buffer<cl_float4> aov_surface, aov_coverage;        // of noise on the pixel: Auxiliary::weigh(), as pixels
 
-  Buffer<cl_float4> host_grad_images;                   // where gradients that come from the host go
-  Buffer<cl_float4> grad_ndc, grad_world, grad_colors;  // [view][vertex] twice, [color]
-  Buffer<cl_float4> grad_texcoords;                     // [texcoord]
-  Buffer<float> material_channels;                      // [channel][face] in the order of the materials
-  Buffer<cl_float4> grad_materials;                     // [material] of backward_on_device(), as Geometry's
-  Buffer<float> grad_numbers;                           // as GradientMap has them
-  std::uint64_t device_gradient_frame = 0;              // the frame of backward_on_device()
-  std::optional<GradientMap> gradient_map;              // of the scene and views as they are
+  Buffer<cl_float4> host_grad_images;       // where gradients that come from the host go
+  Buffer<cl_float4> grad_vertices;          // [view][vertex] by NDC, then by world position
+  Buffer<cl_float4> grad_lit;               // [view][vertex] what shading adds to those by world position
+  Buffer<cl_float4> grad_colors;            // [color]
+  Buffer<cl_float4> grad_texcoords;         // [texcoord]
+  Buffer<float> material_channels;          // [channel][face] in the order of the materials
+  Buffer<cl_float4> grad_materials;         // [material] of backward_on_device(), as Geometry's
+  Buffer<float> grad_numbers;               // as GradientMap has them
+  std::uint64_t device_gradient_frame = 0;  // the frame of backward_on_device()
+  std::optional<GradientMap> gradient_map;  // of the scene and views as they are
 
   Exchange& made_exchange();
   /// The gradient of zero sums: all arrays of the last backward pass but those of vertices, colours, texels.

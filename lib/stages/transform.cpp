@@ -20,18 +20,18 @@ void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, 
 }
 
 void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
-                         const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
-                         Buffer<cl_float4>& grad_world) {
+                         const Buffer<cl_float4>& grad_clip, const Buffer<cl_float4>& grad_lit,
+                         Buffer<cl_float4>& grad) {
   const std::size_t segments = std::size_t{p.views} * p.meshes;
   slots = slots_of_segments(p.vertices / std::max(p.meshes, 1U));
-  grad_world.resize(device_, std::size_t{p.views} * p.vertices);
   partial_sums.resize(device_,
                       (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * segments * 2 * slots);
+  if (p.distorts != 0) {
+    backward_lens_(segments * slots, p, to_uint(slots), views.cameras, views.vertex_starts, world, grad,
+                   partial_sums);
+  }
   backward_(segments * slots, p, lit ? 1 : 0, to_uint(slots), views.cameras, views.models,
-            views.vertex_starts, world, grad_ndc, grad_clip, grad_world, partial_sums);
-  if (p.distorts == 0) return;
-  backward_lens_(segments * slots, p, to_uint(slots), views.cameras, views.vertex_starts, world, grad_ndc,
-                 partial_sums);
+            views.vertex_starts, world, grad_clip, grad_lit, grad, partial_sums);
 }
 
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,

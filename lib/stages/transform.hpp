@@ -19,12 +19,12 @@ class Transform {
   explicit Transform(Device::Impl& device);
 
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
-  /// `grad_clip` is what clipped faces add where p.clips is set, [view][vertex] of x times depth, y times
-  /// depth and depth. `grad_world` holds what shading adds, if the scene is lit, and gets the whole gradient.
-  /// Fills `partial_sums`.
+  /// From the gradients of `ndc` to those of `world`, in place. `grad_clip` is what clipped faces add where
+  /// p.clips is set, [view][vertex] of x times depth, y times depth and depth; `grad_lit` what shading adds
+  /// to that of `world`, if the scene is lit. Fills `partial_sums`.
   void backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
-                const Buffer<cl_float4>& grad_ndc, const Buffer<cl_float4>& grad_clip,
-                Buffer<cl_float4>& grad_world);
+                const Buffer<cl_float4>& grad_clip, const Buffer<cl_float4>& grad_lit,
+                Buffer<cl_float4>& grad);
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                           const Buffer<cl_float4>& grad_world);
 

@@ -161,17 +161,17 @@ TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
     grad_world.push_back(lit ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}}
                              : cl_float4{{NAN, NAN, NAN, NAN}});
   }
-  const dpr::Buffer<cl_float4> ndc_buffer(m.device.impl(), std::span<const cl_float4>(grad_ndc));
+  dpr::Buffer<cl_float4> grad(m.device.impl(), std::span<const cl_float4>(grad_ndc));
   const dpr::Buffer<cl_float4> clip_buffer(m.device.impl(), std::span<const cl_float4>(grad_clip));
-  dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
+  const dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
   const std::size_t channel_count = lens == Lens::distorting ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
   const std::size_t segments = 2 * t.views.size(), slots = dpr::slots_of_segments(vertices / 2);
   poison(m.transform.partial_sums, channel_count * segments * 2 * slots);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
   m.frame.clips = clips ? 1 : 0;
-  m.transform.backward(m.frame, m.device_views, lit, ndc_buffer, clip_buffer, world_buffer);
-  m.transform.backward_positions(m.frame, m.device_views, *m.geometry, world_buffer);
-  const std::vector<cl_float4> found_world = world_buffer.download(),
+  m.transform.backward(m.frame, m.device_views, lit, clip_buffer, world_buffer, grad);
+  m.transform.backward_positions(m.frame, m.device_views, *m.geometry, grad);
+  const std::vector<cl_float4> found_world = grad.download(),
                                found_positions = m.transform.grad_positions.download();
   const std::vector<float> partial = m.transform.partial_sums.download();
   CHECK(partial.size() == channel_count * segments * 2 * slots);
@@ -303,11 +303,11 @@ TEST_SUITE("gradient") {
     dpr::Renderer::Impl& m = renderer.impl();
     m.transform.forward(m.frame, m.device_views, *m.geometry);
     const std::vector<cl_float4> zeros(3, cl_float4{});
-    const dpr::Buffer<cl_float4> grad_ndc(m.device.impl(), std::span<const cl_float4>(zeros));
-    dpr::Buffer<cl_float4> grad_world(m.device.impl(), std::span<const cl_float4>(zeros));
-    m.transform.backward(m.frame, m.device_views, true, grad_ndc, {}, grad_world);
+    const dpr::Buffer<cl_float4> grad_lit(m.device.impl(), std::span<const cl_float4>(zeros));
+    dpr::Buffer<cl_float4> grad(m.device.impl(), std::span<const cl_float4>(zeros));
+    m.transform.backward(m.frame, m.device_views, true, {}, grad_lit, grad);
     CHECK(m.transform.partial_sums.download() ==
           std::vector<float>(DPR_POSE_CHANNELS * 2 * m.transform.slots, 0.0F));
-    for (const cl_float4& g : grad_world.download()) CHECK(g.s[0] == 0.0F);
+    for (const cl_float4& g : grad.download()) CHECK(g.s[0] == 0.0F);
   }
 }
