@@ -121,6 +121,7 @@ void Renderer::Impl::set_up() {
   if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
+  bin.take_counts(setup);
 }
 
 std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {

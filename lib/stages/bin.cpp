@@ -11,22 +11,20 @@ Bin::Bin(Device::Impl& device)
       scan_(device),
       sort_(device) {}
 
-void Bin::forward(const shared::FrameParams& p, Setup& setup) {
-  scan(setup);
+void Bin::take_counts(Setup& setup) {
+  std::swap(setup.counts, pair_starts);
+  scan_(pair_starts.size() - 1, pair_starts);
+}
+
+void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
   const std::size_t faces = pair_starts.size() - 1;
   const std::size_t found = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
   list(p, setup, found);
   settle(found);
 }
 
-void Bin::forward(const shared::FrameParams& p, Setup& setup, std::size_t capacity) {
-  scan(setup);
+void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
   list(p, setup, capacity);
-}
-
-void Bin::scan(Setup& setup) {
-  std::swap(setup.counts, pair_starts);
-  scan_(pair_starts.size() - 1, pair_starts);
 }
 
 void Bin::settle(std::size_t known_pairs) {

@@ -13,10 +13,12 @@ class Bin {
  public:
   explicit Bin(Device::Impl& device);
 
-  /// Takes the setup's counts for `pair_starts`. Blocks to read the number of pairs.
-  void forward(const shared::FrameParams& p, Setup& setup);
+  /// Makes the setup's counts, which it takes, `pair_starts`. Once for a setup, before forward().
+  void take_counts(Setup& setup);
+  /// Blocks to read the number of pairs.
+  void forward(const shared::FrameParams& p, const Setup& setup);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
-  void forward(const shared::FrameParams& p, Setup& setup, std::size_t capacity);
+  void forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
   /// Says how many pairs there are, after a forward() that did not wait for it.
   void settle(std::size_t known_pairs);
 
@@ -32,7 +34,6 @@ class Bin {
   std::size_t bytes() const;
 
  private:
-  void scan(Setup& setup);
   void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
 
   Device::Impl& device_;

@@ -83,6 +83,7 @@ class NdcStages {
   void set_up() { setup.forward(params, views_, geometry_, ndc_, hidden_); }
   void list_pairs() {
     set_up();
+    bin.take_counts(setup);
     bin.forward(params, setup);
   }
   /// Outputs are poisoned before, as far as their sizes are known beforehand.
