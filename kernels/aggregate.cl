@@ -39,9 +39,7 @@ static inline Slots gather_slots(const BarrierPixel q, const Fragments f, global
     front = s.beta == 0.0f ? run.count : front;
     run.count += s.beta > -DPR_BARRIER_REACH;
   }
-  const Slot s = slots[front];
-  slots[front] = slots[0];
-  slots[0] = s;
+  swap_slots(slots, slots + front);
   return run;
 }
 

@@ -90,9 +90,7 @@ static inline void sort_slots(global Slot* slots, uint count) {
   }
   for (uint root = count / 2; root-- > 0;) sift_down(slots, root, count);
   for (uint end = count - 1; end > 0; --end) {
-    const Slot furthest = slots[0];
-    slots[0] = slots[end];
-    slots[end] = furthest;
+    swap_slots(slots, slots + end);  // the furthest
     sift_down(slots, 0, end);
   }
 }
@@ -152,8 +150,8 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
 }
 
 /// One work-item per pixel. Deterministic. Arguments as aggregate_forward, but there are as many slots as the
-/// lists are long: a pixel's begin at starts[pixel], sorted by depth, and those are left that anything is seen
-/// of. A fragment alone has no slot.
+/// lists are long: a pixel's begin at starts[pixel], sorted by depth, and those are left that anything is
+/// seen of. A fragment alone has no slot.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
                                     global const float* restrict depth,

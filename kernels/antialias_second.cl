@@ -145,10 +145,9 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
         if (!is_step_of(p, e, x, s)) continue;
         const uint step = step_of(p, view, e, x), first = winner[step];
         if (!is_contour(first)) continue;
-        const float depth = mix_depths(p, c.depths, x.along);
         if (first == contour) continue;
         const TileContour other = load_contour(p, a, first, edges, faces, facing, ndc, clipped);
-        if (is_second_hidden(p, v, other, c, e, x, depth)) continue;
+        if (is_second_hidden(p, v, other, c, e, x, mix_depths(p, c.depths, x.along))) continue;
         const uint reference = find_reference(p, view, contour, c, e, x, winner, crowded);
         if (reference == DPR_NO_CROSSING) continue;
         const Cut cut = cut_of(p, c, e, x);

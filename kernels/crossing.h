@@ -98,8 +98,9 @@ static inline float position_on_line(const FrameParams p, const RasterEdge e, in
 
 /// Where on the edge that is, from its first end to its second, in [0, 1].
 static inline float along_edge(const FrameParams p, const RasterEdge e, int line) {
-  const float2 at = pixel_centre(p, line, line);
-  return clamp((e.is_by_rows ? at.y - e.a.y : at.x - e.a.x) * e.inverse, 0.0f, 1.0f);
+  const float2 from_first = pixel_centre(p, line, line) - e.a;
+  // Not by ?:, of which a component with an index that varies would be made.
+  return clamp(select(from_first.x, from_first.y, e.is_by_rows) * e.inverse, 0.0f, 1.0f);
 }
 
 /// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the

@@ -98,6 +98,13 @@ typedef struct {
   float covering;  // joint: the sum of their occupancies
 } Slots;
 
+/// As vectors: a structure on its way would be put into a GPU's scratch memory.
+static inline void swap_slots(global Slot* a, global Slot* b) {
+  const uint4 moved = vload4(0, (global uint*)a);
+  vstore4(vload4(0, (global uint*)b), 0, (global uint*)a);
+  vstore4(moved, 0, (global uint*)b);
+}
+
 /// What a pixel adds to the gradients of gamma, alpha and the background colour, which had that weight in it.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,
                                   float background_weight, float4 grad, global float* channels) {

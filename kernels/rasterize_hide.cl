@@ -157,9 +157,9 @@ DPR_SHARING_KERNEL kernel void rasterize_hide(
 #if DPR_LANES == 1
   local uint2 covered[DPR_GROUP];
   local float depths[DPR_GROUP];
-  const uint tile = (uint)get_group_id(0);
-  hide(pairs, tile_starts[tile], tile_starts[tile + 1], reach / views[tile / tiles].inverse_range, covered,
-       depths);
+  const uint tile = (uint)get_group_id(0), first = tile_starts[tile], last = tile_starts[tile + 1];
+  if (last - first < 2) return;  // all of the group: what is alone in a tile hides nothing
+  hide(pairs, first, last, reach / views[tile / tiles].inverse_range, covered, depths);
 #else
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * tiles) return;

@@ -48,7 +48,10 @@ static inline CornerArea corner_of(const FrameParams p, const TileContour c, con
 
 /// What a crossing cuts.
 static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
-  const float area = x.t - 0.5f + corner_of(p, c, e, x, 0).area + corner_of(p, c, e, x, 1).area;
+  float area = x.t - 0.5f;
+  // One end after the other, so that one is in the registers at a time.
+#pragma unroll 1
+  for (int end = 0; end < 2; ++end) area += corner_of(p, c, e, x, end).area;
   return (Cut)(area, fmin(e.slope * e.slope, DPR_SLOPE2_THAT_COUNTS));
 }
 

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """What the kernels need of a GPU at one lane, by the compiler's own account; no GPU is needed.
 
-gpu_kernels.py KERNELS TABLE.csv          fails where a kernel does not compile, spills registers, or needs more than the table says
+gpu_kernels.py KERNELS TABLE.csv          fails where a kernel needs more than the table says
 gpu_kernels.py KERNELS TABLE.csv --write  writes the table anew
+
+Either fails where a kernel does not compile, spills registers, has scratch memory on AMD, or more than 128 registers.
 
 Debian's clang-19 with libclc-19 compiles for AMD's gfx1030 (RDNA 2) and to NVIDIA's PTX; where CUDA is installed, ptxas compiles
 that for an H100. Occupancy is in wavefronts of the 16 that a SIMD holds.
@@ -22,6 +24,7 @@ AMD = ["-target", "amdgcn-mesa-mesa3d", "-mcpu=gfx1030"]
 NVIDIA = ["-target", "nvptx64-nvidia-nvcl", "-march=sm_90"]
 AMD_BUILTINS = "gfx1030-amdgcn-mesa-mesa3d.bc"
 NVIDIA_BUILTINS = "nvptx64--nvidiacl.bc"
+LIMITS = {"amd_vgprs": 128, "amd_scratch_bytes": 0, "nvidia_registers": 128}
 KEYS = ["amd_vgprs", "amd_sgprs", "amd_scratch_bytes", "amd_local_bytes", "amd_occupancy", "nvidia_registers", "nvidia_stack_bytes"]
 
 
@@ -101,6 +104,14 @@ def differences(rows, table):
                 yield f"{' '.join(key)}: {name} {value}, in the table {known}"
 
 
+def excesses(rows):
+    """What is beyond the limits, a line each."""
+    for key, values in rows.items():
+        for name, limit in LIMITS.items():
+            if values.get(name, 0) > limit:
+                yield f"{' '.join(key)}: {name} {values[name]}, at most {limit}"
+
+
 def main():
     # libclc-15, which Mesa's OpenCL needs, takes the place of libclc-19.
     if not shutil.which("clang-19") or not all((LIBRARY / name).exists() for name in (AMD_BUILTINS, NVIDIA_BUILTINS)):
@@ -108,6 +119,8 @@ def main():
         return
     kernels, table = pathlib.Path(sys.argv[1]), sys.argv[2]
     rows = measure(kernels)
+    if beyond := sorted(excesses(rows)):
+        sys.exit("\n".join(beyond))
     if "--write" in sys.argv[3:]:
         write(table, rows)
         return
