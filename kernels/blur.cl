@@ -99,7 +99,8 @@ static inline BlurPlace row_place(const BlurPass p, uint i) {
   return place;
 }
 
-/// The sums of a block of outputs. Loops over them are unrolled, so that they stay in registers.
+/// The sums of a block of outputs. Loops over them are unrolled, also those that end sooner, so that they
+/// stay in registers.
 static inline void clear_sums(pixels_n* sums) {
 #pragma unroll
   for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] = 0.0f;
@@ -128,7 +129,9 @@ static inline void column_sums(const BlurPass p, const BlurPlace place, global c
 static inline void row_sums_by_pixel(const BlurPass p, const BlurPlace place,
                                      global const float* restrict weights, global const float4* restrict in,
                                      float4* sums) {
-  for (int first = 0; first < place.steps; first += DPR_BLUR_ROW_BLOCK) {
+#pragma unroll
+  for (int first = 0; first < DPR_BLUR_ROW; first += DPR_BLUR_ROW_BLOCK) {
+    if (first >= place.steps) break;
     const BlurTaps t = block_taps(p, place.at + first, DPR_BLUR_ROW_BLOCK);
     float4 sum0 = 0.0f, sum1 = 0.0f, sum2 = 0.0f, sum3 = 0.0f;
     for (int k = t.from; k < t.to; ++k) {
@@ -176,10 +179,15 @@ static inline void row_sums(const BlurPass p, const BlurPlace place, global cons
   }
 }
 
-/// By channels.
-static inline float4 product_of_pixels(const float4* a, global const float4* restrict b, int count) {
+/// Of at most `most` pixels, a constant; by channels.
+static inline float4 product_of_pixels(const float4* a, global const float4* restrict b, int count,
+                                       int most) {
   float4 sum = 0.0f;
-  for (int k = 0; k < count; ++k) sum += a[k] * b[k];
+#pragma unroll
+  for (int k = 0; k < most; ++k) {
+    if (k >= count) break;
+    sum += a[k] * b[k];
+  }
   return sum;
 }
 
@@ -196,7 +204,9 @@ kernel void blur_columns(const BlurPass p, global const float* restrict weights,
   const BlurPlace place = column_place(p, i);
   pixels_n sums[DPR_BLUR_BLOCK];
   column_sums(p, place, weights, in, sums);
-  for (int row = 0; row < place.steps; ++row) {
+#pragma unroll
+  for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {
+    if (row >= place.steps) break;
     global float4* to = out + place.out + (size_t)row * p.width;
     if (place.count == DPR_BLUR_PIXELS) {
       store_pixels(sums[row], to);
@@ -220,7 +230,11 @@ kernel void blur_rows(const BlurPass p, global const float* restrict weights,
   const BlurPlace place = row_place(p, i);
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
-  for (int k = 0; k < place.steps; ++k) out[place.out + (size_t)k] = sums[k];
+#pragma unroll
+  for (int k = 0; k < DPR_BLUR_ROW; ++k) {
+    if (k >= place.steps) break;
+    out[place.out + (size_t)k] = sums[k];
+  }
 }
 
 /// Along rows, where outputs or inputs are further apart. NDRange: one work-item per (DPR_BLUR_PIXELS rows,
@@ -240,7 +254,9 @@ kernel void blur_rows_strided(const BlurPass p, global const float* restrict wei
     add_to_sums(weights + (t.last - k * p.in_step), p.out_step, join_lines(lines, k), sums);
   const uint steps = min(p.out_length - at, (uint)DPR_BLUR_BLOCK),
              count = min(p.lines - first, (uint)DPR_BLUR_PIXELS);
-  for (uint step = 0; step < steps; ++step) {
+#pragma unroll
+  for (uint step = 0; step < DPR_BLUR_BLOCK; ++step) {
+    if (step >= steps) break;
     float4 lanes[DPR_BLUR_PIXELS];
     store_lanes(sums[step], lanes);
     for (uint lane = 0; lane < count; ++lane)
@@ -262,10 +278,13 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
   pixels_n sums[DPR_BLUR_BLOCK];
   column_sums(p, place, weights, in, sums);
   float4 product = 0.0f;
-  for (int row = 0; row < place.steps; ++row) {
+#pragma unroll
+  for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {
+    if (row >= place.steps) break;
     float4 lanes[DPR_BLUR_PIXELS];
     store_lanes(sums[row], lanes);
-    product += product_of_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count);
+    product +=
+        product_of_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count, DPR_BLUR_PIXELS);
   }
   products[i / items * stride + first + i % items] = sum_of_channels(product);
 }
@@ -280,5 +299,5 @@ kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint firs
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
   products[i / items * stride + first + i % items] =
-      sum_of_channels(product_of_pixels(sums, grad + place.out, place.steps));
+      sum_of_channels(product_of_pixels(sums, grad + place.out, place.steps, DPR_BLUR_ROW));
 }
