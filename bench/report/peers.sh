@@ -9,12 +9,14 @@ python3 - "$work" <<'END'
 import csv, json, pathlib, sys
 results, work = pathlib.Path("bench/results"), pathlib.Path(sys.argv[1])
 order = ["cube128", "sphere256", "sphere20k", "sphere80k", "million"]
-presets = ["pixel", "sharp"]  # noise of the pixel, a blur of four pixels at 256x256; of the triangles, half a pixel
+# Noise of the pixel, a blur of four pixels at 256x256; of the triangles, half a pixel, as a scene without more words has it.
+presets = {"pixel": "joint", "sharp": "barrier"}
 ours = json.loads((results / "pocl-3.1-skylake-avx512-2-cores.json").read_text())["results"]
-for preset in presets:
+for preset, composition in presets.items():
     with open(work / preset, "w") as out:
         for row in ours:
-            if (row["preset"], row["estimator"]) == (preset, "exact") and row["workload"] in order:
+            kind = (row["preset"], row["composition"], row["estimator"])
+            if kind == (preset, composition, "exact") and row["workload"] in order:
                 if row["views"] == 1 and row["status"] == "ok":
                     print(order.index(row["workload"]), row["forward_ms"]["median"] + row["backward_ms"]["median"], file=out)
 rows = csv.DictReader(line for line in open(results / "peers.csv") if not line.startswith("#"))
