@@ -21,7 +21,7 @@ using dpr::test::reduced;
 
 namespace {
 
-/// A sphere as its subdivision has it, seen from the distance at which issue and README measure.
+/// A sphere as its subdivision has it, which fills most of the image.
 Scene sphere_scene(unsigned subdivisions, int size, float sigma) {
   Scene scene;
   scene.width = scene.height = size;
