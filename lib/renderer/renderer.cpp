@@ -119,9 +119,9 @@ void Renderer::Impl::set_up() {
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
   if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
-  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_);
-  if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup);
-  bin.take_counts(setup);
+  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_, bin.pair_starts);
+  if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup, bin.pair_starts);
+  bin.start();
 }
 
 std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
@@ -223,6 +223,7 @@ void Renderer::Impl::settle() {
     return;
   }
   rendered = false;
+  set_up();  // what did not fit has been emptied, runs of pairs among it
   forward_measured();
   rendered = true;
   aov_frame = 0;

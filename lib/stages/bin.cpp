@@ -1,7 +1,5 @@
 #include "stages/bin.hpp"
 
-#include <utility>
-
 namespace dpr {
 
 Bin::Bin(Device::Impl& device)
@@ -11,10 +9,7 @@ Bin::Bin(Device::Impl& device)
       scan_(device),
       sort_(device) {}
 
-void Bin::take_counts(Setup& setup) {
-  std::swap(setup.counts, pair_starts);
-  scan_(pair_starts.size() - 1, pair_starts);
-}
+void Bin::start() { scan_(pair_starts.size() - 1, pair_starts); }
 
 void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
   const std::size_t faces = pair_starts.size() - 1;

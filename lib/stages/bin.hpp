@@ -13,8 +13,9 @@ class Bin {
  public:
   explicit Bin(Device::Impl& device);
 
-  /// Makes the setup's counts, which it takes, `pair_starts`. Once for a setup, before forward().
-  void take_counts(Setup& setup);
+  /// Makes runs of the setup's counts, which `pair_starts` holds. Before forward(), which empties them where
+  /// the pairs do not fit.
+  void start();
   /// Blocks to read the number of pairs.
   void forward(const shared::FrameParams& p, const Setup& setup);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.

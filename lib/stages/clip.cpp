@@ -11,13 +11,13 @@ Clip::Kernels::Kernels(Device::Impl& device)
       backward(device, "clip.cl", "clip_backward") {}
 
 void Clip::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                   const Transform& transform, Setup& setup) {
+                   const Transform& transform, Setup& setup, Buffer<cl_uint>& counts) {
   if (!kernels_) kernels_.emplace(device_);
   views_ = &views;
   const std::size_t count = std::size_t{p.views} * p.faces;
   faces.resize(device_, count);
   kernels_->forward(count, p, views.cameras, geometry.face_vertices, transform.world, transform.ndc, faces,
-                    setup.facing, setup.kept, setup.counts, setup.triangles);
+                    setup.facing, setup.kept, counts, setup.triangles);
 }
 
 void Clip::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,

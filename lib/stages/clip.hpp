@@ -20,7 +20,7 @@ class Clip {
 
   /// Finds the faces, and sets up what is left of them, after Setup::forward(), which drops them.
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-               const Transform& transform, Setup& setup);
+               const Transform& transform, Setup& setup, Buffer<cl_uint>& counts);
   /// Adds what is missing of their coverage, [pair] as rasterize_cover leaves it.
   void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
              Buffer<cl_uint2>& masks, Buffer<cl_uint>& counts);

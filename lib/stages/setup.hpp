@@ -11,18 +11,17 @@ class Setup {
  public:
   explicit Setup(Device::Impl& device);
 
-  /// `hidden` is [view][mesh], the orientation of faces that nothing can see; 0: all may be.
+  /// `hidden` is [view][mesh], the orientation of faces that nothing can see; 0: all may be. `counts` gets
+  /// how many tiles are listed for each triangle, [view][face], with room for their sum.
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-               const Buffer<cl_float4>& ndc, const Buffer<float>& hidden);
+               const Buffer<cl_float4>& ndc, const Buffer<float>& hidden, Buffer<cl_uint>& counts);
 
-  Buffer<cl_uint> facing;  ///< [view][face] DPR_FACE_FRONT, ...
-  Buffer<cl_uint> kept;    ///< [view][face] 0 where a triangle is dropped, 1 where not
-  Buffer<cl_uint> counts;  ///< [view][face] tiles that are listed for a triangle, and room for their sum
+  Buffer<cl_uint> facing;              ///< [view][face] DPR_FACE_FRONT, ...
+  Buffer<cl_uint> kept;                ///< [view][face] 0 where a triangle is dropped, 1 where not
   Buffer<shared::Triangle> triangles;  ///< [view][face] of those that have tiles
 
   std::size_t bytes() const {
-    return facing.capacity_bytes() + kept.capacity_bytes() + counts.capacity_bytes() +
-           triangles.capacity_bytes();
+    return facing.capacity_bytes() + kept.capacity_bytes() + triangles.capacity_bytes();
   }
 
  private:

@@ -122,7 +122,7 @@ TEST_SUITE("unit") {
     CHECK(t.z2 == k_good[2].z);
     CHECK(t.first_sample == (4U | 4U << 16U));
     CHECK(t.last_sample == (11U | 11U << 16U));
-    CHECK(s.setup.counts.download()[0] == 4);
+    CHECK(s.bin.pair_starts.download()[0] == 4);
   }
 
   TEST_CASE("setup: what reaches nearer than znear, or lies wholly beyond zfar, is dropped") {

@@ -51,7 +51,8 @@ class ContourFrame {
 
   /// Sets the faces up as they are now.
   ContourInputs inputs() {
-    setup.forward(p, views, geometry, transform.ndc, hidden_);
+    Buffer<cl_uint> tile_counts;
+    setup.forward(p, views, geometry, transform.ndc, hidden_, tile_counts);
     return {p, views, geometry, edges, transform, setup.facing, clipped, shading};
   }
 

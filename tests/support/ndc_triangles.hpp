@@ -80,10 +80,10 @@ class NdcStages {
 
   /// What lies that much behind another triangle, normalised depth, is left out from now on.
   void hide(float reach) { rasterize.hiding.emplace(reach, views_.cameras); }
-  void set_up() { setup.forward(params, views_, geometry_, ndc_, hidden_); }
+  void set_up() { setup.forward(params, views_, geometry_, ndc_, hidden_, bin.pair_starts); }
   void list_pairs() {
     set_up();
-    bin.take_counts(setup);
+    bin.start();
     bin.forward(params, setup);
   }
   /// Outputs are poisoned before, as far as their sizes are known beforehand.
