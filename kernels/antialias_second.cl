@@ -66,12 +66,16 @@ static inline int have_face_in_common(uint4 a, uint4 b) {
   return own_face(a) == other || (has_other_face(a) && other_face(a) == other);
 }
 
-/// Edges meet at a vertex. The cut of a face, which has none, meets the face's edges, and lies on one plane
-/// with all other cuts.
-static inline int have_end_in_common(uint4 a, uint4 b) {
-  const int a_is_cut = a.x == a.y, b_is_cut = b.x == b.y;
-  if (a_is_cut != b_is_cut) return have_face_in_common(a, b);
-  return a_is_cut || a.x == b.x || a.x == b.y || a.y == b.x || a.y == b.y;
+static inline int is_end_of(float2 place, float depth, const TileContour c) {
+  return (all(place == c.a) && depth == c.depths.x) || (all(place == c.b) && depth == c.depths.y);
+}
+
+/// Edges meet where ends coincide. The cut of a face meets the face's edges, and lies on one plane with all
+/// other cuts.
+static inline int have_end_in_common(const TileContour a, const TileContour b) {
+  const int a_is_cut = a.record.x == a.record.y, b_is_cut = b.record.x == b.record.y;
+  if (a_is_cut != b_is_cut) return have_face_in_common(a.record, b.record);
+  return a_is_cut || is_end_of(a.a, a.depths.x, b) || is_end_of(a.b, a.depths.y, b);
 }
 
 /// Whether something hides a contour at a step that another has won. Of the two samples only the one on its
@@ -92,7 +96,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
   return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
          mix_depths(p, winner.depths, along_edge(p, of_winner, x.line)) <
              depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
-         !have_end_in_common(winner.record, c.record);
+         !have_end_in_common(winner, c);
 }
 
 /// False only if none of the tile's steps where an edge may cross a line has another contour for its winner.

@@ -27,8 +27,6 @@ typedef struct {
   EdgeScene edges;
 } ContourScene;
 
-static inline int is_same(float4 a, float4 b) { return all(a.xyz == b.xyz); }
-
 /// Which corner of the face a vertex is, or coincides with; 3 where none does.
 static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) {
   const float4 v = ndc[vertex];

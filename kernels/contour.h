@@ -39,10 +39,14 @@ static inline EdgeSides edge_sides(uint4 edge, global const uint* facing) {
 /// The side on which the surface lies that a contour bounds; of a crease its own face.
 static inline int inner_side(EdgeSides s) { return s.own != 0 ? s.own : s.other; }
 
-/// The corner of a face that is neither of two vertices.
-static inline uint corner_across(uint4 face, uint first, uint second) {
-  const uint x_is_end = face.x == first || face.x == second, y_is_end = face.y == first || face.y == second;
-  return !x_is_end ? face.x : !y_is_end ? face.y : face.z;
+static inline int is_same(float4 a, float4 b) { return all(a.xyz == b.xyz); }
+
+/// The corner of a face that lies at neither end of its edge. By place: the ends may be vertices that only
+/// coincide with the face's.
+static inline float3 corner_across(uint4 face, uint4 edge, global const float4* ndc) {
+  const float4 first = ndc[edge.x], second = ndc[edge.y], x = ndc[face.x], y = ndc[face.y];
+  if (!is_same(x, first) && !is_same(x, second)) return x.xyz;
+  return !is_same(y, first) && !is_same(y, second) ? y.xyz : ndc[face.z].xyz;
 }
 
 /// Which corner of a face a vertex is; 3 where it is none.

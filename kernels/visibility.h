@@ -85,7 +85,7 @@ static inline int hides_crease(const FrameParams p, const TileContour c, global 
                                global const float4* restrict ndc, int own, float2 sample, float front,
                                float depth, float slack) {
   const uint4 face = faces[own ? own_face(c.record) : other_face(c.record)];
-  const float3 across = ndc[c.view * p.vertices + corner_across(face, c.record.x, c.record.y)].xyz;
+  const float3 across = corner_across(face, c.record, ndc + c.view * p.vertices);
   const float expected = plane_depth(p, c, across, sample, depth);
   return front < expected - slack - DPR_CREASE_SLACK * fabs(expected - depth);
 }
