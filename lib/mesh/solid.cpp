@@ -1,6 +1,7 @@
 #include "mesh/solid.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace dpr {
@@ -22,7 +23,8 @@ bool is_inner(const WeldedEdge& edge) { return edge.other && !edge.same_directio
 Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) {
   is_closed_ = !edges.empty() && std::ranges::all_of(edges, is_inner);
   if (!is_closed_) return;
-  is_closed_by_indices_ = std::ranges::all_of(edges, &WeldedEdge::shares_vertices);
+  std::ranges::copy_if(edges, std::back_inserter(split_edges_),
+                       [](const WeldedEdge& edge) { return !edge.shares_vertices; });
   std::vector<std::uint32_t> parents(faces);
   std::iota(parents.begin(), parents.end(), 0U);
   for (const WeldedEdge& edge : edges) {
@@ -34,6 +36,18 @@ Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) {
     const std::uint32_t root = root_of(parents, face);
     part_of_face_[face] = root == face ? static_cast<std::uint32_t>(parts_++) : part_of_face_[root];
   }
+}
+
+bool Solid::is_closed_at(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const {
+  const auto meet = [&](const WeldedEdge& edge) {
+    const glm::uvec3& other = faces[*edge.other];
+    const auto touches = [&](std::uint32_t end) {
+      return positions[end] == positions[other.x] || positions[end] == positions[other.y] ||
+             positions[end] == positions[other.z];
+    };
+    return touches(edge.first) && touches(edge.second);
+  };
+  return is_closed_ && std::ranges::all_of(split_edges_, meet);
 }
 
 int Solid::winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const {

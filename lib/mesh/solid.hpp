@@ -16,14 +16,15 @@ class Solid {
 
   /// Whether all faces belong to such parts.
   bool is_closed() const { return is_closed_; }
-  /// Whether that rests on indices alone, not on vertices that coincide and may be moved apart.
-  bool is_closed_by_indices() const { return is_closed_by_indices_; }
+  /// Whether they still do where vertices have moved: those that coincided may have parted.
+  bool is_closed_at(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
   /// +1 where the faces of all parts wind counter-clockwise as seen from outside, -1 clockwise: the sign of
   /// the parts' volumes. 0 where they differ, or one is not closed or not finite.
   int winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
 
  private:
-  bool is_closed_ = false, is_closed_by_indices_ = false;
+  bool is_closed_ = false;
+  std::vector<WeldedEdge> split_edges_;  // whose faces have vertices of their own there
   std::size_t parts_ = 0;
   std::vector<std::uint32_t> part_of_face_;
 };

@@ -2,17 +2,11 @@
 
 namespace dpr {
 
-BackFaces::BackFaces(std::vector<Solid> solids, bool are_placed) : states_(solids.size()) {
-  for (std::size_t m = 0; m < solids.size(); ++m) {
-    states_[m].solid = std::move(solids[m]);
-    states_[m].may_have_parted = !are_placed;
-  }
+BackFaces::BackFaces(std::vector<Solid> solids) : states_(solids.size()) {
+  for (std::size_t m = 0; m < solids.size(); ++m) states_[m].solid = std::move(solids[m]);
 }
 
-void BackFaces::move(std::size_t mesh) noexcept {
-  states_[mesh].may_have_parted = true;
-  states_[mesh].is_measured = false;
-}
+void BackFaces::move(std::size_t mesh) noexcept { states_[mesh].is_measured = false; }
 
 void BackFaces::forget(std::size_t mesh) noexcept {
   move(mesh);
@@ -22,8 +16,7 @@ void BackFaces::forget(std::size_t mesh) noexcept {
 
 void BackFaces::measure(State& state, const Mesh& mesh) {
   state.is_measured = true;
-  const bool is_closed =
-      state.solid.is_closed() && (state.solid.is_closed_by_indices() || !state.may_have_parted);
+  const bool is_closed = state.solid.is_closed_at(mesh.positions, mesh.faces);
   state.winding = is_closed ? state.solid.winding(mesh.positions, mesh.faces) : 0;
   if (state.winding != 0) state.box = box_corners(mesh.positions);
 }

@@ -13,8 +13,8 @@ namespace dpr {
 class BackFaces {
  public:
   BackFaces() = default;
-  /// Of the scene's meshes. `are_placed`: those that are closed because vertices coincide do so in the scene.
-  BackFaces(std::vector<Solid> solids, bool are_placed);
+  /// Of the scene's meshes.
+  explicit BackFaces(std::vector<Solid> solids);
 
   /// The mesh's positions are others than before.
   void move(std::size_t mesh) noexcept;
@@ -30,7 +30,7 @@ class BackFaces {
  private:
   struct State {
     Solid solid;
-    bool may_have_parted = false, is_measured = false;
+    bool is_measured = false;
     int winding = 0;
     BoxCorners box{};  // object space
   };

@@ -92,7 +92,7 @@ void Renderer::Impl::build_pyramids() {
 void Renderer::Impl::find_edges() {
   if (!pixel_noise || pixel_noise->edges) return;
   pixel_noise->edges.emplace(device.impl(), scene, geometry->meshes, shape_of_first_view());
-  pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids), frame.position_stride == 0);
+  pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
   for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
   }

@@ -42,9 +42,15 @@ TEST_SUITE("unit") {
     }
   }
 
-  TEST_CASE("solid: a cube on vertices of its sides' own is closed by their positions alone") {
-    CHECK(solid_of(make_icosphere(1)).is_closed_by_indices());
-    CHECK(!solid_of(make_cube()).is_closed_by_indices());
+  TEST_CASE("solid: a cube on vertices of its sides' own is closed as long as they coincide") {
+    for (const Mesh& mesh : {make_icosphere(1), make_cube()}) {
+      const Solid solid = solid_of(mesh);
+      std::vector<glm::vec3> moved = mesh.positions;
+      for (glm::vec3& p : moved) p = 2.0F * p + glm::vec3(0, 3, 0);
+      CHECK(solid.is_closed_at(moved, mesh.faces));
+      moved[0].x += 0.01F;
+      CHECK(solid.is_closed_at(moved, mesh.faces) == (mesh.positions.size() != 24));
+    }
   }
 
   TEST_CASE("solid: a hole, a face turned round, or none at all") {
