@@ -41,19 +41,13 @@ DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, globa
 
 #else
 
-/// The sum of eight counts.
-static inline uint sum_of_eight(uint8 v) {
-  const uint4 half_sums = add_sat(v.lo, v.hi);
-  const uint2 sums = add_sat(half_sums.lo, half_sums.hi);
-  return add_sat(sums.x, sums.y);
-}
-
 /// Exclusive prefix sums of eight counts, by doubling; `sum` is that of all before, and then of these too.
+/// Lanes one by one: oclgrind 21.10 crashes where vectors of other lengths are joined.
 static inline uint8 scan_eight(uint8 v, uint* sum) {
-  v = add_sat(v, (uint8)(0, v.s012, v.s3456));
-  v = add_sat(v, (uint8)(0, 0, v.s01, v.s2345));
-  v = add_sat(v, (uint8)(0, 0, 0, 0, v.s0123));
-  const uint8 before = add_sat((uint8)(0, v.s012, v.s3456), (uint8)(*sum));
+  v = add_sat(v, (uint8)(0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5, v.s6));
+  v = add_sat(v, (uint8)(0, 0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5));
+  v = add_sat(v, (uint8)(0, 0, 0, 0, v.s0, v.s1, v.s2, v.s3));
+  const uint8 before = add_sat((uint8)(0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5, v.s6), (uint8)(*sum));
   *sum = add_sat(*sum, v.s7);
   return before;
 }
@@ -67,7 +61,8 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
   uint8 eight = 0;
   uint i = first;
   for (; last - i >= 8; i += 8) eight = add_sat(eight, vload8(0, values + i));
-  uint sum = sum_of_eight(eight);
+  uint sum = 0;
+  scan_eight(eight, &sum);
   for (; i < last; ++i) sum = add_sat(sum, values[i]);
   sums[chunk] = sum;
 }
