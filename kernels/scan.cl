@@ -41,17 +41,6 @@ DPR_GROUP_KERNEL kernel void scan_apply(const uint count, const uint size, globa
 
 #else
 
-/// Exclusive prefix sums of eight counts, by doubling; `sum` is that of all before, and then of these too.
-/// Lanes one by one: oclgrind 21.10 crashes where vectors of other lengths are joined.
-static inline uint8 scan_eight(uint8 v, uint* sum) {
-  v = add_sat(v, (uint8)(0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5, v.s6));
-  v = add_sat(v, (uint8)(0, 0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5));
-  v = add_sat(v, (uint8)(0, 0, 0, 0, v.s0, v.s1, v.s2, v.s3));
-  const uint8 before = add_sat((uint8)(0, v.s0, v.s1, v.s2, v.s3, v.s4, v.s5, v.s6), (uint8)(*sum));
-  *sum = add_sat(*sum, v.s7);
-  return before;
-}
-
 /// As above. One work-item per chunk.
 kernel void scan_sum(const uint count, global const uint* restrict values, global uint* restrict sums) {
   const uint chunk = (uint)get_global_id(0);
@@ -61,8 +50,9 @@ kernel void scan_sum(const uint count, global const uint* restrict values, globa
   uint8 eight = 0;
   uint i = first;
   for (; last - i >= 8; i += 8) eight = add_sat(eight, vload8(0, values + i));
-  uint sum = 0;
-  scan_eight(eight, &sum);
+  uint lanes[8], sum = 0;
+  vstore8(eight, 0, lanes);
+  for (uint lane = 0; lane < 8; ++lane) sum = add_sat(sum, lanes[lane]);
   for (; i < last; ++i) sum = add_sat(sum, values[i]);
   sums[chunk] = sum;
 }
@@ -75,9 +65,7 @@ kernel void scan_apply(const uint count, const uint size, global const uint* res
   if (first >= count && chunk != 0) return;
   const uint last = min(count, first + size);
   uint sum = bases[chunk];
-  uint i = first;
-  for (; last - i >= 8; i += 8) vstore8(scan_eight(vload8(0, values + i), &sum), 0, values + i);
-  for (; i < last; ++i) {
+  for (uint i = first; i < last; ++i) {
     const uint value = values[i];
     values[i] = sum;
     sum = add_sat(sum, value);
