@@ -43,6 +43,7 @@ typedef float4 pixels_n;
 
 /// Where a work-item's outputs are.
 typedef struct {
+  uint image;     /* along columns */
   size_t in, out; /* first pixel of the column's or row's input; first output pixel */
   int at;         /* place of the first output along the pass */
   int steps;      /* outputs along the pass: at most DPR_BLUR_BLOCK along columns, DPR_BLUR_ROW along rows */
@@ -77,6 +78,7 @@ static inline BlurPlace column_place(const BlurPass p, uint i) {
   const uint vectors = groups_of(p.width, DPR_BLUR_PIXELS), blocks = groups_of(p.out_length, DPR_BLUR_BLOCK);
   const uint x = i % vectors * DPR_BLUR_PIXELS, image = i / vectors / blocks;
   BlurPlace place;
+  place.image = image;
   place.at = (int)(i / vectors % blocks * DPR_BLUR_BLOCK);
   place.in = (size_t)image * p.in_length * p.width + x;
   place.out = ((size_t)image * p.out_length + (size_t)place.at) * p.width + x;
@@ -91,6 +93,7 @@ static inline uint row_items_per_line(const BlurPass p) { return groups_of(p.out
 static inline BlurPlace row_place(const BlurPass p, uint i) {
   const uint blocks = row_items_per_line(p), row = i / blocks;
   BlurPlace place;
+  place.image = 0;
   place.at = (int)(i % blocks * DPR_BLUR_ROW);
   place.in = (size_t)row * p.in_length;
   place.out = (size_t)row * p.out_length + (size_t)place.at;
@@ -99,11 +102,59 @@ static inline BlurPlace row_place(const BlurPass p, uint i) {
   return place;
 }
 
+/// The samples that inputs along a pass, or across it, are made of; ranges are half open.
+static inline int2 samples_along(const BlurPass p, int2 inputs) {
+  return (int2)(inputs.x * p.along_step + p.along_first, (inputs.y - 1) * p.along_step + p.along_end);
+}
+static inline int2 samples_across(const BlurPass p, int2 inputs) {
+  return (int2)(inputs.x * p.across_step + p.across_first, (inputs.y - 1) * p.across_step + p.across_end);
+}
+
+/// Whether a rectangle of samples lies outside of the extents. One row of tiles more is asked on each side.
+static inline int is_outside(const BlurPass p, global const uint2* restrict extents, uint image, int2 rows,
+                             int2 columns) {
+  const int first = max(rows.x / DPR_TILE - 1, 0),
+            last = min((rows.y - 1) / DPR_TILE + 1, (int)p.tile_rows - 1);
+  for (int row = first; row <= last; ++row) {
+    const int2 extent = as_int2(extents[image * p.tile_rows + (uint)row]);
+    if (columns.x < extent.y && columns.y > extent.x) return 0;
+  }
+  return 1;
+}
+
+/// Whether all that a block of outputs has taps for is there: else its sum is not that of all weights.
+static inline int has_all_taps(const BlurPass p, int at, int block) {
+  const int last = at * p.out_step + p.offset;
+  return last - p.taps + 1 >= 0 && (last + (block - 1) * p.out_step) / p.in_step < (int)p.in_length;
+}
+
+/// Whether all inputs of a block along columns show the background.
+static inline int is_outside_columns(const BlurPass p, const BlurPlace place,
+                                     global const uint2* restrict extents) {
+  if (p.tile_rows == 0 || !has_all_taps(p, place.at, place.steps)) return 0;
+  const BlurTaps t = block_taps(p, place.at, place.steps);
+  const int x = (int)(place.in - (size_t)place.image * p.in_length * p.width);
+  return is_outside(p, extents, place.image, samples_along(p, (int2)(t.from, t.to)),
+                    samples_across(p, (int2)(x, x + place.count)));
+}
+
+/// The same of outputs from `at` on along `count` rows.
+static inline int is_outside_rows(const BlurPass p, uint row, uint count, int at, int steps,
+                                  global const uint2* restrict extents) {
+  if (p.tile_rows == 0 || !has_all_taps(p, at, steps)) return 0;
+  const uint image = row / p.image_lines;
+  if ((row + count - 1) / p.image_lines != image) return 0;
+  const BlurTaps t = block_taps(p, at, steps);
+  const int y = (int)(row - image * p.image_lines);
+  return is_outside(p, extents, image, samples_across(p, (int2)(y, y + (int)count)),
+                    samples_along(p, (int2)(t.from, t.to)));
+}
+
 /// The sums of a block of outputs. Loops over them are unrolled, also those that end sooner, so that they
 /// stay in registers.
-static inline void clear_sums(pixels_n* sums) {
+static inline void fill_sums(pixels_n value, pixels_n* sums) {
 #pragma unroll
-  for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] = 0.0f;
+  for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] = value;
 }
 
 /// Adds an input to them all, whose weights are `step` apart.
@@ -117,7 +168,7 @@ static inline void add_to_sums(global const float* weights, int step, pixels_n v
 static inline void column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
                                global const float4* restrict in, pixels_n* sums) {
   const BlurTaps t = block_taps(p, place.at, DPR_BLUR_BLOCK);
-  clear_sums(sums);
+  fill_sums((pixels_n)(0.0f), sums);
   for (int k = t.from; k < t.to; ++k) {
     add_to_sums(weights + (t.last - k * p.in_step), p.out_step,
                 load_pixels(in + place.in + (size_t)k * p.width), sums);
@@ -193,17 +244,46 @@ static inline float4 product_of_pixels(const float4* a, global const float4* res
 
 static inline float sum_of_channels(float4 v) { return v.x + v.y + v.z + v.w; }
 
+/// The samples of each row of tiles that may differ from one another: those of the tiles that have pairs, and
+/// of one more on each side, since contours blend samples with their neighbours. All others show the
+/// background.
+///
+/// NDRange: one work-item per row of tiles of all views.
+/// in   tile_starts  uint[view * tile + 1]  runs of pairs
+/// out  extents      uint2[view][row of tiles]  the first column, and the one after the last
+kernel void blur_extents(const FrameParams p, global const uint* restrict tile_starts,
+                         global uint2* restrict extents) {
+  const uint row = (uint)get_global_id(0);
+  if (row >= p.views * p.tiles_y) return;
+  global const uint* starts = tile_starts + row * p.tiles_x;
+  uint first = p.tiles_x, last = 0;
+  for (uint x = 0; x < p.tiles_x; ++x) {
+    const int is_covered = starts[x] != starts[x + 1];
+    first = is_covered && x < first ? x : first;
+    last = is_covered ? x : last;
+  }
+  const uint begin = first > 0 ? (first - 1) * DPR_TILE : 0;
+  extents[row] = first == p.tiles_x ? (uint2)(0) : (uint2)(begin, (last + 2) * DPR_TILE);
+}
+
 /// Along columns. NDRange: one work-item per (image, block of output rows, vector of pixels).
+/// in   extents  as blur_extents leaves them, where p.tile_rows says so: blocks outside are not summed up
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[image][in_length][width]
 /// out  out      float4[image][out_length][width]
-kernel void blur_columns(const BlurPass p, global const float* restrict weights,
-                         global const float4* restrict in, global float4* restrict out) {
+kernel void blur_columns(const BlurPass p, global const uint2* restrict extents,
+                         global const float* restrict weights, global const float4* restrict in,
+                         global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.lines * column_items_per_image(p)) return;
   const BlurPlace place = column_place(p, i);
   pixels_n sums[DPR_BLUR_BLOCK];
-  column_sums(p, place, weights, in, sums);
+  if (is_outside_columns(p, place, extents)) {
+    const int from = block_taps(p, place.at, place.steps).from;
+    fill_sums(load_pixels(in + place.in + (size_t)from * p.width), sums);
+  } else {
+    column_sums(p, place, weights, in, sums);
+  }
 #pragma unroll
   for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {
     if (row >= place.steps) break;
@@ -220,14 +300,21 @@ kernel void blur_columns(const BlurPass p, global const float* restrict weights,
 
 /// Along rows, where neighbouring outputs read neighbouring inputs. NDRange: one work-item per (row, block of
 /// vectors of output pixels).
+/// in   extents  as blur_columns
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[row][in_length]
 /// out  out      float4[row][out_length]
-kernel void blur_rows(const BlurPass p, global const float* restrict weights,
-                      global const float4* restrict in, global float4* restrict out) {
+kernel void blur_rows(const BlurPass p, global const uint2* restrict extents,
+                      global const float* restrict weights, global const float4* restrict in,
+                      global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
+  if (is_outside_rows(p, i / row_items_per_line(p), 1, place.at, place.steps, extents)) {
+    const float4 value = in[place.in + (size_t)block_taps(p, place.at, place.steps).from];
+    for (int k = 0; k < place.steps; ++k) out[place.out + (size_t)k] = value;
+    return;
+  }
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
 #pragma unroll
@@ -239,21 +326,26 @@ kernel void blur_rows(const BlurPass p, global const float* restrict weights,
 
 /// Along rows, where outputs or inputs are further apart. NDRange: one work-item per (DPR_BLUR_PIXELS rows,
 /// block of outputs); a lane is a row. Otherwise as blur_rows.
-kernel void blur_rows_strided(const BlurPass p, global const float* restrict weights,
-                              global const float4* restrict in, global float4* restrict out) {
+kernel void blur_rows_strided(const BlurPass p, global const uint2* restrict extents,
+                              global const float* restrict weights, global const float4* restrict in,
+                              global float4* restrict out) {
   const uint i = (uint)get_global_id(0), blocks = groups_of(p.out_length, DPR_BLUR_BLOCK);
   if (i >= groups_of(p.lines, DPR_BLUR_PIXELS) * blocks) return;
   const uint first = i / blocks * DPR_BLUR_PIXELS, at = i % blocks * DPR_BLUR_BLOCK;
   global const float4* lines[DPR_BLUR_PIXELS];
   for (uint lane = 0; lane < DPR_BLUR_PIXELS; ++lane)
     lines[lane] = in + (size_t)min(first + lane, p.lines - 1) * p.in_length;
-  const BlurTaps t = block_taps(p, (int)at, DPR_BLUR_BLOCK);
-  pixels_n sums[DPR_BLUR_BLOCK];
-  clear_sums(sums);
-  for (int k = t.from; k < t.to; ++k)
-    add_to_sums(weights + (t.last - k * p.in_step), p.out_step, join_lines(lines, k), sums);
   const uint steps = min(p.out_length - at, (uint)DPR_BLUR_BLOCK),
              count = min(p.lines - first, (uint)DPR_BLUR_PIXELS);
+  const BlurTaps t = block_taps(p, (int)at, DPR_BLUR_BLOCK);
+  pixels_n sums[DPR_BLUR_BLOCK];
+  if (is_outside_rows(p, first, count, (int)at, (int)steps, extents)) {
+    fill_sums(join_lines(lines, t.from), sums);
+  } else {
+    fill_sums((pixels_n)(0.0f), sums);
+    for (int k = t.from; k < t.to; ++k)
+      add_to_sums(weights + (t.last - k * p.in_step), p.out_step, join_lines(lines, k), sums);
+  }
 #pragma unroll
   for (uint step = 0; step < DPR_BLUR_BLOCK; ++step) {
     if (step >= steps) break;
@@ -266,15 +358,22 @@ kernel void blur_rows_strided(const BlurPass p, global const float* restrict wei
 
 /// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the
 /// gradient of the output. NDRange as blur_columns.
+/// in   extents  as blur_columns: outside the weights' derivative sums to 0
 /// in   weights  float[tap]  derivative, between zeros
 /// in   in, grad            as in and out of blur_columns
 /// out  products  float      that of work-item i of image v: [v * stride + first + i]
 kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint first,
-                               global const float* restrict weights, global const float4* restrict in,
-                               global const float4* restrict grad, global float* restrict products) {
+                               global const uint2* restrict extents, global const float* restrict weights,
+                               global const float4* restrict in, global const float4* restrict grad,
+                               global float* restrict products) {
   const uint i = (uint)get_global_id(0), items = column_items_per_image(p);
   if (i >= p.lines * items) return;
   const BlurPlace place = column_place(p, i);
+  global float* to = products + (i / items * stride + first + i % items);
+  if (is_outside_columns(p, place, extents)) {
+    *to = 0.0f;
+    return;
+  }
   pixels_n sums[DPR_BLUR_BLOCK];
   column_sums(p, place, weights, in, sums);
   float4 product = 0.0f;
@@ -286,18 +385,23 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
     product +=
         product_of_pixels(lanes, grad + place.out + (size_t)row * p.width, place.count, DPR_BLUR_PIXELS);
   }
-  products[i / items * stride + first + i % items] = sum_of_channels(product);
+  *to = sum_of_channels(product);
 }
 
 /// The same along rows, of which each image has `rows`: as blur_columns_scale, with the NDRange of blur_rows.
 kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint first, const uint rows,
-                            global const float* restrict weights, global const float4* restrict in,
-                            global const float4* restrict grad, global float* restrict products) {
+                            global const uint2* restrict extents, global const float* restrict weights,
+                            global const float4* restrict in, global const float4* restrict grad,
+                            global float* restrict products) {
   const uint i = (uint)get_global_id(0), items = rows * row_items_per_line(p);
   if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
+  global float* to = products + (i / items * stride + first + i % items);
+  if (is_outside_rows(p, i / row_items_per_line(p), 1, place.at, place.steps, extents)) {
+    *to = 0.0f;
+    return;
+  }
   float4 sums[DPR_BLUR_ROW];
   row_sums(p, place, weights, in, sums);
-  products[i / items * stride + first + i % items] =
-      sum_of_channels(product_of_pixels(sums, grad + place.out, place.steps, DPR_BLUR_ROW));
+  *to = sum_of_channels(product_of_pixels(sums, grad + place.out, place.steps, DPR_BLUR_ROW));
 }

@@ -321,7 +321,7 @@ typedef struct AntialiasParams {
 typedef struct SecondCrossing {
   DPR_SHARED_NAME(SecondCrossing)
   uint step, contour;
-  uint reference; /* the nearest step that the contour has won: it shows the jump across it */
+  uint reference;    /* the nearest step that the contour has won: it shows the jump across it */
   float cut, slope2; /* of the contour: Cut of crossing.h */
 } SecondCrossing;
 
@@ -343,6 +343,10 @@ typedef struct BlurPass {
   uint width;                 /* along columns: pixels of a row */
   uint out_length, in_length; /* pixels along the pass */
   int out_step, in_step, offset, taps;
+  uint tile_rows;   /* of an image's samples, whose extents are known; 0: they are not */
+  uint image_lines; /* the rest is read where they are. Along rows: rows of an image */
+  /* Input i along the pass, and across it, is made of samples i * step + first to i * step + end - 1. */
+  int along_step, along_first, along_end, across_step, across_first, across_end;
 } BlurPass;
 
 /// The blur by samples of the noise.

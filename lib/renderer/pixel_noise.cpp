@@ -38,7 +38,8 @@ PixelNoise::PixelNoise(Device::Impl& device)
     : contour(device), antialias(device), blur(device), device_(device) {}
 
 void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                         float reach) {
+                         const Buffer<cl_uint>& tile_starts, float reach) {
+  if (!sampled) blur.find_extents(in.p, tile_starts);
   antialias.cross(in, contour, reach);
   antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;

@@ -40,8 +40,9 @@ class PixelNoise {
   BackFaces back_faces;                  // of the edges' meshes
 
   /// From samples, which are blended in place, to the image; after the antialiasing's find_front() of all
-  /// bands.
-  void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, float reach);
+  /// bands. `tile_starts` are the runs of the frame's pairs.
+  void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
+               const Buffer<cl_uint>& tile_starts, float reach);
   /// The raster holds samples as they were before forward(): bands have been rendered again.
   void unblend() { is_blended_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale.

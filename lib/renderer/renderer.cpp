@@ -169,7 +169,8 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 /// From samples to pixels, once all bands are rendered.
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
-  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), depth_reach(scene.smoothing));
+  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts,
+                       depth_reach(scene.smoothing));
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {

@@ -50,12 +50,15 @@ shared::BlurPass transposed(shared::BlurPass pass) {
 
 Blur::Blur(Device::Impl& device)
     : device_(device),
+      find_extents_(device, "blur.cl", "blur_extents"),
       columns_(device, "blur.cl", "blur_columns"),
       rows_(device, "blur.cl", "blur_rows"),
       rows_strided_(device, "blur.cl", "blur_rows_strided"),
       columns_scale_(device, "blur.cl", "blur_columns_scale"),
       rows_scale_(device, "blur.cl", "blur_rows_scale"),
-      reduce_(device) {}
+      reduce_(device) {
+  extents_.resize(device_, 1);  // kernels have the argument where nothing is known, too
+}
 
 Blur::Setting Blur::prepare(BlurKernel kernel) const {
   Setting setting;
@@ -115,12 +118,42 @@ std::size_t Blur::row_items(const Pass& pass) const {
   return groups(pass.out_length, k_row_block * pixels_of_vector(device_));
 }
 
+void Blur::find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts) {
+  const std::size_t rows = std::size_t{p.views} * p.tiles_y;
+  extents_.resize(device_, rows);
+  find_extents_(rows, p, tile_starts, extents_);
+  tile_rows_ = p.tiles_y;
+}
+
+Blur::Footprint Blur::Footprint::through(const Pass& pass) const {
+  // Either the inputs are next to each other, or the pass counts in samples already.
+  const int unit = pass.in_step == 1 ? step : 1;
+  return {pass.out_step * unit, (pass.offset - pass.taps + 1) * unit + first, pass.offset * unit + end};
+}
+
+Blur::Footprint Blur::input_footprint(const Axis& axis) const {
+  return is_coarse() ? Footprint().through(reduction(axis)) : Footprint();
+}
+
+Blur::Pass Blur::within_extents(Pass pass, const Footprint& along, const Footprint& across,
+                                std::size_t image_lines) const {
+  pass.tile_rows = static_cast<cl_uint>(tile_rows_);
+  pass.image_lines = static_cast<cl_uint>(image_lines);
+  pass.along_step = along.step;
+  pass.along_first = along.first;
+  pass.along_end = along.end;
+  pass.across_step = across.step;
+  pass.across_first = across.first;
+  pass.across_end = across.end;
+  return pass;
+}
+
 void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
                    const BufferRef<cl_float4>& in, Buffer<cl_float4>& out) {
   pass.lines = static_cast<cl_uint>(views);
   pass.width = static_cast<cl_uint>(width);
   out.resize(device_, views * pass.out_length * width);
-  columns_(views * column_items(pass, width), pass, weights, in, out);
+  columns_(views * column_items(pass, width), pass, extents_, weights, in, out);
 }
 
 void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
@@ -128,24 +161,30 @@ void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, cons
   pass.lines = static_cast<cl_uint>(lines);
   out.resize(device_, lines * pass.out_length);
   if (pass.in_step == 1 && pass.out_step == 1) {
-    rows_(lines * row_items(pass), pass, weights, in, out);
+    rows_(lines * row_items(pass), pass, extents_, weights, in, out);
   } else {
     const std::size_t blocks = groups(pass.out_length, block_of(device_));
-    rows_strided_(groups(lines, pixels_of_vector(device_)) * blocks, pass, weights, in, out);
+    rows_strided_(groups(lines, pixels_of_vector(device_)) * blocks, pass, extents_, weights, in, out);
   }
 }
 
 void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
   const Axis x = axis(size.width), y = axis(size.height);
+  const Footprint sample, in_x = input_footprint(x), in_y = input_footprint(y);
   if (is_coarse()) {
-    columns(reduction(y), size.views, x.samples, now_.reduce, raster, scratch_);
-    rows(reduction(x), size.views * y.in, now_.reduce, scratch_, in_);
+    columns(within_extents(reduction(y), sample, sample), size.views, x.samples, now_.reduce, raster,
+            scratch_);
+    rows(within_extents(reduction(x), sample, in_y, y.in), size.views * y.in, now_.reduce, scratch_, in_);
   }
-  columns(convolution(y), size.views, x.in, now_.weights, is_coarse() ? in_ : raster, between_);
-  rows(convolution(x), size.views * y.out, now_.weights, between_, is_coarse() ? out_ : image);
+  const Footprint out_x = in_x.through(convolution(x)), out_y = in_y.through(convolution(y));
+  columns(within_extents(convolution(y), in_y, in_x), size.views, x.in, now_.weights,
+          is_coarse() ? in_ : raster, between_);
+  rows(within_extents(convolution(x), in_x, out_y, y.out), size.views * y.out, now_.weights, between_,
+       is_coarse() ? out_ : image);
   if (is_coarse()) {
-    rows(expansion(x), size.views * y.out, now_.expand, out_, scratch_);
-    columns(expansion(y), size.views, x.pixels, now_.expand, scratch_, image);
+    rows(within_extents(expansion(x), out_x, out_y, y.out), size.views * y.out, now_.expand, out_, scratch_);
+    columns(within_extents(expansion(y), out_y, out_x.through(expansion(x))), size.views, x.pixels,
+            now_.expand, scratch_, image);
   }
 }
 
@@ -179,25 +218,27 @@ void Blur::upload_starts(std::size_t views, std::size_t stride) {
 void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                           const BufferRef<cl_float4>& grad_image) {
   const Axis x = axis(size.width), y = axis(size.height);
-  Pass along_columns = convolution(y), along_rows = convolution(x);
+  const Footprint in_x = input_footprint(x), in_y = input_footprint(y);
+  Pass along_columns = within_extents(convolution(y), in_y, in_x),
+       along_rows = within_extents(convolution(x), in_x, in_y.through(convolution(y)), y.out);
   const std::size_t of_columns = column_items(along_columns, x.in), of_rows = y.out * row_items(along_rows);
   const std::size_t stride = of_columns + of_rows;
   products_.resize(device_, size.views * stride);
   along_columns.lines = static_cast<cl_uint>(size.views);
   along_columns.width = static_cast<cl_uint>(x.in);
   along_rows.lines = static_cast<cl_uint>(size.views * y.out);
-  columns_scale_(size.views * of_columns, along_columns, static_cast<cl_uint>(stride), 0,
+  columns_scale_(size.views * of_columns, along_columns, static_cast<cl_uint>(stride), 0, extents_,
                  now_.weights_by_scale, is_coarse() ? in_ : raster, grad_between_, products_);
   rows_scale_(size.views * of_rows, along_rows, static_cast<cl_uint>(stride),
-              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), now_.weights_by_scale, between_,
-              is_coarse() ? grad_out_ : grad_image, products_);
+              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), extents_, now_.weights_by_scale,
+              between_, is_coarse() ? grad_out_ : grad_image, products_);
   upload_starts(size.views, stride);
   reduce_({size.views * stride, 1, size.views, 1, starts_, products_}, grad_scale);
 }
 
 std::size_t Blur::bytes() const {
-  std::size_t bytes =
-      products_.capacity_bytes() + starts_.capacity_bytes() + grad_scale.capacity_bytes() + reduce_.bytes();
+  std::size_t bytes = products_.capacity_bytes() + starts_.capacity_bytes() + grad_scale.capacity_bytes() +
+                      reduce_.bytes() + extents_.capacity_bytes();
   for (const Buffer<float>* buffer : {&now_.weights, &now_.weights_by_scale, &now_.reduce, &now_.expand})
     bytes += buffer->capacity_bytes();
   for (const Buffer<cl_float4>* buffer :

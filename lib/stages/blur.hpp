@@ -29,6 +29,10 @@ class Blur {
   void set_kernel(BlurKernel kernel) { set(prepare(std::move(kernel))); }
   const BlurKernel& kernel() const { return now_.kernel; }
 
+  /// What of the rasters that follow is covered, and so need not be all alike: the tiles that have pairs.
+  /// Elsewhere nothing is summed up. Until then all of a raster may differ.
+  void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
+
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
   /// The transpose of forward().
   void backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster);
@@ -63,6 +67,17 @@ class Blur {
                const BufferRef<cl_float4>& in, Buffer<cl_float4>& out);
   void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
             Buffer<cl_float4>& out);
+  /// The samples that an element along one axis is made of: from i * step + first up to i * step + end.
+  struct Footprint {
+    int step = 1, first = 0, end = 1;
+    /// Of the outputs of a pass whose inputs have this one.
+    Footprint through(const Pass& pass) const;
+  };
+  /// Of what the convolution reads.
+  Footprint input_footprint(const Axis& axis) const;
+  /// The pass, which passes over what lies outside of the extents. `along` and `across` are of its inputs.
+  Pass within_extents(Pass pass, const Footprint& along, const Footprint& across,
+                      std::size_t image_lines = 1) const;
   void upload_starts(std::size_t views, std::size_t stride);
   /// Work-items of a pass of one image's columns, and of one row.
   std::size_t column_items(const Pass& pass, std::size_t width) const;
@@ -70,9 +85,12 @@ class Blur {
 
   Device::Impl& device_;
   Setting now_;
-  Kernel<Pass, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_, rows_strided_;
-  Kernel<Pass, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> columns_scale_;
-  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> rows_scale_;
+  Kernel<shared::FrameParams, In<cl_uint>, Out<cl_uint2>> find_extents_;
+  Kernel<Pass, In<cl_uint2>, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_, rows_strided_;
+  Kernel<Pass, cl_uint, cl_uint, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>>
+      columns_scale_;
+  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>>
+      rows_scale_;
   Reduce reduce_;
   /// Input of the convolution, after its columns, after its rows; the first and the last of a coarse grid
   /// only.
@@ -80,7 +98,9 @@ class Blur {
   Buffer<cl_float4> grad_in_, grad_between_, grad_out_;
   Buffer<cl_float4> scratch_;
   Buffer<float> products_;
-  Buffer<cl_uint> starts_;  ///< of the views' products
+  Buffer<cl_uint2> extents_;   ///< [view][row of tiles], in samples
+  std::size_t tile_rows_ = 0;  ///< 0 while the extents are not known
+  Buffer<cl_uint> starts_;     ///< of the views' products
   std::size_t starts_stride_ = 0;
 };
 

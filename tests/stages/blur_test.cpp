@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -95,12 +96,47 @@ struct Run {
     buffer.fill(cl_float4{{dpr::test::k_poison, 0, 0, dpr::test::k_poison}});
   }
 
+  /// What the extents need of the frame whose samples the raster are.
+  dpr::shared::FrameParams frame(const Case& c) const {
+    dpr::shared::FrameParams p{};
+    p.views = static_cast<cl_uint>(size.views);
+    p.tiles_x = static_cast<cl_uint>(tiles(raster_side(c.width, blur.kernel())));
+    p.tiles_y = static_cast<cl_uint>(tiles(raster_side(c.height, blur.kernel())));
+    return p;
+  }
+  std::size_t tile_count(const Case& c) const {
+    const dpr::shared::FrameParams p = frame(c);
+    return std::size_t{p.views} * p.tiles_x * p.tiles_y;
+  }
+  static std::size_t tiles(std::size_t samples) { return (samples + DPR_TILE - 1) / DPR_TILE; }
+
   dpr::Device::Impl& device;
   Blur blur;
+  Buffer<cl_uint> tile_starts;
   Blur::Size size;
   Pixels raster, grad_image;
   Buffer<cl_float4> raster_buffer, image_buffer, grad_buffer, grad_raster_buffer;
 };
+
+/// Leaves a raster as it is in one tile of each view, each in another place, and makes all else the
+/// background.
+void cover_some_tiles(const Case& c, Run& run) {
+  const dpr::shared::FrameParams p = run.frame(c);
+  const std::size_t width = raster_side(c.width, run.blur.kernel()),
+                    height = raster_side(c.height, run.blur.kernel());
+  std::vector<cl_uint> starts{0};
+  for (std::size_t tile = 0; tile < run.tile_count(c); ++tile) {
+    const std::size_t view = tile / (p.tiles_x * p.tiles_y), place = tile % (p.tiles_x * p.tiles_y);
+    const bool is_covered = place % p.tiles_x == p.tiles_x / (view + 2) && place / p.tiles_x == p.tiles_y / 2;
+    starts.push_back(starts.back() + (is_covered ? 1 : 0));
+  }
+  for (std::size_t i = 0; i < run.raster.size(); ++i) {
+    const std::size_t x = i % width / DPR_TILE, y = i / width % height / DPR_TILE, view = i / width / height;
+    const std::size_t tile = (view * p.tiles_y + y) * p.tiles_x + x;
+    if (starts[tile] == starts[tile + 1]) run.raster[i] = {{0.25F, 0.5F, 0.75F, 0}};
+  }
+  run.tile_starts.upload(run.device, starts);
+}
 
 /// rows * in * columns^T, for every view and channel; [view][row][column][channel].
 std::vector<double> apply(const BlurMatrix& rows, const BlurMatrix& columns, const Pixels& in) {
@@ -187,6 +223,35 @@ TEST_SUITE("unit") {
       const auto matrix = [&](int pixels) { return dpr::test::matrix_of(kernel, kernel.weights, pixels); };
       CAPTURE(text(c));
       DPR_CHECK_WORST(difference(run.forward(), apply(matrix(c.height), matrix(c.width), run.raster)), 1e-6);
+    }
+  }
+
+  TEST_CASE("what no tile covers is the background, and the rest is as it is without asking") {
+    for (const Case& c : cases()) {
+      Run run(c);
+      CAPTURE(text(c));
+      cover_some_tiles(c, run);
+      const Pixels all = run.forward();
+      run.backward();
+      const std::vector<float> scale_of_all = run.backward_scale();
+      run.blur.find_extents(run.frame(c), run.tile_starts);
+      DPR_CHECK_WORST(difference(run.forward(), doubles(all)), 2e-6);
+      const std::vector<float> scale = run.backward_scale();
+      for (std::size_t view = 0; view < scale.size(); ++view)
+        CHECK(scale[view] == doctest::Approx(scale_of_all[view]).epsilon(1e-4));
+    }
+  }
+
+  TEST_CASE("nothing is summed up where no tile is covered") {
+    const Case c{Prior::gaussian, 1.3, 1, 40, 40};
+    Run run(c);
+    run.tile_starts.upload(run.device, std::vector<cl_uint>(run.tile_count(c) + 1, 0));
+    run.blur.find_extents(run.frame(c), run.tile_starts);
+    // Of a raster that is not all alike, so that means are told from samples.
+    for (const cl_float4& pixel : run.forward()) {
+      CHECK(std::ranges::any_of(run.raster, [&](const cl_float4& sample) {
+        return std::memcmp(&sample, &pixel, sizeof pixel) == 0;
+      }));
     }
   }
 
