@@ -26,9 +26,9 @@ std::vector<Setter> setters(const Scene& scene) {
           [mesh](Renderer& r) { r.set_positions(0, mesh.positions); },
           [mesh](Renderer& r) { r.set_colors(0, mesh.face_colors); },
           [mesh](Renderer& r) { r.set_shapes(mesh.positions, {}); },
-          [](Renderer& r) { r.set_lights(std::nullopt); },
-          [](Renderer& r) { r.set_cull(Cull::none); },
-          [](Renderer& r) { r.set_background(glm::vec3(0)); }};
+          [scene](Renderer& r) { r.set_lights(scene.lights); },
+          [scene](Renderer& r) { r.set_cull(scene.cull); },
+          [scene](Renderer& r) { r.set_background(scene.background); }};
 }
 
 void check_ended(Renderer& renderer, ImageLoss& loss) {
