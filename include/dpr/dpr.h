@@ -261,7 +261,8 @@ DPR_API dpr_status dpr_renderer_set_smoothing(dpr_renderer* renderer, const dpr_
 DPR_API dpr_status dpr_renderer_set_background(dpr_renderer* renderer, const float color[3]);
 DPR_API dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word);
 DPR_API dpr_status dpr_renderer_set_gradients(dpr_renderer* renderer, const char* const* names, size_t count);
-/* Renders every view; enqueues the work, and seldom waits for it. */
+/* Renders every view; enqueues the work, and seldom waits for it. A dpr_renderer_set_*() but that of gradients
+ * ends the frame: what reads it fails until the next forward pass. */
 DPR_API dpr_status dpr_renderer_forward(dpr_renderer* renderer);
 /* The floats of all images: views * height * width * 4. */
 DPR_API dpr_status dpr_renderer_image_size(const dpr_renderer* renderer, size_t* count);

@@ -96,6 +96,9 @@ class ImageLoss;
 class MeshLoss;
 
 /// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
+/// Every setter but set_gradients() ends the last frame: what reads it (image(), read_pixels(), a loss,
+/// backward(), backward_pixels(), statistics(), auxiliary outputs) throws InvalidArgument until the next
+/// forward(), as it does before the first.
 class DPR_API Renderer {
  public:
   explicit Renderer(Device device);
@@ -129,7 +132,9 @@ class DPR_API Renderer {
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other, without instances, which have their mesh's. Empty: the scene's own for all views, to which
-  /// set_views() returns as well.
+  /// set_views() returns as well. With noise on the pixel, faces on the far side of closed meshes are kept,
+  /// which those of a scene's own shape are not: images and gradients differ by what these add at edges,
+  /// which grows with the width of the blur.
   void set_shapes(std::span<const vec3> positions, std::span<const vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);
@@ -137,7 +142,7 @@ class DPR_API Renderer {
   void set_cull(Cull cull);
   /// A new background colour, linear RGB.
   void set_background(const vec3& background);
-  /// Replaces what the next backward() computes.
+  /// Replaces what the next backward() computes. The last frame stays.
   void set_gradients(const GradientRequest& gradients);
 
   const Scene& scene() const;
@@ -149,14 +154,15 @@ class DPR_API Renderer {
   /// a loss, ...) renders it again. Throws InvalidArgument where a frame does not fit the device's memory
   /// budget; then that call may be the one to throw.
   void forward();
-  /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument before the first forward().
+  /// The image of a view, from the last forward(). Blocks. Throws InvalidArgument where a setter was called
+  /// since then, or there was none: an image is always that of the scene as it is.
   Image image(std::size_t view = 0) const;
-  /// All images at once, [view][height][width], RGBA. Blocks.
+  /// All images at once, [view][height][width], RGBA. Blocks. Throws as image() does.
   void read_pixels(std::span<vec4> pixels) const;
 
   /// Gradients of sum over views and pixels of <grad_images, image> (RGBA; the colour part counts the
-  /// background). One image a view, of the renderer's size. After forward(); Monte Carlo draws the same noise
-  /// again.
+  /// background). One image a view, of the renderer's size. After forward(), and throws as image() does where
+  /// a setter came between; Monte Carlo draws the same noise again.
   SceneGradient backward(std::span<const Image> grad_images);
   /// The same from [view][height][width], RGBA.
   SceneGradient backward_pixels(std::span<const vec4> grad_pixels);
@@ -166,6 +172,7 @@ class DPR_API Renderer {
   /// evaluated on the last forward(). Throws InvalidArgument if the scene asks for no positions' gradient.
   SceneGradient backward(const ImageLoss& loss, const MeshLoss& mesh_loss);
 
+  /// Of the last forward(). Throws as image() does.
   RenderStatistics statistics() const;
   const Device& device() const;
 

@@ -140,10 +140,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   Json json = pose_to_json(scene, result);
-  if (result.light == PoseLight::harmonics) {
-    if (const auto light = found_light(device, scene, target, result, options.least_squares))
-      add_found_light(json, *light);
-  }
+  add_light(json, device, scene, target, result, options.least_squares);
   write_json(options.output, json);
   if (!options.report.empty()) {
     const std::string title = "The pose of " + std::filesystem::path(options.scene).filename().string();

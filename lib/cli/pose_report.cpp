@@ -197,17 +197,27 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   return json;
 }
 
-std::optional<Lights> found_light(const Device& device, Scene scene, const Image& target,
-                                  const PoseResult& result, const LeastSquares& method) {
+void add_light(Json& json, const Device& device, const Scene& of, const Image& target,
+               const PoseResult& result, const LeastSquares& method) {
+  if (result.light == PoseLight::fixed) return;
   constexpr float k_blur_pixels = 0.25F, k_robust_scale = 0.1F;  // of a robust fit that leaves it open
+  Scene scene = of;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(scene.width, scene.height));  // NDC
   scene.meshes.front().transform = affine(result.pose.rotation * stretch_of(scene), result.pose.translation);
   scene.smoothing = Smoothing();
   scene.smoothing.sigma = blur * blur;
   scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
   const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
-  const float scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
-  return find_light(device, scene, {&view, 1}, method.robust ? scale : 0);
+  const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
+  const float scale = method.robust ? open_scale : 0;
+  if (result.light == PoseLight::gain) {
+    const auto found = find_gain(device, scene, view, scale);
+    if (!found) return;
+    json["gain"] = to_json(found->gain);
+    json["offset"] = to_json(found->offset);
+  } else if (const auto light = find_light(device, scene, {&view, 1}, scale)) {
+    add_found_light(json, *light);
+  }
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,

@@ -26,10 +26,9 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 /// pose.json, of a fit to the scene's only mesh. With the true rotation, the angle errors too.
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
 
-/// The distant light, in world space, in which the scene's mesh explains the target where it was found; none
-/// where it is not seen. By what counts in the method.
-std::optional<Lights> found_light(const Device& device, Scene scene, const Image& target,
-                                  const PoseResult& result, const LeastSquares& method);
+/// Adds the light that was found along with the pose to pose.json, as find_light() and find_gain() have it.
+void add_light(Json& json, const Device& device, const Scene& scene, const Image& target,
+               const PoseResult& result, const LeastSquares& method);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw

@@ -16,6 +16,7 @@
 #include "mesh/bounding_box.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
+#include "solve/pose_light.hpp"
 #include "solve/scene_light.hpp"
 #include "solve/shape_space.hpp"
 
@@ -210,6 +211,37 @@ std::optional<Lights> find_light(const Device& device, const Scene& scene, std::
       lights.harmonics[k][c] = static_cast<float>(light(static_cast<Eigen::Index>(k), c));
   }
   return lights;
+}
+
+std::optional<ColorGain> find_gain(const Device& device, Scene scene, const ShapeView& view,
+                                   float robust_scale) {
+  WeighedTarget target;
+  target.background = std::exchange(scene.background, glm::vec3(0));
+  target.inverse_scale_squared = robust_scale > 0 ? 1 / (robust_scale * robust_scale) : 0;
+  scene.lights.reset();
+  scene.gradients = no_gradients();
+  scene.camera = view.camera;
+  Renderer renderer(device);
+  renderer.set_scene(scene);
+  renderer.forward();
+  const Image image = renderer.image();
+  std::vector<cl_float4> colors;
+  std::vector<std::size_t> shown;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const glm::vec4 &p = image.pixels[i], &q = view.image.pixels[i];
+    colors.push_back({{p.x, p.y, p.z, p.w}});
+    target.colors.push_back({{q.x, q.y, q.z, q.w}});
+    target.weights.push_back(view.mask.pixels.empty() ? 1.0F : view.mask.pixels[i].x);
+    if (p.w > 0) shown.push_back(i);
+  }
+  if (shown.empty()) return std::nullopt;
+  const LightFit fit(target, shown, {colors.data(), nullptr});
+  ColorGain found;
+  for (int c = 0; c < 3; ++c) {
+    found.gain[c] = fit.gain(c);
+    found.offset[c] = fit.offset(c);
+  }
+  return found;
 }
 
 }  // namespace dpr

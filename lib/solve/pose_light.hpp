@@ -46,6 +46,9 @@ class LightFit {
   /// 1.4826 times the median of the residuals' sizes: their standard deviation if they were normal but for
   /// outliers.
   float deviation() const;
+  /// The light's even part in a channel, and what is reflected whatever the colour.
+  double gain(int channel) const { return light_[static_cast<std::size_t>(channel)][0]; }
+  double offset(int channel) const { return light_[static_cast<std::size_t>(channel)].tail<1>()[0]; }
   /// [pixel][channel] image in its light minus target.
   const Eigen::MatrixX3f& residuals() const { return residuals_; }
   /// [pixel] of the squares that have the robust loss's derivative here.

@@ -16,4 +16,13 @@ namespace dpr {
 std::optional<Lights> find_light(const Device& device, const Scene& scene, std::span<const ShapeView> views,
                                  float robust_scale);
 
+/// By channel: an image shows colours times `gain`, plus `offset`.
+struct ColorGain {
+  dvec3 gain{1.0}, offset{0.0};
+};
+
+/// The gain in which the same mesh explains one image, without the scene's lights. None where it is not seen.
+std::optional<ColorGain> find_gain(const Device& device, Scene scene, const ShapeView& view,
+                                   float robust_scale);
+
 }  // namespace dpr

@@ -2,6 +2,7 @@
 // environment variable DPR_CLI names the command.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -117,6 +118,36 @@ TEST_SUITE("pipeline") {
       return sum;
     };
     CHECK(difference("found.exr") < 0.2 * difference("dark.exr"));
+  }
+
+  TEST_CASE("dpr pose --light gain: the gain and the offset that it found are in the file") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const glm::dvec3 gain(0.3, 0.5, 1.4), offset(0.2, 0, 0.1);
+    dpr::Image target = dpr::read_image(folder / "target.exr");
+    for (glm::vec4& pixel : target.pixels)
+      pixel = glm::vec4(glm::vec3(gain) * glm::vec3(pixel) + glm::vec3(offset) * pixel.w, pixel.w);
+    dpr::write_image(folder / "target.exr", target);
+    REQUIRE(run(folder,
+                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --light gain "
+                "-o pose.json --quiet")
+                .status == 0);
+    const json pose = json::parse(folder.read("pose.json"));
+    check_is_truth(pose);
+    REQUIRE(pose["light"] == "gain");
+    CHECK_FALSE(pose.contains("harmonics"));
+    const auto found = [&](const char* key, int c) {
+      return pose[key][static_cast<std::size_t>(c)].get<double>();
+    };
+    for (int c = 1; c < 3; ++c) {
+      CHECK(found("gain", c) == doctest::Approx(gain[c]).epsilon(0.03));
+      CHECK(std::abs(found("offset", c) - offset[c]) < 0.02);
+    }
+    // All sides in sight have the same red, which leaves open how much of it is reflected by the offset.
+    constexpr double k_red = 0.1;
+    CHECK(k_red * found("gain", 0) + found("offset", 0) ==
+          doctest::Approx(k_red * gain[0] + offset[0]).epsilon(0.03));
   }
 
   TEST_CASE("dpr pose: mask, robust loss, focal length and the grid's size") {

@@ -317,6 +317,37 @@ class PackageTest(RenderTest):
             with self.assertRaisesRegex((RuntimeError, ValueError), message):
                 renderer.subdivide(**{"vertices": wall, "faces": faces, "views": views, "intrinsics": lens, **wrong})
 
+    def test_subdivision_of_texture_coordinates(self):
+        wall = torch.tensor([[-2.0, -1.6, 2.0], [2.1, -1.5, 1.8], [2.0, 1.6, 1.7], [-2.2, 1.5, 2.1]])
+        faces = torch.tensor([[0, 1, 2], [0, 2, 3]])
+        views, lens = cameras(1)[0], torch.tensor([[45.0, 45.0, 40.0, 30.0, -0.22, 0.03, 0.0, 0.0, 0.0]])
+        renderer = dpr.Renderer(80, 60)
+        self.assertIsNone(renderer.subdivide(wall, faces, views, lens).texcoords)
+
+        # An affine function of the place, another one on each face: the seam between them must stay.
+        slopes, starts = random(2, 3, 2, seed=5), torch.tensor([[0.0, 0.0], [5.0, -3.0]])
+        corners = (torch.einsum("fkc,fcd->fkd", wall[faces], slopes) + starts[:, None]).requires_grad_()
+        cut = renderer.subdivide(wall, faces, views, lens, texcoords=corners)
+        places, of = cut.of_vertices(wall)[cut.faces], cut.face_of
+        expected = torch.einsum("fkc,fcd->fkd", places, slopes[of]) + starts[of][:, None]
+        self.assertGreater(len(cut.faces), 20)
+        self.assertLess((cut.texcoords - expected).abs().max(), 1e-5)
+        cut.texcoords.sum().backward()
+        self.assertAlmostEqual(float(corners.grad.sum()), 6.0 * len(cut.faces), delta=1e-2)
+
+        listed = corners.detach().reshape(-1, 2)
+        by_index = dpr.subdivide(wall, faces, views, lens, width=80, height=60, texcoords=listed,
+                                 face_texcoords=torch.arange(6).view(2, 3))
+        self.assertTrue(torch.equal(by_index.texcoords, cut.texcoords))
+        of_vertices = random(4, 2, seed=6)
+        pieces = renderer.subdivide(wall, faces, views, lens, texcoords=of_vertices)
+        self.assertLess((pieces.texcoords - pieces.of_vertices(of_vertices)[pieces.faces]).abs().max(), 1e-6)
+        whole = renderer.subdivide(wall, faces, views, lens[:, :4], texcoords=corners)
+        self.assertTrue(torch.equal(whole.texcoords, corners))
+        renderer(cut.of_vertices(wall), cut.faces, views, lens, texcoords=cut.texcoords, textures=random(4, 4, 3))
+        with self.assertRaisesRegex(ValueError, "texcoords .* expected"):
+            renderer.subdivide(wall, faces, views, lens, texcoords=random(3, 2))
+
     def test_another_default_type(self):
         renderer, (views, intrinsics) = dpr.Renderer(SIZE, SIZE), cameras(1)
         expected = renderer(TETRAHEDRON, FACES, views, intrinsics)

@@ -121,7 +121,8 @@ class Renderer:
             return self._render_each(_views.meshes_of_each, mesh, views, intrinsics, lights, shared)
         return self._render(mesh, views, intrinsics, lights, shared, first_view=0)
 
-    def subdivide(self, vertices, faces, views, intrinsics, *, tolerance=0.25, copy=False):
+    def subdivide(self, vertices, faces, views, intrinsics, *, texcoords=None, face_texcoords=None, tolerance=0.25,
+                  copy=False):
         """Cuts a mesh's faces where lenses bend their edges, which images draw straight between vertices.
 
         vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a
@@ -129,6 +130,9 @@ class Renderer:
         vertices that only coincide. Without lenses nothing is cut. The result is right for meshes and cameras near
         these: cut again when they have moved. With lights, normals are those of the pieces: new vertices have their
         face's own, so that what coarse faces shade smoothly gets flat within them.
+
+        texcoords and face_texcoords, as a call takes them, come back as the pieces': `texcoords` [F', 3, 2] of the result,
+        with gradients of the given ones.
 
         Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
         """
@@ -139,7 +143,11 @@ class Renderer:
         faces = _arguments.indices("faces", faces, ("F", 3), copy)
         pieces = torch.ops.dpr._subdivide(self.width, self.height, self._texts, tolerance, faces, vertices[None],
                                           views, intrinsics)
-        return Subdivision(*pieces, of=(vertices.shape[0], faces.shape[0]))
+        cut = Subdivision(*pieces, of=(vertices.shape[0], faces.shape[0]))
+        corners = _surface.corner_texcoords(texcoords, face_texcoords, faces, vertices.shape[0], copy)
+        if corners is not None:
+            cut.texcoords = cut.of_corners(corners, faces)
+        return cut
 
     def _render_each(self, as_lists, mesh, views, intrinsics, lights, shared):
         """Views that differ, each by itself. Sampled noise is that of their places in the batch."""
@@ -221,10 +229,11 @@ def render(vertices, faces, views, intrinsics, *, width, height, device="", **ar
     return Renderer(width, height, device=device, **settings)(vertices, faces, views, intrinsics, **of_call)
 
 
-def subdivide(vertices, faces, views, intrinsics, *, width, height, tolerance=0.25, copy=False, **settings):
+def subdivide(vertices, faces, views, intrinsics, *, width, height, texcoords=None, face_texcoords=None,
+              tolerance=0.25, copy=False, **settings):
     """Renderer(width, height, **settings).subdivide(): see there."""
-    return Renderer(width, height, **settings).subdivide(vertices, faces, views, intrinsics, tolerance=tolerance,
-                                                         copy=copy)
+    return Renderer(width, height, **settings).subdivide(vertices, faces, views, intrinsics, texcoords=texcoords,
+                                                         face_texcoords=face_texcoords, tolerance=tolerance, copy=copy)
 
 
 def release():

@@ -22,6 +22,14 @@ def _texcoords(mesh, faces, vertex_count, copy):
     return texcoords.reshape(-1, 2), torch.arange(3 * count).view(count, 3)
 
 
+def corner_texcoords(texcoords, face_texcoords, faces, vertex_count, copy):
+    """[F, 3, 2], however they were given; None for None."""
+    values, indices = _texcoords({"texcoords": texcoords, "face_texcoords": face_texcoords}, faces, vertex_count, copy)
+    if texcoords is None:
+        return None
+    return values[indices if indices.numel() else faces]
+
+
 def _textures(given, copy):
     """(all texels [..., 3] one texture after the other, height and width of each)."""
     given = listed(given)
