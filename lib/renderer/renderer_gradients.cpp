@@ -12,8 +12,8 @@ using glm::dvec3;
 
 namespace {
 
-/// A mesh's part of a joined buffer. In pieces: what lies on the way from rows of four to three floats is held
-/// beside both, when a frame holds the most.
+/// A mesh's part of a joined buffer. In pieces: what lies on the way from rows of four to three floats is
+/// held beside both, when a frame holds the most.
 std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count) {
   constexpr std::size_t k_piece = std::size_t{1} << 17;  // 2 MiB
   std::vector<cl_float4> values(std::min(count, k_piece));
