@@ -70,7 +70,7 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, uint fi
 /// Finds what crosses the steps of a tile. One work-item per tile of all views. Deterministic.
 /// in   edges         uint4[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
-/// in   facing        uint[view][face]
+/// in   facing        uchar[view][face]
 /// in   ndc           float4[view][vertex]
 /// in   clipped       ClippedFace[view][face]  read where p.clips is set
 /// in   tile_starts   uint[view * tile + 1] runs of pairs
@@ -84,7 +84,7 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, uint fi
 ///                                          written where the winners are not
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
                             global const ViewParams* restrict views, global const uint4* restrict edges,
-                            global const uint4* restrict faces, global const uint* restrict facing,
+                            global const uint4* restrict faces, global const uchar* restrict facing,
                             global const float4* restrict ndc, global const ClippedFace* restrict clipped,
                             global const uint* restrict tile_starts, global const uint* restrict pair_contour,
                             global const float* restrict front, global uint* restrict winner,
@@ -165,7 +165,7 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint tile, global con
 kernel void antialias_cross_backward(
     const FrameParams p, const AntialiasParams a, global const uint* restrict pairs,
     global const uint4* restrict edges, global const uint4* restrict faces,
-    global const uint* restrict facing, global const float4* restrict ndc,
+    global const uchar* restrict facing, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,
     global const float2* restrict grad_cut, global const uint* restrict second_counts,

@@ -75,7 +75,7 @@ static inline Triangle triangle_of(const Outline o, int second, float orientatio
 kernel void clip_forward(const FrameParams p, global const ViewParams* restrict views,
                          global const uint4* restrict faces, global const float4* restrict world,
                          global const float4* restrict ndc, global ClippedFace* restrict clipped,
-                         global uint* restrict facing, global uint* restrict kept,
+                         global uchar* restrict facing, global uchar* restrict kept,
                          global uint* restrict counts, global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;

@@ -20,7 +20,7 @@
 
 /// Everything that says what an edge is; of one view.
 typedef struct {
-  global const uint* facing;         // [face]
+  global const uchar* facing;        // [face]
   global const float4 *ndc, *world;  // [vertex]
   global const uint4 *faces, *face_colors;
   global const float4* colors;
@@ -57,7 +57,7 @@ static inline int normals_differ(const ContourScene s, uint4 edge) {
 
 /// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is
 /// in front.
-static inline int stands_for_both(uint4 edge, global const uint* facing) {
+static inline int stands_for_both(uint4 edge, global const uchar* facing) {
   const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
   const int own_rank = own == DPR_FACE_DROPPED ? 0 : own == DPR_FACE_BACK ? 1 : 2;
   const int other_rank = other == DPR_FACE_DROPPED ? 0 : other == DPR_FACE_BACK ? 1 : 2;
@@ -100,7 +100,7 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
 }
 
 static inline ContourScene scene_of_view(const FrameParams p, const ContourParams c, uint view,
-                                         global const uint4* edges, global const uint* facing,
+                                         global const uint4* edges, global const uchar* facing,
                                          global const float4* ndc, global const float4* world,
                                          global const uint4* faces, global const ClippedFace* clipped,
                                          global const uint4* face_colors, global const float4* colors) {
@@ -142,14 +142,14 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
 /// in   edges        uint4[edge]           of the scene; see DPR_EDGE_FLAG
-/// in   facing       uint[view][face]      as setup and clipping leave it
+/// in   facing       uchar[view][face]     as setup and clipping leave it
 /// in   ndc, world   float4[view][vertex]
 /// in   faces, face_colors  uint4[face]    vertices and colours of the corners
 /// in   clipped      ClippedFace[view][face]  read where p.clips is set
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// out  counts       uint[view][edge]
 kernel void contour_count(const FrameParams p, const ContourParams c, global const uint4* restrict edges,
-                          global const uint* restrict facing, global const float4* restrict ndc,
+                          global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
                           global const ClippedFace* restrict clipped,
                           global const uint4* restrict face_colors, global const float4* restrict colors,
@@ -239,7 +239,7 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
 /// out  places         uint[place]  the place itself: what sorting permutes
 kernel void contour_fill(const FrameParams p, const ContourParams c, const uint capacity,
                          global const uint4* restrict edges, global const uint* restrict end_starts,
-                         global const uint* restrict ends, global const uint* restrict facing,
+                         global const uint* restrict ends, global const uchar* restrict facing,
                          global const float4* restrict ndc, global const float4* restrict world,
                          global const uint4* restrict faces, global const ClippedFace* restrict clipped,
                          global const uint4* restrict face_colors, global const float4* restrict colors,

@@ -26,7 +26,7 @@ static inline uint own_face(uint4 edge) { return edge.z & ~(DPR_EDGE_FLAG | DPR_
 static inline uint other_face(uint4 edge) { return edge.w & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM); }
 
 /// `facing` is the view's.
-static inline EdgeSides edge_sides(uint4 edge, global const uint* facing) {
+static inline EdgeSides edge_sides(uint4 edge, global const uchar* facing) {
   EdgeSides s = {side_of_face(facing[own_face(edge)]), 0};
   if (has_other_face(edge)) {
     // Faces that wind alike go through their edge in opposite directions.

@@ -19,7 +19,7 @@ static inline int is_in_range(float3 a, float3 b, float3 c, float zfar) {
 /// Assembles a triangle; returns whether it is kept.
 static inline int set_up(const FrameParams p, uint i, global const ViewParams* restrict views,
                          global const uint4* restrict faces, global const float4* restrict ndc,
-                         global const float* restrict hidden, global uint* restrict facing, Triangle* t) {
+                         global const float* restrict hidden, global uchar* restrict facing, Triangle* t) {
   const uint view = i / p.faces;
   const uint4 face = faces[i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
@@ -56,14 +56,14 @@ static inline int set_up(const FrameParams p, uint i, global const ViewParams* r
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
 /// in   hidden     float[view][mesh]       the orientation of faces that nothing can see; 0: all may be seen
-/// out  facing     uint[view][face]        see DPR_FACE_DROPPED; of what is not seen too
-/// out  kept       uint[view][face]        0 or 1
+/// out  facing     uchar[view][face]       see DPR_FACE_DROPPED; of what is not seen too
+/// out  kept       uchar[view][face]       0 or 1
 /// out  counts     uint[view][face]        tiles that are listed for it
 /// out  triangles  Triangle[view][face]    means nothing where there is no tile
 DPR_SHARING_KERNEL kernel void setup_forward(
     const FrameParams p, global const ViewParams* restrict views, global const uint4* restrict faces,
-    global const float4* restrict ndc, global const float* restrict hidden, global uint* restrict facing,
-    global uint* restrict kept, global uint* restrict counts, global Triangle* restrict triangles) {
+    global const float4* restrict ndc, global const float* restrict hidden, global uchar* restrict facing,
+    global uchar* restrict kept, global uint* restrict counts, global Triangle* restrict triangles) {
   const uint i = (uint)get_global_id(0);
   const int is_face = i < p.views * p.faces;
   Triangle t;

@@ -22,7 +22,7 @@ typedef struct {
 
 static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
                                        global const uint4* restrict edges, global const uint4* restrict faces,
-                                       global const uint* restrict facing, global const float4* restrict ndc,
+                                       global const uchar* restrict facing, global const float4* restrict ndc,
                                        global const ClippedFace* restrict clipped) {
   TileContour c;
   const uint numbered = contour / DPR_CONTOUR_FLAGS;

@@ -28,6 +28,8 @@ inline constexpr std::string_view k_cl_type_name<float> = "float";
 template <>
 inline constexpr std::string_view k_cl_type_name<cl_uint> = "uint";
 template <>
+inline constexpr std::string_view k_cl_type_name<cl_uchar> = "uchar";
+template <>
 inline constexpr std::string_view k_cl_type_name<cl_ulong> = "ulong";
 template <>
 inline constexpr std::string_view k_cl_type_name<cl_float2> = "float2";

@@ -36,6 +36,7 @@ Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) {
     const std::uint32_t root = root_of(parents, face);
     part_of_face_[face] = root == face ? static_cast<std::uint32_t>(parts_++) : part_of_face_[root];
   }
+  if (parts_ == 1) part_of_face_ = std::vector<std::uint32_t>();  // `= {}` would keep the memory
 }
 
 bool Solid::is_closed_at(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const {
@@ -55,8 +56,9 @@ int Solid::winding(std::span<const glm::vec3> positions, std::span<const glm::uv
   const glm::dvec3 origin(positions[faces[0].x]);
   std::vector<double> volumes(parts_);
   for (std::size_t face = 0; face < faces.size(); ++face) {
+    const std::size_t part = part_of_face_.empty() ? 0 : part_of_face_[face];
     const auto corner = [&](int i) { return glm::dvec3(positions[faces[face][i]]) - origin; };
-    volumes[part_of_face_[face]] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+    volumes[part] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
   }
   if (std::ranges::all_of(volumes, [](double volume) { return volume > 0; })) return 1;
   return std::ranges::all_of(volumes, [](double volume) { return volume < 0; }) ? -1 : 0;

@@ -26,7 +26,7 @@ class Solid {
   bool is_closed_ = false;
   std::vector<WeldedEdge> split_edges_;  // whose faces have vertices of their own there
   std::size_t parts_ = 0;
-  std::vector<std::uint32_t> part_of_face_;
+  std::vector<std::uint32_t> part_of_face_;  // empty where there is one part
 };
 
 }  // namespace dpr

@@ -165,7 +165,7 @@ RenderStatistics Renderer::statistics() const {
   m.require_forward("Renderer::statistics");
   RenderStatistics s;
   s.faces = std::size_t{m.frame.views} * m.frame.faces;
-  s.faces_dropped = static_cast<std::size_t>(std::ranges::count(m.setup.kept.download(), 0U));
+  s.faces_dropped = static_cast<std::size_t>(std::ranges::count(m.setup.kept.download(), cl_uchar{0}));
   s.pairs = m.bin.pairs;
   s.fragments = m.rasterize.frame_fragments;
   s.bands = m.bands.size();

@@ -12,13 +12,18 @@ using glm::dvec3;
 
 namespace {
 
-/// A mesh's part of a joined buffer.
+/// A mesh's part of a joined buffer. In pieces: what lies on the way from rows of four to three floats is
+/// held beside both, when a frame holds the most.
 std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count) {
-  std::vector<cl_float4> values(count);
-  buffer.download(values, first);
+  constexpr std::size_t k_piece = std::size_t{1} << 17;  // 2 MiB
+  std::vector<cl_float4> values(std::min(count, k_piece));
   std::vector<glm::vec3> result;
   result.reserve(count);
-  for (const cl_float4& v : values) result.emplace_back(v.s[0], v.s[1], v.s[2]);
+  while (result.size() < count) {
+    const std::span<cl_float4> piece(values.data(), std::min(values.size(), count - result.size()));
+    buffer.download(piece, first + result.size());
+    for (const cl_float4& v : piece) result.emplace_back(v.s[0], v.s[1], v.s[2]);
+  }
   return result;
 }
 

@@ -190,6 +190,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> vectors);
 
   ShadeInputs shade_inputs() const {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};

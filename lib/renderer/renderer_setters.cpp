@@ -299,7 +299,7 @@ void Renderer::Impl::set_cull(Cull cull) noexcept {
 }
 
 void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  replace(geometry->positions, geometry->meshes[mesh].first_position, to_cl(positions));
+  replace(geometry->positions, geometry->meshes[mesh].first_position, positions);
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
   near_plane.move(mesh);
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
@@ -307,14 +307,14 @@ void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> 
 }
 
 void Renderer::Impl::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  replace(geometry->color_values, geometry->meshes[mesh].first_color, to_cl(colors));
+  replace(geometry->color_values, geometry->meshes[mesh].first_color, colors);
   std::ranges::copy(colors, colors_of(scene.meshes[mesh].mesh).begin());
   rendered = false;
 }
 
 void Renderer::Impl::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> values) {
   const shared::Texture& on_device = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
-  replace(geometry->textures.texel_values, on_device.first, to_cl(values));
+  replace(geometry->textures.texel_values, on_device.first, values);
   geometry->textures.has_levels = false;
   std::ranges::copy(values, scene.meshes[mesh].mesh.textures[texture].texels.begin());
   rendered = false;
@@ -330,7 +330,7 @@ void Renderer::Impl::set_texcoords(std::size_t mesh, std::span<const glm::vec2> 
 }
 
 void Renderer::Impl::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  replace(geometry->given_normals.values, geometry->meshes[mesh].first_normal, to_cl(normals));
+  replace(geometry->given_normals.values, geometry->meshes[mesh].first_normal, normals);
   std::ranges::copy(normals, scene.meshes[mesh].mesh.normals.begin());
   if (pixel_noise) pixel_noise->edges.reset();  // which know where they jump
   rendered = false;
@@ -342,6 +342,19 @@ void Renderer::Impl::set_materials(std::size_t mesh, std::span<const Material> m
   replace(geometry->materials.values, geometry->meshes[mesh].first_material, values);
   std::ranges::copy(materials, scene.meshes[mesh].mesh.materials.begin());
   rendered = false;
+}
+
+/// The same in pieces, so that the host does not hold all of it as rows of four floats.
+void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
+                             std::span<const glm::vec3> vectors) {
+  constexpr std::size_t k_piece = std::size_t{1} << 17;  // 2 MiB
+  spare_values_.resize(device.impl(), buffer.size());
+  if (vectors.size() < buffer.size()) buffer.copy_to(spare_values_);
+  for (std::size_t done = 0; done < vectors.size(); done += k_piece) {
+    const std::span<const glm::vec3> piece = vectors.subspan(done, std::min(k_piece, vectors.size() - done));
+    write_range(device.impl(), spare_values_, first + done, to_cl(piece));
+  }
+  std::swap(buffer, spare_values_);
 }
 
 /// A part of a buffer, in a copy that takes its place.

@@ -46,7 +46,7 @@ class Clip {
   struct Kernels {
     explicit Kernels(Device::Impl& device);
     Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
-           Out<shared::ClippedFace>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<shared::Triangle>>
+           Out<shared::ClippedFace>, Out<cl_uchar>, Out<cl_uchar>, Out<cl_uint>, Out<shared::Triangle>>
         forward;
     Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::ClippedFace>, In<shared::Triangle>,
            In<cl_uint>, In<cl_uint>, Out<cl_uint2>, Out<cl_uint>>

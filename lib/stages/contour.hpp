@@ -36,7 +36,7 @@ struct ContourInputs {
   const Geometry& geometry;
   const Edges& edges;
   const Transform& transform;
-  const Buffer<cl_uint>& facing;               ///< [view][face] Setup::facing
+  const Buffer<cl_uchar>& facing;              ///< [view][face] Setup::facing
   const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set
   std::optional<Shading> shading;              ///< of a lit scene
 };
@@ -77,11 +77,11 @@ class Contour {
   void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
+  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uchar>, In<cl_float4>, In<cl_float4>,
          In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
       count_;
   Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>,
+         In<cl_uchar>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>,
          In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;

@@ -16,8 +16,8 @@ class Setup {
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                const Buffer<cl_float4>& ndc, const Buffer<float>& hidden, Buffer<cl_uint>& counts);
 
-  Buffer<cl_uint> facing;              ///< [view][face] DPR_FACE_FRONT, ...
-  Buffer<cl_uint> kept;                ///< [view][face] 0 where a triangle is dropped, 1 where not
+  Buffer<cl_uchar> facing;             ///< [view][face] DPR_FACE_FRONT, ...
+  Buffer<cl_uchar> kept;               ///< [view][face] 0 where a triangle is dropped, 1 where not
   Buffer<shared::Triangle> triangles;  ///< [view][face] of those that have tiles
 
   std::size_t bytes() const {
@@ -26,8 +26,8 @@ class Setup {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>, Out<cl_uint>,
-         Out<cl_uint>, Out<cl_uint>, Out<shared::Triangle>>
+  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>, Out<cl_uchar>,
+         Out<cl_uchar>, Out<cl_uint>, Out<shared::Triangle>>
       forward_;
 };
 
