@@ -218,9 +218,8 @@ void Blur::upload_starts(std::size_t views, std::size_t stride) {
 void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                           const BufferRef<cl_float4>& grad_image) {
   const Axis x = axis(size.width), y = axis(size.height);
-  const Footprint in_x = input_footprint(x), in_y = input_footprint(y);
-  Pass along_columns = within_extents(convolution(y), in_y, in_x),
-       along_rows = within_extents(convolution(x), in_x, in_y.through(convolution(y)), y.out);
+  Pass along_columns = within_extents(convolution(y), input_footprint(y), input_footprint(x)),
+       along_rows = convolution(x);
   const std::size_t of_columns = column_items(along_columns, x.in), of_rows = y.out * row_items(along_rows);
   const std::size_t stride = of_columns + of_rows;
   products_.resize(device_, size.views * stride);
@@ -230,8 +229,8 @@ void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
   columns_scale_(size.views * of_columns, along_columns, static_cast<cl_uint>(stride), 0, extents_,
                  now_.weights_by_scale, is_coarse() ? in_ : raster, grad_between_, products_);
   rows_scale_(size.views * of_rows, along_rows, static_cast<cl_uint>(stride),
-              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), extents_, now_.weights_by_scale,
-              between_, is_coarse() ? grad_out_ : grad_image, products_);
+              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), now_.weights_by_scale, between_,
+              is_coarse() ? grad_out_ : grad_image, products_);
   upload_starts(size.views, stride);
   reduce_({size.views * stride, 1, size.views, 1, starts_, products_}, grad_scale);
 }

@@ -89,8 +89,7 @@ class Blur {
   Kernel<Pass, In<cl_uint2>, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_, rows_strided_;
   Kernel<Pass, cl_uint, cl_uint, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>>
       columns_scale_;
-  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>>
-      rows_scale_;
+  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> rows_scale_;
   Reduce reduce_;
   /// Input of the convolution, after its columns, after its rows; the first and the last of a coarse grid
   /// only.
