@@ -133,8 +133,8 @@ class DPR_API Renderer {
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other, without instances, which have their mesh's. Empty: the scene's own for all views, to which
   /// set_views() returns as well. With noise on the pixel, faces on the far side of closed meshes are kept,
-  /// which those of a scene's own shape are not: images and gradients differ by what these add at edges,
-  /// which grows with the width of the blur.
+  /// which those of a scene's own shape are not: images and gradients differ by what these add at edges
+  /// (a cube at 128x128: 0.008 of an image's 1, 4% of a pose's gradient).
   void set_shapes(std::span<const vec3> positions, std::span<const vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);
