@@ -181,8 +181,12 @@ void set_weights(BlurKernel& kernel, double scale, int pixel_samples, const Weig
   kernel.weights_by_scale = rounded(over_pixel(change, pixel_samples));
 }
 
+/// Samples around the frame, however narrow the noise: a contour between the frame's last sample and the next
+/// blends both, and what their colours change by is seen from the one behind.
+constexpr int k_least_margin = 2;
+
 void set_fine(BlurKernel& kernel, const PriorRow& row, double scale) {
-  kernel.margin = sample_radius(row, sampled_width(row, scale));
+  kernel.margin = std::max(sample_radius(row, sampled_width(row, scale)), k_least_margin);
   set_weights(kernel, scale, kernel.supersampling,
               [&](double s) { return fine_weights(row, s, kernel.margin); });
 }

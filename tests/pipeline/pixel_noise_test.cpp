@@ -328,9 +328,41 @@ void check_light_gradients(const Device& device, const Scene& scene, double tole
   }
 }
 
+/// A slanted square, whose lower edge crosses row 44; `height` says where the frame ends.
+Scene cut_off_scene(int height, double blur_pixels) {
+  Scene scene;
+  scene.width = 60;
+  scene.height = height;
+  scene.camera.view = glm::translate(glm::mat4(1.0F), glm::vec3(0.0F, 0.0F, -4.0F));
+  scene.camera.intrinsics = Intrinsics{60.0F, 60.0F, 30.3F, 30.4F};
+  Mesh mesh;
+  mesh.positions = {{-1.1F, -0.9F, 0}, {1, -1, 0}, {0.6F, 1.1F, 0}, {-0.7F, 1, 0}};
+  mesh.faces = {{0, 1, 2}, {0, 2, 3}};
+  scene.meshes.push_back({mesh});
+  scene.smoothing = smoothing_preset("pixel");
+  scene.smoothing.sigma = sigma_of_pixels(blur_pixels, height);
+  return scene;
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("the frame's last row is what it is in a larger frame") {
+    for (const double blur_pixels : {0.05, 0.3, 1.0}) {
+      CAPTURE(blur_pixels);
+      Renderer small(open_device()), large(open_device());
+      small.set_scene(cut_off_scene(45, blur_pixels));
+      large.set_scene(cut_off_scene(60, blur_pixels));
+      small.forward();
+      large.forward();
+      const Image found = small.image(), expected = large.image();
+      dpr::test::Worst worst;
+      for (int x = 0; x < 60; ++x)
+        worst.add(std::abs(static_cast<double>(found.at(x, 44).w - expected.at(x, 44).w)), "column", x);
+      DPR_CHECK_WORST(worst, 1e-4);
+    }
+  }
+
   TEST_CASE("pixel noise: areas are the polyhedron's, and their derivatives, whatever triangles and sigma") {
     const Device device = open_device();
     const int size = reduced(128, 16);

@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -106,10 +107,12 @@ TEST_SUITE("unit") {
     for (const Prior prior : k_priors) {
       for (const int supersampling : {1, 2, 4}) {
         const BlurKernel kernel = dpr::blur_kernel(prior, 0, supersampling);
-        const auto samples = static_cast<std::size_t>(supersampling);
-        CHECK(kernel.margin == 0);
-        CHECK(kernel.weights == std::vector<float>(samples, 1.0F / static_cast<float>(supersampling)));
-        CHECK(kernel.weights_by_scale == std::vector<float>(samples, 0.0F));
+        REQUIRE(kernel.margin == 2);  // for the contours beside the frame
+        std::vector<float> mean(static_cast<std::size_t>(supersampling + 2 * kernel.margin));
+        std::fill(mean.begin() + kernel.margin, mean.end() - kernel.margin,
+                  1.0F / static_cast<float>(supersampling));
+        CHECK(kernel.weights == mean);
+        CHECK(kernel.weights_by_scale == std::vector<float>(mean.size(), 0.0F));
       }
     }
   }

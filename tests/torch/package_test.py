@@ -336,6 +336,9 @@ class PackageTest(RenderTest):
         self.assertAlmostEqual(float(corners.grad.sum()), 6.0 * len(cut.faces), delta=1e-2)
 
         listed = corners.detach().reshape(-1, 2)
+        with self.assertRaisesRegex(ValueError, "face_texcoords .*: got indices 0 to 9"):
+            renderer.subdivide(wall, faces, views, lens, texcoords=listed,
+                               face_texcoords=torch.tensor([[0, 1, 2], [3, 4, 9]]))
         by_index = dpr.subdivide(wall, faces, views, lens, width=80, height=60, texcoords=listed,
                                  face_texcoords=torch.arange(6).view(2, 3))
         self.assertTrue(torch.equal(by_index.texcoords, cut.texcoords))

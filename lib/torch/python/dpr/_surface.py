@@ -27,6 +27,9 @@ def corner_texcoords(texcoords, face_texcoords, faces, vertex_count, copy):
     values, indices = _texcoords({"texcoords": texcoords, "face_texcoords": face_texcoords}, faces, vertex_count, copy)
     if texcoords is None:
         return None
+    if indices.numel() and not 0 <= indices.min() <= indices.max() < len(values):
+        _arguments.fail(ValueError, "face_texcoords", f"indices {indices.min()} to {indices.max()}",
+                        f"0 to {len(values) - 1}, of texcoords")
     return values[indices if indices.numel() else faces]
 
 
