@@ -5,25 +5,7 @@
 //
 // Few steps are crossed: samples are blended where they lie, and only those near a contour are kept as they
 // were. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all of its rows.
-#include "steps.h"
-#include "tile_rows.h"
-
-/// A row of a tile: `count` samples from `first` on, at column and row `at` of its view.
-typedef struct {
-  uint first, count;
-  uint2 at;
-} TileRow;
-
-static inline TileRow row_of(const FrameParams p, const TileRows rows, uint row) {
-  const TileRow r = {(rows.view * p.height + row) * p.width + rows.first_column, rows.columns,
-                     (uint2)(rows.first_column, row)};
-  return r;
-}
-
-static inline Sample sample_of(TileRow r, uint k) {
-  const Sample s = {r.first + k, (int2)((int)(r.at.x + k), (int)r.at.y)};
-  return s;
-}
+#include "touched.h"
 
 /// Keeps the samples near contours, or their gradients, which the blending changes. One work-item per row of
 /// a tile. in   tile_starts  uint[view * tile + 1]  runs of contours' pairs in   from         float4[pixel]
@@ -32,48 +14,7 @@ kernel void antialias_keep(const FrameParams p, global const uint* restrict tile
                            global const float4* restrict from, global float4* restrict kept) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
-  for (uint row = rows.first; row < rows.last; ++row) {
-    const TileRow r = row_of(p, rows, row);
-    if (r.count == DPR_TILE) {
-      global const float* first = (global const float*)(from + r.first);
-      const float16 low = vload16(0, first), high = vload16(1, first);
-      vstore16(low, 0, (global float*)(kept + r.first));
-      vstore16(high, 1, (global float*)(kept + r.first));
-      continue;
-    }
-    for (uint k = 0; k < r.count; ++k) kept[r.first + k] = from[r.first + k];
-  }
-}
-
-/// Whether anything is at a step from a sample, or, with a reach of 2, at the next in the same direction.
-static inline int is_touched(const FrameParams p, const Steps steps, Sample s, int reach) {
-  uint all = DPR_NO_CROSSING;
-#pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    all &= at_step(p, steps, s, k);
-    if (reach == 2) all &= at_step(p, steps, sample_beside(p, s, k), k);
-  }
-  return all != DPR_NO_CROSSING;
-}
-
-/// Where is_touched() holds in a row of a tile: a bit a sample. Most of the samples near a contour are not.
-static inline uint touched_in_row(const FrameParams p, const Steps steps, TileRow r, int reach) {
-  const int is_inner = r.at.x >= 2 && r.at.x + DPR_TILE < p.width && r.at.y >= 2 && r.at.y + 1 < p.height;
-  uint bits = 0;
-  if (!is_inner) {
-    for (uint k = 0; k < r.count; ++k) bits |= is_touched(p, steps, sample_of(r, k), reach) ? 1u << k : 0u;
-    return bits;
-  }
-  global const uint *right = steps.winner + r.first, *down = right + steps.pixels;
-  uint8 all = vload8(0, right) & vload8(0, right - 1) & vload8(0, down) & vload8(0, down - p.width);
-  if (reach == 2) {
-    all &= vload8(0, right + 1) & vload8(0, right - 2) & vload8(0, down + p.width) &
-           vload8(0, down - 2 * p.width);
-  }
-  const int8 is_clear = all == (uint8)(DPR_NO_CROSSING);
-  const int8 bit = ~is_clear & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-  const int4 half_bits = bit.lo | bit.hi;
-  return (uint)(half_bits.x | half_bits.y | half_bits.z | half_bits.w);
+  for (uint row = rows.first; row < rows.last; ++row) copy_row(row_of(p, rows, row), from, kept);
 }
 
 /// What a sample's parts at a step take: the difference of the colours with the sample's own continued all

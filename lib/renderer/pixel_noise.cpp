@@ -85,8 +85,8 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
 
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
-         (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.capacity_bytes() +
-         other_kept_.capacity_bytes() + grad_raster_.capacity_bytes();
+         (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
+         grad_raster_.capacity_bytes();
 }
 
 }  // namespace dpr

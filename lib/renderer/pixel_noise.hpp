@@ -64,7 +64,7 @@ class PixelNoise {
  private:
   void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
 
-  Buffer<cl_float4> kept_, other_kept_;  // samples near contours before they were blended
+  KeptSamples kept_, other_kept_;
   Buffer<cl_float4> grad_raster_;
   bool is_blended_ = false;        // the raster is
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image

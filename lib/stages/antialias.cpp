@@ -27,11 +27,13 @@ Antialias::Antialias(Device::Impl& device)
       front_(device, "antialias_cross.cl", "antialias_front"),
       cross_(device, "antialias_cross.cl", "antialias_cross"),
       second_find_(device, "antialias_second.cl", "antialias_second_find"),
+      fade_(device, "antialias_fade.cl", "antialias_fade"),
       keep_(device, "antialias.cl", "antialias_keep"),
       forward_(device, "antialias.cl", "antialias_forward"),
       backward_(device, "antialias.cl", "antialias_backward"),
       second_forward_(device, "antialias_second.cl", "antialias_second_forward"),
       second_backward_(device, "antialias_second.cl", "antialias_second_backward"),
+      fade_backward_(device, "antialias_fade.cl", "antialias_fade_backward"),
       cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
 
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour) {
@@ -58,15 +60,17 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
 }
 
 void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
-                        Buffer<cl_float4>& kept) {
+                        KeptSamples& kept) {
   const std::size_t rows = tiles_of(p) * row_items(device_);
-  kept.resize(device_, samples_of(p));
-  keep_(rows, p, contour.tile_starts, samples, kept);
-  forward_(rows, p, contour.tile_starts, winner, cut, kept, samples);
-  second_forward_(tiles_of(p), p, contour.tile_starts, second_counts, seconds, winner, cut, kept, samples);
+  kept.samples.resize(device_, samples_of(p));
+  kept.faded.resize(device_, samples_of(p));
+  fade_(rows, p, contour.tile_starts, winner, cut, samples, kept.samples, kept.faded);
+  forward_(rows, p, contour.tile_starts, winner, cut, kept.faded, samples);
+  second_forward_(tiles_of(p), p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
+                  samples);
 }
 
-void Antialias::backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
+void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                          Buffer<cl_float4>& grad) {
   const std::size_t samples = samples_of(in.p), rows = tiles_of(in.p) * row_items(device_);
   grad_cut_.resize(device_, 2 * samples);
@@ -74,9 +78,11 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   kept_grad_.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
   keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
-  backward_(rows, in.p, contour.tile_starts, winner, cut, kept, kept_grad_, grad_cut_, grad);
-  second_backward_(tiles_of(in.p), in.p, contour.tile_starts, second_counts, seconds, winner, cut, kept,
+  backward_(rows, in.p, contour.tile_starts, winner, cut, kept.faded, kept_grad_, grad_cut_, grad);
+  second_backward_(tiles_of(in.p), in.p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
                    kept_grad_, grad_cut_, grad, grad_seconds_);
+  keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
+  fade_backward_(rows, in.p, contour.tile_starts, winner, cut, kept.samples, kept_grad_, grad_cut_, grad);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
                   contour.pair_tile, winner, grad_cut_, second_counts, seconds, grad_seconds_, grad_ends);

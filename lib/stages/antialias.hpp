@@ -7,6 +7,14 @@
 
 namespace dpr {
 
+/// Samples near contours, [view][height][width]: as they were before they were blended, and faded
+/// (kernels/antialias_fade.cl).
+struct KeptSamples {
+  Buffer<cl_float4> samples, faded;
+
+  std::size_t bytes() const { return samples.capacity_bytes() + faded.capacity_bytes(); }
+};
+
 class Antialias {
  public:
   explicit Antialias(Device::Impl& device);
@@ -16,12 +24,12 @@ class Antialias {
   /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces `depth_reach`
   /// (normalised depth) behind the nearest count as seen.
   void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
-  /// Blends the samples of [view][height][width] in place; `kept` gets those near contours as they were.
+  /// Blends the samples of [view][height][width] in place.
   void forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
-               Buffer<cl_float4>& kept);
+               KeptSamples& kept);
   /// From the gradients of the blended samples to those of the samples, in place, and to `grad_ends`. `kept`
   /// as forward() leaves it.
-  void backward(const ContourInputs& in, const Contour& contour, const Buffer<cl_float4>& kept,
+  void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                 Buffer<cl_float4>& grad);
 
   Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is; only near
@@ -46,6 +54,9 @@ class Antialias {
          In<cl_uchar>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
       second_find_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>,
+         Out<cl_float4>>
+      fade_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_float4>, Out<cl_float4>> keep_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>>
       forward_;
@@ -58,6 +69,9 @@ class Antialias {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
          In<cl_float2>, In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
       second_backward_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
+         Out<cl_float2>, Out<cl_float4>>
+      fade_backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uchar>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
          In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, Out<cl_float4>>

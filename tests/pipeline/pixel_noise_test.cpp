@@ -344,9 +344,80 @@ Scene cut_off_scene(int height, double blur_pixels) {
   return scene;
 }
 
+/// A sphere in the light of its camera: towards its silhouette, where it is dark, it changes ever faster.
+Scene falling_off_scene(const glm::vec3& camera, int supersampling) {
+  Scene scene = sphere_scene(4, 64, sigma_of_pixels(1, 64));
+  scene.camera.view = glm::translate(glm::mat4(1.0F), -camera);
+  scene.meshes[0].mesh.vertex_colors.clear();
+  Lights lights;
+  lights.point.clear();
+  lights.ambient = glm::vec3(0.0F);
+  lights.directional.push_back({{-0.2F, -0.3F, -1.0F}, glm::vec3(1.0F), glm::vec3(0.0F)});
+  scene.lights = lights;
+  scene.smoothing.supersampling = supersampling;
+  return scene;
+}
+
+/// A derivative of the image that differs from pixel to pixel.
+Image varying_weights(int size) {
+  Image weights(size, size);
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column < size; ++column) {
+      const float x = (static_cast<float>(column) + 0.5F) / static_cast<float>(size),
+                  y = (static_cast<float>(row) + 0.5F) / static_cast<float>(size);
+      weights.at(column, row) = {std::sin(6 * x), std::cos(5 * y), std::sin(4 * x + 3 * y), 0.0F};
+    }
+  }
+  return weights;
+}
+
+double weighted_sum(const Image& image, const Image& weights) {
+  double sum = 0;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    sum += static_cast<double>(glm::dot(image.pixels[i], weights.pixels[i]));
+  return sum;
+}
+
+/// By fourth-order differences over a pixel or so, of finer images.
+glm::dvec3 by_camera(Renderer& renderer, const glm::vec3& camera, const Image& weights) {
+  constexpr float k_step = 0.03F;
+  glm::dvec3 derivative;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = [&](float steps) {
+      glm::vec3 moved = camera;
+      moved[axis] += steps * k_step;
+      renderer.set_scene(falling_off_scene(moved, 4));
+      renderer.forward();
+      return weighted_sum(renderer.image(), weights);
+    };
+    derivative[axis] = (at(-2) - 8 * at(-1) + 8 * at(1) - at(2)) / (12 * static_cast<double>(k_step));
+  }
+  return derivative;
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("pixel noise: gradients are right in the mean where colours fall off towards silhouettes") {
+    if (test::is_reduced()) return;
+    const Image weights = varying_weights(64);
+    Renderer renderer(open_device());
+    glm::dvec3 error(0.0), size(0.0);
+    for (int i = 0; i < 4; ++i) {  // places within a pixel
+      const auto along = static_cast<float>(i);
+      const glm::vec3 camera(0.049F * glm::fract(0.755F * along), 0.049F * glm::fract(0.57F * along), 2.732F);
+      renderer.set_scene(falling_off_scene(camera, 1));
+      renderer.forward();
+      const SceneGradient gradient = renderer.backward(std::span(&weights, 1));
+      const glm::dvec3 expected = by_camera(renderer, camera, weights);
+      // The camera's translation moves the scene the other way.
+      error += -gradient.views[0].camera.view.translation - expected;
+      size += expected;
+    }
+    CAPTURE(glm::length(error) / glm::length(size));
+    CHECK(glm::length(error) < 1e-2 * glm::length(size));
+  }
+
   TEST_CASE("the frame's last row is what it is in a larger frame") {
     for (const double blur_pixels : {0.05, 0.3, 1.0}) {
       CAPTURE(blur_pixels);

@@ -55,7 +55,7 @@ Samples rigid_samples(const ContourFrame& frame, const Mesh& mesh) {
 
 struct Blended {
   std::vector<cl_float4> image;
-  Buffer<cl_float4> kept;  // the samples near contours
+  KeptSamples kept;
 };
 
 /// `unknown` is in the steps before they are looked at.
@@ -64,9 +64,11 @@ Blended blend_and_keep(ContourFrame& frame, const Samples& samples, cl_uint unkn
   frame.antialias.front.upload(device_impl(), samples.front);
   test::poison(frame.antialias.winner, 2 * frame.samples(), unknown);
   frame.antialias.cross(frame.inputs(), frame.contour, 0.0F);
-  Buffer<cl_float4> raster(device_impl(), samples.colors), kept;
-  test::poison(kept, frame.samples(),
-               cl_float4{{test::k_poison, test::k_poison, test::k_poison, test::k_poison}});
+  Buffer<cl_float4> raster(device_impl(), samples.colors);
+  KeptSamples kept;
+  for (Buffer<cl_float4>* buffer : {&kept.samples, &kept.faded})
+    test::poison(*buffer, frame.samples(),
+                 cl_float4{{test::k_poison, test::k_poison, test::k_poison, test::k_poison}});
   frame.antialias.forward(frame.p, frame.contour, raster, kept);
   return {raster.download(), std::move(kept)};
 }
@@ -202,6 +204,30 @@ TEST_SUITE("unit") {
             doctest::Approx(covered(i, left, right)).epsilon(1e-5));
       CHECK(image[static_cast<std::size_t>(i * 16 + 8)].s[3] ==
             doctest::Approx(covered(15 - i, bottom, top)).epsilon(1e-5));
+    }
+  }
+
+  TEST_CASE("antialias: no jump where an edge passes over a sample, however steep the colours") {
+    for (const float slope : {0.0F, 0.4F, 1.0F, -0.7F}) {
+      CAPTURE(slope);
+      const glm::vec2 sample(0.0625F, -0.0625F);
+      const auto image_at = [&](float beyond_sample) {
+        const float edge = sample.x - slope * sample.y + beyond_sample;
+        const Mesh mesh = fan({{-5, -3}, {edge - 3 * slope, -3}, {edge + 3 * slope, 3}, {-5, 3}}, 5);
+        ContourFrame frame(mesh, 16, 16);
+        Samples samples = rigid_samples(frame, mesh);
+        for (std::size_t i = 0; i < samples.colors.size(); ++i) {
+          const float x = (static_cast<float>(i % 16) + 0.5F) / 8 - 1;
+          const float y = 1 - (static_cast<float>(i / 16) + 0.5F) / 8;
+          for (int c = 0; c < 3; ++c) samples.colors[i].s[c] *= std::sqrt(std::abs(edge + slope * y - x));
+        }
+        return blend(frame, samples);
+      };
+      const std::vector<cl_float4> covered = image_at(1e-5F), uncovered = image_at(-1e-5F);
+      for (std::size_t i = 0; i < covered.size(); ++i) {
+        CAPTURE(i);
+        CHECK(covered[i].s[0] == doctest::Approx(uncovered[i].s[0]).epsilon(1e-3));
+      }
     }
   }
 
