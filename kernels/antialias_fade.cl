@@ -23,23 +23,44 @@ static inline Cut share_faded_gradient(Cut cut, float turn) {
                weight_of_slope_gradient(cut.y) * near2 * near);
 }
 
-/// Whether a contour at a step fades a sample: there is something behind that continues to it.
-static inline int is_faded_at(const FrameParams p, const Steps steps, Sample s, int step) {
-  return is_contour(at_step(p, steps, s, step)) && continues(p, steps, s, step);
+/// What fades a sample: at most one step of either axis, since a colour continues from the other side.
+typedef struct {
+  int2 step;     // by axis; -1: none
+  float2 share;  // 0 where nothing does; together at most 1
+  float limit;   // what that has scaled them by
+} Fading;
+
+/// Of the steps of an axis, the one whose contour fades a sample; -1 if there is none.
+static inline int step_that_fades(const FrameParams p, const Steps steps, Sample s, int axis) {
+  const uint ahead = at_step(p, steps, s, axis), back = at_step(p, steps, s, DPR_OPPOSITE(axis));
+  if (is_contour(ahead) && back == DPR_NO_CROSSING)
+    return is_on_raster(p, sample_beside(p, s, DPR_OPPOSITE(axis))) ? axis : -1;
+  if (is_contour(back) && ahead == DPR_NO_CROSSING)
+    return is_on_raster(p, sample_beside(p, s, axis)) ? DPR_OPPOSITE(axis) : -1;
+  return -1;
+}
+
+static inline Cut cut_at(const FrameParams p, const Steps steps, Sample s, int step) {
+  return steps.cut[place_of(p, steps, s, step)];
 }
 
 static inline float share_at(const FrameParams p, const Steps steps, Sample s, int step) {
-  return share_faded(steps.cut[place_of(p, steps, s, step)], turn_of(step));
+  return step < 0 ? 0.0f : share_faded(cut_at(p, steps, s, step), turn_of(step));
 }
 
-/// The sum of the shares at all steps, or 1 if that is less.
-static inline float total_faded(const FrameParams p, const Steps steps, Sample s) {
-  float sum = 0.0f;
-#pragma unroll
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (is_faded_at(p, steps, s, k)) sum += share_at(p, steps, s, k);
-  }
-  return fmax(sum, 1.0f);
+static inline Fading fading_of(const FrameParams p, const Steps steps, Sample s) {
+  Fading f;
+  f.step = (int2)(step_that_fades(p, steps, s, 0), step_that_fades(p, steps, s, 1));
+  f.share = (float2)(share_at(p, steps, s, f.step.x), share_at(p, steps, s, f.step.y));
+  f.limit = 1.0f / fmax(f.share.x + f.share.y, 1.0f);
+  f.share *= f.limit;
+  return f;
+}
+
+/// The share of a step; 0 where it does not fade the sample.
+static inline float share_of(const Fading f, int step) {
+  const int of_axis = step & 1 ? f.step.y : f.step.x;
+  return of_axis == step ? (step & 1 ? f.share.y : f.share.x) : 0.0f;
 }
 
 /// The colour that continues to a sample along a step from the two samples behind it, or from one.
@@ -49,15 +70,12 @@ static inline float4 continued_to(const FrameParams p, const Steps steps, Sample
   return raster[behind.index] + change_towards(p, steps, behind, step, raster);
 }
 
-static inline float4 faded(const FrameParams p, const Steps steps, Sample s,
+static inline float4 faded(const FrameParams p, const Steps steps, Sample s, const Fading f,
                            global const float4* restrict raster) {
-  float4 sum = 0.0f;
-#pragma unroll 1
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (is_faded_at(p, steps, s, k))
-      sum += share_at(p, steps, s, k) * (continued_to(p, steps, s, k, raster) - raster[s.index]);
-  }
-  return raster[s.index] + sum / total_faded(p, steps, s);
+  float4 sum = (1.0f - f.share.x - f.share.y) * raster[s.index];
+  if (f.step.x >= 0) sum += f.share.x * continued_to(p, steps, s, f.step.x, raster);
+  if (f.step.y >= 0) sum += f.share.y * continued_to(p, steps, s, f.step.y, raster);
+  return sum;
 }
 
 /// Fades the samples near contours, and keeps them as they were. One work-item per DPR_ROWS of a tile.
@@ -76,11 +94,12 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
+    if (touched_in_row(p, steps, r, 3) == 0) continue;
     copy_row(r, raster, kept);
     copy_row(r, raster, faded_raster);
     for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
       const Sample s = sample_of(r, lowest_bit(touched));
-      faded_raster[s.index] = faded(p, steps, s, raster);
+      faded_raster[s.index] = faded(p, steps, s, fading_of(p, steps, s), raster);
     }
   }
 }
@@ -88,31 +107,54 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
 /// What the gradient of a faded sample is to its cut at a step.
 static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
                                   global const float4* restrict raster, global const float4* restrict grad) {
-  if (!is_faded_at(p, steps, s, step)) return 0.0f;
-  const float total = total_faded(p, steps, s);
-  const float4 own = total > 1.0f ? faded(p, steps, s, raster) : raster[s.index];
-  return dot(grad[s.index], continued_to(p, steps, s, step, raster) - own) / total *
-         share_faded_gradient(steps.cut[place_of(p, steps, s, step)], turn_of(step));
+  const Fading f = fading_of(p, steps, s);
+  if ((step & 1 ? f.step.y : f.step.x) != step) return 0.0f;
+  const float4 own = f.limit < 1.0f ? faded(p, steps, s, f, raster) : raster[s.index];
+  return f.limit * dot(grad[s.index], continued_to(p, steps, s, step, raster) - own) *
+         share_faded_gradient(cut_at(p, steps, s, step), turn_of(step));
 }
 
 /// The part of a faded sample's gradient that what continues along a step has; 0 where that is nothing.
 static inline float4 gradient_continued(const FrameParams p, const Steps steps, Sample s, int step,
                                         global const float4* restrict grad) {
-  if (!is_faded_at(p, steps, s, step)) return 0.0f;
-  return share_at(p, steps, s, step) / total_faded(p, steps, s) * grad[s.index];
+  return share_of(fading_of(p, steps, s), step) * grad[s.index];
 }
 
-/// What a sample is to those that it continues to along a step: the next, and the one after that.
-static inline float4 gradient_ahead(const FrameParams p, const Steps steps, Sample s, int step,
-                                    global const float4* restrict grad) {
-  if (at_step(p, steps, s, step) != DPR_NO_CROSSING) return 0.0f;
-  const Sample next = sample_beside(p, s, step);
-  if (!is_on_raster(p, next)) return 0.0f;
-  if (at_step(p, steps, next, step) == DPR_NO_CROSSING) {
-    const Sample second = sample_beside(p, next, step);
-    return is_on_raster(p, second) ? -gradient_continued(p, steps, second, step, grad) : 0.0f;
+/// Of a row's samples, what each is to those that it continues to along a step: the next, and the one after
+/// that.
+static inline void add_continued(const FrameParams p, const Steps steps, TileRow r, int step,
+                                 global const float4* restrict grad_faded,
+                                 global float4* restrict grad_raster) {
+  for (uint next = ahead_in_row(p, steps, r, step, 1); next != 0; next &= next - 1) {
+    const Sample s = sample_of(r, lowest_bit(next));
+    grad_raster[s.index] += (continues(p, steps, s, step) ? 2.0f : 1.0f) *
+                            gradient_continued(p, steps, sample_beside(p, s, step), step, grad_faded);
   }
-  return (continues(p, steps, s, step) ? 2.0f : 1.0f) * gradient_continued(p, steps, next, step, grad);
+  for (uint second = ahead_in_row(p, steps, r, step, 2); second != 0; second &= second - 1) {
+    const Sample s = sample_of(r, lowest_bit(second));
+    const Sample to = sample_beside(p, sample_beside(p, s, step), step);
+    grad_raster[s.index] -= gradient_continued(p, steps, to, step, grad_faded);
+  }
+}
+
+/// Of a row's samples beside contours, what each keeps of its gradient, and what the cuts have.
+static inline void differentiate_faded(const FrameParams p, const Steps steps, TileRow r,
+                                       global const float4* restrict raster,
+                                       global const float4* restrict grad_faded,
+                                       global float2* restrict grad_cut,
+                                       global float4* restrict grad_raster) {
+  for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
+    const Sample s = sample_of(r, lowest_bit(touched));
+    const Fading f = fading_of(p, steps, s);
+    grad_raster[s.index] = (1.0f - f.share.x - f.share.y) * grad_faded[s.index];
+    for (int k = 0; k < 2; ++k) {
+      if (!is_contour(at_step(p, steps, s, k))) continue;
+      const Sample other = sample_beside(p, s, k);
+      grad_cut[place_of(p, steps, s, k)] +=
+          gradient_at_end(p, steps, s, k, raster, grad_faded) +
+          gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
+    }
+  }
 }
 
 /// The gradients of the samples by those of the faded ones, and of the cuts. One work-item per DPR_ROWS of a
@@ -131,18 +173,8 @@ kernel void antialias_fade_backward(const FrameParams p, global const uint* rest
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
-    for (uint touched = touched_in_row(p, steps, r, 3); touched != 0; touched &= touched - 1) {
-      const Sample s = sample_of(r, lowest_bit(touched));
-      float4 grad = grad_faded[s.index];
-      for (int k = 0; k < DPR_STEPS; ++k) {
-        grad += gradient_ahead(p, steps, s, k, grad_faded) - gradient_continued(p, steps, s, k, grad_faded);
-        if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
-        const Sample other = sample_beside(p, s, k);
-        grad_cut[place_of(p, steps, s, k)] +=
-            gradient_at_end(p, steps, s, k, raster, grad_faded) +
-            gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
-      }
-      grad_raster[s.index] = grad;
-    }
+    if (touched_in_row(p, steps, r, 3) == 0) continue;
+    differentiate_faded(p, steps, r, raster, grad_faded, grad_cut, grad_raster);
+    for (int k = 0; k < DPR_STEPS; ++k) add_continued(p, steps, r, k, grad_faded, grad_raster);
   }
 }

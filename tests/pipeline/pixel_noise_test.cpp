@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dpr/dpr.hpp"
@@ -344,10 +345,11 @@ Scene cut_off_scene(int height, double blur_pixels) {
   return scene;
 }
 
-/// A sphere in the light of its camera: towards its silhouette, where it is dark, it changes ever faster.
-Scene falling_off_scene(const glm::vec3& camera, int supersampling) {
-  Scene scene = sphere_scene(4, 64, sigma_of_pixels(1, 64));
+/// A mesh in the light of its camera: towards its silhouette, where it is dark, it changes ever faster.
+Scene falling_off_scene(const Mesh& mesh, const glm::vec3& camera, int supersampling) {
+  Scene scene = sphere_scene(0, 64, sigma_of_pixels(1, 64));
   scene.camera.view = glm::translate(glm::mat4(1.0F), -camera);
+  scene.meshes[0].mesh = mesh;
   scene.meshes[0].mesh.vertex_colors.clear();
   Lights lights;
   lights.point.clear();
@@ -379,14 +381,14 @@ double weighted_sum(const Image& image, const Image& weights) {
 }
 
 /// By fourth-order differences over a pixel or so, of finer images.
-glm::dvec3 by_camera(Renderer& renderer, const glm::vec3& camera, const Image& weights) {
+glm::dvec3 by_camera(Renderer& renderer, const Mesh& mesh, const glm::vec3& camera, const Image& weights) {
   constexpr float k_step = 0.03F;
   glm::dvec3 derivative;
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = [&](float steps) {
       glm::vec3 moved = camera;
       moved[axis] += steps * k_step;
-      renderer.set_scene(falling_off_scene(moved, 4));
+      renderer.set_scene(falling_off_scene(mesh, moved, 4));
       renderer.forward();
       return weighted_sum(renderer.image(), weights);
     };
@@ -402,20 +404,26 @@ TEST_SUITE("pipeline") {
     if (test::is_reduced()) return;
     const Image weights = varying_weights(64);
     Renderer renderer(open_device());
-    glm::dvec3 error(0.0), size(0.0);
-    for (int i = 0; i < 4; ++i) {  // places within a pixel
-      const auto along = static_cast<float>(i);
-      const glm::vec3 camera(0.049F * glm::fract(0.755F * along), 0.049F * glm::fract(0.57F * along), 2.732F);
-      renderer.set_scene(falling_off_scene(camera, 1));
-      renderer.forward();
-      const SceneGradient gradient = renderer.backward(std::span(&weights, 1));
-      const glm::dvec3 expected = by_camera(renderer, camera, weights);
-      // The camera's translation moves the scene the other way.
-      error += -gradient.views[0].camera.view.translation - expected;
-      size += expected;
+    // The torus hides parts of itself: where its contours end, they cross steps that no fading reaches.
+    const std::pair<Mesh, double> meshes[] = {{make_icosphere(4), 4e-3},
+                                              {make_torus(0.8F, 0.35F, 96, 48), 4e-2}};
+    for (const auto& [mesh, tolerance] : meshes) {
+      glm::dvec3 error(0.0), size(0.0);
+      for (int i = 0; i < 4; ++i) {  // places within a pixel
+        const auto along = static_cast<float>(i);
+        const glm::vec3 camera(0.049F * glm::fract(0.755F * along), 0.049F * glm::fract(0.57F * along),
+                               2.732F);
+        renderer.set_scene(falling_off_scene(mesh, camera, 1));
+        renderer.forward();
+        const SceneGradient gradient = renderer.backward(std::span(&weights, 1));
+        const glm::dvec3 expected = by_camera(renderer, mesh, camera, weights);
+        // The camera's translation moves the scene the other way.
+        error += -gradient.views[0].camera.view.translation - expected;
+        size += expected;
+      }
+      MESSAGE("off by " << 100 * glm::length(error) / glm::length(size) << "%");
+      CHECK(glm::length(error) < tolerance * glm::length(size));
     }
-    CAPTURE(glm::length(error) / glm::length(size));
-    CHECK(glm::length(error) < 1e-2 * glm::length(size));
   }
 
   TEST_CASE("the frame's last row is what it is in a larger frame") {
