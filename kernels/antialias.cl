@@ -84,51 +84,43 @@ static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s
   return parts_taken(steps.cut[place_of(p, steps, s, step)], turn_of(step)) / total;
 }
 
-/// What a sample is to the samples at both ends of a step of its own that is crossed, itself among them.
-static inline float4 gradient_beside(const FrameParams p, const Steps steps, Sample s, int step,
-                                     global const float4* restrict grad) {
+/// What a sample is to the samples at a step from it, itself among them, if that is crossed; and to those
+/// at the next step, behind whose first it lies.
+static inline float4 gradient_through(const FrameParams p, const Steps steps, Sample s, int step, float total,
+                                      global const float4* restrict grad) {
   const int back = DPR_OPPOSITE(step);
+  const uint here = at_step(p, steps, s, step);
   const Sample other = sample_beside(p, s, step);
-  const Parts own = share_taken(p, steps, s, step, total_taken(p, steps, s)),
-              others = share_taken(p, steps, other, back, total_taken(p, steps, other));
-  const float is_continued = continues(p, steps, s, step) ? 1.0f : 0.0f;
-  return (others.x + is_continued * others.y) * grad[other.index] -
-         (own.x + is_continued * (own.x - own.y)) * grad[s.index];
-}
-
-/// What a sample is to those at both ends of the next step, behind whose first it lies.
-static inline float4 gradient_behind(const FrameParams p, const Steps steps, Sample s, int step,
-                                     global const float4* restrict grad) {
-  const Sample other = sample_beside(p, s, step), beyond = sample_beside(p, other, step);
+  if (is_contour(here)) {
+    const Parts own = share_taken(p, steps, s, step, total),
+                others = share_taken(p, steps, other, back, total_taken(p, steps, other));
+    const float is_continued = continues(p, steps, s, step) ? 1.0f : 0.0f;
+    return (others.x + is_continued * others.y) * grad[other.index] -
+           (own.x + is_continued * (own.x - own.y)) * grad[s.index];
+  }
+  if (here != DPR_NO_CROSSING || !is_contour(at_step(p, steps, other, step))) return 0.0f;
+  const Sample beyond = sample_beside(p, other, step);
   const Parts first = share_taken(p, steps, other, step, total_taken(p, steps, other)),
-              second = share_taken(p, steps, beyond, DPR_OPPOSITE(step), total_taken(p, steps, beyond));
+              second = share_taken(p, steps, beyond, back, total_taken(p, steps, beyond));
   return (first.x - first.y) * grad[other.index] - second.y * grad[beyond.index];
 }
 
-/// The gradient of the cut of a step to the right or down.
-static inline Cut gradient_of_step(const FrameParams p, const Steps steps, Sample s, int step,
-                                   global const float4* restrict raster, global const float4* restrict grad) {
-  const Sample other = sample_beside(p, s, step);
-  return gradient_at_end(p, steps, s, step, total_taken(p, steps, s), raster, grad[s.index]) +
-         gradient_at_end(p, steps, other, DPR_OPPOSITE(step), total_taken(p, steps, other), raster,
-                         grad[other.index]);
-}
-
-/// Adds to the gradients of a row's samples what they have given to others along a step, less what others
-/// have of their colours. Writes the gradients of the cuts of steps to the right and down.
-static inline void differentiate_row(const FrameParams p, const Steps steps, TileRow r, int step,
-                                     global const float4* restrict raster,
-                                     global const float4* restrict grad_blended,
-                                     global float2* restrict grad_cut, global float4* restrict grad_raster) {
-  for (uint beside = ahead_in_row(p, steps, r, step, 0); beside != 0; beside &= beside - 1) {
-    const Sample s = sample_of(r, lowest_bit(beside));
-    grad_raster[s.index] += gradient_beside(p, steps, s, step, grad_blended);
-    if (step < 2)
-      grad_cut[place_of(p, steps, s, step)] = gradient_of_step(p, steps, s, step, raster, grad_blended);
-  }
-  for (uint behind = ahead_in_row(p, steps, r, step, 1); behind != 0; behind &= behind - 1) {
-    const Sample s = sample_of(r, lowest_bit(behind));
-    grad_raster[s.index] += gradient_behind(p, steps, s, step, grad_blended);
+/// Adds to a sample's gradient what it has given to others, less what others have of its colour. Writes the
+/// gradients of the cuts of its steps to the right and down.
+static inline void differentiate_sample(const FrameParams p, const Steps steps, Sample s,
+                                        global const float4* restrict raster,
+                                        global const float4* restrict grad_blended,
+                                        global float2* restrict grad_cut,
+                                        global float4* restrict grad_raster) {
+  const float total = total_taken(p, steps, s);
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    grad_raster[s.index] += gradient_through(p, steps, s, k, total, grad_blended);
+    if (k >= 2 || !is_contour(at_step(p, steps, s, k))) continue;
+    const Sample other = sample_beside(p, s, k);
+    grad_cut[place_of(p, steps, s, k)] =
+        gradient_at_end(p, steps, s, k, total, raster, grad_blended[s.index]) +
+        gradient_at_end(p, steps, other, DPR_OPPOSITE(k), total_taken(p, steps, other), raster,
+                        grad_blended[other.index]);
   }
 }
 
@@ -148,8 +140,8 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
-    if (touched_in_row(p, steps, r, 2) == 0) continue;
-    for (int k = 0; k < DPR_STEPS; ++k)
-      differentiate_row(p, steps, r, k, raster, grad_blended, grad_cut, grad_raster);
+    for (uint touched = touched_in_row(p, steps, r, 2); touched != 0; touched &= touched - 1)
+      differentiate_sample(p, steps, sample_of(r, lowest_bit(touched)), raster, grad_blended, grad_cut,
+                           grad_raster);
   }
 }

@@ -30,6 +30,9 @@ typedef struct {
   float limit;   // what that has scaled them by
 } Fading;
 
+/// The same as it is kept: the share by each axis, negative for the step to the left or up.
+typedef float2 Shares;
+
 /// Of the steps of an axis, the one whose contour fades a sample; -1 if there is none.
 static inline int step_that_fades(const FrameParams p, const Steps steps, Sample s, int axis) {
   const uint ahead = at_step(p, steps, s, axis), back = at_step(p, steps, s, DPR_OPPOSITE(axis));
@@ -57,10 +60,14 @@ static inline Fading fading_of(const FrameParams p, const Steps steps, Sample s)
   return f;
 }
 
+static inline Shares shares_of(const Fading f) {
+  return (Shares)(f.step.x < 2 ? f.share.x : -f.share.x, f.step.y < 2 ? f.share.y : -f.share.y);
+}
+
 /// The share of a step; 0 where it does not fade the sample.
-static inline float share_of(const Fading f, int step) {
-  const int of_axis = step & 1 ? f.step.y : f.step.x;
-  return of_axis == step ? (step & 1 ? f.share.y : f.share.x) : 0.0f;
+static inline float share_of(Shares shares, int step) {
+  const float of_axis = step & 1 ? shares.y : shares.x;
+  return fmax(step < 2 ? of_axis : -of_axis, 0.0f);
 }
 
 /// The colour that continues to a sample along a step from the two samples behind it, or from one.
@@ -85,10 +92,11 @@ static inline float4 faded(const FrameParams p, const Steps steps, Sample s, con
 /// in   raster       float4[pixel]          the samples
 /// out  kept         float4[pixel]          not written in tiles further than one from a contour
 /// out  faded_raster float4[pixel]          the same
+/// out  shares       Shares[pixel]          not written away from contours
 kernel void antialias_fade(const FrameParams p, global const uint* restrict tile_starts,
                            global const uint* restrict winner, global const float2* restrict cut,
                            global const float4* restrict raster, global float4* restrict kept,
-                           global float4* restrict faded_raster) {
+                           global float4* restrict faded_raster, global float2* restrict shares) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
@@ -99,7 +107,9 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
     copy_row(r, raster, faded_raster);
     for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
       const Sample s = sample_of(r, lowest_bit(touched));
-      faded_raster[s.index] = faded(p, steps, s, fading_of(p, steps, s), raster);
+      const Fading f = fading_of(p, steps, s);
+      faded_raster[s.index] = faded(p, steps, s, f, raster);
+      shares[s.index] = shares_of(f);
     }
   }
 }
@@ -114,58 +124,56 @@ static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample
          share_faded_gradient(cut_at(p, steps, s, step), turn_of(step));
 }
 
-/// The part of a faded sample's gradient that what continues along a step has; 0 where that is nothing.
-static inline float4 gradient_continued(const FrameParams p, const Steps steps, Sample s, int step,
-                                        global const float4* restrict grad) {
-  return share_of(fading_of(p, steps, s), step) * grad[s.index];
+/// What a sample is to those that it continues to along a step: the next, and the one after that.
+static inline float4 gradient_ahead(const FrameParams p, const Steps steps, Sample s, int step,
+                                    global const float2* restrict shares,
+                                    global const float4* restrict grad) {
+  const Sample next = sample_beside(p, s, step), second = sample_beside(p, next, step);
+  const uint beyond = at_step(p, steps, next, step);
+  if (is_contour(beyond)) {
+    const float counted = continues(p, steps, s, step) ? 2.0f : 1.0f;
+    return counted * share_of(shares[next.index], step) * grad[next.index];
+  }
+  return beyond == DPR_NO_CROSSING && is_contour(at_step(p, steps, second, step))
+             ? -share_of(shares[second.index], step) * grad[second.index]
+             : 0.0f;
 }
 
-/// Of a row's samples, what each is to those that it continues to along a step: the next, and the one after
-/// that.
-static inline void add_continued(const FrameParams p, const Steps steps, TileRow r, int step,
-                                 global const float4* restrict grad_faded,
-                                 global float4* restrict grad_raster) {
-  for (uint next = ahead_in_row(p, steps, r, step, 1); next != 0; next &= next - 1) {
-    const Sample s = sample_of(r, lowest_bit(next));
-    grad_raster[s.index] += (continues(p, steps, s, step) ? 2.0f : 1.0f) *
-                            gradient_continued(p, steps, sample_beside(p, s, step), step, grad_faded);
-  }
-  for (uint second = ahead_in_row(p, steps, r, step, 2); second != 0; second &= second - 1) {
-    const Sample s = sample_of(r, lowest_bit(second));
-    const Sample to = sample_beside(p, sample_beside(p, s, step), step);
-    grad_raster[s.index] -= gradient_continued(p, steps, to, step, grad_faded);
-  }
-}
-
-/// Of a row's samples beside contours, what each keeps of its gradient, and what the cuts have.
-static inline void differentiate_faded(const FrameParams p, const Steps steps, TileRow r,
+/// Gives a sample the gradients of the faded ones that it is part of, and the cuts of its steps to the right
+/// and down theirs.
+static inline void differentiate_faded(const FrameParams p, const Steps steps, Sample s,
                                        global const float4* restrict raster,
+                                       global const float2* restrict shares,
                                        global const float4* restrict grad_faded,
                                        global float2* restrict grad_cut,
                                        global float4* restrict grad_raster) {
-  for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
-    const Sample s = sample_of(r, lowest_bit(touched));
-    const Fading f = fading_of(p, steps, s);
-    grad_raster[s.index] = (1.0f - f.share.x - f.share.y) * grad_faded[s.index];
-    for (int k = 0; k < 2; ++k) {
-      if (!is_contour(at_step(p, steps, s, k))) continue;
-      const Sample other = sample_beside(p, s, k);
-      grad_cut[place_of(p, steps, s, k)] +=
-          gradient_at_end(p, steps, s, k, raster, grad_faded) +
-          gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
-    }
+  float4 grad = grad_faded[s.index];
+#pragma unroll 1
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    const uint at = at_step(p, steps, s, k);
+    if (at == DPR_NO_CROSSING) grad += gradient_ahead(p, steps, s, k, shares, grad_faded);
+    if (!is_contour(at)) continue;
+    grad -= share_of(shares[s.index], k) * grad_faded[s.index];
+    if (k >= 2) continue;
+    const Sample other = sample_beside(p, s, k);
+    grad_cut[place_of(p, steps, s, k)] +=
+        gradient_at_end(p, steps, s, k, raster, grad_faded) +
+        gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
   }
+  grad_raster[s.index] = grad;
 }
 
 /// The gradients of the samples by those of the faded ones, and of the cuts. One work-item per DPR_ROWS of a
 /// tile; a step's cut is its first sample's to write. Deterministic.
 /// Inputs as antialias_fade, and
+/// in      shares      Shares[pixel]   as it leaves them
 /// in      grad_faded  float4[pixel]   kept as the samples are
 /// in out  grad_cut    Cut[2][pixel]
 /// in out  grad_raster float4[pixel]   the gradients of the faded samples
 kernel void antialias_fade_backward(const FrameParams p, global const uint* restrict tile_starts,
                                     global const uint* restrict winner, global const float2* restrict cut,
                                     global const float4* restrict raster,
+                                    global const float2* restrict shares,
                                     global const float4* restrict grad_faded,
                                     global float2* restrict grad_cut, global float4* restrict grad_raster) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
@@ -173,8 +181,8 @@ kernel void antialias_fade_backward(const FrameParams p, global const uint* rest
   const Steps steps = {winner, cut, p.views * p.width * p.height};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
-    if (touched_in_row(p, steps, r, 3) == 0) continue;
-    differentiate_faded(p, steps, r, raster, grad_faded, grad_cut, grad_raster);
-    for (int k = 0; k < DPR_STEPS; ++k) add_continued(p, steps, r, k, grad_faded, grad_raster);
+    for (uint touched = touched_in_row(p, steps, r, 3); touched != 0; touched &= touched - 1)
+      differentiate_faded(p, steps, sample_of(r, lowest_bit(touched)), raster, shares, grad_faded, grad_cut,
+                          grad_raster);
   }
 }

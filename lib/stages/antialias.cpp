@@ -64,7 +64,8 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
   const std::size_t rows = tiles_of(p) * row_items(device_);
   kept.samples.resize(device_, samples_of(p));
   kept.faded.resize(device_, samples_of(p));
-  fade_(rows, p, contour.tile_starts, winner, cut, samples, kept.samples, kept.faded);
+  kept.shares.resize(device_, samples_of(p));
+  fade_(rows, p, contour.tile_starts, winner, cut, samples, kept.samples, kept.faded, kept.shares);
   forward_(rows, p, contour.tile_starts, winner, cut, kept.faded, samples);
   second_forward_(tiles_of(p), p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
                   samples);
@@ -82,7 +83,8 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   second_backward_(tiles_of(in.p), in.p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
                    kept_grad_, grad_cut_, grad, grad_seconds_);
   keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
-  fade_backward_(rows, in.p, contour.tile_starts, winner, cut, kept.samples, kept_grad_, grad_cut_, grad);
+  fade_backward_(rows, in.p, contour.tile_starts, winner, cut, kept.samples, kept.shares, kept_grad_,
+                 grad_cut_, grad);
   cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
                   in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
                   contour.pair_tile, winner, grad_cut_, second_counts, seconds, grad_seconds_, grad_ends);

@@ -8,11 +8,14 @@
 namespace dpr {
 
 /// Samples near contours, [view][height][width]: as they were before they were blended, and faded
-/// (kernels/antialias_fade.cl).
+/// (kernels/antialias_fade.cl), by how much.
 struct KeptSamples {
   Buffer<cl_float4> samples, faded;
+  Buffer<cl_float2> shares;
 
-  std::size_t bytes() const { return samples.capacity_bytes() + faded.capacity_bytes(); }
+  std::size_t bytes() const {
+    return samples.capacity_bytes() + faded.capacity_bytes() + shares.capacity_bytes();
+  }
 };
 
 class Antialias {
@@ -55,7 +58,7 @@ class Antialias {
          In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
       second_find_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>,
-         Out<cl_float4>>
+         Out<cl_float4>, Out<cl_float2>>
       fade_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_float4>, Out<cl_float4>> keep_;
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>>
@@ -69,8 +72,8 @@ class Antialias {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
          In<cl_float2>, In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
       second_backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
-         Out<cl_float2>, Out<cl_float4>>
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float2>,
+         In<cl_float4>, Out<cl_float2>, Out<cl_float4>>
       fade_backward_;
   Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uchar>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
