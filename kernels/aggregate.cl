@@ -2,8 +2,9 @@
 // w = E[argmax <beta + Z, y>] with beta = b / gamma, b = zeta + (gamma / alpha) ln p, eq. (7), (9), (10).
 //
 // The forward pass gathers the slots that count, and integrates (integrate.h). The weights sum to 1, so
-// dividing by the quadrature's own sum removes most of its error. A slot alone needs no integral, nor does
-// the Gumbel prior, whose weights are the softmax (40). Errors: tests/stages/aggregate_test.cpp.
+// dividing by the quadrature's own sum removes most of its error. A slot alone needs no integral, nor do two
+// and three of Gaussian noise (triple.h), nor the Gumbel prior, whose weights are the softmax (40). Errors:
+// tests/stages/aggregate_test.cpp.
 #ifndef DPR_LANES
 #define DPR_LANES 8
 #endif
