@@ -51,9 +51,8 @@ DPR_ALWAYS_INLINE Slots gather_run(const BarrierPixel q, uint length, const Frag
 
 /// What the pixel's fragments leave of the light behind them, too.
 DPR_ALWAYS_INLINE Slots gather_pixel(const AggregateParams p, uint pixel, uint length,
-                                     global const ViewParams* restrict views,
-                                     global const uint* restrict starts, const Fragments f,
-                                     global Slot* slots, float* transparency) {
+                                     global const ViewParams* views, global const uint* starts,
+                                     const Fragments f, global Slot* slots, float* transparency) {
   const BarrierPixel q = load_barrier_run(p, pixel, length, views, starts, f);
   *transparency = q.transparency;
   return gather_run(q, length, f, slots + q.first + pixel);

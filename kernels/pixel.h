@@ -67,8 +67,8 @@ typedef struct {
 
 /// Of a pixel with `length` fragments.
 DPR_ALWAYS_INLINE BarrierPixel load_barrier_run(const AggregateParams p, uint pixel, uint length,
-                                                global const ViewParams* restrict views,
-                                                global const uint* restrict starts, const Fragments f) {
+                                                global const ViewParams* views, global const uint* starts,
+                                                const Fragments f) {
   global const ViewParams* view = views + pixel / p.pixels_per_view;
   BarrierPixel q;
   q.first = starts[pixel];
