@@ -19,7 +19,8 @@
 /// The slots that count, the largest first; betas relative to it. Slots further below than the prior reaches
 /// have no weight, and change no other's. Everything is written, and what does not count written over: no
 /// branch to mispredict.
-DPR_ALWAYS_INLINE Slots gather_run(const BarrierPixel q, uint length, const Fragments f, global Slot* slots) {
+DPR_ALWAYS_INLINE void gather_run(const BarrierPixel q, uint length, const Fragments f, global Slot* slots,
+                                  Slots* out) {
   const Slot background = {q.background, 1.0f, 0.0f, DPR_BACKGROUND_SLOT};
   slots[0] = background;
   float largest = q.background;
@@ -46,44 +47,52 @@ DPR_ALWAYS_INLINE Slots gather_run(const BarrierPixel q, uint length, const Frag
   }
   swap_slots(slots, slots + front);
   slots[0].occupancy = lower_end(nearby);
-  return run;
+  *out = run;
 }
 
 /// What the pixel's fragments leave of the light behind them, too.
-DPR_ALWAYS_INLINE Slots gather_pixel(const AggregateParams p, uint pixel, uint length,
-                                     global const ViewParams* views, global const uint* starts,
-                                     const Fragments f, global Slot* slots, float* transparency) {
-  const BarrierPixel q = load_barrier_run(p, pixel, length, views, starts, f);
+DPR_ALWAYS_INLINE void gather_pixel(const AggregateParams p, uint pixel, uint length,
+                                    global const ViewParams* views, global const uint* starts,
+                                    const Fragments f, global Slot* slots, Slots* run, float* transparency) {
+  BarrierPixel q;
+  load_barrier_run(p, pixel, length, views, starts, f, &q);
   *transparency = q.transparency;
-  return gather_run(q, length, f, slots + q.first + pixel);
+  gather_run(q, length, f, slots + q.first + pixel, run);
 }
 
 /// On a CPU loops of few turns are unrolled: to mispredict where they end takes longer than they do.
-static inline Slots gather_slots(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
-                                 global const uint* restrict starts, const Fragments f, global Slot* slots,
-                                 float* transparency) {
+static inline void gather_slots(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
+                                global const uint* restrict starts, const Fragments f, global Slot* slots,
+                                Slots* run, float* transparency) {
   const uint length = starts[pixel + 1] - starts[pixel];
-#if DPR_LANES != 1
-  switch (length) {
+  switch (DPR_LANES == 1 ? 0 : length) {
     case 1:
-      return gather_pixel(p, pixel, 1, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 1, views, starts, f, slots, run, transparency);
+      break;
     case 2:
-      return gather_pixel(p, pixel, 2, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 2, views, starts, f, slots, run, transparency);
+      break;
     case 3:
-      return gather_pixel(p, pixel, 3, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 3, views, starts, f, slots, run, transparency);
+      break;
     case 4:
-      return gather_pixel(p, pixel, 4, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 4, views, starts, f, slots, run, transparency);
+      break;
     case 5:
-      return gather_pixel(p, pixel, 5, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 5, views, starts, f, slots, run, transparency);
+      break;
     case 6:
-      return gather_pixel(p, pixel, 6, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 6, views, starts, f, slots, run, transparency);
+      break;
     case 7:
-      return gather_pixel(p, pixel, 7, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 7, views, starts, f, slots, run, transparency);
+      break;
     case 8:
-      return gather_pixel(p, pixel, 8, views, starts, f, slots, transparency);
+      gather_pixel(p, pixel, 8, views, starts, f, slots, run, transparency);
+      break;
+    default:
+      gather_pixel(p, pixel, length, views, starts, f, slots, run, transparency);
   }
-#endif
-  return gather_pixel(p, pixel, length, views, starts, f, slots, transparency);
 }
 
 #ifdef DPR_SOFTMAX
@@ -183,7 +192,8 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
   }
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
   float transparency;
-  const Slots run = gather_slots(p, pixel, views, starts, f, slots, &transparency);
+  Slots run;
+  gather_slots(p, pixel, views, starts, f, slots, &run, &transparency);
   slot_counts[pixel] = run.count;
   float3 color = slot_color(run.slot[0], f, background);
   if (run.count > 1) {

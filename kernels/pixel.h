@@ -65,10 +65,11 @@ typedef struct {
   float transparency;   // prod (1 - p)
 } BarrierPixel;
 
-/// Of a pixel with `length` fragments.
-DPR_ALWAYS_INLINE BarrierPixel load_barrier_run(const AggregateParams p, uint pixel, uint length,
-                                                global const ViewParams* views, global const uint* starts,
-                                                const Fragments f) {
+/// Of a pixel with `length` fragments. Nothing is returned: oclgrind cannot read what a structure is returned by
+/// where a call is always inlined.
+DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uint length,
+                                        global const ViewParams* views, global const uint* starts,
+                                        const Fragments f, BarrierPixel* out) {
   global const ViewParams* view = views + pixel / p.pixels_per_view;
   BarrierPixel q;
   q.first = starts[pixel];
@@ -85,13 +86,15 @@ DPR_ALWAYS_INLINE BarrierPixel load_barrier_run(const AggregateParams p, uint pi
   q.inverse_alpha = 1.0f / p.alpha;
   const float background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
   q.background = clamp(background, -DPR_MAX_BETA, DPR_MAX_BETA);
-  return q;
+  *out = q;
 }
 
 static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
                                               global const ViewParams* restrict views,
                                               global const uint* restrict starts, const Fragments f) {
-  return load_barrier_run(p, pixel, starts[pixel + 1] - starts[pixel], views, starts, f);
+  BarrierPixel q;
+  load_barrier_run(p, pixel, starts[pixel + 1] - starts[pixel], views, starts, f, &q);
+  return q;
 }
 
 /// b / gamma, eq. (7): relative to the pixel's nearest fragment, since zeta / gamma itself would waste its
