@@ -2,8 +2,9 @@
 // w = E[argmax <beta + Z, y>] with beta = b / gamma, b = zeta + (gamma / alpha) ln p, eq. (7), (9), (10).
 //
 // The forward pass gathers the slots that count, and integrates (integrate.h). The weights sum to 1, so
-// dividing by the quadrature's own sum removes most of its error. A slot alone needs no integral, nor does
-// the Gumbel prior, whose weights are the softmax (40). Errors: tests/stages/aggregate_test.cpp.
+// dividing by the quadrature's own sum removes most of its error. A slot alone needs no integral, nor do two
+// and three of Gaussian noise (triple.h), nor the Gumbel prior, whose weights are the softmax (40). Errors:
+// tests/stages/aggregate_test.cpp.
 #ifndef DPR_LANES
 #define DPR_LANES 8
 #endif
@@ -13,34 +14,85 @@
 #define DPR_WIDTH 16 /* lanes are quadrature nodes */
 #endif
 #include "integrate.h"
+#include "triple.h"
 
 /// The slots that count, the largest first; betas relative to it. Slots further below than the prior reaches
 /// have no weight, and change no other's. Everything is written, and what does not count written over: no
 /// branch to mispredict.
-static inline Slots gather_slots(const BarrierPixel q, const Fragments f, global Slot* slots) {
-  float largest = q.background;
+DPR_ALWAYS_INLINE void gather_run(const BarrierPixel q, uint length, const Fragments f, global Slot* slots,
+                                  Slots* out) {
   const Slot background = {q.background, 1.0f, 0.0f, DPR_BACKGROUND_SLOT};
   slots[0] = background;
-  uint appended = 1;
-  for (uint i = q.first; i < q.last; ++i) {
-    const uint k = f.list[i];
+  float largest = q.background;
+#pragma unroll
+  for (uint i = 0; i < length; ++i) {
+    const uint k = f.list[q.first + i];
     const float log_p = f.log_occupancy[k];
-    const Slot s = {barrier_beta(q, f.depth[k], log_p), 1.0f, 0.0f, k};
-    slots[appended] = s;
-    appended += log_p > DPR_LOG_ZERO && s.beta > largest - DPR_BARRIER_REACH;
-    largest = log_p > DPR_LOG_ZERO && s.beta > largest ? s.beta : largest;
+    const float beta = log_p > DPR_LOG_ZERO ? barrier_beta(q, f.depth[k], log_p) : -INFINITY;
+    const Slot s = {beta, 1.0f, 0.0f, k};
+    slots[1 + i] = s;
+    largest = beta > largest ? beta : largest;
   }
   Slots run = {slots, 0, 0.0f};
   uint front = 0;
-  for (uint i = 0; i < appended; ++i) {
+  Nearby nearby = no_slots();
+#pragma unroll
+  for (uint i = 0; i <= length; ++i) {
     Slot s = slots[i];
     s.beta -= largest;
     slots[run.count] = s;
     front = s.beta == 0.0f ? run.count : front;
     run.count += s.beta > -DPR_BARRIER_REACH;
+    add_nearby(s.beta, &nearby);
   }
   swap_slots(slots, slots + front);
-  return run;
+  slots[0].occupancy = lower_end(nearby);
+  *out = run;
+}
+
+/// What the pixel's fragments leave of the light behind them, too.
+DPR_ALWAYS_INLINE void gather_pixel(const AggregateParams p, uint pixel, uint length,
+                                    global const ViewParams* views, global const uint* starts,
+                                    const Fragments f, global Slot* slots, Slots* run, float* transparency) {
+  BarrierPixel q;
+  load_barrier_run(p, pixel, length, views, starts, f, &q);
+  *transparency = q.transparency;
+  gather_run(q, length, f, slots + q.first + pixel, run);
+}
+
+/// On a CPU loops of few turns are unrolled: to mispredict where they end takes longer than they do.
+static inline void gather_slots(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
+                                global const uint* restrict starts, const Fragments f, global Slot* slots,
+                                Slots* run, float* transparency) {
+  const uint length = starts[pixel + 1] - starts[pixel];
+  switch (DPR_LANES == 1 ? 0 : length) {
+    case 1:
+      gather_pixel(p, pixel, 1, views, starts, f, slots, run, transparency);
+      break;
+    case 2:
+      gather_pixel(p, pixel, 2, views, starts, f, slots, run, transparency);
+      break;
+    case 3:
+      gather_pixel(p, pixel, 3, views, starts, f, slots, run, transparency);
+      break;
+    case 4:
+      gather_pixel(p, pixel, 4, views, starts, f, slots, run, transparency);
+      break;
+    case 5:
+      gather_pixel(p, pixel, 5, views, starts, f, slots, run, transparency);
+      break;
+    case 6:
+      gather_pixel(p, pixel, 6, views, starts, f, slots, run, transparency);
+      break;
+    case 7:
+      gather_pixel(p, pixel, 7, views, starts, f, slots, run, transparency);
+      break;
+    case 8:
+      gather_pixel(p, pixel, 8, views, starts, f, slots, run, transparency);
+      break;
+    default:
+      gather_pixel(p, pixel, length, views, starts, f, slots, run, transparency);
+  }
 }
 
 #ifdef DPR_SOFTMAX
@@ -81,10 +133,16 @@ static inline float weigh_gradients(const Slots run, SlotGradients* out) {
 #else
 
 static inline float4 weigh_colors(const Slots run, const Fragments f, float3 background) {
+#ifdef DPR_TRIPLE
+  if (run.count <= DPR_TRIPLE) return weigh_triple(run, f, background);
+#endif
   return integrate_colors(run, f, background);
 }
 
 static inline float weigh_gradients(const Slots run, SlotGradients* out) {
+#ifdef DPR_TRIPLE
+  if (run.count <= DPR_TRIPLE) return triple_gradients(run, out);
+#endif
   return integrate_gradients(run, out).x;
 }
 
@@ -133,15 +191,16 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
     return;
   }
   const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
-  const BarrierPixel q = load_barrier_pixel(p, pixel, views, starts, f);
-  const Slots run = gather_slots(q, f, slots + q.first + pixel);
+  float transparency;
+  Slots run;
+  gather_slots(p, pixel, views, starts, f, slots, &run, &transparency);
   slot_counts[pixel] = run.count;
   float3 color = slot_color(run.slot[0], f, background);
   if (run.count > 1) {
     const float4 sum = weigh_colors(run, f, background);
     color = sum.xyz / sum.w;
   }
-  image[pixel] = (float4)(color, 1.0f - q.transparency);
+  image[pixel] = (float4)(color, 1.0f - transparency);
 }
 
 /// Clears a pixel's gradients, but for what alpha adds to those of ln p.

@@ -91,6 +91,20 @@ static inline realn triangle_distance2(const View3 v) {
   return lesser(lesser(edge_distance2(v.edge[0]), edge_distance2(v.edge[1])), edge_distance2(v.edge[2]));
 }
 
+/// Whether the triangle is nearer than the root of `limit`: a corner, or an edge that the sample is beside.
+static inline intn is_within(const View3 v, float limit) {
+  realn nearest = INFINITY;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const Edge e = v.edge[k];
+    const realn along = (e.dx * e.ex + e.dy * e.ey) * e.inverse_length2;
+    const intn is_beside = along > 0.0f && along < 1.0f;
+    nearest = lesser(nearest, e.dx * e.dx + e.dy * e.dy);
+    nearest = lesser(nearest, choose(is_beside, e.side * e.side * e.inverse_length2, (realn)(INFINITY)));
+  }
+  return nearest < limit;
+}
+
 static inline float doubled_area(const Triangle t) {
   return (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
 }

@@ -113,6 +113,21 @@ static inline float4 integrate_colors(const Slots run, const Fragments f, float3
   return sum_lanes_of_4(red, green, blue, mass);
 }
 
+#ifndef DPR_JOINT
+
+/// Adds to a slot's weight and to its gradient by beta.
+static inline void add_gradient(uint fragment, float weight, float by_beta, SlotGradients* out) {
+  if (fragment == DPR_BACKGROUND_SLOT) {
+    out->background_weight += weight;
+    out->background_beta += by_beta;
+  } else {
+    out->weight[fragment] += weight;
+    out->beta[fragment] += by_beta;
+  }
+}
+
+#endif
+
 /// Adds a block's share of the integrals to a slot's gradients. `product` is P times the nodes' weights.
 static inline void add_gradients(const Slot s, const Terms terms, realn product, realn ratio_sum,
                                  realn grad_sum, SlotGradients* out) {
@@ -123,16 +138,12 @@ static inline void add_gradients(const Slot s, const Terms terms, realn product,
   const realn by_occupancy = mad(s.grad, share, product * terms.absent * mad(-s.grad, ratio, grad_sum));
   const float4 sums = sum_lanes_of_4(share, by_beta, by_occupancy, (realn)(0.0f));
   out->occupancy[s.fragment] += sums.z;
-#else
-  const float4 sums = sum_lanes_of_4(share, by_beta, (realn)(0.0f), (realn)(0.0f));
-  if (s.fragment == DPR_BACKGROUND_SLOT) {
-    out->background_weight += sums.x;
-    out->background_beta += sums.y;
-    return;
-  }
-#endif
   out->weight[s.fragment] += sums.x;
   out->beta[s.fragment] += sums.y;
+#else
+  const float4 sums = sum_lanes_of_4(share, by_beta, (realn)(0.0f), (realn)(0.0f));
+  add_gradient(s.fragment, sums.x, sums.y, out);
+#endif
 }
 
 /// Adds the integrals to the gradients of the slots, whose `grad` holds g. Returns the sums of w and of w g.

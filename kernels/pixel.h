@@ -3,6 +3,7 @@
 #ifndef DPR_PIXEL_H
 #define DPR_PIXEL_H
 
+#include "lanes.h"
 #include "shared_types.h"
 
 /// 1 - p is kept above this, so that products without one factor are quotients.
@@ -64,24 +65,35 @@ typedef struct {
   float transparency;   // prod (1 - p)
 } BarrierPixel;
 
-static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
-                                              global const ViewParams* restrict views,
-                                              global const uint* restrict starts, const Fragments f) {
+/// Of a pixel with `length` fragments. Nothing is returned: oclgrind cannot read what a structure is returned by
+/// where a call is always inlined.
+DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uint length,
+                                        global const ViewParams* views, global const uint* starts,
+                                        const Fragments f, BarrierPixel* out) {
   global const ViewParams* view = views + pixel / p.pixels_per_view;
   BarrierPixel q;
   q.first = starts[pixel];
-  q.last = starts[pixel + 1];
+  q.last = q.first + length;
   q.nearest = INFINITY;
   q.transparency = 1.0f;
-  for (uint i = q.first; i < q.last; ++i) {
-    const float depth = f.depth[f.list[i]];
-    q.nearest = depth < q.nearest ? depth : q.nearest;
-    q.transparency *= fragment_transparency(f, f.list[i]);
+#pragma unroll
+  for (uint i = 0; i < length; ++i) {
+    const uint k = f.list[q.first + i];
+    q.nearest = f.depth[k] < q.nearest ? f.depth[k] : q.nearest;
+    q.transparency *= fragment_transparency(f, k);
   }
   q.depth_scale = view->inverse_range / p.gamma;
   q.inverse_alpha = 1.0f / p.alpha;
   const float background = (p.background_depth - (view->zfar - q.nearest) * view->inverse_range) / p.gamma;
   q.background = clamp(background, -DPR_MAX_BETA, DPR_MAX_BETA);
+  *out = q;
+}
+
+static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
+                                              global const ViewParams* restrict views,
+                                              global const uint* restrict starts, const Fragments f) {
+  BarrierPixel q;
+  load_barrier_run(p, pixel, starts[pixel + 1] - starts[pixel], views, starts, f, &q);
   return q;
 }
 

@@ -52,9 +52,13 @@ static inline realn gaussian_score(realn z) { return z; }
 /// The integrand is left out where the product of the F is below exp(-16).
 #define DPR_BARRIER_LOG_FLOOR 16.0f
 #define DPR_BARRIER_NODES 16
-/// How far below the largest a slot still counts. Further down its weight is Phi(-9.5 / sqrt 2) = 1e-11 at
-/// most.
-#define DPR_BARRIER_REACH 9.5f
+/// Slots no further below the largest than one of these count for where the integrand begins (quadrature.h).
+#define DPR_BARRIER_WINDOWS ((float2)(1.2f, 3.0f))
+/// Up to so many slots have closed forms (triple.h).
+#define DPR_TRIPLE 3
+/// How far below the largest a slot still counts. Further down its weight is Phi(-8.6 / sqrt 2) = 6e-10 at
+/// most, its gradient by beta 3e-9: below the integrals' errors.
+#define DPR_BARRIER_REACH 8.6f
 /// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each),
 /// and the largest step between nodes where few slots cover, and where many do.
 #define DPR_JOINT_BELOW 4.8f
@@ -92,11 +96,11 @@ static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
   *cdf = choose(x < 0.0f, tail, 1.0f - tail);
 }
 
-/// A bound from above of ln F(x), negated, and its derivative: -ln F >= 0.3 max(1.5 - x, 0)^2.
-static inline float prior_log_cdf_bound(float x, float* slope) {
-  const float y = max(1.5f - x, 0.0f);
-  *slope = 0.6f * y;
-  return 0.3f * y * y;
+/// Where ln of the product of the F of slots within either window is -DPR_BARRIER_LOG_FLOOR, or a little
+/// lower: -ln F(x) >= 0.3 max(1.5 - x, 0)^2, and a sum of these is a parabola below the window.
+static inline float2 prior_lower_ends(float2 windows, float2 count, float2 sum, float2 squares) {
+  const float2 deficit = max(sum * sum - count * (squares - DPR_BARRIER_LOG_FLOOR / 0.3f), 0.0f);
+  return 1.5f - max((sqrt(deficit) - sum) / count, windows);
 }
 
 static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {

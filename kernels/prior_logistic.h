@@ -25,6 +25,7 @@ static inline realn logistic_score(realn z) {
 #define DPR_BARRIER_HIGH_PER_LOG 1.0f
 #define DPR_BARRIER_LOG_FLOOR 16.0f
 #define DPR_BARRIER_NODES 32
+#define DPR_BARRIER_WINDOWS ((float2)(2.0f, 6.0f))
 #define DPR_BARRIER_REACH 26.0f
 #define DPR_JOINT_BELOW 14.0f
 #define DPR_JOINT_ABOVE 14.0f
@@ -38,10 +39,10 @@ static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
   *density = small * large;
 }
 
-/// A bound from above of ln F(x), negated, and its derivative: -ln F >= max(-x, 0).
-static inline float prior_log_cdf_bound(float x, float* slope) {
-  *slope = x < 0.0f ? 1.0f : 0.0f;
-  return max(-x, 0.0f);
+/// As in prior_gaussian.h, by -ln F(x) >= max(-x, 0).
+static inline float2 prior_lower_ends(float2 windows, float2 count, float2 sum, float2 squares) {
+  (void)squares;
+  return min((sum - DPR_BARRIER_LOG_FLOOR) / count, -windows);
 }
 
 static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {

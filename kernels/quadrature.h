@@ -34,6 +34,49 @@ typedef struct {
   int is_upper;  // tails: this is the cluster's upper half
 } Stretch;
 
+/// What the lower end of the barrier's integral depends on, where its rule needs one: how many slots lie no
+/// further below the largest than a narrow window reaches, and a wide one, the sums of their betas, and of
+/// the squares.
+typedef struct {
+  float2 count, sum, squares;
+} Nearby;
+
+static inline Nearby no_slots(void) {
+  const Nearby none = {0.0f, 0.0f, 0.0f};
+  return none;
+}
+
+#ifdef DPR_BARRIER_WINDOWS
+
+static inline void add_nearby(float beta, Nearby* n) {
+  const int2 is_near = beta >= -DPR_BARRIER_WINDOWS;
+  const float2 counted = select((float2)(0.0f), (float2)(beta), is_near);
+  n->count += select((float2)(0.0f), (float2)(1.0f), is_near);
+  n->sum += counted;
+  n->squares += counted * counted;
+}
+
+/// Where the product of the F of all slots falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower: of the
+/// bounds by either window the tighter one.
+static inline float lower_end(const Nearby n) {
+  const float2 ends = prior_lower_ends(DPR_BARRIER_WINDOWS, n.count, n.sum, n.squares);
+  return max(ends.x, ends.y);
+}
+
+#else
+
+static inline void add_nearby(float beta, Nearby* n) {
+  (void)beta;
+  (void)n;
+}
+
+static inline float lower_end(const Nearby n) {
+  (void)n;
+  return 0.0f;
+}
+
+#endif
+
 #if DPR_RULE == DPR_RULE_SMOOTH
 
 /// Nodes and weights of a block of a stretch.
@@ -63,21 +106,10 @@ static inline Stretch first_stretch(const Slots run) {
 
 #elif !defined(DPR_SOFTMAX)
 
-/// Where the product of the F of all slots falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower.
-/// Newton's method on the sum of a bound of each, which is convex and falls: from the first step on it comes
-/// from below.
-static inline float lower_end(const Slots run) {
-  float low = -DPR_BARRIER_HIGH;
-  for (int step = 0; step < 3; ++step) {
-    float sum = -DPR_BARRIER_LOG_FLOOR, slopes = 0.0f;
-    for (uint i = 0; i < run.count; ++i) {
-      float slope;
-      sum += prior_log_cdf_bound(low - run.slot[i].beta, &slope);
-      slopes += slope;
-    }
-    low += sum / max(slopes, 1e-3f);
-  }
-  return low;
+/// ln(count), or less than 0.06 below it: the logarithm of a float between powers of two is nearly its
+/// mantissa.
+static inline float log_of_count(uint count) {
+  return M_LN2_F * (0x1p-23f * (float)as_int((float)count) - 127.0f);
 }
 
 /// The stretch that holds all but 1e-7 of the largest slot's and its neighbours' mass. With many slots it is
@@ -85,8 +117,8 @@ static inline float lower_end(const Slots run) {
 static inline Stretch first_stretch(const Slots run) {
   Stretch s;
   s.centre = 0.0f;
-  s.low = lower_end(run);
-  s.high = DPR_BARRIER_HIGH + DPR_BARRIER_HIGH_PER_LOG * log((float)run.count);
+  s.low = run.slot[0].occupancy;
+  s.high = DPR_BARRIER_HIGH + DPR_BARRIER_HIGH_PER_LOG * log_of_count(run.count);
   s.blocks = DPR_BARRIER_NODES / DPR_WIDTH;
   if (run.count > DPR_THRONG) s.blocks *= 2;
   return s;

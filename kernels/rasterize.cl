@@ -190,18 +190,17 @@ kernel void rasterize_list(const FrameParams p, const uint last_share,
   }
 }
 
-/// Takes a vector of pixels, x | y << 16, out of a mask, row by row. Behind the mask's last pixel that one is
-/// repeated. `corner` is the tile's first pixel.
+/// Takes a vector of pixels, x | y << 16, out of a mask, row by row. Behind the mask's last pixel the tile's
+/// last one is repeated. `corner` is the tile's first pixel.
 static inline uintn take_pixels(ulong* mask, uint corner) {
-  uint lanes[DPR_WIDTH];
+  uint bits[DPR_WIDTH];
 #pragma unroll
   for (uint lane = 0; lane < DPR_WIDTH; ++lane) {
-    const uint bit = lowest_bit_of(*mask);
-    lanes[lane] = corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
-    const ulong rest = *mask & (*mask - 1);
-    *mask = rest != 0 ? rest : *mask;
+    bits[lane] = lowest_bit_of(*mask);  // -1 if there is none
+    *mask &= *mask - 1;
   }
-  return load_n(0, lanes);
+  const uintn bit = load_n(0, bits) % (DPR_TILE * DPR_TILE);
+  return corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
 }
 
 /// What a fragment is: distance, depth, barycentrics. One work-item per group of `pairs`. Deterministic.

@@ -45,7 +45,7 @@ static inline uint2 cover_tile(const FrameParams p, const Triangle t, uint view_
       const realn side = least_side(v, t.orientation);
       const intn in_image = column < (int)p.width, doubtful = !(fabs(side) > error);
       uint bits = lane_bits(side > error && in_image);
-      if (limit > 0.0f) bits |= lane_bits((side > 0.0f || triangle_distance2(v) < limit) && in_image);
+      if (limit > 0.0f) bits |= lane_bits((side > 0.0f || is_within(v, limit)) && in_image);
       if (any_lane(doubtful)) {
         bits |= owned_of(lane_bits(doubtful && in_image), p, t, first_column + part, first_row + row);
       }

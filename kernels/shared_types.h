@@ -295,7 +295,8 @@ typedef struct AggregateParams {
 typedef struct Slot {
   DPR_SHARED_NAME(Slot)
   float beta;      /* relative to the largest of its pixel (barrier) or its cluster's nearest (joint) */
-  float occupancy; /* joint composition */
+  float occupancy; /* joint; barrier: of a pixel's first where its integral begins, of up to DPR_TRIPLE in
+                      closed form their weights */
   float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
   uint fragment;   /* or DPR_BACKGROUND_SLOT */
 } Slot;
