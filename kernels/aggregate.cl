@@ -24,7 +24,7 @@ DPR_ALWAYS_INLINE void gather_run(const BarrierPixel q, uint length, const Fragm
   const Slot background = {q.background, 1.0f, 0.0f, DPR_BACKGROUND_SLOT};
   slots[0] = background;
   float largest = q.background;
-#pragma unroll
+  DPR_UNROLL_ON_CPU
   for (uint i = 0; i < length; ++i) {
     const uint k = f.list[q.first + i];
     const float log_p = f.log_occupancy[k];
@@ -36,7 +36,7 @@ DPR_ALWAYS_INLINE void gather_run(const BarrierPixel q, uint length, const Fragm
   Slots run = {slots, 0, 0.0f};
   uint front = 0;
   Nearby nearby = no_slots();
-#pragma unroll
+  DPR_UNROLL_ON_CPU
   for (uint i = 0; i <= length; ++i) {
     Slot s = slots[i];
     s.beta -= largest;
@@ -60,7 +60,7 @@ DPR_ALWAYS_INLINE void gather_pixel(const AggregateParams p, uint pixel, uint le
   gather_run(q, length, f, slots + q.first + pixel, run);
 }
 
-/// On a CPU loops of few turns are unrolled: to mispredict where they end takes longer than they do.
+/// Short runs each by a copy of their own for its length, which a CPU unrolls.
 static inline void gather_slots(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                 global const uint* restrict starts, const Fragments f, global Slot* slots,
                                 Slots* run, float* transparency) {

@@ -15,6 +15,14 @@
 /// once for a whole launch on a CPU; and a structure that is handed over lies in memory.
 #define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
+/// Before a loop that a CPU unrolls where its number of turns is known: to mispredict where a loop of few
+/// ends takes longer than its turns do.
+#if DPR_LANES == 1
+#define DPR_UNROLL_ON_CPU
+#else
+#define DPR_UNROLL_ON_CPU _Pragma("unroll")
+#endif
+
 #define DPR_CONCAT_(a, b) a##b
 #define DPR_CONCAT(a, b) DPR_CONCAT_(a, b)
 

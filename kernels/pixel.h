@@ -57,16 +57,16 @@ static inline float alpha_sensitivity(const Fragments f, uint fragment, float tr
 
 /// What the slots of a pixel have in common in the barrier composition.
 typedef struct {
-  uint first, last;     // the pixel's run of the fragment lists
-  float nearest;        // view depth of the nearest fragment
-  float depth_scale;    // d beta / d (nearest - depth)
+  uint first, last;   // the pixel's run of the fragment lists
+  float nearest;      // view depth of the nearest fragment
+  float depth_scale;  // d beta / d (nearest - depth)
   float inverse_alpha;
-  float background;     // beta of the background slot
-  float transparency;   // prod (1 - p)
+  float background;    // beta of the background slot
+  float transparency;  // prod (1 - p)
 } BarrierPixel;
 
-/// Of a pixel with `length` fragments. Nothing is returned: oclgrind cannot read what a structure is returned by
-/// where a call is always inlined.
+/// Of a pixel with `length` fragments. Nothing is returned: oclgrind cannot read what a structure is returned
+/// by where a call is always inlined.
 DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uint length,
                                         global const ViewParams* views, global const uint* starts,
                                         const Fragments f, BarrierPixel* out) {
@@ -76,7 +76,7 @@ DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uin
   q.last = q.first + length;
   q.nearest = INFINITY;
   q.transparency = 1.0f;
-#pragma unroll
+  DPR_UNROLL_ON_CPU
   for (uint i = 0; i < length; ++i) {
     const uint k = f.list[q.first + i];
     q.nearest = f.depth[k] < q.nearest ? f.depth[k] : q.nearest;

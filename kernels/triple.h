@@ -86,7 +86,7 @@ static inline float4 weigh_triple(Slots run, const Fragments f, float3 backgroun
   float4 sum = 0.0f;
 #pragma unroll
   for (uint i = 0; i < DPR_TRIPLE; ++i) {
-    if (i == run.count) break;
+    if (i >= run.count) continue;
     run.slot[i].occupancy = weights[i];
     sum += weights[i] * (float4)(slot_color(run.slot[i], f, background), 1.0f);
   }
@@ -104,7 +104,7 @@ static inline float triple_gradients(const Slots run, SlotGradients* out) {
   const float by_beta[DPR_TRIPLE] = {by01 + by02, by12 - by01, -by02 - by12};
 #pragma unroll
   for (uint i = 0; i < DPR_TRIPLE; ++i) {
-    if (i == run.count) break;
+    if (i >= run.count) continue;
     add_gradient(run.slot[i].fragment, run.slot[i].occupancy, by_beta[i], out);
   }
   return 1.0f;
