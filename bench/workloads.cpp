@@ -179,6 +179,8 @@ std::vector<Variant> make_variants(const Definition& d, const Smoothing& publish
       Smoothing smoothing = smoothing_preset("gaussian");
       smoothing.sigma = half_a_pixel * half_a_pixel;
       smoothing.composition = composition;
+      // The barrier is what is held against z-buffers, to which a far side does not count.
+      if (composition == Composition::barrier) smoothing.gamma = 1e-4F;
       list.push_back({"sharp", smoothing});
     }
   }

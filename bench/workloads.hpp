@@ -13,8 +13,8 @@ namespace dpr::bench {
 
 /// One way in which a workload is rendered.
 struct Variant {
-  /// "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"; "sharp": what
-  /// Smoothing{} says, with noise of the triangles whose sigma is half a pixel.
+  /// "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"; "sharp": noise
+  /// of the triangles that comes nearest to a z-buffer with antialiased silhouettes, a sigma of half a pixel.
   std::string preset;
   Smoothing smoothing;
 };
