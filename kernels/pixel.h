@@ -56,12 +56,12 @@ static inline float alpha_sensitivity(const Fragments f, uint fragment, float tr
 
 /// What the slots of a pixel have in common in the barrier composition.
 typedef struct {
-  uint first, last;     // the pixel's run of the fragment lists
-  float nearest;        // view depth of the nearest fragment
-  float depth_scale;    // d beta / d (nearest - depth)
+  uint first, last;   // the pixel's run of the fragment lists
+  float nearest;      // view depth of the nearest fragment
+  float depth_scale;  // d beta / d (nearest - depth)
   float inverse_alpha;
-  float background;     // beta of the background slot
-  float transparency;   // prod (1 - p)
+  float background;    // beta of the background slot
+  float transparency;  // prod (1 - p)
 } BarrierPixel;
 
 static inline BarrierPixel load_barrier_pixel(const AggregateParams p, uint pixel,
@@ -108,11 +108,11 @@ static inline void swap_slots(global Slot* a, global Slot* b) {
 /// What a pixel adds to the gradients of gamma, alpha and the background colour, which had that weight in it.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,
                                   float background_weight, float4 grad, global float* channels) {
-  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
-  channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = grad_alpha;
   channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = background_weight * grad.x;
   channels[(DPR_CHANNEL_BACKGROUND + 1) * p.pixels + pixel] = background_weight * grad.y;
   channels[(DPR_CHANNEL_BACKGROUND + 2) * p.pixels + pixel] = background_weight * grad.z;
+  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
+  if (p.channels > DPR_CHANNEL_ALPHA) channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = grad_alpha;
 }
 
 #endif
