@@ -227,14 +227,14 @@ TEST_SUITE("pipeline") {
     renderer.set_scene(scene);
     renderer.forward();
     REQUIRE_FALSE(renderer.impl().pixel_noise->blur.scale_reads_raster());
-    const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
-    const SceneGradient first = renderer.backward(grad), second = renderer.backward(grad);
+    const std::vector<Image> grads(1, random_image(scene.width, scene.height, -1.0F, 1.0F));
+    const SceneGradient first = renderer.backward(grads), second = renderer.backward(grads);
     CHECK(first.sigma != 0);
     CHECK(same_bits(first, second));
     CHECK(&renderer.impl().pixel_noise->grad_raster(renderer.impl().aggregate.image) ==
           &renderer.impl().aggregate.image);
     static_cast<void>(auxiliary_outputs(renderer));
-    CHECK(same_bits(first, renderer.backward(grad)));
+    CHECK(same_bits(first, renderer.backward(grads)));
   }
 
   TEST_CASE("aov: frames in bands show the same") {
