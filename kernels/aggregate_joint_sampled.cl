@@ -240,7 +240,7 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
 /// in   grad_image  float4[pixel]
 /// out  grad_distance, grad_depth, grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_sigma  float[pixel]                      what the pixel adds to dL/dsigma
-/// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma and the background colour
+/// out  channels    float[p.channels][pixel]  what the pixel adds to gamma and the background colour
 kernel void aggregate_joint_sampled_backward(
     const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
     global const uint* restrict list, global const float* restrict distance,

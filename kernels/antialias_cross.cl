@@ -68,7 +68,7 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, uint fi
 }
 
 /// Finds what crosses the steps of a tile. One work-item per tile of all views. Deterministic.
-/// in   edges         uint4[edge]           of the scene; see DPR_EDGE_FLAG
+/// in   edges         uint2[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
 /// in   facing        uchar[view][face]
 /// in   ndc           float4[view][vertex]
@@ -83,7 +83,7 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, uint fi
 /// out  crowded       uint[tile][4]         see bit_in_tile(): steps that several contours cross. Not
 ///                                          written where the winners are not
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
-                            global const ViewParams* restrict views, global const uint4* restrict edges,
+                            global const ViewParams* restrict views, global const uint2* restrict edges,
                             global const uint4* restrict faces, global const uchar* restrict facing,
                             global const float4* restrict ndc, global const ClippedFace* restrict clipped,
                             global const uint* restrict tile_starts, global const uint* restrict pair_contour,
@@ -164,7 +164,7 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint tile, global con
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
 kernel void antialias_cross_backward(
     const FrameParams p, const AntialiasParams a, global const uint* restrict pairs,
-    global const uint4* restrict edges, global const uint4* restrict faces,
+    global const uint2* restrict edges, global const uint4* restrict faces,
     global const uchar* restrict facing, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,

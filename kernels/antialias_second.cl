@@ -120,7 +120,7 @@ static inline int may_be_second(const FrameParams p, uint view, uint contour, co
 /// out  counts   uint[tile]
 /// out  seconds  SecondCrossing[tile][DPR_SECOND_CROSSINGS]
 kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
-                                  global const ViewParams* restrict views, global const uint4* restrict edges,
+                                  global const ViewParams* restrict views, global const uint2* restrict edges,
                                   global const uint4* restrict faces, global const uchar* restrict facing,
                                   global const float4* restrict ndc,
                                   global const ClippedFace* restrict clipped,

@@ -13,7 +13,7 @@ static inline float3 normalized(float3 v) {
 /// in   starts         uint[pixel + 1]        runs of `list`
 /// in   list           uint[...]              fragments, by pixel
 /// in   weight         float[fragment]        in the pixel's colour
-/// in   channels       float[DPR_PIXEL_CHANNELS][pixel]  of aggregation's backward pass for a gradient of 1
+/// in   channels       float[channel][pixel]  of aggregation's backward pass for a gradient of 1
 ///                                                       in red: the background's weight is in that of the
 ///                                                       background colour
 /// in   depth, bary1, bary2  float[fragment]

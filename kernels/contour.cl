@@ -67,10 +67,11 @@ static inline int stands_for_both(uint4 edge, global const uchar* facing) {
 /// Whether an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
 static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
   if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
-  const uint4 record = s.edges.edges[edge];
-  if (!has_other_face(record) || (record.z & (DPR_EDGE_FLAG | DPR_EDGE_SEAM)) || (record.w & DPR_EDGE_SEAM))
+  const uint2 sides_of = s.edges.edges[edge];
+  if ((sides_of.x & (DPR_EDGE_FLAG | DPR_EDGE_SEAM)) || sides_of.y == DPR_NO_FACE ||
+      (sides_of.y & DPR_EDGE_SEAM))
     return 0;
-  const EdgeSides sides = edge_sides(record, s.facing);
+  const EdgeSides sides = edge_sides((uint4)(0, 0, sides_of.x / 3, sides_of.y), s.facing);
   return sides.own == -sides.other;
 }
 
@@ -100,7 +101,7 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
 }
 
 static inline ContourScene scene_of_view(const FrameParams p, const ContourParams c, uint view,
-                                         global const uint4* edges, global const uchar* facing,
+                                         global const uint2* edges, global const uchar* facing,
                                          global const float4* ndc, global const float4* world,
                                          global const uint4* faces, global const ClippedFace* clipped,
                                          global const uint4* face_colors, global const float4* colors) {
@@ -141,14 +142,14 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 }
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
-/// in   edges        uint4[edge]           of the scene; see DPR_EDGE_FLAG
+/// in   edges        uint2[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   facing       uchar[view][face]     as setup and clipping leave it
 /// in   ndc, world   float4[view][vertex]
 /// in   faces, face_colors  uint4[face]    vertices and colours of the corners
 /// in   clipped      ClippedFace[view][face]  read where p.clips is set
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// out  counts       uint[view][edge]
-kernel void contour_count(const FrameParams p, const ContourParams c, global const uint4* restrict edges,
+kernel void contour_count(const FrameParams p, const ContourParams c, global const uint2* restrict edges,
                           global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
                           global const ClippedFace* restrict clipped,
@@ -181,8 +182,9 @@ kernel void contour_count(const FrameParams p, const ContourParams c, global con
 /// The contours of a view.
 typedef struct {
   EdgeScene edges;
-  global const uint *end_starts, *ends;  // edge * 2 + end, by vertex
-  global const uint* offsets;            // of the view's edges: equal where an edge is no contour
+  global const uint* face_edges;               // see DPR_FACE_SIDES
+  global const uint *corner_starts, *corners;  // face * 3 + corner, by vertex
+  global const uint* offsets;                  // of the view's edges: equal where an edge is no contour
 } Contours;
 
 /// Whether an edge that is a contour is that long.
@@ -196,33 +198,40 @@ static inline int is_long(const FrameParams p, const Contours c, uint edge) {
 
 /// The edge of a face between two of its vertices.
 static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
-  for (uint k = c.end_starts[a]; k < c.end_starts[a + 1]; ++k) {
-    const uint4 record = c.edges.edges[c.ends[k] / 2];
+  const uint last = 2 * c.corner_starts[a + 1];
+  for (uint k = 2 * c.corner_starts[a]; k < last; ++k) {
+    const uint edge = edge_at(c.face_edges, c.corners[k / 2], k % 2);
+    if (edge == DPR_NO_MESH_EDGE) continue;
+    const uint4 record = record_of(c.edges.edges[edge], c.edges.faces);
     const int is_of_face = own_face(record) == face || (has_other_face(record) && other_face(record) == face);
-    if (is_of_face && (record.x == b || record.y == b)) return c.ends[k] / 2;
+    if (is_of_face && (record.x == b || record.y == b)) return edge;
   }
-  return c.edges.mesh_edges;
+  return DPR_NO_MESH_EDGE;
+}
+
+/// Whether all contours that end in a vertex are that long.
+static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
+  const uint last = 2 * c.corner_starts[vertex + 1];
+  for (uint k = 2 * c.corner_starts[vertex]; k < last; ++k) {
+    const uint edge = edge_at(c.face_edges, c.corners[k / 2], k % 2);
+    if (edge != DPR_NO_MESH_EDGE && !is_long(p, c, edge)) return 0;
+  }
+  return 1;
 }
 
 /// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
 /// plane, the edge that is cut there, and the cuts of its faces.
 static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
   const uint mesh_edges = c.edges.mesh_edges, cut = end == 0 ? e.cut[0] : e.cut[1];
-  if (cut == DPR_NO_CUT) {
-    const uint vertex = end == 0 ? e.record.x : e.record.y;
-    for (uint k = c.end_starts[vertex]; k < c.end_starts[vertex + 1]; ++k) {
-      if (!is_long(p, c, c.ends[k] / 2)) return 0;
-    }
-    return 1;
-  }
+  if (cut == DPR_NO_CUT) return are_long(p, c, end == 0 ? e.record.x : e.record.y);
   if (edge >= mesh_edges) {
     const ClippedFace of = c.edges.clipped[e.cut_face];
     global const uint4* const face = c.edges.faces + e.cut_face;
     edge = edge_between(c, e.cut_face, corner_in(face, kept_corner(of, cut)),
                         corner_in(face, lost_corner(of, cut)));
-    if (edge == mesh_edges) return 0;
+    if (edge == DPR_NO_MESH_EDGE) return 0;
   }
-  const uint4 record = c.edges.edges[edge];
+  const uint4 record = record_of(c.edges.edges[edge], c.edges.faces);
   return is_long(p, c, edge) && is_long(p, c, mesh_edges + own_face(record)) &&
          (!has_other_face(record) || is_long(p, c, mesh_edges + other_face(record)));
 }
@@ -230,22 +239,23 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
 /// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as
 /// contour_count, and
 /// in   capacity    places that there are
-/// in   end_starts  uint[vertex + 1]       runs of `ends`
-/// in   ends        uint[...]              edge * 2 + end, by vertex
+/// in   face_edges  uint[face]             see DPR_FACE_SIDES
+/// in   corner_starts  uint[vertex + 1]    runs of `corners`
+/// in   corners     uint[corner]           face * 3 + corner, by vertex
 /// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
 /// out  pairs       uint[1]      how many there are; 0 where they do not fit
 /// out  place_contour  uint[place]  see DPR_CONTOUR_FLAGS
 /// out  place_tile     uint[place]  view * tiles + tile
 /// out  places         uint[place]  the place itself: what sorting permutes
 kernel void contour_fill(const FrameParams p, const ContourParams c, const uint capacity,
-                         global const uint4* restrict edges, global const uint* restrict end_starts,
-                         global const uint* restrict ends, global const uchar* restrict facing,
-                         global const float4* restrict ndc, global const float4* restrict world,
-                         global const uint4* restrict faces, global const ClippedFace* restrict clipped,
-                         global const uint4* restrict face_colors, global const float4* restrict colors,
-                         global const uint* restrict offsets, global uint* restrict pairs,
-                         global uint* restrict place_contour, global uint* restrict place_tile,
-                         global uint* restrict places) {
+                         global const uint2* restrict edges, global const uint* restrict face_edges,
+                         global const uint* restrict corner_starts, global const uint* restrict corners,
+                         global const uchar* restrict facing, global const float4* restrict ndc,
+                         global const float4* restrict world, global const uint4* restrict faces,
+                         global const ClippedFace* restrict clipped, global const uint4* restrict face_colors,
+                         global const float4* restrict colors, global const uint* restrict offsets,
+                         global uint* restrict pairs, global uint* restrict place_contour,
+                         global uint* restrict place_tile, global uint* restrict places) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * c.edges) return;
   const uint total = offsets[p.views * c.edges];
@@ -258,7 +268,7 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   const ViewEdge edge = view_edge(s.edges, i - first_edge);
   uint contour = DPR_CONTOUR_FLAGS * i;
   if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
-  const Contours contours = {s.edges, end_starts, ends, offsets + first_edge};
+  const Contours contours = {s.edges, face_edges, corner_starts, corners, offsets + first_edge};
   if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
   if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
@@ -275,27 +285,28 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   }
 }
 
-/// Adds the gradients of contours' ends to those of the vertices: each vertex its edges in order, each edge
-/// its pairs. One work-item per (view, vertex). Deterministic.
-/// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`
-/// in      edge_pairs    uint[...]
-/// in      end_starts    uint[vertex + 1]       runs of `ends`
-/// in      ends          uint[...]              edge * 2 + end, by vertex
-/// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
-/// in out  grad_ndc      float4[view][vertex]
+/// Adds the gradients of contours' ends to those of the vertices: each vertex the edges at its corners in
+/// order, each edge its pairs. One work-item per (view, vertex). Deterministic. in      pair_starts uint[view
+/// * edge + 1]  runs of `edge_pairs` in      edge_pairs    uint[...] in      face_edges    uint[face] see
+/// DPR_FACE_SIDES in      corner_starts uint[vertex + 1]       runs of `corners` in      corners uint[corner]
+/// face * 3 + corner, by vertex in      grad_ends     float4[pair]           of x, y of the first end, x, y
+/// of the second, NDC in out  grad_ndc      float4[view][vertex]
 kernel void contour_gather(const FrameParams p, const ContourParams c,
                            global const uint* restrict pair_starts, global const uint* restrict edge_pairs,
-                           global const uint* restrict end_starts, global const uint* restrict ends,
-                           global const float4* restrict grad_ends, global float4* restrict grad_ndc) {
+                           global const uint* restrict face_edges, global const uint* restrict corner_starts,
+                           global const uint* restrict corners, global const float4* restrict grad_ends,
+                           global float4* restrict grad_ndc) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
   float2 sum = 0.0f;
-  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
-    const uint edge = view * c.edges + ends[k] / 2;
+  const uint last = 2 * corner_starts[vertex + 1];
+  for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
+    const uint of_mesh = edge_at(face_edges, corners[k / 2], k % 2), edge = view * c.edges + of_mesh;
+    if (of_mesh == DPR_NO_MESH_EDGE) continue;
     for (uint place = pair_starts[edge]; place < pair_starts[edge + 1]; ++place) {
       const float4 grad = grad_ends[edge_pairs[place]];
-      sum += ends[k] % 2 ? grad.zw : grad.xy;
+      sum += k % 2 ? grad.zw : grad.xy;
     }
   }
   grad_ndc[i] += (float4)(sum, 0.0f, 0.0f);
@@ -321,20 +332,18 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
 /// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
 /// per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
 /// in      views          ViewParams[view]
-/// in      corner_starts  uint[vertex + 1]      runs of `corners`
-/// in      corners        uint[corner]          face * 3 + corner, by vertex
 /// in out  grad_ndc       float4[view][vertex]
 /// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates
 kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
-                                global const ViewParams* restrict views, global const uint4* restrict edges,
+                                global const ViewParams* restrict views, global const uint2* restrict edges,
                                 global const uint4* restrict faces, global const float4* restrict ndc,
                                 global const ClippedFace* restrict clipped,
-                                global const uint* restrict corner_starts,
-                                global const uint* restrict corners, global const uint* restrict pair_starts,
+                                global const uint* restrict pair_starts,
                                 global const uint* restrict edge_pairs,
-                                global const uint* restrict end_starts, global const uint* restrict ends,
-                                global const float4* restrict grad_ends, global float4* restrict grad_ndc,
-                                global float4* restrict grad_clip) {
+                                global const uint* restrict face_edges,
+                                global const uint* restrict corner_starts,
+                                global const uint* restrict corners, global const float4* restrict grad_ends,
+                                global float4* restrict grad_ndc, global float4* restrict grad_clip) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * c.edges;
@@ -353,8 +362,10 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
     }
     is_near = is_near || is_lost(of, corner);
   }
-  for (uint k = end_starts[vertex]; k < end_starts[vertex + 1]; ++k) {
-    const uint edge = ends[k] / 2, own_end = ends[k] % 2;
+  const uint last = 2 * corner_starts[vertex + 1];
+  for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
+    const uint own_end = k % 2, edge = edge_at(face_edges, corners[k / 2], own_end);
+    if (edge == DPR_NO_MESH_EDGE) continue;
     const ViewEdge e = view_edge(s, edge);
     const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1, cut = min(e.cut[0], e.cut[1]);
     if (!e.is_there || cut == DPR_NO_CUT) continue;

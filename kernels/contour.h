@@ -21,6 +21,23 @@ static inline int side_of_face(uint facing) {
   return facing == DPR_FACE_DROPPED ? 0 : facing == DPR_FACE_FRONT ? 1 : -1;
 }
 
+/// An edge as it is looked at: its ends, own face and other face, with the flags of both.
+static inline uint4 record_of(uint2 edge, global const uint4* faces) {
+  const uint flags = DPR_EDGE_FLAG | DPR_EDGE_SEAM, side = edge.x & ~flags, own = side / 3,
+             corner = side - 3 * own;
+  return (uint4)(corner_in(faces + own, corner), corner_in(faces + own, (corner + 1) % 3),
+                 own | (edge.x & flags), edge.y);
+}
+
+/// The edge whose first end (0) or second end (1) is a corner, 3 * face + corner; DPR_NO_MESH_EDGE where the
+/// side there is not the own side of one.
+static inline uint edge_at(global const uint* face_edges, uint corner, uint end) {
+  const uint face = corner / 3, of_face = corner - 3 * face, side = end == 0 ? of_face : (of_face + 2) % 3;
+  const uint sides = face_edges[face];
+  if (!(sides >> side & 1u)) return DPR_NO_MESH_EDGE;
+  return sides / DPR_FACE_SIDES + popcount(sides & ((1u << side) - 1));
+}
+
 static inline int has_other_face(uint4 edge) { return edge.w != DPR_NO_FACE; }
 static inline uint own_face(uint4 edge) { return edge.z & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM); }
 static inline uint other_face(uint4 edge) { return edge.w & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM); }
@@ -56,14 +73,15 @@ static inline uint corner_of_vertex(uint4 face, uint vertex) {
 
 /// What the edges of a view are read from.
 typedef struct {
-  global const uint4 *edges, *faces;
+  global const uint2* edges;
+  global const uint4* faces;
   global const float4* ndc;           // [vertex] of the view
   global const ClippedFace* clipped;  // [face] of the view; not read where no face is clipped
   uint mesh_edges, clips;
 } EdgeScene;
 
 static inline EdgeScene edges_of_view(const FrameParams p, uint view, uint mesh_edges,
-                                      global const uint4* edges, global const uint4* faces,
+                                      global const uint2* edges, global const uint4* faces,
                                       global const float4* ndc, global const ClippedFace* clipped) {
   const EdgeScene s = {edges,      faces,  ndc + view * p.vertices, clipped + (p.clips ? view * p.faces : 0),
                        mesh_edges, p.clips};
@@ -75,7 +93,7 @@ static inline EdgeScene edges_of_view(const FrameParams p, uint view, uint mesh_
 
 /// An edge as a view has it.
 typedef struct {
-  uint4 record;   // as in the list of edges; of the cut of a face (face, none) without vertices
+  uint4 record;   // record_of(); of the cut of a face (face, none) without vertices
   float4 end[2];  // x, y in NDC, depth; w is not used
   int is_there;   // 0: all of it is nearer than the near plane
   uint cut_face;  // whose cuts the ends are
@@ -122,7 +140,7 @@ static inline void clip_edge(const EdgeScene s, ViewEdge* e) {
 
 static inline ViewEdge view_edge(const EdgeScene s, uint edge) {
   if (edge >= s.mesh_edges) return edge_of_cut(s, edge - s.mesh_edges);
-  const uint4 record = s.edges[edge];
+  const uint4 record = record_of(s.edges[edge], s.faces);
   ViewEdge e = {record, {s.ndc[record.x], s.ndc[record.y]}, 1, 0, {DPR_NO_CUT, DPR_NO_CUT}};
   if (s.clips) clip_edge(s, &e);
   return e;

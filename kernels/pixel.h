@@ -120,11 +120,11 @@ static inline void swap_slots(global Slot* a, global Slot* b) {
 /// What a pixel adds to the gradients of gamma, alpha and the background colour, which had that weight in it.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,
                                   float background_weight, float4 grad, global float* channels) {
-  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
-  channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = grad_alpha;
   channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = background_weight * grad.x;
   channels[(DPR_CHANNEL_BACKGROUND + 1) * p.pixels + pixel] = background_weight * grad.y;
   channels[(DPR_CHANNEL_BACKGROUND + 2) * p.pixels + pixel] = background_weight * grad.z;
+  channels[DPR_CHANNEL_GAMMA * p.pixels + pixel] = grad_gamma;
+  if (p.channels > DPR_CHANNEL_ALPHA) channels[DPR_CHANNEL_ALPHA * p.pixels + pixel] = grad_alpha;
 }
 
 #endif

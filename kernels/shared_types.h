@@ -110,10 +110,10 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_DISTORTION 16 /* k1, k2, p1, p2, k3, where some view distorts: 5 */
 #define DPR_LENS_CHANNELS 21
 
-/// Channels that aggregation's backward pass leaves per pixel.
-#define DPR_CHANNEL_GAMMA 0
-#define DPR_CHANNEL_ALPHA 1
-#define DPR_CHANNEL_BACKGROUND 2 /* 3 */
+/// Channels that aggregation's backward pass leaves per pixel, at most: the joint composition has no alpha.
+#define DPR_CHANNEL_BACKGROUND 0 /* 3 */
+#define DPR_CHANNEL_GAMMA 3
+#define DPR_CHANNEL_ALPHA 4
 #define DPR_PIXEL_CHANNELS 5
 
 /// Channels of the auxiliary outputs, and the face of a pixel that shows none.
@@ -130,12 +130,17 @@ using float4 = cl_float4;
 #define DPR_FACE_FRONT 1 /* counter-clockwise */
 #define DPR_FACE_BACK 2
 
-/// Set in the faces of an edge, uint4(first end, second end, own face, other face or DPR_NO_FACE): in the own
-/// face where colours or normals may jump there, in the other where it goes through the edge in the same
-/// direction. DPR_EDGE_SEAM is set in the own face where the texture jumps, in the other where, in the light,
-/// materials or given normals do.
+/// An edge is uint2(side of the own face, other face or DPR_NO_FACE); a side is 3 * face + the corner at
+/// which it begins. DPR_EDGE_FLAG is set in the side where colours or normals may jump there, in the other
+/// face where it goes through the edge in the same direction. DPR_EDGE_SEAM is set in the side where the
+/// texture jumps, in the other face where, in the light, materials or given normals do.
 #define DPR_EDGE_FLAG 0x80000000u
 #define DPR_EDGE_SEAM 0x40000000u
+
+/// Edges are numbered in the order of their sides. Every face has the number of its first edge times
+/// DPR_FACE_SIDES, and bit k set where side k is an edge's; DPR_NO_MESH_EDGE in place of the number of one.
+#define DPR_FACE_SIDES 8
+#define DPR_NO_MESH_EDGE 0xffffffffu
 
 /// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of
 /// its ends have corners that count (CornerArea in crossing.h).
@@ -287,7 +292,7 @@ typedef struct AggregateParams {
   uint faces;      /* of one view */
   uint first_view; /* of the batch that names the noise */
   uint last_pixel; /* where those of the launch end */
-  uint unused;
+  uint channels;   /* DPR_PIXEL_CHANNELS, or those before alpha's */
 } AggregateParams;
 
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward

@@ -21,7 +21,7 @@ typedef struct {
 } TileContour;
 
 static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
-                                       global const uint4* restrict edges, global const uint4* restrict faces,
+                                       global const uint2* restrict edges, global const uint4* restrict faces,
                                        global const uchar* restrict facing, global const float4* restrict ndc,
                                        global const ClippedFace* restrict clipped) {
   TileContour c;

@@ -22,7 +22,8 @@ inline cl_uint to_uint(std::size_t value) {
   return static_cast<cl_uint>(value);
 }
 
-/// How many elements a buffer holds: a number, or an upper bound where so far only the device knows it.
+/// How many elements a buffer holds: a number, or an upper bound where so far only the device knows it; and
+/// whether it is likely to be another one in the next frame, by a little.
 struct Length {
   Length(std::size_t count_) : count(count_) {}
   static Length at_most(std::size_t count) {
@@ -30,9 +31,17 @@ struct Length {
     length.is_known = false;
     return length;
   }
+  static Length varying(std::size_t count) {
+    Length length(count);
+    length.varies = true;
+    return length;
+  }
+
+  /// Room for it in a buffer that has none yet: a sixteenth more for what varies.
+  std::size_t first_room() const { return varies ? count + count / 16 : count; }
 
   std::size_t count;
-  bool is_known = true;
+  bool is_known = true, varies = false;
 };
 
 /// Elements of T on a device. Movable. Capacity is rounded up so that a kernel may load a whole vector of
@@ -57,7 +66,7 @@ class Buffer {
   /// from frame to frame settle. Where it throws, the buffer is empty.
   void resize(Device::Impl& device, Length length) {
     if (length.count > 0 && length.count + k_padding > capacity_)
-      allocate(device, capacity_ == 0 ? length.count : with_headroom(length.count));
+      allocate(device, capacity_ == 0 ? length.first_room() : with_headroom(length.count));
     length_ = length;
   }
 

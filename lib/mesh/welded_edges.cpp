@@ -11,6 +11,7 @@ WeldedEdge lone_edge(std::span<const glm::uvec3> faces, const FaceSide& side) {
   return {.first = face[side.corner()],
           .second = face[(side.corner() + 1) % 3],
           .face = side.face(),
+          .corner = static_cast<std::uint8_t>(side.corner()),
           .other = {}};
 }
 

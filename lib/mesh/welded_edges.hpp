@@ -15,6 +15,7 @@ namespace dpr {
 struct WeldedEdge {
   std::uint32_t first, second;  ///< vertices
   std::uint32_t face;
+  std::uint8_t corner;  ///< of the face: where it begins
   std::optional<std::uint32_t> other;
   bool same_direction = false;   ///< the other face goes through it from first to second too
   bool shares_vertices = false;  ///< the other face has both vertices themselves

@@ -66,21 +66,23 @@ void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, con
 }
 
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                          const BufferRef<cl_float4>& grad_image, bool by_scale) {
-  if (by_scale && !is_blended_) antialias.forward(in.p, contour, raster, kept_);
-  is_blended_ = is_blended_ || by_scale;
+                          const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole) {
+  if (by_scale && !raster_is_gradient_) {
+    if (!is_blended_) antialias.forward(in.p, contour, raster, kept_);
+    is_blended_ = true;
+    if (!sampled && !blur_holds_image_) blur.forward(size, raster, image);
+    blur_holds_image_ = true;
+  }
+  raster_is_gradient_ = is_whole && !sampled && !blur.scale_reads_raster();
+  Buffer<cl_float4>& grad_raster = raster_is_gradient_ ? raster : grad_raster_;
   if (sampled) {
-    sampled->backward(grad_image, grad_raster_);
+    sampled->backward(grad_image, grad_raster);
     if (by_scale) sampled->backward_scale(raster, grad_image);
   } else {
-    blur.backward(size, grad_image, grad_raster_);
+    blur.backward(size, grad_image, grad_raster);
+    if (by_scale) blur.backward_scale(size, raster, grad_image);
   }
-  if (by_scale && !sampled) {
-    if (!blur_holds_image_) blur.forward(size, raster, image);
-    blur_holds_image_ = true;
-    blur.backward_scale(size, raster, grad_image);
-  }
-  antialias.backward(in, contour, kept_, grad_raster_);
+  antialias.backward(in, contour, kept_, grad_raster);
 }
 
 std::size_t PixelNoise::bytes() const {

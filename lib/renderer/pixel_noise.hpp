@@ -44,10 +44,15 @@ class PixelNoise {
   void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                const Buffer<cl_uint>& tile_starts, float reach);
   /// The raster holds samples as they were before forward(): bands have been rendered again.
-  void unblend() { is_blended_ = false; }
-  /// To `grad_raster` and the contours' ends; and, if asked for, to the scale.
+  void unblend() { is_blended_ = raster_is_gradient_ = false; }
+  /// To `grad_raster` and the contours' ends; and, if asked for, to the scale. `is_whole`: the raster is not
+  /// rendered again, by bands, before the gradient is read. That takes its place then, unless the scale's
+  /// gradient is found by the raster itself.
   void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                const BufferRef<cl_float4>& grad_image, bool by_scale);
+                const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole);
+  /// Whether backward() lacks the raster, whose place a gradient has taken: other samples have been smoothed
+  /// since, and the blur no longer holds what it kept of it.
+  bool lacks_raster(bool by_scale) const { return by_scale && raster_is_gradient_ && !blur_holds_image_; }
 
   /// Samples other than those of forward() the same way, to [view][height][width].
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
@@ -56,8 +61,10 @@ class PixelNoise {
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
   Buffer<cl_float4> image;  ///< [view][height][width] RGBA
-  /// Of the samples, after backward().
-  const Buffer<cl_float4>& grad_raster() const { return grad_raster_; }
+  /// Of the samples of `raster`, after backward().
+  const Buffer<cl_float4>& grad_raster(const Buffer<cl_float4>& raster) const {
+    return raster_is_gradient_ ? raster : grad_raster_;
+  }
 
   std::size_t bytes() const;
 
@@ -65,8 +72,9 @@ class PixelNoise {
   void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
 
   KeptSamples kept_, other_kept_;
-  Buffer<cl_float4> grad_raster_;
+  Buffer<cl_float4> grad_raster_;  // where it has not taken the raster's place
   bool is_blended_ = false;        // the raster is
+  bool raster_is_gradient_ = false;
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;
 };

@@ -223,11 +223,17 @@ void Renderer::Impl::settle() {
     if (pixel_noise) pixel_noise->contour.settle(found.contours);
     return;
   }
+  render_again();
+  aov_frame = 0;
+}
+
+/// The same frame, whatever its buffers hold.
+void Renderer::Impl::render_again() {
+  capacity.reset();
   rendered = false;
   set_up();  // what did not fit has been emptied, runs of pairs among it
   forward_measured();
   rendered = true;
-  aov_frame = 0;
 }
 
 void Renderer::Impl::render(const Band& band) {
@@ -275,11 +281,14 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
                           "Renderer::set_views(): the eye's part of it needs their inverses");
   }
   if (pixel_noise) {
-    pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing);
+    if (pixel_noise->lacks_raster(wanted.smoothing)) render_again();
+    pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
+                          bands.size() == 1);
   }
   const bool textured = !geometry->textures.empty();
   if (wanted.texture && textured) texels->start(geometry->textures);
-  const BufferRef<cl_float4> grad_raster = pixel_noise ? pixel_noise->grad_raster() : grad_images;
+  const BufferRef<cl_float4> grad_raster =
+      pixel_noise ? pixel_noise->grad_raster(aggregate.image) : grad_images;
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     differentiate(grad_raster);

@@ -12,11 +12,10 @@ using glm::dvec3;
 
 namespace {
 
-/// A mesh's part of a joined buffer. In pieces: what lies on the way from rows of four to three floats is
-/// held beside both, when a frame holds the most.
+/// A mesh's part of a joined buffer. In pieces: what is on the way is held beside both, when a frame holds
+/// the most.
 std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count) {
-  constexpr std::size_t k_piece = std::size_t{1} << 17;  // 2 MiB
-  std::vector<cl_float4> values(std::min(count, k_piece));
+  std::vector<cl_float4> values(std::min(count, k_rows_of_piece));
   std::vector<glm::vec3> result;
   result.reserve(count);
   while (result.size() < count) {
@@ -222,7 +221,7 @@ void Renderer::Impl::sum_gradients() {
           ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
           : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma, pairs};
   std::vector<Summation> all{
-      {pixels, channels(wanted.smoothing || wanted.background, DPR_PIXEL_CHANNELS), 1, 1, all_pixels,
+      {pixels, channels(wanted.smoothing || wanted.background, aggregate.channel_count()), 1, 1, all_pixels,
        aggregate.channels},
       sigma,
       {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
@@ -263,7 +262,7 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
   const std::span<const float> pixel_sums = list(summed_.pixels);
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
-    gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
+    if (pixel_sums.size() > DPR_CHANNEL_ALPHA) gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
     const double by_scale =
         pixel_noise ? pixel_scale(scene.smoothing, std::min(scene.width, scene.height)).by_sigma : 1.0;
     gradient.sigma = by_scale * static_cast<double>(list(pixel_noise ? summed_.scale : summed_.sigma)[0]);

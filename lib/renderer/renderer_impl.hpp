@@ -64,6 +64,9 @@ using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buf
 /// or nowhere, until it asks.
 enum class FrameSizes { read, kept };
 
+/// Rows that are on the way between the host's three floats and the device's four at a time: 2 MiB of these.
+inline constexpr std::size_t k_rows_of_piece = std::size_t{1} << 17;
+
 /// Setters come in two halves: the first prepares everything that can fail beside what is in force, the
 /// second swaps it in and cannot fail. What it replaced is freed or kept for the next.
 struct Renderer::Impl : OnDevice, ViewSet {
@@ -167,7 +170,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> aov_surface, aov_coverage;        // of noise on the pixel: Auxiliary::weigh(), as pixels
 
   Buffer<cl_float4> host_grad_images;       // where gradients that come from the host go
-  Buffer<cl_float4> grad_vertices;          // [view][vertex] by NDC, then by world position
+  Buffer<cl_float4> grad_vertices;          // [view][vertex] by NDC, then by world position; see spare_for()
   Buffer<cl_float4> grad_lit;               // [view][vertex] what shading adds to those by world position
   Buffer<cl_float4> grad_colors;            // [color]
   Buffer<cl_float4> grad_texcoords;         // [texcoord]
@@ -191,6 +194,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set(ViewSet& prepared) noexcept;
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> vectors);
+  Buffer<cl_float4>& spare_for(const Buffer<cl_float4>& buffer);
 
   ShadeInputs shade_inputs() const {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};
@@ -208,6 +212,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void forward_within(const FrameCounts& expected, FrameSizes sizes);
   void forward_measured();
   void settle();
+  void render_again();
 
   /// The stages from the fragments on: of a band, and backward of the one rendered last.
   void render(const Band& band);

@@ -344,26 +344,33 @@ void Renderer::Impl::set_materials(std::size_t mesh, std::span<const Material> m
   rendered = false;
 }
 
-/// The same in pieces, so that the host does not hold all of it as rows of four floats.
-void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
-                             std::span<const glm::vec3> vectors) {
-  constexpr std::size_t k_piece = std::size_t{1} << 17;  // 2 MiB
-  spare_values_.resize(device.impl(), buffer.size());
-  if (vectors.size() < buffer.size()) buffer.copy_to(spare_values_);
-  for (std::size_t done = 0; done < vectors.size(); done += k_piece) {
-    const std::span<const glm::vec3> piece = vectors.subspan(done, std::min(k_piece, vectors.size() - done));
-    write_range(device.impl(), spare_values_, first + done, to_cl(piece));
-  }
-  std::swap(buffer, spare_values_);
+/// Where the copy of a buffer is prepared that takes its place: in what nothing reads between a backward pass
+/// and the next, if that is as long.
+Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
+  const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
+  Buffer<cl_float4>& spare = buffer.size() == vertices ? grad_vertices : spare_values_;
+  spare.resize(device.impl(), buffer.size());
+  return spare;
 }
 
-/// A part of a buffer, in a copy that takes its place.
+/// A part of a buffer, in pieces: the host does not hold all of it as rows of four floats.
+void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
+                             std::span<const glm::vec3> vectors) {
+  Buffer<cl_float4>& spare = spare_for(buffer);
+  if (vectors.size() < buffer.size()) buffer.copy_to(spare);
+  for (std::size_t done = 0; done < vectors.size(); done += k_rows_of_piece) {
+    const auto piece = vectors.subspan(done, std::min(k_rows_of_piece, vectors.size() - done));
+    write_range(device.impl(), spare, first + done, to_cl(piece));
+  }
+  std::swap(buffer, spare);
+}
+
 void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
                              std::span<const cl_float4> values) {
-  spare_values_.resize(device.impl(), buffer.size());
-  if (values.size() < buffer.size()) buffer.copy_to(spare_values_);
-  write_range(device.impl(), spare_values_, first, values);
-  std::swap(buffer, spare_values_);
+  Buffer<cl_float4>& spare = spare_for(buffer);
+  if (values.size() < buffer.size()) buffer.copy_to(spare);
+  write_range(device.impl(), spare, first, values);
+  std::swap(buffer, spare);
 }
 
 }  // namespace dpr

@@ -58,6 +58,7 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   a.pixels = p.views * a.pixels_per_view;
   a.faces = p.faces;
   a.first_view = p.first_view;
+  a.channels = to_uint(channel_count());
   return a;
 }
 
@@ -100,7 +101,7 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
        {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
     buffer->resize(device_, in.rasterize.fragments);
   }
-  channels.resize(device_, std::size_t{DPR_PIXEL_CHANNELS} * a.pixels);
+  channels.resize(device_, channel_count() * a.pixels);
   if (now_.kernels->joint_sampled) {
     grad_distance.resize(device_, in.rasterize.fragments);
     grad_sigma.resize(device_, a.pixels);

@@ -82,13 +82,18 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   void backward(const AggregateInputs& in, const glm::vec3& background,
                 const BufferRef<cl_float4>& grad_image);
 
+  /// Of `channels`: the joint composition has none of alpha.
+  std::size_t channel_count() const {
+    return now_.smoothing.composition == Composition::joint ? DPR_CHANNEL_ALPHA : DPR_PIXEL_CHANNELS;
+  }
+
   /// Of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
 
   Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
   Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
   ColorPlanes grad_color;                        ///< [fragment]
-  Buffer<float> channels;                        ///< [DPR_PIXEL_CHANNELS][view][height][width]
+  Buffer<float> channels;                        ///< [channel_count()][view][height][width]
 
   /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
   /// written, but these are.

@@ -49,11 +49,11 @@ class Antialias {
  private:
   Device::Impl& device_;
   Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
+  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
          In<cl_uchar>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          Out<cl_uint>, Out<cl_float2>, Out<cl_uint>>
       cross_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
+  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
          In<cl_uchar>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
          In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
       second_find_;
@@ -75,7 +75,7 @@ class Antialias {
   Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float2>,
          In<cl_float4>, Out<cl_float2>, Out<cl_float4>>
       fade_backward_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint4>, In<cl_uint4>, In<cl_uchar>,
+  Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint2>, In<cl_uint4>, In<cl_uchar>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
          In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, Out<cl_float4>>
       cross_backward_;

@@ -41,6 +41,8 @@ class Blur {
   void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                       const BufferRef<cl_float4>& grad_image);
 
+  /// Whether backward_scale() reads the raster itself, not what forward() has kept of it.
+  bool scale_reads_raster() const { return !is_coarse(); }
   /// Whether backward() loads whole vectors where the image ends: memory behind it must be there.
   bool loads_behind_images() const { return is_coarse(); }
 

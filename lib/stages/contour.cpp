@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <limits>
 
 #include "image/texture_words.hpp"
@@ -61,58 +62,65 @@ bool light_may_jump(const Mesh& mesh, std::span<const glm::vec3> positions, cons
   });
 }
 
-cl_uint4 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge,
-                std::size_t first_vertex, std::size_t first_face) {
-  cl_uint4 row{{to_uint(first_vertex) + edge.first, to_uint(first_vertex) + edge.second,
-                to_uint(first_face) + edge.face, DPR_NO_FACE}};
+cl_uint2 joined(const Mesh& mesh, std::span<const glm::vec3> positions, const WeldedEdge& edge,
+                std::size_t first_face) {
+  cl_uint2 row{{3 * (to_uint(first_face) + edge.face) + edge.corner, DPR_NO_FACE}};
   if (!edge.other) return row;
-  row.s[3] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
-  if (may_jump(mesh, edge)) row.s[2] |= DPR_EDGE_FLAG;
-  if (is_seam(mesh, positions, edge)) row.s[2] |= DPR_EDGE_SEAM;
-  if (light_may_jump(mesh, positions, edge)) row.s[3] |= DPR_EDGE_SEAM;
+  row.s[1] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
+  if (may_jump(mesh, edge)) row.s[0] |= DPR_EDGE_FLAG;
+  if (is_seam(mesh, positions, edge)) row.s[0] |= DPR_EDGE_SEAM;
+  if (light_may_jump(mesh, positions, edge)) row.s[1] |= DPR_EDGE_SEAM;
   return row;
+}
+
+/// Numbers a mesh's edges from `count` on, in the order of their sides: see DPR_FACE_SIDES.
+std::vector<cl_uint> number_edges(std::span<const WeldedEdge> edges, std::size_t faces, std::size_t count) {
+  std::vector<cl_uint> numbers(faces);
+  for (const WeldedEdge& edge : edges) numbers[edge.face] |= 1U << edge.corner;
+  for (cl_uint& of_face : numbers) {
+    const cl_uint sides = of_face;
+    of_face |= to_uint(count) * DPR_FACE_SIDES;
+    count += static_cast<std::size_t>(std::popcount(sides));
+  }
+  return numbers;
+}
+
+/// As kernels/contour.h has it.
+std::size_t number_of(const WeldedEdge& edge, std::span<const cl_uint> numbers) {
+  const cl_uint sides = numbers[edge.face], before = sides & ((1U << edge.corner) - 1);
+  return sides / DPR_FACE_SIDES + static_cast<std::size_t>(std::popcount(before));
 }
 
 }  // namespace
 
 Edges::Edges(Device::Impl& device, const Scene& scene, std::span<const MeshRange> meshes,
              std::span<const glm::vec3> positions) {
-  std::vector<cl_uint4> rows;
-  std::size_t first_vertex = 0, first_face = 0;
+  constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
+  std::vector<cl_uint2> rows;
+  std::vector<cl_uint> all_numbers;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
+    const std::size_t first_face = all_numbers.size();
+    if (first_face + mesh.faces.size() > k_most) {
+      throw InvalidArgument("faces (scene)", "more than " + std::to_string(k_most),
+                            "at most that many with noise of the pixel");
+    }
     const std::span<const glm::vec3> own = positions.subspan(meshes[m].first_position, mesh.positions.size());
     const std::vector<WeldedEdge> welded = make_welded_edges(own, mesh.faces);
-    for (const WeldedEdge& edge : welded) rows.push_back(joined(mesh, own, edge, first_vertex, first_face));
+    const std::vector<cl_uint> numbers = number_edges(welded, mesh.faces.size(), rows.size());
+    rows.resize(rows.size() + welded.size());
+    for (const WeldedEdge& edge : welded)
+      rows[number_of(edge, numbers)] = joined(mesh, own, edge, first_face);
+    all_numbers.insert(all_numbers.end(), numbers.begin(), numbers.end());
     solids.emplace_back(welded, mesh.faces.size());
-    first_vertex += mesh.positions.size();
-    first_face += mesh.faces.size();
   }
   count = rows.size();
-  if (first_face >= DPR_EDGE_SEAM) {
-    throw InvalidArgument("faces (scene)", std::to_string(first_face),
-                          "fewer than 2^30 with noise of the pixel");
-  }
-
-  std::vector<cl_uint> starts(first_vertex + 1, 0), by_vertex(2 * count);
-  for (const cl_uint4& row : rows) {
-    for (int end = 0; end < 2; ++end) ++starts[row.s[end] + 1];
-  }
-  for (std::size_t v = 0; v < first_vertex; ++v) starts[v + 1] += starts[v];
-  std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
-  for (std::size_t edge = 0; edge < count; ++edge) {
-    for (cl_uint end = 0; end < 2; ++end) by_vertex[next[rows[edge].s[end]]++] = to_uint(2 * edge) + end;
-  }
   if (rows.empty()) rows.emplace_back();  // never read, but an argument all the same
   edges.upload(device, rows);
-  end_starts.upload(device, starts);
-  if (by_vertex.empty()) by_vertex.emplace_back();
-  ends.upload(device, by_vertex);
+  face_edges.upload(device, all_numbers);
 }
 
-std::size_t Edges::bytes() const {
-  return edges.capacity_bytes() + end_starts.capacity_bytes() + ends.capacity_bytes();
-}
+std::size_t Edges::bytes() const { return edges.capacity_bytes() + face_edges.capacity_bytes(); }
 
 Contour::Contour(Device::Impl& device)
     : device_(device),
@@ -185,10 +193,11 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
-  fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.end_starts,
-        in.edges.ends, in.facing, in.transform.ndc, in.transform.world, in.geometry.face_vertices, in.clipped,
-        in.geometry.face_colors(), in.geometry.colors_of(in.p), pair_starts, pair_count, place_contour_,
-        pair_tile, places_);
+  const Incidence& corners = in.geometry.vertex_corners;
+  fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.face_edges,
+        corners.starts, corners.corners, in.facing, in.transform.ndc, in.transform.world,
+        in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
+        pair_starts, pair_count, place_contour_, pair_tile, places_);
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
   link_(pairs, to_uint(capacity), pair_count, places_, place_contour_, pair_contour, edge_pairs_);
@@ -197,13 +206,13 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
                      Buffer<cl_float4>& grad_clip) {
   const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
-  gather_(vertices, in.p, params(in), pair_starts, edge_pairs_, in.edges.end_starts, in.edges.ends, grad_ends,
-          grad_ndc);
-  if (in.p.clips == 0) return;
   const Incidence& corners = in.geometry.vertex_corners;
+  gather_(vertices, in.p, params(in), pair_starts, edge_pairs_, in.edges.face_edges, corners.starts,
+          corners.corners, grad_ends, grad_ndc);
+  if (in.p.clips == 0) return;
   gather_cuts_(vertices, in.p, params(in), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
-               in.transform.ndc, in.clipped, corners.starts, corners.corners, pair_starts, edge_pairs_,
-               in.edges.end_starts, in.edges.ends, grad_ends, grad_ndc, grad_clip);
+               in.transform.ndc, in.clipped, pair_starts, edge_pairs_, in.edges.face_edges, corners.starts,
+               corners.corners, grad_ends, grad_ndc, grad_clip);
 }
 
 std::size_t Contour::bytes() const {

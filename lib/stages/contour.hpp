@@ -22,9 +22,8 @@ struct Edges {
 
   std::size_t count = 0;
   std::vector<Solid> solids;   ///< [mesh], for the first who wants them
-  Buffer<cl_uint4> edges;      ///< [edge] ends, own face, other face: see DPR_EDGE_FLAG
-  Buffer<cl_uint> end_starts;  ///< [vertex + 1] runs of `ends`
-  Buffer<cl_uint> ends;        ///< edge * 2 + end, by vertex
+  Buffer<cl_uint2> edges;      ///< [edge] see DPR_EDGE_FLAG
+  Buffer<cl_uint> face_edges;  ///< [face] see DPR_FACE_SIDES
 
   std::size_t bytes() const;
 };
@@ -77,20 +76,20 @@ class Contour {
   void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint4>, In<cl_uchar>, In<cl_float4>, In<cl_float4>,
+  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint2>, In<cl_uchar>, In<cl_float4>, In<cl_float4>,
          In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
       count_;
-  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_uint>,
-         In<cl_uchar>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>,
-         In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
+  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint2>, In<cl_uint>, In<cl_uint>,
+         In<cl_uint>, In<cl_uchar>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>,
+         In<cl_uint4>, In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_float4>, Out<cl_float4>>
+         In<cl_uint>, In<cl_float4>, Out<cl_float4>>
       gather_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_uint4>,
+  Kernel<shared::FrameParams, shared::ContourParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
+         In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
       gather_cuts_;
   Scan scan_;
   Sort sort_;

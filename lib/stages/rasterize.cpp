@@ -267,7 +267,7 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
                          const Bin& bin, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range range = pairs(bin);
-  grad_corners.resize(device_, std::size_t{9} * bin.pairs);
+  grad_corners.resize(device_, Length::varying(std::size_t{9} * bin.pairs));
   backward_(range, p, range.last(), triangles, bin.pair_face, fragment_starts, fragment_pixel, distance,
             grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
   if (clip != nullptr)

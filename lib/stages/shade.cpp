@@ -97,7 +97,7 @@ void Shade::light(const ShadeInputs& in) {
 void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
   const bool is_textured = !in.geometry.textures.empty();
   for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
-  grad_corner_colors.resize(device_, std::size_t{9} * in.bin.pairs);
+  grad_corner_colors.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
   if (lit()) light_backward(in, grad);
   if (is_textured) {
     surface->backward(in.surface(), grad_base(grad), lit(), grad_bary1, grad_bary2, grad_corner_colors);
@@ -112,10 +112,10 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
 void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
   const Range pairs = in.rasterize.pairs(in.bin);
   if (now_.kernels->model.is_textured) grad_base_.resize(device_, in.rasterize.fragments);
-  grad_corner_positions_.resize(device_, std::size_t{9} * in.bin.pairs);
-  grad_corner_normals_.resize(device_, std::size_t{9} * in.bin.pairs);
-  grad_materials.resize(device_, std::size_t{DPR_MATERIAL_CHANNELS} * in.bin.pairs);
-  grad_eye.resize(device_, std::size_t{3} * in.bin.pairs);
+  grad_corner_positions_.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
+  grad_corner_normals_.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
+  grad_materials.resize(device_, Length::varying(std::size_t{DPR_MATERIAL_CHANNELS} * in.bin.pairs));
+  grad_eye.resize(device_, Length::varying(std::size_t{3} * in.bin.pairs));
   now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
                          in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
                          in.geometry.colors_of(in.p), in.transform.world, in.geometry.face_normals(),

@@ -11,6 +11,7 @@
 
 #include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
+#include "pipeline/determinism.hpp"
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "renderer/renderer_impl.hpp"
@@ -215,6 +216,25 @@ TEST_SUITE("pipeline") {
     CHECK(alone.face_id == b.face_id);
     CHECK(alone.depth == b.depth);
     CHECK(alone.normal == b.normal);
+  }
+
+  TEST_CASE("aov: of noise on the pixel, between backward passes, change no gradient") {
+    // By a coarse grid, where the samples' gradient takes the place of the samples.
+    Scene scene = two_meshes(reduced(32, 16), reduced(32, 16));
+    scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
+    scene.smoothing.sigma = 0.1F;
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    REQUIRE_FALSE(renderer.impl().pixel_noise->blur.scale_reads_raster());
+    const std::vector<Image> grads(1, random_image(scene.width, scene.height, -1.0F, 1.0F));
+    const SceneGradient first = renderer.backward(grads), second = renderer.backward(grads);
+    CHECK(first.sigma != 0);
+    CHECK(same_bits(first, second));
+    CHECK(&renderer.impl().pixel_noise->grad_raster(renderer.impl().aggregate.image) ==
+          &renderer.impl().aggregate.image);
+    static_cast<void>(auxiliary_outputs(renderer));
+    CHECK(same_bits(first, renderer.backward(grads)));
   }
 
   TEST_CASE("aov: frames in bands show the same") {

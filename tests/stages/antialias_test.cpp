@@ -14,6 +14,7 @@
 using namespace dpr;
 using dpr::test::ContourFrame;
 using dpr::test::device_impl;
+using dpr::test::ends_of;
 using dpr::test::reduced;
 using dpr::test::pipeline::Random;
 
@@ -310,10 +311,10 @@ TEST_SUITE("unit") {
       if (!is_hidden) CHECK(sum_of(image, 1) == doctest::Approx(area_of(far) / unit).epsilon(2e-2));
       const std::vector<cl_uint> winners = frame.antialias.winner.download();
       const auto rim = static_cast<cl_uint>(near.size());
-      const std::vector<cl_uint4> edges = frame.edges.edges.download();
+      const std::vector<cl_uint2> edges = frame.edges.edges.download();
       const auto is_inner = [&](cl_uint w) {
         const std::size_t edge = w / DPR_CONTOUR_FLAGS;
-        return edge < edges.size() && edges[edge].s[0] >= rim;
+        return edge < edges.size() && ends_of(edges[edge], mesh.faces).x >= rim;
       };
       CHECK(std::ranges::any_of(winners, is_inner) == !is_hidden);
     }

@@ -13,6 +13,7 @@
 
 using namespace dpr;
 using dpr::test::ContourFrame;
+using dpr::test::ends_of;
 using dpr::test::reduced;
 
 namespace {
@@ -91,14 +92,13 @@ struct Found {
 Found found_contours(const ContourFrame& frame, const Mesh& mesh) {
   Found found;
   found.pairs = frame.contour.pairs;
-  const std::vector<cl_uint4> edges = frame.edges.edges.download();
+  const std::vector<cl_uint2> edges = frame.edges.edges.download();
   const std::vector<cl_uint> contours = frame.contour.pair_contour.download(),
                              tiles = frame.contour.pair_tile.download();
   for (std::size_t i = 0; i < frame.contour.pairs; ++i) {
-    const cl_uint4 edge = edges[contours[i] / DPR_CONTOUR_FLAGS];
+    const glm::uvec2 ends = ends_of(edges[contours[i] / DPR_CONTOUR_FLAGS], mesh.faces);
     auto& list = (contours[i] & DPR_CONTOUR_CREASE) != 0 ? found.creases : found.occludes;
-    const bool is_new =
-        list[segment(mesh.positions[edge.s[0]], mesh.positions[edge.s[1]])].insert(tiles[i]).second;
+    const bool is_new = list[segment(mesh.positions[ends.x], mesh.positions[ends.y])].insert(tiles[i]).second;
     CHECK(is_new);  // one of two edges at the same place stands for both
   }
   return found;
@@ -132,6 +132,24 @@ TEST_SUITE("unit") {
       colorful.face_colors.emplace_back(static_cast<float>(f % 3), 0.5F, 1.0F);
     }
     check_contours(colorful);
+  }
+
+  TEST_CASE("contour: edges take a number for each of their faces, and each face one more") {
+    const Mesh mesh = make_icosphere(reduced(3, 1));
+    const ContourFrame frame(seen(mesh), 16, 16);
+    constexpr std::size_t k_most_padding = 2 * 32 * sizeof(cl_uint2);
+    CHECK(frame.edges.count == mesh.faces.size() * 3 / 2);
+    CHECK(frame.edges.bytes() <= mesh.faces.size() * 4 * sizeof(cl_uint) + k_most_padding);
+    const std::vector<cl_uint2> edges = frame.edges.edges.download();
+    const std::vector<cl_uint> of_faces = frame.edges.face_edges.download();
+    std::size_t edge = 0;
+    for (cl_uint side = 0; side < 3 * mesh.faces.size(); ++side) {
+      const cl_uint of_face = of_faces[side / 3];
+      if ((of_face >> side % 3 & 1) == 0) continue;
+      if (side % 3 == 0 || (of_face & ((1U << side % 3) - 1)) == 0) CHECK(of_face / DPR_FACE_SIDES == edge);
+      CHECK(edges[edge++].s[0] == side);
+    }
+    CHECK(edge == frame.edges.count);
   }
 
   TEST_CASE("contour: boundaries, and faces that wind the other way") {

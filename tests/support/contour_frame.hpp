@@ -11,6 +11,14 @@
 
 namespace dpr::test {
 
+/// The vertices at the ends of an edge.
+inline glm::uvec2 ends_of(const cl_uint2& edge, const std::vector<glm::uvec3>& faces) {
+  const cl_uint side = edge.s[0] & ~(DPR_EDGE_FLAG | DPR_EDGE_SEAM);
+  const glm::uvec3& face = faces[side / 3];
+  const int corner = static_cast<int>(side % 3);
+  return {face[corner], face[(corner + 1) % 3]};
+}
+
 /// One view of one mesh, whose positions are x, y in NDC and z the view depth.
 class ContourFrame {
  public:

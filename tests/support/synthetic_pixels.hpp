@@ -147,7 +147,7 @@ class SyntheticFrame {
       poison(*buffer, fragments_);
     }
     const std::size_t pixels = frame_.width;
-    poison(aggregate_.channels, DPR_PIXEL_CHANNELS * pixels);
+    poison(aggregate_.channels, aggregate_.channel_count() * pixels);
     poison(aggregate_.grad_distance, fragments_);
     poison(aggregate_.grad_sigma, pixels);
     aggregate_.backward(inputs(), background, grad);
@@ -165,7 +165,8 @@ class SyntheticFrame {
     const auto channel = [&](std::size_t c, std::size_t i) { return channels[c * pixels + i]; };
     for (std::size_t i = 0; i < pixels; ++i) {
       g.gamma.push_back(channel(DPR_CHANNEL_GAMMA, i));
-      g.alpha.push_back(channel(DPR_CHANNEL_ALPHA, i));
+      g.alpha.push_back(aggregate_.channel_count() > DPR_CHANNEL_ALPHA ? channel(DPR_CHANNEL_ALPHA, i)
+                                                                       : 0.0F);
       g.background.emplace_back(channel(DPR_CHANNEL_BACKGROUND, i), channel(DPR_CHANNEL_BACKGROUND + 1, i),
                                 channel(DPR_CHANNEL_BACKGROUND + 2, i));
     }
