@@ -285,31 +285,46 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
   }
 }
 
-/// Adds the gradients of contours' ends to those of the vertices: each vertex the edges at its corners in
-/// order, each edge its pairs. One work-item per (view, vertex). Deterministic. in      pair_starts uint[view
-/// * edge + 1]  runs of `edge_pairs` in      edge_pairs    uint[...] in      face_edges    uint[face] see
-/// DPR_FACE_SIDES in      corner_starts uint[vertex + 1]       runs of `corners` in      corners uint[corner]
-/// face * 3 + corner, by vertex in      grad_ends     float4[pair]           of x, y of the first end, x, y
-/// of the second, NDC in out  grad_ndc      float4[view][vertex]
-kernel void contour_gather(const FrameParams p, const ContourParams c,
-                           global const uint* restrict pair_starts, global const uint* restrict edge_pairs,
-                           global const uint* restrict face_edges, global const uint* restrict corner_starts,
-                           global const uint* restrict corners, global const float4* restrict grad_ends,
-                           global float4* restrict grad_ndc) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= p.views * p.vertices) return;
-  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+/// Adds the gradients of contours' ends to those of the vertices: each vertex the contours at its corners in
+/// order, each contour its pairs. One work-item per end of a pair: vertices are many, and few have a contour.
+/// That of the first pair of the first contour of a vertex sums for the vertex. Deterministic.
+/// in      pairs         uint[1]                how many there are
+/// in      pair_contour  uint[pair]             see DPR_CONTOUR_FLAGS
+/// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`
+/// in      edge_pairs    uint[...]
+/// in      edges         uint2[edge]            of the scene; see DPR_EDGE_FLAG
+/// in      faces         uint4[face]            vertex indices
+/// in      face_edges    uint[face]             see DPR_FACE_SIDES
+/// in      corner_starts uint[vertex + 1]       runs of `corners`
+/// in      corners       uint[corner]           face * 3 + corner, by vertex
+/// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
+/// in out  grad_ndc      float4[view][vertex]
+kernel void contour_gather(const FrameParams p, const ContourParams c, global const uint* restrict pairs,
+                           global const uint* restrict pair_contour, global const uint* restrict pair_starts,
+                           global const uint* restrict edge_pairs, global const uint2* restrict edges,
+                           global const uint4* restrict faces, global const uint* restrict face_edges,
+                           global const uint* restrict corner_starts, global const uint* restrict corners,
+                           global const float4* restrict grad_ends, global float4* restrict grad_ndc) {
+  const uint i = (uint)get_global_id(0), pair = i / 2;
+  if (pair >= pairs[0]) return;
+  const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / c.edges;
+  const uint own = contour - view * c.edges;
+  if (own >= c.mesh_edges || edge_pairs[pair_starts[contour]] != pair) return;
+  const uint4 record = record_of(edges[own], faces);
+  const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
+  global const uint* starts = pair_starts + view * c.edges;
+  uint first = DPR_NO_MESH_EDGE;
   float2 sum = 0.0f;
-  const uint last = 2 * corner_starts[vertex + 1];
   for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
-    const uint of_mesh = edge_at(face_edges, corners[k / 2], k % 2), edge = view * c.edges + of_mesh;
-    if (of_mesh == DPR_NO_MESH_EDGE) continue;
-    for (uint place = pair_starts[edge]; place < pair_starts[edge + 1]; ++place) {
+    const uint edge = edge_at(face_edges, corners[k / 2], k % 2);
+    if (edge == DPR_NO_MESH_EDGE || starts[edge] == starts[edge + 1]) continue;
+    first = min(first, edge);
+    for (uint place = starts[edge]; place < starts[edge + 1]; ++place) {
       const float4 grad = grad_ends[edge_pairs[place]];
       sum += k % 2 ? grad.zw : grad.xy;
     }
   }
-  grad_ndc[i] += (float4)(sum, 0.0f, 0.0f);
+  if (first == own) grad_ndc[view * p.vertices + vertex] += (float4)(sum, 0.0f, 0.0f);
 }
 
 /// The gradients of a contour's ends, summed over its pairs.

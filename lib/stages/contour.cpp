@@ -205,14 +205,14 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
                      Buffer<cl_float4>& grad_clip) {
-  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
   const Incidence& corners = in.geometry.vertex_corners;
-  gather_(vertices, in.p, params(in), pair_starts, edge_pairs_, in.edges.face_edges, corners.starts,
-          corners.corners, grad_ends, grad_ndc);
+  gather_(2 * pairs, in.p, params(in), pair_count, pair_contour, pair_starts, edge_pairs_, in.edges.edges,
+          in.geometry.face_vertices, in.edges.face_edges, corners.starts, corners.corners, grad_ends,
+          grad_ndc);
   if (in.p.clips == 0) return;
-  gather_cuts_(vertices, in.p, params(in), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
-               in.transform.ndc, in.clipped, pair_starts, edge_pairs_, in.edges.face_edges, corners.starts,
-               corners.corners, grad_ends, grad_ndc, grad_clip);
+  gather_cuts_(std::size_t{in.p.views} * in.p.vertices, in.p, params(in), in.views.cameras, in.edges.edges,
+               in.geometry.face_vertices, in.transform.ndc, in.clipped, pair_starts, edge_pairs_,
+               in.edges.face_edges, corners.starts, corners.corners, grad_ends, grad_ndc, grad_clip);
 }
 
 std::size_t Contour::bytes() const {

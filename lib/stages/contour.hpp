@@ -85,7 +85,7 @@ class Contour {
       fill_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, Out<cl_float4>>
+         In<cl_uint2>, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
       gather_;
   Kernel<shared::FrameParams, shared::ContourParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
          In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
