@@ -8,8 +8,8 @@
 #include "lens.h"
 #include "shared_types.h"
 
-/// A corner of a list of faces, read where it lies: an index that varies would put the face into memory. 3, that
-/// of no corner, names the last.
+/// A corner of a list of faces, read where it lies: an index that varies would put the face into memory. 3,
+/// that of no corner, names the last.
 static inline uint corner_in(global const uint4* face, uint corner) {
   return ((global const uint*)face)[min(corner, 2u)];
 }
