@@ -220,7 +220,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("aov: of noise on the pixel, between backward passes, change no gradient") {
     // By a coarse grid, where the samples' gradient takes the place of the samples.
-    Scene scene = two_meshes(reduced(32, 16), reduced(32, 16));
+    Scene scene = two_meshes(32, 32);
     scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
     scene.smoothing.sigma = 0.1F;
     Renderer renderer(open_device());
