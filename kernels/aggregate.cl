@@ -60,36 +60,26 @@ DPR_ALWAYS_INLINE void gather_pixel(const AggregateParams p, uint pixel, uint le
   gather_run(q, length, f, slots + q.first + pixel, run);
 }
 
-/// Short runs each by a copy of their own for its length, which a CPU unrolls.
+/// A copy of gather_pixel() for runs of one length.
+#define DPR_GATHER_RUN_OF(LENGTH)                                               \
+  case LENGTH:                                                                  \
+    gather_pixel(p, pixel, LENGTH, views, starts, f, slots, run, transparency); \
+    return
+
+/// Short runs each by a copy of their own, which a CPU unrolls.
 static inline void gather_slots(const AggregateParams p, uint pixel, global const ViewParams* restrict views,
                                 global const uint* restrict starts, const Fragments f, global Slot* slots,
                                 Slots* run, float* transparency) {
   const uint length = starts[pixel + 1] - starts[pixel];
   switch (DPR_LANES == 1 ? 0 : length) {
-    case 1:
-      gather_pixel(p, pixel, 1, views, starts, f, slots, run, transparency);
-      break;
-    case 2:
-      gather_pixel(p, pixel, 2, views, starts, f, slots, run, transparency);
-      break;
-    case 3:
-      gather_pixel(p, pixel, 3, views, starts, f, slots, run, transparency);
-      break;
-    case 4:
-      gather_pixel(p, pixel, 4, views, starts, f, slots, run, transparency);
-      break;
-    case 5:
-      gather_pixel(p, pixel, 5, views, starts, f, slots, run, transparency);
-      break;
-    case 6:
-      gather_pixel(p, pixel, 6, views, starts, f, slots, run, transparency);
-      break;
-    case 7:
-      gather_pixel(p, pixel, 7, views, starts, f, slots, run, transparency);
-      break;
-    case 8:
-      gather_pixel(p, pixel, 8, views, starts, f, slots, run, transparency);
-      break;
+    DPR_GATHER_RUN_OF(1);
+    DPR_GATHER_RUN_OF(2);
+    DPR_GATHER_RUN_OF(3);
+    DPR_GATHER_RUN_OF(4);
+    DPR_GATHER_RUN_OF(5);
+    DPR_GATHER_RUN_OF(6);
+    DPR_GATHER_RUN_OF(7);
+    DPR_GATHER_RUN_OF(8);
     default:
       gather_pixel(p, pixel, length, views, starts, f, slots, run, transparency);
   }
