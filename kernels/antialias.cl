@@ -3,13 +3,17 @@
 // contour, and its derivative by what is cut is the jump across it. What crosses, and how much it cuts,
 // antialias_cross.cl finds.
 //
-// Few steps are crossed: samples are blended where they lie, and only those near a contour are kept as they
-// were. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all of its rows.
+// Few steps are crossed: samples are blended where they lie, by those near contours as antialias_fade.cl has
+// faded and kept them. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all
+// of its rows.
 #include "touched.h"
 
-/// Keeps the samples near contours, or their gradients, which the blending changes. One work-item per row of
-/// a tile. in   tile_starts  uint[view * tile + 1]  runs of contours' pairs in   from         float4[pixel]
-/// out  kept         float4[pixel]  not written in tiles further than one from a contour
+/// Keeps the gradients of the samples near contours, which the passes that follow change where they lie. One
+/// work-item per DPR_ROWS of a tile. Deterministic.
+///
+/// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
+/// in   from         float4[pixel]
+/// out  kept         float4[pixel]          not written in tiles further than one from a contour
 kernel void antialias_keep(const FrameParams p, global const uint* restrict tile_starts,
                            global const float4* restrict from, global float4* restrict kept) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
@@ -41,7 +45,7 @@ static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
 #pragma unroll 1
   for (int k = 0; k < DPR_STEPS; ++k) {
     if (!is_contour(at_step(p, steps, s, k))) continue;
-    const Parts parts = parts_taken(steps.cut[place_of(p, steps, s, k)], turn_of(k));
+    const Parts parts = parts_taken(cut_at(p, steps, s, k), turn_of(k));
     const Taken taken = taken_at(p, steps, s, k, raster);
     sum += parts.x * taken.difference + parts.y * taken.changes;
     total += parts.x;
@@ -52,7 +56,7 @@ static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
 /// Blends the samples. One work-item per DPR_ROWS of a tile. Deterministic.
 /// in      tile_starts  as antialias_keep has it
 /// in      winner, cut  as antialias_cross leaves them
-/// in      raster       float4[pixel]  the samples, as antialias_keep has kept them
+/// in      raster       float4[pixel]  the samples, as antialias_fade has faded them
 /// in out  blended      float4[pixel]  the samples
 kernel void antialias_forward(const FrameParams p, global const uint* restrict tile_starts,
                               global const uint* restrict winner, global const float2* restrict cut,
@@ -76,12 +80,12 @@ static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample
   const Taken taken = taken_at(p, steps, s, step, raster);
   const float4 added = total > 1.0f ? added_to(p, steps, s, raster) : 0.0f;
   const Parts grad_parts = (Parts)(dot(grad, taken.difference - added), dot(grad, taken.changes)) / total;
-  return parts_taken_gradient(steps.cut[place_of(p, steps, s, step)], turn_of(step), grad_parts);
+  return parts_taken_gradient(cut_at(p, steps, s, step), turn_of(step), grad_parts);
 }
 
 /// The parts that a sample takes at a step that is crossed.
 static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s, int step, float total) {
-  return parts_taken(steps.cut[place_of(p, steps, s, step)], turn_of(step)) / total;
+  return parts_taken(cut_at(p, steps, s, step), turn_of(step)) / total;
 }
 
 /// What a sample is to the samples at a step from it, itself among them, if that is crossed; and to those

@@ -43,10 +43,6 @@ static inline int step_that_fades(const FrameParams p, const Steps steps, Sample
   return -1;
 }
 
-static inline Cut cut_at(const FrameParams p, const Steps steps, Sample s, int step) {
-  return steps.cut[place_of(p, steps, s, step)];
-}
-
 static inline float share_at(const FrameParams p, const Steps steps, Sample s, int step) {
   return step < 0 ? 0.0f : share_faded(cut_at(p, steps, s, step), turn_of(step));
 }

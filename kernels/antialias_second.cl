@@ -237,7 +237,7 @@ static inline void add_to_end(const FrameParams p, const Steps steps, uint tile,
 /// in      tile_starts      as antialias_cross has it: seconds are where contours are
 /// in      counts, seconds  as antialias_second_find leaves them
 /// in      winner, cut      as antialias_cross does
-/// in      raster           float4[pixel]    the samples
+/// in      raster           float4[pixel]    the samples, as antialias_fade has faded them
 /// in out  blended          float4[pixel]
 kernel void antialias_second_forward(const FrameParams p, global const uint* restrict tile_starts,
                                      global const uint* restrict counts,

@@ -49,6 +49,10 @@ static inline uint place_of(const FrameParams p, const Steps steps, Sample s, in
   return (step & 1 ? steps.pixels : 0) + first.index;
 }
 
+static inline Cut cut_at(const FrameParams p, const Steps steps, Sample s, int step) {
+  return steps.cut[place_of(p, steps, s, step)];
+}
+
 static inline Sample sample_at(const FrameParams p, uint index) {
   const uint line = index / p.width;
   const Sample s = {index, (int2)((int)(index % p.width), (int)(line % p.height))};
@@ -95,8 +99,7 @@ static inline float total_taken(const FrameParams p, const Steps steps, Sample s
   float sum = 0.0f;
 #pragma unroll
   for (int k = 0; k < DPR_STEPS; ++k) {
-    if (is_contour(at_step(p, steps, s, k)))
-      sum += parts_taken(steps.cut[place_of(p, steps, s, k)], turn_of(k)).x;
+    if (is_contour(at_step(p, steps, s, k))) sum += parts_taken(cut_at(p, steps, s, k), turn_of(k)).x;
   }
   return fmax(sum, 1.0f);
 }

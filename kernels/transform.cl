@@ -103,9 +103,11 @@ static inline void store_sums(float8 sum, float8 error, uint first, uint count, 
 /// From the gradients of what transform_forward leaves to those of the world positions, in place, and the
 /// sums over the vertices of a mesh of what they add to the gradients of its pose and of the camera. A vertex
 /// that no kept triangle uses has zero gradient, wherever it lies. One work-item per (view, mesh, slot).
-/// Deterministic. in      views, models, world  as transform_forward in      starts      uint[view * mesh +
-/// 1]  of the vertices, [view][vertex] in      grad_clip   float4[view][vertex]   what clipped faces add, of
-/// homogeneous coordinates: x and y in
+/// Deterministic.
+///
+/// in      views, models, world  as transform_forward
+/// in      starts      uint[view * mesh + 1]  of the vertices, [view][vertex]
+/// in      grad_clip   float4[view][vertex]   what clipped faces add, of homogeneous coordinates: x and y in
 ///                     NDC, times depth, and depth; orthographic: x, y, depth. Where the lens distorts,
 ///                     without its distortion: what it does to cuts is left out of its own gradients. Read
 ///                     where p.clips is set
