@@ -58,7 +58,7 @@ void run(const BenchOptions& options, const CommonOptions& common) {
   run_bench(options.measure, common);
 }
 
-/// What --help says after the options.
+/// Text of --help after the options.
 std::string footer() {
   std::string text = "Workloads:\n";
   for (const auto& names : {bench::workload_names(), bench::sweep_names()}) {

@@ -7,7 +7,7 @@
 
 namespace dpr::bench {
 
-/// What two timings {"median", "q1", "q3", "n"} say of each other. "same" if the medians differ by no more
+/// Compares two timings {"median", "q1", "q3", "n"}. "same" if the medians differ by no more
 /// than 5%. "faster" or "slower" (the second than the first) if they do and the middle halves of the runs do
 /// not overlap: the second's q3 lies below the first's q1, or its q1 above the first's q3. "unclear" where
 /// they overlap, or where either timing has fewer than 5 runs, whose quartiles say little.

@@ -1,4 +1,4 @@
-// What the stages cost: floating-point operations and bytes, counted in the sources and written down here, so
+// Costs of the stages: floating-point operations and bytes, counted in the sources and written down here, so
 // that a reader can check a fraction of a peak. One line of the table a kernel; units are those of
 // frame_work.hpp.
 //
@@ -85,7 +85,7 @@ inline constexpr double k_softmax_slot = k_exp + 8, k_softmax_slot_backward = 2 
 inline constexpr double k_sampled_slot = k_normal_sample + 4;
 inline constexpr double k_sampled_slot_backward = k_sampled_slot + k_normal_sample + 2;
 
-/// What a stage of a frame costs, forward and backward; nothing for stages and members that are not counted.
+/// Cost of a stage of a frame, forward and backward; empty for stages and members that are not counted.
 struct StageCost {
   Cost forward, backward;
 };

@@ -6,7 +6,7 @@
 namespace dpr::bench {
 namespace {
 
-/// Where a row has what a column shows.
+/// JSON paths of the columns within a row.
 std::vector<std::string> columns() {
   std::vector<std::string> paths{"workload", "preset",    "composition", "estimator", "samples", "sigma",
                                  "seed",     "triangles", "width",       "height",    "views"};

@@ -17,7 +17,7 @@ namespace {
 
 using cli::Json;
 
-/// Of PoCL, the ICD loader, this library, oclgrind, Mesa, Intel, NVIDIA and OpenMP.
+/// Prefixes of the variables of PoCL, the ICD loader, this library, oclgrind, Mesa, Intel, NVIDIA and OpenMP.
 constexpr std::string_view k_prefixes[] = {"POCL_", "OCL_",     "OPENCL_", "DPR_",  "OCLGRIND_", "RUSTICL_",
                                            "LP_",   "GALLIUM_", "NEO_",    "CUDA_", "OMP_"};
 
@@ -32,7 +32,7 @@ Json variables() {
   return found;
 }
 
-/// What follows a key and a separator in the first such line of a file; empty without one.
+/// Text after a key and a separator in the first such line of a file; empty without one.
 std::string value_of(const char* file, const std::string& key, char separator) {
   std::ifstream stream(file);
   for (std::string line; std::getline(stream, line);) {

@@ -1,4 +1,4 @@
-// What a measurement's figures depend on beside the program and the OpenCL device.
+// The environment that a measurement depends on, beside the program and the OpenCL device.
 #pragma once
 
 #include "cli/json.hpp"

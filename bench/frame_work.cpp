@@ -22,7 +22,7 @@ double kernel_constant(std::string_view file, std::string_view name) {
   return std::strtod(text.data() + at + definition.size(), nullptr);
 }
 
-/// Where the Gaussian integrals are evaluated, as kernels/prior_gaussian.h and quadrature.h have it.
+/// Quadrature of the Gaussian integrals, as in kernels/prior_gaussian.h and quadrature.h.
 struct Rule {
   static double of_prior(std::string_view name) { return kernel_constant("prior_gaussian.h", name); }
   static double of_any(std::string_view name) { return kernel_constant("quadrature.h", name); }

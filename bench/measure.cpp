@@ -78,7 +78,7 @@ class Budget {
   Clock::time_point start_ = Clock::now();
 };
 
-/// What they have in common, and every run in its turn.
+/// Quartiles of the runs, and every run in order.
 Json timing_of(const std::vector<double>& milliseconds) {
   Json timing = quartiles(milliseconds);
   for (const double run : milliseconds) timing["runs"].push_back(rounded(run));
@@ -106,7 +106,7 @@ Json to_json(const TransferCounts& before, const TransferCounts& after) {
           {"host_waits", after.host_waits - before.host_waits}};
 }
 
-/// Of a frame as a descent has it: the vertices have moved. No image goes to the host.
+/// Counts the transfers of a frame of a descent: the vertices have moved, and no image goes to the host.
 void count_transfers(Row& row, const Workload& workload, Json& result) {
   const Device::Impl& device = row.renderer.device().impl();
   const TransferCounts before = device.transfers();

@@ -11,7 +11,7 @@ namespace dpr::bench {
 
 using cli::Json;
 
-/// Of a results file, as bench/README.md describes it. What later versions add, a file may lack.
+/// Schema of a results file, as bench/README.md describes it. A file may lack later versions' additions.
 inline constexpr int k_results_schema = 1;
 
 /// Reads a file that `dpr bench -o` wrote. Throws IoError where it cannot be read or is not JSON,
@@ -21,7 +21,7 @@ Json read_results(const std::filesystem::path& file);
 /// Names a row: workload, preset, composition, estimator and samples, with what a sweep varies.
 std::string row_name(const Json& row);
 
-/// Whether the row has figures.
+/// True if the row has figures.
 bool is_measured(const Json& row);
 
 /// Forward and backward milliseconds of a measured row together: the sum of their medians, or q1 or q3.

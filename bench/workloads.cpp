@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t k_exact = 0;  // in a list of sample counts
 
-/// What the scene has beside its mesh. inside: the camera, so that faces cross the near plane.
+/// Additions to the scene's mesh. inside: the camera is inside, so that faces cross the near plane.
 enum class Scenery { plain, inside, textured, lit };
 
 struct Definition {

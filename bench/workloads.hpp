@@ -31,7 +31,7 @@ struct Workload {
 std::vector<std::string_view> workload_names();
 std::vector<std::string_view> sweep_names();
 
-/// What a workload is, in a line.
+/// A workload's description, one line.
 std::string_view describe(std::string_view name);
 
 /// Throws InvalidArgument for a name that is none of them.

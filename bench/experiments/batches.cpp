@@ -11,8 +11,8 @@
 namespace dpr::experiments {
 namespace {
 
-/// Of spheres and tori, no two with as many faces, in other colours, lights and views; 64x64, as networks
-/// learn from.
+/// Scenes of spheres and tori of different numbers of faces, colours, lights and views; 64x64 pixels, as
+/// networks learn from.
 std::vector<Scene> unlike_scenes(unsigned count) {
   std::vector<Scene> scenes;
   for (unsigned i = 0; i < count; ++i) {

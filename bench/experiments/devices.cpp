@@ -31,7 +31,7 @@ double evaluate_milliseconds(MultiDeviceRenderer& renderer) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// For 1, 2, ... devices; all in turn, so that whatever else the machine does hits all of them.
+/// Times for 1, 2, ... devices, taken in turn so that other work on the machine hits all of them.
 std::vector<std::vector<double>> measure_all(std::vector<MultiDeviceRenderer>& renderers,
                                              unsigned repetitions) {
   std::vector<std::vector<double>> times(renderers.size());

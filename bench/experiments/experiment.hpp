@@ -17,7 +17,7 @@ namespace dpr::experiments {
 
 using cli::Json;
 
-/// What the command line says, for every experiment.
+/// Settings of every experiment, from the command line.
 struct Settings {
   Device device;
   std::filesystem::path folder;  ///< exists; where everything goes

@@ -32,7 +32,7 @@ class Random {
     const float x = (*this)(low, high), y = (*this)(low, high);
     return {x, y, (*this)(low, high)};
   }
-  /// Of length 1, above the horizon and in front.
+  /// A unit vector above the horizon and in front.
   glm::vec3 towards_light() {
     const float x = (*this)(-1, 1), y = (*this)(0.1F, 1);
     return glm::normalize(glm::vec3(x, y, (*this)(0.3F, 1)));
@@ -96,7 +96,7 @@ struct Kind {
   std::vector<Figure> (*errors)(const Lights& found, const Lights& truth);
 };
 
-/// Of the distance from the middle of the shape.
+/// Error in per cent of the distance from the middle of the shape.
 double position_error(const glm::vec3& found, const glm::vec3& truth) {
   return 100 * static_cast<double>(glm::distance(found, truth) / glm::length(truth));
 }

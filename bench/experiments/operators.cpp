@@ -16,7 +16,7 @@ struct Curve {
   Response response;
 };
 
-/// Whether the library has an estimator for it.
+/// True if the library has an estimator for the smoothing.
 bool is_valid(const Smoothing& smoothing) {
   try {
     validate(smoothing);

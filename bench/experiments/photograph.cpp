@@ -38,7 +38,7 @@ std::vector<Landmark> read_landmarks(const std::filesystem::path& file) {
   return landmarks;
 }
 
-/// Where an image of that size shows a point, pixels from its upper left corner.
+/// Projection of a point, in pixels from the upper left corner of an image of that size.
 glm::dvec2 pixel_of(const Camera& camera, int width, int height, const glm::vec3& point) {
   const Projection p = projection(camera, width, height);
   const glm::dvec4 at = glm::dmat4(camera.view) * glm::dvec4(point, 1);
@@ -121,7 +121,7 @@ Camera gone_around(Camera camera, const Mesh& mesh, float degrees) {
   return camera;
 }
 
-/// Where the photograph counts, how well colours agree, decibels.
+/// Agreement of the colours where the photograph counts, in decibels.
 double psnr_inside(const Settings& settings, const ShapeViews& views, const Mesh& mesh) {
   const ShapeView& view = views.views[0];
   Image image = cli::render_rigidly(settings.device, mesh, {view.camera}, views.width, views.height,

@@ -1,4 +1,4 @@
-// What a device can do at most: multiply-adds that depend on nothing else, and a stream through memory.
+// Peaks of a device: independent multiply-adds, and a stream through memory.
 #include "lanes.h"
 
 /// Independent chains of a work-item: enough to hide the latency of a multiply-add, few enough to stay in registers.

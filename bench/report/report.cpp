@@ -34,7 +34,7 @@ std::vector<const Json*> rows_where(const Json& results, const std::function<boo
 
 bool is_sweep(const Json& row) { return row["workload"].get<std::string>().starts_with("sweep-"); }
 
-/// What a legend calls a file: its device, and its commit where there are several files.
+/// A file's name in legends: its device, and its commit if there are several files.
 std::string label_of(const Json& results, std::size_t files) {
   const std::string device = results["device"]["name"].get<std::string>();
   constexpr std::size_t k_short_commit = 7;
@@ -88,7 +88,7 @@ Plot stage_plot(const Json& results) {
   return {k_width, k_margins + k_row_height * static_cast<int>(rows.size()), script.str()};
 }
 
-/// What a sweep varies, and how its axis is called.
+/// Variable of a sweep, and the label of its axis.
 struct Axis {
   const char *workload, *label;
   double (*value)(const Json& row);
@@ -186,8 +186,7 @@ Plot memory_plot(std::span<const Json> files) {
               "\nset logscale x\nset yrange [0:*]\nset ylabel 'peak memory, MiB'\n" + panel};
 }
 
-/// What a stage reaches of the device's peaks: a point a row, below the roof that its operations a byte
-/// allow.
+/// Roofline: a point for each row's stage, below the roof that its operations a byte allow.
 Plot roofline_plot(const Json& results) {
   const Json& device = results["device"];
   if (!device.contains("peak_gflops")) return {};

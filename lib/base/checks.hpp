@@ -1,5 +1,4 @@
-// What the checks of the scene's parts share: how a value reads in a message, and the conditions they have in
-// common.
+// Helpers that the checks of the scene's parts share: a value's text in messages, and common conditions.
 #pragma once
 
 #include <charconv>
@@ -14,7 +13,7 @@
 
 namespace dpr::checks {
 
-/// Of an image, in pixels.
+/// Largest side of an image, in pixels.
 inline constexpr int k_largest_side = 16384;
 
 /// The shortest text that reads back as the same number; independent of the locale.

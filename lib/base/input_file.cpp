@@ -9,7 +9,7 @@
 namespace dpr {
 namespace {
 
-/// Of a pipe or a device: what is longer has no end, such as /dev/zero.
+/// Most bytes read from a pipe or a device. A longer one, such as /dev/zero, is taken to have no end.
 constexpr std::size_t k_most_streamed = std::size_t{1} << 28U;
 
 constexpr std::size_t k_chunk = std::size_t{1} << 16U;

@@ -13,7 +13,7 @@ namespace {
 
 std::string in_quotes(std::string_view key) { return "\"" + std::string(key) + "\""; }
 
-// What a value is, for messages.
+// Describes a value in messages.
 std::string describe(const nlohmann::json& value) {
   constexpr std::size_t k_longest = 40;
   if (value.is_object()) return "an object";

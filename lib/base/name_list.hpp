@@ -18,8 +18,8 @@ std::string joined(std::span<const std::string_view> names);
 /// "a, b,c" as its items, without the spaces around them. An item may be empty; an empty text has none.
 std::vector<std::string> split_list(std::string_view text);
 
-/// Where a name stands in the list. Throws InvalidArgument, which calls what the word is for `argument`, for
-/// a word that is none of them.
+/// Index of a name in the list. Throws InvalidArgument for a word that is not in it; the message calls the
+/// word's purpose `argument`.
 std::size_t position_of(std::string_view word, std::span<const std::string_view> names,
                         const std::string& argument);
 

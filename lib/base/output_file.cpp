@@ -40,7 +40,7 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-/// What is there now, if anything is. Throws IoError where it is nothing that can be written.
+/// Status of the file, if it exists. Throws IoError if it cannot be written.
 std::optional<Status> find(const std::filesystem::path& file) {
   Status status{};
   if (stat(file.c_str(), &status) != 0) {

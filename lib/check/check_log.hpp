@@ -1,4 +1,4 @@
-// Where the parts of the self-test put their comparisons, and the parts themselves.
+// The self-test's parts, and the log that collects their comparisons.
 #pragma once
 
 #include <chrono>
@@ -55,7 +55,7 @@ class CheckLog {
 void check_lists(const Device& device, CheckLog& log);
 /// Vertices, fragments, colours and occupancies of a frame, stage by stage, its image, and all gradients.
 void check_frame(const Device& device, CheckLog& log);
-/// What the near plane cuts.
+/// Triangles that the near plane cuts.
 void check_clipping(const Device& device, CheckLog& log);
 /// The exact aggregation of every prior in both compositions.
 void check_aggregation(const Device& device, CheckLog& log);

@@ -284,7 +284,7 @@ inline double block_error(const Block& block, double tolerance) {
   return std::isfinite(error) ? error : INFINITY;
 }
 
-/// Where the image jumps or kinks: within a distance of a few roundings, NDC.
+/// Pixels at which the image jumps or kinks within a few roundings, in NDC.
 struct Delicate {
   std::vector<bool> jump;  ///< [pixel] a triangle's distance equals the blur radius
   std::vector<bool> kink;  ///< [pixel] a jump, or on an edge's line, or as near to one edge as to another

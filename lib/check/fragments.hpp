@@ -1,5 +1,5 @@
-// What the rasterizer and the shading say of a frame's fragments, pixel by pixel, as double precision: what
-// independent evaluations of a member of the family start from.
+// A frame's fragments after rasterization and shading, pixel by pixel, in double precision. Independent
+// evaluations of the renderer's members start from them.
 #pragma once
 
 #include <array>

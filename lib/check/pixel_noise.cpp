@@ -11,9 +11,9 @@
 namespace dpr::check {
 namespace {
 
-/// What is left of the samples' cells, of a blur of two pixels and 4x4 samples in each.
+/// Largest difference of an image from the reference, for a blur of two pixels and 4x4 samples a pixel.
 constexpr double k_blurred_image = 1.5e-3;
-/// Of the derivative along a direction, relative.
+/// Largest relative difference of a directional derivative.
 constexpr double k_blurred_gradient = 3e-3;
 
 Scene blurred_cube() {

@@ -11,9 +11,9 @@ namespace dpr::check {
 namespace {
 
 constexpr std::uint32_t k_samples = 4096;
-/// Of a mean of so many samples of 0 or 1: five standard errors, for the worst of many pixels.
+/// Largest error of a mean of k_samples values of 0 or 1: five standard errors, for the worst of many pixels.
 constexpr double k_mean_of_samples = 0.04;
-/// Of the norm of a gradient, whose score has heavier tails.
+/// Largest error relative to the gradient's norm. The score has heavier tails.
 constexpr double k_sampled_gradient = 0.1;
 
 Scene sampled_scene(Composition composition) {

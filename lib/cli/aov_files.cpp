@@ -26,7 +26,7 @@ Aov parse(const std::string& name) {
   }
 }
 
-/// Of the mean over pixels and colour channels: without a target, what there is to differentiate.
+/// Gradient of the mean over pixels and colour channels, which is differentiated where there is no target.
 Image mean_gradient(const Scene& scene) {
   const float share = 1.0F / (3.0F * static_cast<float>(scene.width) * static_cast<float>(scene.height));
   return {scene.width, scene.height, glm::vec4(share, share, share, 0)};

@@ -1,4 +1,4 @@
-// What a program of commands does with its arguments and with errors.
+// Arguments and errors of a program with commands.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -8,7 +8,7 @@
 namespace dpr::cli {
 
 void add_devices_command(CLI::App& application, CommonOptions& common);
-/// What is in a file; no device is opened.
+/// Describes a file's content; opens no device.
 void add_info_command(CLI::App& application, CommonOptions& common);
 void add_render_command(CLI::App& application, CommonOptions& common);
 void add_gradient_command(CLI::App& application, CommonOptions& common);

@@ -107,7 +107,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
 
 namespace {
 
-/// What the options say of a device that was opened.
+/// Applies the options to an opened device.
 void set_up(Device& device, const CommonOptions& options) {
   constexpr std::size_t k_mebibyte = 1024 * 1024;
   print_notes(device.info().passed_over, options);

@@ -32,7 +32,7 @@ struct CommonOptions {
 
 /// The help group of the smoothing's flags.
 inline constexpr const char* k_smoothing_group = "Smoothing (each replaces the scene's value)";
-/// Whether the command line gave any option of a help group.
+/// True if the command line gives any option of a help group.
 bool gives_any(const CLI::App& command, const std::string& group);
 
 /// --seed, as scene files take it: the command line's library would read -1 as 2^64 - 1.
@@ -56,7 +56,7 @@ SmoothingOptions smoothing_options(const CommonOptions& options);
 /// Puts --size, --seed and the smoothing flags into a scene that no file describes: what they leave open is
 /// the scene's. Throws InvalidArgument.
 void apply(const CommonOptions& options, Scene& scene);
-/// What a file asked for and the program leaves out, one line each on stderr; with --quiet nothing.
+/// Prints what the program leaves out of a file, one line each on stderr; nothing with --quiet.
 void print_notes(const Notes& notes, const CommonOptions& options);
 
 /// The scene that the file describes, with these in the place of its values; and print_notes().

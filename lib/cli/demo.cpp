@@ -115,7 +115,7 @@ void write_views(const std::filesystem::path& folder, const Device& device, cons
   write_json(folder / "views.json", {{"width", k_size}, {"height", k_size}, {"views", views}});
 }
 
-/// What the other commands take, so that they can be tried on it.
+/// Writes files on which the other commands can be tried.
 void write_inputs(const std::filesystem::path& folder, const Device& device, const Scene& scene,
                   const Pose& truth, const Pose& start, const Image& target) {
   write_mesh(folder / "cube.obj", scene.meshes.front().mesh);

@@ -56,7 +56,7 @@ void resize(ShapeViews& views, glm::ivec2 size) {
 }
 
 /// The views that the file describes, with --size, --seed and the smoothing flags in the place of its values.
-/// Where none of them says anything of the smoothing, it is the solver's.
+/// Reads the views. The smoothing is the solver's if neither the file nor the options name one.
 ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
                       const CommonOptions& common) {
   Notes notes;
@@ -91,7 +91,7 @@ void require_measured(const CLI::App& command, const char* name, float weight, c
                         "an image of one beside every view's, in the views file");
 }
 
-/// What can be wrong about the output is found out before the work, not after it.
+/// Checks the outputs before the work.
 void check_outputs(const FitCommandOptions& options) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".obj" && extension != ".ply") {
@@ -101,7 +101,7 @@ void check_outputs(const FitCommandOptions& options) {
   if (!options.checkpoint.empty()) require_writable(options.checkpoint);
 }
 
-/// Of the views whose cameras are not known. What looks unlikely is told.
+/// Finds the cameras of the views that have none. Reports unlikely results.
 void find_cameras(const Device& device, ShapeViews& views, bool robust, const CommonOptions& common) {
   PoseOptions options;
   options.solve_focal = true;
@@ -116,7 +116,7 @@ void find_cameras(const Device& device, ShapeViews& views, bool robust, const Co
   }
 }
 
-/// Whether to look for a light; colours are what shows where cameras were known.
+/// True if the light is looked for. Known cameras mean that colours are shown without light.
 bool finds_light(const std::string& word, bool is_photographed) {
   if (word.empty()) return is_photographed;
   if (word != "harmonics" && word != "fixed")
@@ -124,8 +124,7 @@ bool finds_light(const std::string& word, bool is_photographed) {
   return word == "harmonics";
 }
 
-/// Of what the command line leaves open, what suits a template: it keeps its faces, its colours and much of
-/// its shape.
+/// Defaults for a template, which keeps its faces, its colours and much of its shape.
 void bend_template(const CLI::App& command, FitCommandOptions& options) {
   const ShapeOptions bending = template_shape_options();
   const auto take = [&](const char* name, auto ShapeOptions::*member) {

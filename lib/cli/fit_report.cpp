@@ -156,7 +156,7 @@ Scene rigid_scene(const Mesh& mesh, const Camera& camera, int width, int height)
   return scene;
 }
 
-/// Of numbers that a view has measured, where the shape is seen: each channel's absolute difference.
+/// Mean absolute difference of a view's measured numbers, by channel, where the shape is seen.
 struct MeanDifference {
   double sum = 0, weight = 0;
 

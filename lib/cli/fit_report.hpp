@@ -1,4 +1,4 @@
-// What the shape solver did, as numbers, pictures and plots.
+// Report of the shape solver: numbers, pictures and plots.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ class FitObserver {
  public:
   FitObserver(unsigned iterations, bool quiet, ShapeSolver::Callback keep = {});
 
-  /// For ShapeSolver::solve(). Must not outlive the observer.
+  /// The callback for ShapeSolver::solve(). It must not outlive the observer.
   ShapeSolver::Callback callback();
 
  private:
@@ -52,7 +52,7 @@ class FitReport {
   void write(const PageSource& source, const ShapeResult& result, bool quiet) const;
 
  private:
-  /// What work returns on the first device that is not lost.
+  /// Returns the result of `work` on the first device that is not lost.
   template <class Work>
   auto on_any_device(const Work& on) const;
   std::vector<Image> render(const Mesh& mesh, const std::vector<Camera>& cameras) const;

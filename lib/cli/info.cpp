@@ -48,7 +48,7 @@ std::string counted(std::size_t count, const char* what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-/// What dpr does with a mesh that its user may not expect.
+/// Notes on a mesh's treatment that its user may not expect.
 Json mesh_notes(const Mesh& mesh, const MeshFacts& facts) {
   Json notes = Json::array();
   if (facts.faces_without_area > 0)

@@ -17,7 +17,7 @@ using OptionNames = std::map<std::string, std::string>;
 /// argument.
 std::string option_argument(const CLI::App& command, const OptionNames& names, const std::string& argument);
 
-/// What `work` returns; an InvalidArgument that it throws names the option in place of the field.
+/// Returns the result of `work`. An InvalidArgument that it throws names the option in place of the field.
 template <typename Work>
 auto with_option_names(const CLI::App& command, const OptionNames& names, Work work) {
   try {

@@ -10,7 +10,7 @@
 
 namespace dpr::cli {
 
-/// What a page says of where it comes from.
+/// Origin of a page.
 struct PageSource {
   std::string title, command, device;
 };

@@ -22,7 +22,7 @@ const char* const k_least_squares_group = "Least squares (--method least_squares
 const char* const k_descent_group =
     "Descent (--method descent; any of these, or of the smoothing's, implies it)";
 
-/// What the paper gives its schedule, which shrinks the smoothing by a tenth every 50 iterations.
+/// Iterations of the paper's schedule, which shrinks the smoothing by a tenth every 50 iterations.
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
@@ -93,7 +93,7 @@ PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rota
   return solver.solve(initial, callback);
 }
 
-/// What may help where the target is not explained: what was not asked for.
+/// Options that were not given and may help if the target is not explained.
 std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
   std::string text;
   const auto add = [&](const char* option, const char* why) {
@@ -123,7 +123,7 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
 }
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
-  // What can be wrong about the output is found out before the work, not after it.
+  // The outputs are checked before the work.
   require_writable(options.output);
   std::optional<glm::dmat3> rotation;
   if (!options.initial_rotation.empty()) {

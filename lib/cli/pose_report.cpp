@@ -1,4 +1,4 @@
-// What the pose solver did, as numbers, pictures and plots.
+// Report of the pose solver: numbers, pictures and plots.
 #include "cli/pose_report.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t k_strip_length = 12;  // the start among them
 
-/// What the scene's transform holds beside rotation and translation: its scale.
+/// Scale in the scene's transform, beside rotation and translation.
 glm::dmat3 stretch_of(const Scene& scene) {
   return polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch;
 }
@@ -37,7 +37,7 @@ class PoseCamera {
     renderer_.set_scene(scene);
   }
 
-  /// What was found: of a solver's step or result.
+  /// Renders the pose of a solver's step or result.
   template <typename Found>
   Image render(const Found& found, const Smoothing& smoothing) {
     return render(calibrated(camera_, found.focal_scale, found.radial), found.pose, smoothing);

@@ -1,4 +1,4 @@
-// What the pose solver did, as numbers, pictures and plots.
+// Report of the pose solver: numbers, pictures and plots.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// What a program owes those who run it, beside its work.
+// Signals and streams of a program's process.
 #pragma once
 
 namespace dpr::cli {

@@ -30,8 +30,8 @@ class Progress {
   unsigned total_;
   bool quiet_, is_terminal_, line_is_open_ = false;
   unsigned printed_tenths_ = 0;
-  /// Of the update that time is counted from: earlier runs may have done much of the work, and a further
-  /// attempt begins anew.
+  /// Share at the update from which time is counted: earlier runs may have done much of the work, and a
+  /// further attempt begins anew.
   double first_share_ = 0, last_share_ = 0;
   Clock::time_point first_time_;
 };

@@ -1,4 +1,4 @@
-// What a file of results, or a page, says about where they come from.
+// Provenance of results, in files and on pages.
 #pragma once
 
 #include <span>

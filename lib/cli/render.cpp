@@ -64,8 +64,8 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   return camera;
 }
 
-/// For a picture: edges blurred by a quarter of a pixel. Flags that describe another member of the family
-/// start from the triangles' noise, with as little noise in depth as seams allow.
+/// Smoothing of a picture: edges blurred by a quarter of a pixel. Flags that describe another member of the
+/// family start from the triangles' noise, with as little noise in depth as seams allow.
 Smoothing picture_smoothing(const SmoothingOptions& flags, glm::ivec2 size) {
   constexpr float k_blur_pixels = 0.25F, k_gamma_of_triangles = 1e-3F;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(size.x, size.y));  // NDC

@@ -10,7 +10,7 @@
 
 namespace dpr {
 
-/// What the pixels of a file are.
+/// Pixel format of a file to write.
 struct PixelFormat {
   std::string extension;  ///< of the file, without the dot
   int channels = 4;       ///< 3 or 4
@@ -18,14 +18,14 @@ struct PixelFormat {
   bool srgb = true;       ///< what a file of bytes says that they are
 };
 
-/// What a file says of its pixels.
+/// Pixel format found in a file.
 struct PixelFacts {
   bool has_alpha = false;
   bool floats = false;  ///< or else whole numbers, as parts of the largest one
 };
 
-/// What a module does. Its functions throw std::runtime_error with the reason. Where it only writes, `read`
-/// is null.
+/// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module
+/// that only writes.
 struct ImageCodec {
   /// The pixels as they are stored, finite or not; whole numbers from 0 to 1.
   Image (*read)(const std::string& file, PixelFacts& facts);

@@ -1,4 +1,4 @@
-// What files say of textures: the names of wraps and filters, in the order of their enumerations.
+// Names of texture wraps and filters in files, in the order of their enumerations.
 #pragma once
 
 #include <algorithm>

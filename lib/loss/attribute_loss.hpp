@@ -10,9 +10,10 @@ class AttributeLoss {
  public:
   AttributeLoss(const Device& device, const AttributeTarget& target, unsigned levels);
 
-  /// Of the renderer's last images, one value a view.
+  /// The loss of the renderer's last images, one value a view.
   std::span<const double> evaluate(const Renderer& renderer);
-  /// Of the mean over the views, after evaluate(): those of the targets, or a batch that they are part of.
+  /// The gradient of the mean over the views, after evaluate(): the targets' views, or those of a batch that
+  /// contains them.
   SceneGradient backward();
   void set_views_of_mean(std::size_t count);
 

@@ -94,7 +94,7 @@ std::vector<cl_float4> rgba_of(std::span<const Image> images, std::size_t pixels
   return result;
 }
 
-/// Of the pixels of all views: what their masks say, or 1 without masks.
+/// Weights of all views' pixels: their masks, or 1 without masks.
 std::vector<float> weights_of(std::span<const Image> masks, std::size_t pixels) {
   if (masks.empty()) return std::vector<float>(pixels, 1.0F);
   std::vector<float> result;

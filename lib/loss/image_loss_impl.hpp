@@ -1,4 +1,4 @@
-// What an ImageLoss holds on its device.
+// State of an ImageLoss on its device.
 #pragma once
 
 #include <cstdint>
@@ -73,11 +73,11 @@ struct ImageLoss::Impl {
             level.target,
             level.windows};
   }
-  /// Of images that the targets are for; throws InvalidArgument for others.
+  /// Evaluates the loss. Throws InvalidArgument for images of another size or number than the targets.
   void evaluate(const FrameImages& images);
   /// The total, once everything of that frame is there.
   double finish(std::uint64_t number);
-  /// Of the mean over the levels: value by view, and gradient.
+  /// Evaluates the mean over the levels: a value a view, and the gradient.
   void evaluate(const Buffer<cl_float4>& image);
   /// Adds the gradients of the attributes after evaluate().
   void add_attribute_gradients(SceneGradient& gradient);

@@ -1,4 +1,4 @@
-// What a MeshLoss holds on its device.
+// State of a MeshLoss on its device.
 #pragma once
 
 #include <cstdint>

@@ -9,8 +9,8 @@ namespace dpr {
 /// Throws InvalidArgument unless an image of that size holds a window.
 void require_window(int width, int height);
 
-/// What windows count: [view][height][width], in proportion to the mask at their middle, and over the colour
-/// channels of a view 1 in all. Throws InvalidArgument where a mask leaves none.
+/// Weights of the windows, [view][height][width]: in proportion to the mask at a window's centre, with a sum
+/// of 1 over a view's colour channels. Throws InvalidArgument where a mask leaves no window.
 std::vector<float> ssim_windows(std::span<const Image> masks);
 
 class Ssim {
@@ -24,7 +24,7 @@ class Ssim {
 
   explicit Ssim(Device::Impl& device);
 
-  /// What windows add to the similarity of their views: from `similarity[first]` on, by pixel.
+  /// Writes each window's share of its view's similarity, by pixel, from `similarity[first]` on.
   void forward(const Images& in, std::size_t first, Buffer<float>& similarity);
   /// After forward() of the same images: takes the gradient of `weights[view]` times the similarity from
   /// `grad_image`.

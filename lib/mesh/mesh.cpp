@@ -1,4 +1,4 @@
-// What makes a mesh one that can be rendered.
+// Validity of a mesh.
 #include "dpr/mesh.hpp"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What kind of surface a mesh is.
+// Topology of a mesh's surface.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace dpr {
 
-/// Of the surface, in which vertices at equal positions are one and triangles with two equal corners are left
-/// out: seams of colours, normals and texture coordinates do not cut it.
+/// Facts of the surface. Vertices at equal positions count as one, and triangles with two equal corners are
+/// left out, so that seams of colours, normals and texture coordinates do not cut the surface.
 struct MeshFacts {
   std::size_t distinct_positions = 0;
   std::size_t unused_vertices = 0;     ///< that no face refers to
@@ -25,7 +25,7 @@ struct MeshFacts {
   bool is_oriented() const { return reversed_edges == 0; }
 };
 
-/// Of a valid mesh. O(n log n).
+/// Computes the facts of a valid mesh in O(n log n).
 MeshFacts mesh_facts(const Mesh& mesh);
 
 }  // namespace dpr

@@ -67,7 +67,7 @@ class CombinationList {
   std::map<Key, std::uint32_t> indices_;
 };
 
-/// What the corners of the pieces refer to: `corners` are those of the faces.
+/// Indices of the pieces' corners; `corners` are those of the faces.
 std::vector<glm::uvec3> combine_corners(const MeshSubdivision& pieces, std::span<const glm::uvec3> corners,
                                         std::size_t values, Combinations& list) {
   std::vector<glm::uvec3> result;
@@ -172,7 +172,7 @@ std::vector<glm::dvec3> old_normals(const Mesh& mesh, const MeshSubdivision& sub
   return {mesh.normals.begin(), mesh.normals.end()};
 }
 
-/// Of length one, or 0 where there is no direction.
+/// The unit vector along a normal, or 0 if the normal is 0.
 glm::dvec3 direction_of(const glm::dvec3& normal) {
   const double length = glm::length(normal);
   return length > 0 ? normal / length : glm::dvec3(0);

@@ -8,7 +8,7 @@
 
 namespace dpr {
 
-/// Of a valid mesh. `computed_normals` as the member of MeshSubdivision; 0 for a mesh that gives normals.
+/// Subdivides a valid mesh. `computed_normals` is the member of MeshSubdivision; 0 for a mesh with normals.
 MeshSubdivision make_subdivision(const Mesh& mesh, std::span<const FacePiece> pieces, int computed_normals);
 
 }  // namespace dpr

@@ -272,7 +272,7 @@ class ObjReader {
     }
   }
 
-  /// Of a file that is not read.
+  /// Reason why a file is not read.
   static std::string what_is_wrong(const std::filesystem::path& file) {
     std::error_code error;
     return std::filesystem::exists(file, error) ? " is no regular file" : " is not there";

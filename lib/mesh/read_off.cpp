@@ -119,7 +119,7 @@ class OffReader {
     if (const auto found = color()) append_color(*found, first, mesh.faces.size(), mesh.face_colors);
   }
 
-  /// What is left of the line: nothing, an entry of a colour map (ignored), or RGB or RGBA in bytes or
+  /// Reads the rest of the line: nothing, an entry of a colour map (ignored), or RGB or RGBA in bytes or
   /// floats.
   std::optional<glm::vec3> color() {
     const std::size_t left = words_.size() - next_word_;

@@ -69,7 +69,7 @@ bool is_binary(std::string_view bytes) {
   return !text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size())).starts_with("solid");
 }
 
-/// Of a binary file that is as long as its header promises.
+/// Notes the attributes of a binary file whose length agrees with its header.
 void note_attributes(const std::filesystem::path& file, std::string_view bytes, Notes& notes) {
   std::size_t count = 0;
   for (std::size_t end = k_binary_header + k_binary_facet; end <= bytes.size(); end += k_binary_facet)

@@ -96,8 +96,8 @@ void split_long_edges(Halfedges& m, double longest) {
   }
 }
 
-/// Whether no face around `moved`, but those at `other`, turns over or gets an edge that is too long if it
-/// moves to `target`.
+/// True if `moved` can move to `target` without turning a face over or making an edge too long. Faces at
+/// `other` do not count.
 bool can_move(const Halfedges& m, VertexHandle moved, VertexHandle other, const Vec3d& target,
               double longest) {
   for (const VertexHandle v : m.vv_range(moved)) {

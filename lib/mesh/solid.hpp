@@ -1,4 +1,4 @@
-// Whether a mesh bounds a solid, and on which side of its faces that lies.
+// Parts of a mesh that bound a solid, and the side of their faces on which it lies.
 #pragma once
 
 #include <span>
@@ -14,9 +14,9 @@ class Solid {
   /// `edges` are those of the faces: make_welded_edges().
   Solid(std::span<const WeldedEdge> edges, std::size_t faces);
 
-  /// Whether all faces belong to such parts.
+  /// True if all faces belong to such parts.
   bool is_closed() const { return is_closed_; }
-  /// Whether they still do where vertices have moved: those that coincided may have parted.
+  /// True if they still do after vertices have moved: coincident ones may have parted.
   bool is_closed_at(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
   /// +1 where the faces of all parts wind counter-clockwise as seen from outside, -1 clockwise: the sign of
   /// the parts' volumes. 0 where they differ, or one is not closed or not finite.

@@ -129,7 +129,8 @@ inline std::vector<double> integrate_weights(Prior prior, const std::vector<Slot
   return weights;
 }
 
-/// For every k the sum of the other values. Subtracting from the total would lose them beside a huge value.
+/// The sum of all values but the k-th, for every k. Subtracting from the total would lose small values beside
+/// a huge one.
 inline std::vector<double> sums_of_others(const std::vector<double>& values) {
   std::vector<double> sums(values.size(), 0.0);
   double before = 0.0;
@@ -151,7 +152,7 @@ struct SlotGradient {
 
 /// With g_k = dL/dw_k, R = sum q, G = sum g q:
 ///     dL/dbeta_k = integral P q_k (g_k R - G) dt
-/// Where P vanishes so does the integrand, though q may be huge there.
+/// The integrand vanishes with P, though q may be huge there.
 inline void add_beta_gradient(const std::vector<Slot>& slots, const std::vector<double>& grad_weights,
                               const Integrand& at, double node_weight, std::vector<SlotGradient>& grad) {
   if (at.product == 0.0) return;

@@ -12,7 +12,8 @@
 
 namespace dpr::reference {
 
-/// Where the noise ends, in scales, and how far before that a cubic begins to take its density to zero.
+/// End of the noise, in scales, and the distance before it at which a cubic starts to take its density to
+/// zero.
 struct NoiseReach {
   double end = 0.0;
   double taper = 0.5;

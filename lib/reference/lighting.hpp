@@ -136,7 +136,7 @@ inline Vec3d ray_backward(const DirectionalLight&, const Vec3d&, const Ray& grad
 
 inline double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-/// Where a ray lies in the edge of a spot's cone: 0 outside to 1 inside.
+/// Position of a ray in the soft edge of a spot's cone: 0 outside to 1 inside.
 inline double in_edge(const SpotLight& light, const Vec3d& way) {
   const double outer = std::cos(radians(light.angle_degrees)),
                inner = std::cos(radians(light.inner_angle_degrees));
@@ -196,7 +196,7 @@ struct LightTerms {
   Vec3d specular;
 };
 
-/// What the highlight is a power of.
+/// Base of the highlight's power.
 inline double highlight_base(Shading shading, const Vec3d& l, const Vec3d& v, const Vec3d& n) {
   return shading == Shading::blinn ? dot(n, unit(l + v)) : dot(v, 2.0 * dot(n, l) * n - l);
 }

@@ -36,7 +36,7 @@ inline constexpr std::array k_losses{NamedLoss{Loss::mse, "mse"}, NamedLoss{Loss
                                      NamedLoss{Loss::silhouette, "silhouette"},
                                      NamedLoss{Loss::robust, "robust"}};
 
-/// Of the robust loss.
+/// Scale of the robust loss.
 inline constexpr double k_robust_scale = 0.1;
 
 struct LossResult {

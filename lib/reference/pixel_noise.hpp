@@ -8,7 +8,7 @@
 /// two crossings of a line, R is a smooth function. So Gauss-Legendre is exact to rounding, and finite
 /// differences of the image are as good as their step.
 ///
-/// Where triangles pass through each other and gamma is 0, the line of their crossing is not followed.
+/// The line along which triangles pass through each other is not followed at a gamma of 0.
 #pragma once
 
 #include "renderer.hpp"
@@ -163,7 +163,8 @@ class PixelNoiseRenderer {
     return result;
   }
 
-  /// What the line at height y adds to the pixels of each column: colour less the background, and alpha.
+  /// Contribution of the line at height y to the pixels of each column: colour less the background, and
+  /// alpha.
   std::vector<double> render_line(double y) const {
     std::vector<double> sums(4 * static_cast<std::size_t>(scene_.width));
     const double left = pixel_center(0, 0, size_).x, right = pixel_center(scene_.width - 1, 0, size_).x;

@@ -109,7 +109,7 @@ inline double score(Prior prior, double z) {
   throw std::invalid_argument("score: the uniform prior has no score");
 }
 
-/// What the panels of a prior look like, in units of gamma.
+/// Quadrature panels of a prior, in units of gamma.
 struct PanelRule {
   double lower;   ///< F(lower) and the mass below it are negligible
   double upper;   ///< 1 - F(upper) is negligible

@@ -99,7 +99,7 @@ inline double side_of_edge(const Vec2d& a, const Vec2d& b, const Vec2d& point) {
   return (falls ? side <= 0.0 : side > 0.0) ? 1.0 : -1.0;
 }
 
-/// Whether the triangle owns the sample: of triangles that share an edge, exactly one does.
+/// True if the triangle owns the sample. Exactly one of the triangles that share an edge does.
 inline bool is_inside(const NdcTriangle& t, const Vec2d& point) {
   const double orientation = double_area(t);
   for (std::size_t i = 0; i < 3; ++i) {

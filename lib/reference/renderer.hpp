@@ -281,7 +281,7 @@ inline Image render(const Scene& scene) {
   return image;
 }
 
-/// What the pixels accumulate before the transform is differentiated.
+/// Sums over pixels before the transform is differentiated.
 struct PixelSums {
   std::vector<Vec3d> ndc;          ///< per vertex: x, y in NDC and depth
   std::vector<Vec3d> homogeneous;  ///< per vertex, from faces that cross the near plane

@@ -26,14 +26,14 @@ struct ShadeGradient {
   Lights lights = zero_like({});  ///< every number but shininess
 };
 
-/// What highlights are multiplied by, and their exponent where it is above 0.
+/// Factor of the highlights, and their exponent if it is above 0.
 struct Material {
   Vec3d specular{1.0, 1.0, 1.0};
   double shininess = 0.0;
 };
 
-/// What a face has of its own: a material, and the world-space normals of its corners, of length one, where
-/// the mesh gives some. Its gradients are not here: they are compared with finite differences.
+/// A face's material, and the world-space unit normals of its corners if the mesh gives normals. Their
+/// gradients are compared with finite differences instead.
 struct FaceLook {
   Material material;
   std::optional<std::array<Vec3d, 3>> normals;
@@ -74,8 +74,7 @@ inline ShadeScene shade_prepare(std::vector<Vec3d> world, std::vector<Face> face
 /// Colours at the three corners of a triangle: three times the same for face colours.
 using CornerColors = std::array<Vec3d, 3>;
 
-/// What a triangle's base colour is made of: its corners' colours, and a texture by which they are
-/// multiplied.
+/// Base colour of a triangle: its corners' colours times a texture.
 struct BaseColor {
   BaseColor(const CornerColors& corners_) : corners(corners_) {}
 
@@ -83,7 +82,7 @@ struct BaseColor {
   const Texture* texture = nullptr;
   std::array<Vec2d, 3> texcoords;
 
-  // For trilinear filtering: what is seen of the triangle a pixel further.
+  // The triangle and the pixel's size, by which trilinear filtering finds its level.
   NdcTriangle triangle;
   double pixel = 0.0;  ///< NDC
   bool perspective_correct = true;

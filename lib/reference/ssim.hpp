@@ -26,7 +26,7 @@ inline double rgba_at(const Image& image, int column, int row, int channel) {
   return image.rgba[static_cast<std::size_t>(4 * (row * image.width + column) + channel)];
 }
 
-/// Of one channel in the window about a pixel.
+/// Similarity of one channel in the window about a pixel.
 inline double window_ssim(const Image& image, const Image& target, int column, int row, int channel) {
   using W = SsimWindow;
   double x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;

@@ -234,8 +234,8 @@ inline TransformGradient transform_backward(const Vec3d& position, const Mat4d& 
   return g;
 }
 
-/// What the view matrix takes the camera's centre from: its translation. An orthographic camera stands very
-/// far behind, whatever the translation.
+/// The translation from which the camera's centre is computed. An orthographic camera stands very far behind,
+/// whatever its view's translation.
 inline Vec3d center_translation(const Camera& camera) {
   constexpr double k_far_away = 1e8;
   return camera.orthographic_height ? Vec3d{0.0, 0.0, -k_far_away} : translation_part(camera.view);

@@ -24,7 +24,7 @@ double radial_slope(const Distortion& d, double s) {
   return 1 + s * (3.0 * d.k1 + s * (5.0 * d.k2 + s * 7.0 * d.k3));
 }
 
-/// Where the slope has its own extremes, in [0, most], ascending, and those two ends.
+/// Extremes of the slope in [0, most], ascending, with the two ends.
 std::vector<double> slope_extremes(const Distortion& d, double most) {
   const double a = 21.0 * d.k3, b = 10.0 * d.k2, c = 3.0 * d.k1;  // a s^2 + b s + c
   std::vector<double> extremes{0.0, most};

@@ -16,7 +16,7 @@
 
 namespace dpr {
 
-/// What a scene's list of gradients may ask for.
+/// A name in a scene's list of gradients.
 struct GradientName {
   std::string_view word;
   bool GradientRequest::*wanted;
@@ -25,11 +25,10 @@ std::span<const GradientName> gradient_names();
 /// Asks for none.
 GradientRequest no_gradients();
 
-/// What an array of numbers is one of. Those of a view belong to it alone; the others are sums over the
-/// views.
+/// Owner of a gradient array. A view's arrays belong to it alone; the others are sums over the views.
 enum class GradientOf { scene, mesh, light, view, mesh_in_view, all_views };
 
-/// Whether a batch rendered in parts has the arrays one after the other, and not their sum.
+/// True if the arrays of a batch's parts are concatenated, not added.
 inline bool is_per_view(GradientOf of) {
   return of == GradientOf::view || of == GradientOf::mesh_in_view || of == GradientOf::all_views;
 }
@@ -51,15 +50,14 @@ struct GradientRow {
   /// arrays are those of the file's only view, and no file has those of `all_views`.
   std::string path;
   std::function<GradientArray(SceneGradient& gradient, GradientIndex index)> array;
-  /// Whether a scene has what this is the gradient of. None: every scene has.
+  /// True if a scene has the input whose gradient this is. Null: every scene has.
   std::function<bool(const Scene& scene)> exists = nullptr;
-  /// Of lights: how many there are of the kind.
+  /// Number of lights of the kind.
   std::function<std::size_t(const SceneGradient& gradient)> lights = nullptr;
 };
 std::span<const GradientRow> gradient_rows();
 
-/// Whether there is what one array of a row is the gradient of: in the scene, or in its view where the row is
-/// of views.
+/// True if the input of a row's array exists in the scene, or in its view if the row is a view's.
 bool exists(const GradientRow& row, GradientIndex index, const Scene& scene, std::span<const View> views);
 
 /// How many arrays of a row a gradient has.

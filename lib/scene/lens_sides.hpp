@@ -26,7 +26,7 @@ class LensSides {
   glm::dvec2 bend(glm::dvec2 tangent) const;
   /// A tangent further from the axis than this is shown outside of the image.
   double visible_radius(int width, int height) const;
-  /// What of a side in camera space is beyond the near plane; false where nothing is.
+  /// Clips a side in camera space at the near plane; false if nothing is left.
   bool clip(const glm::dvec3& a, const glm::dvec3& b, Segment& clipped) const;
   bool may_be_seen(const std::array<glm::dvec3, 3>& corners) const;
   bool is_off(const Segment& side) const;

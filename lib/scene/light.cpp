@@ -1,4 +1,4 @@
-// What makes lights that can be rendered with.
+// Validity of lights.
 #include "dpr/light.hpp"
 
 #include "base/checks.hpp"
@@ -15,7 +15,7 @@ void require_direction(const glm::vec3& direction, const std::string& argument) 
     throw InvalidArgument(argument, checks::text(direction), "a vector of length 1e-9 to 1e9");
 }
 
-/// What a kind asks for beyond finite numbers.
+/// Checks of each kind beyond finite numbers.
 void check(const PointLight&, const std::string&) {}
 
 void check(const DirectionalLight& light, const std::string& where) {

@@ -16,7 +16,7 @@ cl_float4 to_cl(const glm::dvec3& v, double w = 0) {
 
 double cosine(float degrees) { return std::cos(glm::radians(static_cast<double>(degrees))); }
 
-/// Of the basis, times what a white diffuse surface reflects of each order: 1, 2/3 and 1/4.
+/// Constants of the basis, times the reflectance of a white diffuse surface in each order: 1, 2/3 and 1/4.
 std::array<double, k_harmonics> harmonic_constants() {
   const auto root = [](double over_pi) { return std::sqrt(over_pi / std::numbers::pi); };
   const double first = 2.0 / 3 * root(0.75), second = 0.25 * root(3.75);

@@ -1,4 +1,4 @@
-// What makes a scene one that can be rendered.
+// Validity of a scene.
 #include "dpr/scene.hpp"
 
 #include <string>

@@ -17,7 +17,7 @@ Camera parse_camera(const JsonNode& node);
 /// The "smoothing" object of a scene.
 SmoothingOptions parse_smoothing(const JsonNode& node);
 
-/// What takes the place of a scene file's values.
+/// Values that replace those of a scene file.
 struct SceneOverrides {
   std::optional<glm::ivec2> size;  ///< pixels
   SmoothingOptions smoothing;
@@ -26,7 +26,7 @@ struct SceneOverrides {
 /// The same picture with other pixels: intrinsics, which are in pixels, follow.
 void resize(Scene& scene, glm::ivec2 size);
 
-/// What a scene file holds; `file` is what messages call it, and beside it the scene's meshes are looked for.
+/// Parses a scene file. Messages call it `file`, and the scene's meshes are looked for beside that path.
 /// The smoothing is resolved with the overrides, for their size. Throws as read_scene() does.
 Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes,
                   const SceneOverrides& overrides = {});

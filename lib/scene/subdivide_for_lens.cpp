@@ -50,8 +50,8 @@ std::vector<LensSides> lenses_before(std::size_t mesh, const Scene& scene, std::
   return lenses;
 }
 
-/// Whether what light sees of a mesh are the normals of the faces around vertices, of which pieces have
-/// others; -1 where its transform mirrors: given normals keep to their side there, those of faces do not.
+/// Nonzero if the mesh is lit by normals computed from the faces around its vertices, which pieces would
+/// change; -1 if its transform mirrors: given normals keep their side there, computed ones do not.
 int computed_normals(const Scene& scene, const Instance& entry) {
   if (!scene.lights || scene.lights->shading == Shading::flat || !entry.mesh.face_normals.empty()) return 0;
   return glm::determinant(glm::dmat3(entry.transform)) < 0 ? -1 : 1;
@@ -74,7 +74,7 @@ void require_same_meshes(const Scene& scene, const SubdividedScene& subdivided) 
                         std::to_string(subdivided.meshes.size()) + ", as the scene has that was cut");
 }
 
-/// What a face of the cut scene is a piece of.
+/// Origin of a face of the cut scene.
 struct OldFace {
   std::size_t face;                              ///< counted through the meshes of the scene
   const std::array<glm::vec3, 3>* barycentrics;  ///< none: it was not cut

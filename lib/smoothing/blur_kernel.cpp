@@ -144,7 +144,7 @@ std::vector<float> rounded(const Weights& weights) {
   std::vector<float> floats(weights.begin(), weights.end());
   double error = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) error += weights[i] - static_cast<double>(floats[i]);
-  // Of an even number of weights two are in the middle, of an odd number it is one twice.
+  // An even number of weights has two in the middle; an odd number has one, which gets both halves.
   floats[floats.size() / 2] += static_cast<float>(error / 2);
   floats[(floats.size() - 1) / 2] += static_cast<float>(error / 2);
   return floats;

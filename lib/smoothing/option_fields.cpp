@@ -9,7 +9,7 @@
 namespace dpr {
 namespace {
 
-/// What messages say of a value.
+/// A value's text in messages.
 std::string text_of(const OptionValue& value) {
   if (const auto* const word = std::get_if<std::string>(&value)) return "\"" + *word + "\"";
   if (const auto* const whole = std::get_if<std::int64_t>(&value)) return std::to_string(*whole);

@@ -50,7 +50,7 @@ void for_each_option(Visit&& visit) {
 /// The keys, in that order.
 std::vector<std::string_view> option_keys();
 
-/// What an option takes, as --help has it: "gaussian|cauchy|...", "FLOAT", "N".
+/// An option's type in --help: "gaussian|cauchy|...", "FLOAT", "N".
 template <SmoothingChoice Choice>
 std::string option_type(const std::optional<Choice>&) {
   return joined(names_of_choices<Choice>());
@@ -68,8 +68,8 @@ using OptionValue = std::variant<double, std::int64_t, std::string>;
 bool set_option(SmoothingOptions& options, std::string_view key, const OptionValue& value,
                 std::string_view where);
 
-/// What to tell of options that take the default, noise of the pixel, from a scene that says nothing of its
-/// smoothing, without a word on the noise; empty if these do not.
+/// Note for options that get the default noise, that of the pixel, because neither they nor the scene name
+/// one. Empty for all others.
 std::string noise_note(const SmoothingOptions& scene, const SmoothingOptions& options);
 
 }  // namespace dpr

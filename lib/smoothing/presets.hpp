@@ -1,4 +1,4 @@
-// What readers of presets' names check.
+// Checks of preset names for readers of files and options.
 #pragma once
 
 #include <string_view>

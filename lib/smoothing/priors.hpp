@@ -1,5 +1,4 @@
-// What the library knows of each prior, in double precision: a row of one table. Their kernels are
-// kernels/prior_<name>.h.
+// The table of priors, in double precision. Their kernels are kernels/prior_<name>.h.
 #pragma once
 
 #include <limits>
@@ -21,10 +20,10 @@ struct PriorRow {
   double (*score)(double z);
   /// The inverse CDF of u in (0, 1); null where the density is symmetric about 0 and upper_quantile says it.
   double (*asymmetric_quantile)(double u) = nullptr;
-  /// Where the blur radius ends, in sigmas, whatever the occupancy there.
+  /// Upper bound of the blur radius, in sigmas, for any occupancy there.
   double longest_reach = std::numeric_limits<double>::infinity();
   double variance = std::numeric_limits<double>::infinity();
-  /// What lies this much further behind, in scales, is the nearer one with a probability below 1e-9.
+  /// Depth difference, in scales, beyond which the further surface is in front with a probability below 1e-9.
   double hidden_behind = std::numeric_limits<double>::infinity();
   /// Noise of a pixel's position: where it ends, in scales, and how far before that its density, there below
   /// 4e-4 of the peak, Cauchy's below 3e-2, starts to fall to zero.

@@ -30,7 +30,7 @@ void take_estimators(const SmoothingOptions& given, Smoothing& smoothing) {
   take(given.aggregation_estimator, smoothing.aggregation_estimator);
 }
 
-/// What the options change.
+/// The smoothing that the options start from.
 Smoothing basis(const SmoothingOptions& given, int width, int height,
                 const std::optional<Smoothing>& otherwise) {
   if (given.preset) {

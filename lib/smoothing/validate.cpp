@@ -32,7 +32,7 @@ void validate_choices(const Smoothing& s) {
   require_known(s.noise, "noise (smoothing)");
 }
 
-/// What a sampled stage asks of its prior.
+/// Checks that a sampled stage can draw from its prior.
 void validate_sampled_prior(Prior prior, Draws draws, const std::string& stage) {
   const PriorRow& row = row_of(prior);
   const std::string name(row.name);
@@ -100,7 +100,7 @@ void validate_width(const Smoothing& s) {
   require_with(s.blur_radius.has_value(), "no blur_radius", "a blur_radius");
 }
 
-/// What noise of the pixel goes with.
+/// Checks that noise of the pixel is combined with members that support it.
 void validate_noise(const Smoothing& s) {
   const bool known = s.supersampling == 1 || s.supersampling == 2 || s.supersampling == 4;
   if (!known || (s.noise == Noise::triangle && s.supersampling != 1)) {

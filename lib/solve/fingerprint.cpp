@@ -1,4 +1,4 @@
-// What a checkpoint must have been made of: views, start and options.
+// Fingerprint of a fit's views, start and options, by which a checkpoint is recognised.
 #include "scene/light_table.hpp"
 #include "solve/hash.hpp"
 #include "solve/shape_state.hpp"

@@ -46,8 +46,8 @@ void substitute(const PoseSpace::Matrix& factor, std::size_t n, PoseSpace::Step&
   }
 }
 
-/// Whether the gradient is more than the pixels make by chance: the score test, g^T S^-1 g, S being the
-/// scatter of the pixels' gradients. What is elsewhere in the image, as clutter is, plays no part.
+/// True if the gradient exceeds what the pixels give by chance: the score test g^T S^-1 g, where S is the
+/// scatter of the pixels' gradients. Clutter elsewhere in the image plays no part.
 bool is_significant(const NormalEquations& equations, std::size_t parameters) {
   auto factor = equations.scatter;
   if (!factorize(factor, parameters)) return true;
@@ -84,7 +84,7 @@ void judge(Candidate& candidate, const Hypothesis& hypothesis, const NormalEquat
   }
 }
 
-/// Of those that came from another level.
+/// Linearizes the candidates that came from another level.
 void linearize(PoseLevel& level, std::vector<Candidate>& candidates) {
   std::vector<Candidate*> fresh;
   std::vector<Hypothesis> hypotheses;
@@ -105,7 +105,7 @@ double least_loss(const std::vector<Candidate>& candidates) {
   return std::ranges::min(candidates, {}, loss).equations.loss;
 }
 
-/// Whether the best candidate is still on its way: losses of all iterations so far.
+/// True if the best candidate still descends. `losses` are those of all iterations so far.
 bool still_falls(const std::vector<double>& losses) {
   constexpr std::size_t k_last = 3;
   constexpr double k_least_fall = 0.03;  // over the last iterations

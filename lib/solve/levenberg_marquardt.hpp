@@ -16,7 +16,7 @@ struct Candidate {
   bool is_still = false;        ///< no step at this level gains anything
   bool is_initial = false;      ///< descends from the first pose that was given
 
-  /// For another level.
+  /// Prepares the candidate for another level.
   void restart() { damping = 0, is_still = false; }
 };
 

@@ -18,13 +18,13 @@ enum class Measured { depth, normal };
 class MeasuredImages {
  public:
   MeasuredImages() = default;
-  /// Of files whose depths are so many lengths of the scene where they are 1.
+  /// depth_scale: lengths of the scene for a depth of 1 in the files.
   explicit MeasuredImages(float depth_scale) : depth_scale_(depth_scale) {}
 
   /// Pixels that are 0 do not count: alpha 0. Throws IoError, and InvalidArgument for another size than the
   /// picture's and for depths below 0.
   Image read(const std::filesystem::path& file, const Image& picture, Measured kind);
-  /// Of a view whose depths have been read: those that its camera cannot see.
+  /// Notes depths of a view outside its camera's range. Throws InvalidArgument where all lie outside.
   void check_range(const ShapeView& view, const std::string& name);
   void append_to(Notes& notes) const;
 

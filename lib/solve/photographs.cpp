@@ -67,7 +67,7 @@ Lights no_light() {
   return lights;
 }
 
-/// What a pixel shows: its colours in each harmonic, of radiance 1, and what they should add up to.
+/// A pixel's colours under each harmonic of radiance 1, and the colour that their sum should reach.
 struct LitPixel {
   std::array<glm::vec3, k_harmonics> terms;
   glm::vec3 wanted;

@@ -108,8 +108,8 @@ class Schedule {
   std::optional<AdaptiveSmoothing> adaptive_;
 };
 
-/// Where a descent starts: the initial pose, then that pose turned by a fixed angle about axes spread evenly
-/// over the sphere (a Fibonacci lattice).
+/// Start of a descent: the initial pose, then that pose turned by a fixed angle about axes spread evenly over
+/// the sphere (a Fibonacci lattice).
 Pose restart_pose(const Pose& initial, unsigned descent) {
   if (descent == 0) return initial;
   constexpr double k_turn_degrees = 60;  // out of the valley, not out of the neighbourhood
@@ -121,7 +121,7 @@ Pose restart_pose(const Pose& initial, unsigned descent) {
   return {rotation_from_vector(glm::radians(k_turn_degrees) * axis) * initial.rotation, initial.translation};
 }
 
-/// What one descent found: the best pose of its last smoothing level.
+/// Result of a descent: the best pose of its last smoothing level.
 struct Found {
   Pose pose;
   Smoothing smoothing;

@@ -17,12 +17,12 @@ namespace {
 constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
-// Of the blur: how far the rim of the object moves for a difference. A longer way would cross edges that the
-// residual does not see; a shorter one would drown in rounding.
+// Step of finite differences at the object's rim, as a part of the blur. A longer step would cross edges that
+// the residual does not see; a shorter one would drown in rounding.
 constexpr double k_difference = 0.3;
 
-// Of the robust loss, in standard deviations of the residuals; and the least, a colour difference that blur
-// and rounding leave of anything.
+// Scale of the robust loss, in standard deviations of the residuals, and its lower bound: the colour
+// difference that blur and rounding leave anywhere.
 constexpr float k_scale = 4, k_least_scale = 0.02F;
 constexpr int k_scale_iterations = 3;  // the light of the robust fit leaves other residuals
 
@@ -44,12 +44,12 @@ void average(const std::vector<cl_float4>& drawn, int width, int samples, std::v
   }
 }
 
-/// Of a pixel's squared colour difference (Geman & McClure 1985).
+/// Robust loss of a pixel's squared colour difference (Geman & McClure 1985).
 double robust(float weight, float squared, float inverse_scale_squared) {
   return static_cast<double>(weight * squared / (1 + squared * inverse_scale_squared));
 }
 
-/// What a pixel adds to gradient, and to the lower triangles of Hessian and scatter.
+/// Adds a pixel to the gradient and to the lower triangles of Hessian and scatter.
 void add_pixel(std::span<const cl_float4> jacobian, const float (&residual)[3], float weight,
                NormalEquations& result) {
   const std::size_t n = jacobian.size();

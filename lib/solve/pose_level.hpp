@@ -39,7 +39,7 @@ class PoseLevel {
   /// hypotheses leave at the object, beyond which a pixel hardly counts. Without any hypothesis that shows
   /// the object, squares stay.
   void estimate_scale(std::span<const Hypothesis> hypotheses);
-  /// Of the robust loss, a colour difference; 0: squares.
+  /// Sets the scale of the robust loss, a colour difference; 0: squared differences.
   void set_scale(float scale);
   float scale() const { return scale_; }
 

@@ -14,14 +14,14 @@
 
 namespace dpr {
 
-/// What is rendered of a hypothesis to find its light.
+/// Images of a hypothesis from which its light is found.
 struct HypothesisImages {
   const cl_float4* colors = nullptr;  ///< without light, over black; alpha is the coverage
   const cl_float4* normals =
       nullptr;  ///< as colours, object space, over black; null: light without direction
 };
 
-/// What a level's pixels show, and how much they count.
+/// A level's target: colours and weights of its pixels.
 struct WeighedTarget {
   std::vector<cl_float4> colors;
   std::vector<float> weights;  ///< in [0, 1]
@@ -80,8 +80,8 @@ class LightFit {
 /// The same of residuals' sizes, which come out in another order; 0 of none.
 float robust_deviation(std::span<float> sizes);
 
-/// How corners have their normals where the mesh gives none: the mean over those faces at their vertex that no
-/// sharp edge parts from theirs, or over all.
+/// How corners have their normals where the mesh gives none: the mean over those faces at their vertex that
+/// no sharp edge parts from theirs, or over all.
 enum class CornerNormals { parted, smooth };
 
 /// The mesh with a corner of its own for each corner of each face, coloured by its unit normal after

@@ -30,7 +30,7 @@ constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
 constexpr int k_samples = 4;
 constexpr std::size_t k_most_image_samples = std::size_t{1} << 18;
 
-// Of the best hypotheses in a light of their own: so many are tried after half a turn too.
+// Number of the best hypotheses, each in a light of its own, that are tried after half a turn too.
 constexpr std::size_t k_turned = 4;
 
 /// One fit at work: the candidates on their way through the levels.
@@ -53,7 +53,7 @@ class Fit {
 
  private:
   void start(PoseLevel& level);
-  /// What was found in another light, and the level at which it was given up.
+  /// Candidates found under another light, and the level at which that search was given up.
   struct Found {
     std::vector<Candidate> candidates;
     std::size_t level = 0;
@@ -124,7 +124,7 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
   candidates_.clear();
   for (std::size_t i = 0; i + 1 < shapes.size() && (goes_on_ || i == 0); ++i) {
     const bool is_finest = i + 2 == shapes.size();
-    // Of a light's direction the coarsest images say so little that it would explain any pose.
+    // The coarsest images constrain a light's direction so little that it would explain any pose.
     const bool is_known = light_ == PoseLight::fixed || i > 0 || is_finest;
     PoseLevel level = make_level(shapes[i], is_known ? light_ : PoseLight::gain);
     if (i == 0) start(level);
@@ -139,9 +139,8 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
   return std::nullopt;
 }
 
-/// What was found elsewhere, and, where other rotations than the initial ones are tried at all, the best
-/// after half a turn, as far as there is hope: many an object looks much the same so, and where the light is
-/// unknown coarse images don't tell one from the other.
+/// Adds the candidates found elsewhere. A search over rotations also adds the best of them after half a turn:
+/// many objects look much the same then, and coarse images in unknown light do not tell the two apart.
 void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
   const std::size_t own = candidates_.size();
   const std::size_t count = method_.rotations > 0 ? std::min(own, k_turned) : 0;
@@ -161,7 +160,7 @@ PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
   return PoseLevel(device_, scene_, target_, method_, space_, shape, light, normals_);
 }
 
-/// Whether a further look for the pose in the scene's own light is in vain. A robust loss can't tell.
+/// True if a further search in the scene's own light is in vain. A robust loss cannot tell.
 bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape) const {
   constexpr double k_unexplained = 0.2, k_doubtful = 0.1;  // of what a wrong pose leaves
   constexpr float k_much_better = 0.5F;
@@ -170,7 +169,7 @@ bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape) const {
   return part > k_unexplained || (part > k_doubtful && light_gain(level, shape) < k_much_better);
 }
 
-/// What a light of its own leaves of most of the object, as a part of what the scene's leaves.
+/// Residual of most of the object in a light of its own, relative to the residual in the scene's light.
 float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
   PoseLevel lit = make_level(shape, method_.light);
   level.estimate_scale(hypotheses());
@@ -319,7 +318,7 @@ void Fit::choose_equals(bool anywhere) {
   }
 }
 
-/// What a pose leaves that explains nothing: the median over rotations.
+/// Loss of a pose that explains nothing: the median over rotations.
 double Fit::wrong_loss(PoseLevel& level) const {
   constexpr std::size_t k_enough = 15;  // the finest level's renders are dear
   std::vector<double> losses = level.losses(grid(k_enough));

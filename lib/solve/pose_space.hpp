@@ -11,7 +11,7 @@
 
 namespace dpr {
 
-/// What is looked for: a pose, the factor on the camera's focal length, and what is added to k1 and k2.
+/// The unknowns: a pose, a factor on the camera's focal length, and offsets of the lens' k1 and k2.
 struct Hypothesis {
   Pose pose;
   double focal_scale = 1;

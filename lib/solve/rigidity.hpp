@@ -1,4 +1,4 @@
-// What it costs a mesh to be bent away from the shape that it had.
+// Penalty for bending a mesh away from its first shape.
 #pragma once
 
 #include <span>

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t k_most_draws = 4096;
 
-/// What a random word is for: the third word of its counter.
+/// Purpose of a random word: the third word of its counter.
 enum Purpose : std::uint32_t { sampling, shuffling };
 
 /// A number in (0, 1), never 0 or 1, from 52 random bits.

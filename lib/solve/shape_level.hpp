@@ -26,7 +26,7 @@ struct ShapeLevel {
   std::vector<View> views;
 };
 
-/// What the views of a level are compared with.
+/// Targets of a level's views.
 struct ShapeTargets {
   ShapeTargets(const ShapeViews& all, const ShapeOptions& options, const ShapeLevel& level);
 

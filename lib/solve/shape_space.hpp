@@ -1,4 +1,4 @@
-// Where the cameras look, and how large things are there.
+// The region that the cameras look at, and its size.
 #pragma once
 
 #include <string>
@@ -7,14 +7,13 @@
 
 namespace dpr {
 
-/// What the shape solver makes of an initial mesh: grey without vertex colours, and nothing else of its
-/// surface stays.
+/// The initial mesh with vertex colours, grey where it has none. Nothing else of its surface stays.
 Mesh with_vertex_colors(Mesh mesh);
 
 /// Throws InvalidArgument where a camera is to be found first; `where` is in its message.
 void require_known_cameras(const ShapeViews& views, const std::string& where);
 
-/// What all cameras see.
+/// The region that all cameras see.
 struct CommonView {
   glm::dvec3 centre{0.0};  ///< nearest to the axes through the images' centres
   double radius = 0;       ///< of a sphere about it: half of the narrowest image, and inside znear and zfar

@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What a file begins with. The fingerprint and the checksum follow, and then the content.
+/// First bytes of a file. The fingerprint and the checksum follow, and then the content.
 constexpr std::string_view k_magic = "dpr shape checkpoint 4\n";
 constexpr std::size_t k_number_size = 8, k_head_size = k_magic.size() + 2 * k_number_size;
 
@@ -72,7 +72,7 @@ json to_json(const ShapeState& state) {
           {"history", history}};
 }
 
-/// What the solver relies on: a checksum keeps damage out, but not a file that was made up.
+/// Checks the sizes and values that the solver relies on: a checksum detects damage, but not a forged file.
 bool is_consistent(const ShapeState& state) {
   const std::size_t vertices = state.positions.size() / 3;
   const auto is_finite = [](const std::vector<double>& values) {

@@ -1,4 +1,4 @@
-// Where a shape solver is between two iterations, in memory and on disk.
+// State of a shape solver between two iterations, in memory and on disk.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 namespace dpr {
 
 struct ShapeState {
-  /// Of a smoothing that adapts: its scales now, and the average sensitivity.
+  /// State of an adaptive smoothing: its present scales, and the average sensitivity.
   struct Adaptive {
     float sigma = 0, gamma = 0;
     std::uint32_t samples = 0;

@@ -21,8 +21,7 @@ int parse_side(const JsonNode& node) {
   return side;
 }
 
-/// Whether an image's alpha tells the object from what is around it. Programs that know no transparency
-/// write 1.
+/// True if an image's alpha tells the object from its surroundings. Programs without transparency write 1.
 bool shows_silhouette(const Image& image) {
   return std::ranges::any_of(image.pixels, [](const glm::vec4& pixel) { return pixel.a < 1; });
 }
@@ -35,7 +34,7 @@ void cut_out(Image& picture, const Image& silhouette, const glm::vec3& backgroun
   }
 }
 
-/// What differs from a picture of the background alone is the object.
+/// Silhouette of the object: the pixels that differ from a picture of the background alone.
 Image difference_silhouette(const Image& picture, const Image& background) {
   constexpr float k_same = 0.02F, k_other = 0.08F;  // of linear colours, in the channel that differs most
   Image silhouette(picture.width, picture.height);
@@ -57,7 +56,7 @@ Image read_beside(const JsonNode& node, const std::filesystem::path& folder, con
   return image;
 }
 
-/// What the file says of where the object is in the picture, if it says something.
+/// The object's silhouette in the picture, if the file names one.
 std::optional<Image> parse_silhouette(const JsonNode& node, const std::filesystem::path& folder,
                                       const Image& picture, Encoding encoding) {
   const auto silhouette = node.find("silhouette"), background = node.find("background");

@@ -17,8 +17,8 @@ struct ViewsFile {
   std::optional<SmoothingOptions> smoothing;
 };
 
-/// What a file of views holds; `file` is what messages call it, and beside it the images are looked for.
-/// Throws as read_views() does.
+/// Parses a file of views. Messages call it `file`, and images are looked for beside that path. Throws as
+/// read_views() does.
 ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes,
                            Encoding encoding = Encoding::srgb);
 /// The same, resolved.

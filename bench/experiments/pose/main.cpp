@@ -106,7 +106,7 @@ namespace {
 using dpr::bench::Figure;
 using dpr::bench::Options;
 
-/// What a run is made of; figures choose it themselves.
+/// Options of a run. Figures choose their own.
 void add_set_options(CLI::App& application, Options& options, const char* group) {
   std::string methods = "May be repeated:";
   for (const auto& [name, description] : dpr::bench::pose_method_names()) {

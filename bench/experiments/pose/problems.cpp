@@ -17,7 +17,7 @@
 namespace dpr::bench {
 namespace {
 
-/// What problems are drawn from: a stream of random numbers of its own for each.
+/// Random numbers of a problem: a stream of its own for each.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t stream) {
@@ -47,7 +47,7 @@ class Random {
   std::mt19937_64 generator_;
 };
 
-/// What a mesh without colours shows of itself.
+/// Colours a mesh without colours by position.
 void color_by_position(Mesh& mesh) {
   for (const glm::vec3& p : mesh.positions)
     mesh.vertex_colors.push_back(glm::clamp(0.5F + 0.4F * p, 0.0F, 1.0F));

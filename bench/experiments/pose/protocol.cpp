@@ -74,8 +74,8 @@ class PerturbedImage : public Objective {
   }
 
  private:
-  /// What 1 instead of d adds on average: (d - 1) / gamma times the sum over pixels of <dL/dw, w>, which is
-  /// <dL/dR, R> over a black background.
+  /// Mean bias of 1 instead of d: (d - 1) / gamma times the sum over pixels of <dL/dw, w>, which is <dL/dR,
+  /// R> over a black background.
   double bias_of_one() const {
     constexpr double k_slots = 51;
     const Image image = renderer_.image();

@@ -120,7 +120,7 @@ Json earlier_rows(const std::filesystem::path& file, const Json& wanted) {
   }
 }
 
-/// For others to replay. A longer file of the same set, from a run of more, stays.
+/// Writes the problems for others to replay. A longer file of the same set stays.
 void keep_problems(const std::filesystem::path& file, const PoseRun& run) {
   PoseProblemSet set;
   if (std::filesystem::exists(file) && read_pose_problems(file, set).size() > run.problems.size()) return;

@@ -20,7 +20,7 @@ struct PoseRun {
   bool smoke = false, quiet = false;
 };
 
-/// What tells a run's files from another's: object, set, seed and method.
+/// Stem of a run's files: object, set, seed and method.
 std::string file_stem(const PoseRun& run);
 
 /// Solves what the run's file in `folder` does not hold yet, one row a problem, and writes the file after
