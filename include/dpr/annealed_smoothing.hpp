@@ -6,7 +6,7 @@
 
 namespace dpr {
 
-/// Where annealing ends; it begins with the smoothing and the learning rate it is given.
+/// End of annealing. It begins with the given smoothing and learning rate.
 struct AnnealSchedule {
   unsigned levels = 20;             ///< > 0: steps in which the smoothing shrinks, evenly spread
   float sigma_end = 3e-6F;          ///< > 0
@@ -15,10 +15,10 @@ struct AnnealSchedule {
 };
 
 /// Lets sigma, gamma and the learning rate fall geometrically to their end values, one level after another.
-/// What starts below its end value stays. A blur radius given explicitly shrinks with sigma.
+/// A value that starts below its end stays. A blur radius given explicitly shrinks with sigma.
 class DPR_API AnnealedSmoothing {
  public:
-  /// For a descent of that many iterations. Throws InvalidArgument for a schedule out of range.
+  /// Plans a descent of that many iterations. Throws InvalidArgument for a schedule out of range.
   AnnealedSmoothing(const AnnealSchedule& schedule, unsigned iterations, const Smoothing& start,
                     double learning_rate);
 

@@ -20,8 +20,9 @@ DPR_API std::string_view to_string(Aov);
 /// The inverse; `where` names the argument in the InvalidArgument thrown for an unknown word.
 DPR_API Aov parse_aov(std::string_view word, std::string_view where);
 
-/// What a view's pixels show. Every list is [height * width], row 0 on top. The fragments of a pixel count by
-/// their weights in its colour, those of the estimator in force; exact weights hold the expectation.
+/// Auxiliary outputs of a view's pixels. Every list is [height * width], row 0 on top. The fragments of a
+/// pixel count by their weights in its colour, those of the estimator in force; exact weights hold the
+/// expectation.
 struct AuxiliaryOutputs {
   int width = 0, height = 0;
   /// Expected depth along the view direction, world units: sum w_j z_j / sum w_j; 0 where no face has weight.
@@ -32,7 +33,8 @@ struct AuxiliaryOutputs {
   /// The face of the largest weight, counted through the meshes of the scene in order; -1 where the
   /// background has more.
   std::vector<std::int32_t> face_id;
-  /// Of that face at the pixel, or at the nearest point of it: >= 0, sum 1; 0 on the background.
+  /// Barycentrics of that face at the pixel, or at the face's nearest point: >= 0, sum 1; 0 on the
+  /// background.
   std::vector<vec3> barycentrics;
   /// Texture coordinates of that face there; 0 on the background. Empty unless all meshes have some.
   std::vector<vec2> uv;
@@ -41,8 +43,8 @@ struct AuxiliaryOutputs {
   std::vector<float> effective_faces;
 };
 
-/// Of a view of the last forward(). Blocks; costs an aggregation backward pass. Throws InvalidArgument before
-/// the first forward(), and for a view that is not there.
+/// Auxiliary outputs of a view of the last forward(). Blocks; costs an aggregation backward pass. Throws
+/// InvalidArgument before the first forward(), and for a view that does not exist.
 DPR_API AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view = 0);
 
 /// One of them as an image: numbers in red, green and blue (uv in red and green, single numbers in all three;

@@ -14,8 +14,8 @@
 
 namespace dpr {
 
-/// What a surface can show in place of its colour. depth: along the view direction, world units. position:
-/// world space. normal: the faces', world space, of length 1, on the side from which they wind
+/// An attribute that a surface shows in place of its colour. depth: along the view direction, world units.
+/// position: world space. normal: the faces', world space, of length 1, on the side from which they wind
 /// counter-clockwise. texcoords: u and v.
 enum class Attribute { depth, position, normal, texcoords };
 
@@ -51,8 +51,8 @@ DPR_API Attribute parse_attribute(std::string_view word, std::string_view where)
 class DPR_API AttributeImages {
  public:
   AttributeImages(const Device& device, Attribute attribute);
-  /// Of numbers at the vertices, in this many channels, as set_values() has them. Throws InvalidArgument for
-  /// no channels.
+  /// Images of the caller's values at the vertices, [vertex][channel], as set_values() has them. Throws
+  /// InvalidArgument for no channels.
   AttributeImages(const Device& device, std::size_t channels, std::span<const float> values);
   ~AttributeImages();
   AttributeImages(AttributeImages&&) noexcept;
@@ -79,7 +79,7 @@ class DPR_API AttributeImages {
   /// renderer's scene asked for at the forward pass, of positions, transforms, cameras, distortion and
   /// smoothing, and for texcoords of these; the rest is zero or empty. dpr::add() sums them with others.
   SceneGradient backward(std::span<const Image> grad_images);
-  /// Of the numbers at the vertices, [vertex][channel], after backward(). Empty for other attributes.
+  /// Gradient of the values at the vertices, [vertex][channel], after backward(). Empty for other attributes.
   std::span<const float> grad_values() const;
 
   struct DPR_LOCAL Impl;

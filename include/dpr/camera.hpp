@@ -23,10 +23,10 @@ struct Intrinsics {
 ///   exchanged.
 ///
 /// It moves vertices. Between them edges and what is on faces stay straight, an edge of length l in tangents
-/// off by up to about 3/4 |k1| l^2 r: subdivide_for_lens() (dpr/subdivision.hpp) cuts faces that are too large
-/// for that. From the radius on where the image would fold over (largest_radius()) points are held at it. Of
-/// faces that cross the near plane what is left is distorted; how the lens moves the cuts is not in its own
-/// gradients, nor in those of the intrinsics beside it, but in all others.
+/// off by up to about 3/4 |k1| l^2 r: subdivide_for_lens() (dpr/subdivision.hpp) cuts faces that are too
+/// large for that. From the radius on where the image would fold over (largest_radius()) points are held at
+/// it. Of faces that cross the near plane what is left is distorted; how the lens moves the cuts is not in
+/// its own gradients, nor in those of the intrinsics beside it, but in all others.
 struct Distortion {
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
 
@@ -89,12 +89,12 @@ DPR_API mat4 from_pytorch3d_view(const PyTorch3dView& view);
 DPR_API Intrinsics to_opencv_intrinsics(const Intrinsics& intrinsics);
 DPR_API Intrinsics from_opencv_intrinsics(const Intrinsics& intrinsics);
 
-/// What PyTorch3D's PerspectiveCameras and OrthographicCameras are made with, in its NDC (in_ndc=True).
+/// Arguments of PyTorch3D's PerspectiveCameras and OrthographicCameras, in its NDC (in_ndc=True).
 struct PyTorch3dProjection {
   vec2 focal_length, principal_point;
 };
 DPR_API PyTorch3dProjection to_pytorch3d_projection(const Camera& camera, int width, int height);
-/// Of PerspectiveCameras.
+/// Intrinsics from those of PerspectiveCameras.
 DPR_API Intrinsics from_pytorch3d_projection(const PyTorch3dProjection& projection, int width, int height);
 
 /// OpenGL's projection matrix: clip coordinates from camera space, for a viewport of that many pixels.

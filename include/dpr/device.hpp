@@ -21,7 +21,8 @@ struct DeviceInfo {
   bool shares_host_memory = false;  ///< as CPUs and integrated GPUs do
   bool is_default = false;          ///< what open_device("") takes, if it can be used
   std::string default_reason;       ///< why it is the default; empty for the others
-  /// Of an opened default: what was preferred to it and could not be used, a sentence each with the reason.
+  /// Devices that were preferred to an opened default and could not be used, each with its reason, a
+  /// sentence.
   std::vector<std::string> passed_over;
 };
 
@@ -50,7 +51,7 @@ class DPR_API Device {
   /// tile rows, or of parts of one, forward and backward, with the same results bit by bit. What grows with
   /// the scene, the image and the number of triangles in each tile comes on top.
   std::size_t memory_budget() const;
-  /// For all that use the device, from their next forward() on, which throws InvalidArgument if one tile
+  /// Sets the budget of all renderers on the device. Their next forward() throws InvalidArgument if one tile
   /// of 8x8 pixels does not fit. Throws InvalidArgument for 0.
   void set_memory_budget(std::size_t bytes);
 

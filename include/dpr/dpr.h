@@ -34,7 +34,7 @@ typedef enum dpr_status {
   DPR_INTERNAL_ERROR = 6
 } dpr_status;
 
-/* What the thread's last call that failed said; "" before. Valid until the thread's next call that fails. */
+/* Message of the thread's last call that failed; "" before. Valid until the thread's next call that fails. */
 DPR_API const char* dpr_last_error(void);
 
 /* "0.2.0": of the library that runs. */
@@ -94,7 +94,7 @@ typedef struct dpr_camera {
         NULL, 0                                                                                            \
   }
 
-/* What lies beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels. */
+/* Texture beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels. */
 typedef enum dpr_wrap { DPR_WRAP_REPEAT = 0, DPR_WRAP_MIRROR = 1, DPR_WRAP_CLAMP = 2 } dpr_wrap;
 
 /* Between the centres of texels: the nearest, the four around, or those of two levels of a pyramid. */
@@ -115,7 +115,7 @@ typedef struct dpr_texture {
 /* The texture of a face that has none. */
 #define DPR_TEXTURE_NONE UINT32_MAX
 
-/* What a surface shows of highlights: those of the lights are multiplied by `specular`. */
+/* Highlights of a surface: those of the lights are multiplied by `specular`. */
 typedef struct dpr_material {
   float specular[3];
   float shininess; /* >= 1; 0: that of the lights */
@@ -215,9 +215,9 @@ DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* ke
 /* The same for a number: "sigma", "gamma", "samples", "seed", ... Together they are checked when a renderer
  * takes the scene. */
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
-/* What backward passes compute: "positions", "colors", "transform", "camera", "lights", "smoothing",
- * "background", "texture" (the texels), "texcoords", "distortion" (of lenses), "normals", "materials".
- * Without this call all but "lights" and the last five. */
+/* Gradients that backward passes compute: "positions", "colors", "transform", "camera", "lights",
+ * "smoothing", "background", "texture" (the texels), "texcoords", "distortion" (of lenses), "normals",
+ * "materials". Without this call all but "lights" and the last five. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -261,8 +261,8 @@ DPR_API dpr_status dpr_renderer_set_smoothing(dpr_renderer* renderer, const dpr_
 DPR_API dpr_status dpr_renderer_set_background(dpr_renderer* renderer, const float color[3]);
 DPR_API dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word);
 DPR_API dpr_status dpr_renderer_set_gradients(dpr_renderer* renderer, const char* const* names, size_t count);
-/* Renders every view; enqueues the work, and seldom waits for it. A dpr_renderer_set_*() but that of gradients
- * ends the frame: what reads it fails until the next forward pass. */
+/* Renders every view; enqueues the work, and seldom waits for it. A dpr_renderer_set_*() but that of
+ * gradients ends the frame: what reads it fails until the next forward pass. */
 DPR_API dpr_status dpr_renderer_forward(dpr_renderer* renderer);
 /* The floats of all images: views * height * width * 4. */
 DPR_API dpr_status dpr_renderer_image_size(const dpr_renderer* renderer, size_t* count);
@@ -294,7 +294,7 @@ typedef struct dpr_loss_weights {
 DPR_API dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* weights,
                                    const float* targets, size_t count, size_t views, int width, int height,
                                    dpr_loss** loss);
-/* What surfaces show in place of their colours, compared with what they ought to: dpr/image_loss.hpp. */
+/* An attribute of the surfaces, compared with a target: dpr/image_loss.hpp. */
 typedef struct dpr_attribute_target {
   const char* name;                /* "depth", "position", "normal" or "texcoords" */
   const dpr_loss_weights* weights; /* no silhouette, no ssim */
@@ -333,22 +333,22 @@ typedef struct dpr_mesh_loss_weights {
 #define DPR_MESH_LOSS_WEIGHTS_INIT \
   { sizeof(dpr_mesh_loss_weights), 0, 0, 0, 0, 0 }
 
-/* Of meshes with the faces of this one. */
+/* A loss for meshes with the faces of this one. */
 DPR_API dpr_status dpr_mesh_loss_create(const dpr_device* device, const dpr_mesh_loss_weights* weights,
                                         const dpr_mesh* mesh, dpr_mesh_loss** loss);
-/* Of a mesh of the renderer's scene at the last forward pass. Waits for the device. */
+/* The loss of a mesh of the renderer's scene at the last forward pass. Waits for the device. */
 DPR_API dpr_status dpr_mesh_loss_evaluate(dpr_mesh_loss* loss, const dpr_renderer* renderer, size_t mesh,
                                           double* value);
 DPR_API void dpr_mesh_loss_destroy(dpr_mesh_loss* loss);
 
 /* ---- Gradients ---- */
 
-/* Of a loss that was evaluated on the last forward pass. */
+/* Gradients of a loss that was evaluated on the last forward pass. */
 DPR_API dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_gradient** gradient);
-/* Of the sum of that and a mesh's own, both evaluated on it. */
+/* Gradients of the sum of that loss and a mesh's own, both evaluated on the last forward pass. */
 DPR_API dpr_status dpr_backward_losses(dpr_renderer* renderer, const dpr_loss* loss,
                                        const dpr_mesh_loss* mesh_loss, dpr_gradient** gradient);
-/* Of sum <grad, image> over views and pixels: grad is [view][height][width][4], `count` floats. */
+/* Gradients of sum <grad, image> over views and pixels: grad is [view][height][width][4], `count` floats. */
 DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad, size_t count,
                                        dpr_gradient** gradient);
 /* The same from a cl_mem of the device's context. */
@@ -381,7 +381,7 @@ DPR_API dpr_status dpr_renderer_read_aov(dpr_renderer* renderer, const char* nam
  * formulas. */
 DPR_API dpr_status dpr_attribute_create(const dpr_device* device, const char* name,
                                         dpr_attribute** attribute);
-/* Of numbers at the vertices, so many channels, which dpr_attribute_set_values() sets. */
+/* Images of the caller's values at the vertices, `channels` of them, set by dpr_attribute_set_values(). */
 DPR_API dpr_status dpr_attribute_create_values(const dpr_device* device, size_t channels,
                                                dpr_attribute** attribute);
 /* [vertex][channel], the vertices of all meshes one after the other, instances' among them, which may have

@@ -42,12 +42,13 @@ DPR_API dpr_status dpr_loss_evaluate_batch(dpr_loss* loss, const dpr_batch* batc
  * is to be destroyed. Of a loss that was evaluated on the last forward pass. */
 DPR_API dpr_status dpr_batch_backward_loss(dpr_batch* batch, const dpr_loss* loss, dpr_gradient** gradients,
                                            size_t count);
-/* Of the sum of that and meshes' own, [count], each evaluated on the scene's renderer; NULL for a scene
- * without one. */
+/* Gradients of the sum of that loss and meshes' own, [count], each evaluated on its scene's renderer; NULL
+ * for a scene without one. */
 DPR_API dpr_status dpr_batch_backward_losses(dpr_batch* batch, const dpr_loss* loss,
                                              const dpr_mesh_loss* const* mesh_losses,
                                              dpr_gradient** gradients, size_t count);
-/* Of sum <grad, image> over views and pixels: grad is [view][height][width][4], `grad_count` floats. */
+/* Gradients of sum <grad, image> over views and pixels: grad is [view][height][width][4], `grad_count`
+ * floats. */
 DPR_API dpr_status dpr_batch_backward_pixels(dpr_batch* batch, const float* grad, size_t grad_count,
                                              dpr_gradient** gradients, size_t count);
 /* The same from a cl_mem of the device's context. */

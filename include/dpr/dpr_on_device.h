@@ -29,7 +29,7 @@ typedef struct dpr_buffer {
 #define DPR_BUFFER_INIT \
   { sizeof(dpr_buffer), NULL, 0, 0, 0, 0 }
 
-/* What the work of a call waits for, and its own event, which the caller releases. NULL for neither. */
+/* Events that a call's work waits for, and the call's own event, which the caller releases. NULL: none. */
 typedef struct dpr_events {
   size_t size;
   struct _cl_event* const* wait; /* [wait_count]; NULL if that is 0 */

@@ -31,7 +31,7 @@ struct Image {
   }
 };
 
-/// What the colours in files of 8 or 16 bits mean: sRGB (IEC 61966-2-1), which is decoded and encoded, or
+/// Encoding of the colours in files of 8 or 16 bits: sRGB (IEC 61966-2-1), which is decoded and encoded, or
 /// linear, which is taken as it is. Files of floats are linear, and alpha always is.
 enum class Encoding { srgb, linear };
 

@@ -36,7 +36,7 @@ struct DPR_API LossWeights {
   static LossWeights only(LossKind kind);
 };
 
-/// What surfaces show in place of their colours, compared with what they ought to. A pixel's difference is
+/// An attribute of the surfaces, compared with a target. A pixel's difference is
 /// sum_j w_j (a_j - target), of the weights w_j that blend its colour: RGB - A target of AttributeImages. It
 /// counts surfaces that are seen in part as such, and the background not at all, so that it says nothing of
 /// where a silhouette should be: a loss of the images beside it does.
@@ -48,7 +48,7 @@ struct AttributeTarget {
   std::span<const Image> targets = {};
 };
 
-/// What an ImageLoss compares, and how much of it.
+/// Options of an ImageLoss.
 struct LossOptions {
   LossWeights weights = {};
   /// One value a target, or empty for all: where it is 0 a target has no silhouette, and its view no
@@ -58,8 +58,8 @@ struct LossOptions {
   /// Means are over the weights, which are not all 0 in any. A window of ssim counts as the pixel at its
   /// middle does.
   std::span<const Image> masks = {};
-  /// Of a pyramid, 1 to 16: the loss is the mean over the images and ever smaller ones, each the means of
-  /// blocks of 2x2 pixels of the one before. Large differences of place get gradients from the small ones.
+  /// Levels of a pyramid, 1 to 16: the loss is the mean over the images and ever smaller ones, each the means
+  /// of blocks of 2x2 pixels of the one before. Large differences of place get gradients from the small ones.
   /// With ssim the smallest has to hold a window.
   unsigned levels = 1;
   /// Added to the loss of the images, whose weights may then all be 0. Each costs a forward and a backward

@@ -9,7 +9,7 @@
 
 namespace dpr {
 
-/// Where lighting is evaluated: per face, per fragment with interpolated normals, or per vertex; blinn is as
+/// Evaluation of lighting: per face, per fragment with interpolated normals, or per vertex; blinn is as
 /// phong, with Blinn's highlight.
 enum class Shading { flat, phong, gouraud, blinn };
 

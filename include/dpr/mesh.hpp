@@ -18,7 +18,7 @@ namespace dpr {
 /// The texture of a face that has none.
 inline constexpr std::uint32_t k_no_texture = std::numeric_limits<std::uint32_t>::max();
 
-/// What a surface shows of the highlights of lights, whose formula is that of Lights.
+/// Highlights of a surface. Lights has their formula.
 struct Material {
   vec3 specular{1.0F};             ///< the lights' specular is multiplied by it
   std::optional<float> shininess;  ///< >= 1; none: that of the lights

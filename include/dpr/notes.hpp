@@ -1,4 +1,4 @@
-// What a file asks for and the library leaves out: the readers that tell.
+// Readers that report the parts of a file that the library leaves out.
 #pragma once
 
 #include <filesystem>

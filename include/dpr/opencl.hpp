@@ -1,4 +1,4 @@
-// For embedding with the OpenCL C++ bindings, of any version and with any CL_HPP_ setting of the caller's.
+// Embedding with the OpenCL C++ bindings, of any version and with any CL_HPP_ setting of the caller's.
 #pragma once
 
 #include <CL/opencl.hpp>
@@ -8,7 +8,7 @@
 
 namespace dpr {
 
-/// What dpr/opencl_handles.hpp has, with the bindings' types.
+/// The calls of dpr/opencl_handles.hpp with the bindings' types.
 inline Device adopt_device(const cl::Context& context, const cl::CommandQueue& queue) {
   return adopt_device(context(), queue());
 }

@@ -1,6 +1,6 @@
-// For programs with OpenCL objects of their own, by OpenCL's C handles: everything that changes in a scene
-// comes from buffers on the device, images and gradients stay in buffers there, and no call waits unless it
-// says so. dpr/opencl.hpp does the same with the C++ bindings.
+// Embedding in programs with OpenCL objects of their own, by OpenCL's C handles: everything that changes in a
+// scene comes from buffers on the device, images and gradients stay in buffers there, and no call waits
+// unless it says so. dpr/opencl.hpp does the same with the C++ bindings.
 #pragma once
 
 #include <CL/cl.h>
@@ -47,9 +47,9 @@ struct BufferView {
   BufferSpan span() const { return {buffer, offset, stride}; }
 };
 
-/// What the work of a call waits for, and where its event goes. On an in-order queue of the caller's own
-/// neither is needed for what is enqueued there before and after the call. Events of other queues have to be
-/// flushed there, as OpenCL asks for. Throws InvalidArgument for an event of another context.
+/// Events that a call's work waits for, and the place of its own event. On an in-order queue of the caller's
+/// own neither is needed for what is enqueued there before and after the call. Events of other queues have to
+/// be flushed there, as OpenCL asks for. Throws InvalidArgument for an event of another context.
 struct Events {
   std::span<const cl_event> wait = {};
   cl_event* done = nullptr;  ///< receives one that the caller releases: the call's work has run
@@ -61,7 +61,7 @@ struct Events {
 // prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
 // closed mesh: until Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
 
-/// Of a mesh of the scene: [vertex] of three floats, object space.
+/// Positions of a mesh of the scene: [vertex] of three floats, object space.
 DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
                            const Events& events = {});
 /// [vertex] or [face], as the mesh has them, of three floats.
@@ -117,7 +117,7 @@ DPR_API void reserve(Renderer& renderer, const FrameRoom& room);
 /// That waits for the device, as do a frame in several bands and the first with noise on the pixel.
 DPR_API void forward_on_device(Renderer& renderer, const Events& events = {});
 
-/// What frames of forward_on_device() took since the last call.
+/// Room that frames of forward_on_device() took since the last call.
 struct FrameHistory {
   std::size_t emptied = 0;  ///< frames that exceeded the room
   FrameRoom largest;        ///< exceeding or not; fragments of frames whose pairs fitted

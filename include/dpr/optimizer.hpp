@@ -20,7 +20,7 @@ struct OptimizerOptions {
   double epsilon = 1e-8;        ///< > 0
 };
 
-/// What an optimizer remembers between steps; empty before the first.
+/// State of an optimizer between steps; empty before the first.
 struct OptimizerState {
   std::vector<double> first_moment, second_moment;
   unsigned iteration = 0;

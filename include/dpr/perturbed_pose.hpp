@@ -31,8 +31,8 @@ struct PerturbedPoseOptions {
   PoseParameters scale{.mesh_rotation = dvec3(0.1), .mesh_translation = dvec3(0.1)};
   Prior prior = Prior::gaussian;  ///< any but uniform, whose density has no score
   std::uint32_t samples = 64;     ///< M, 1 to 4096: rigid renders of a batch
-  /// What is subtracted from a loss: nothing, the loss of the unperturbed pose, eq. (14), or the mean loss of
-  /// the samples that are independent of it.
+  /// Control variate subtracted from a loss: nothing, the loss of the unperturbed pose, eq. (14), or the mean
+  /// loss of the samples that are independent of it.
   VarianceReduction variance_reduction = VarianceReduction::leave_one_out;
   /// Stratified: a Latin hypercube, each parameter's marginal split in `samples` strata of equal probability
   /// (McKay, Beckman & Conover 1979).

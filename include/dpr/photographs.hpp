@@ -21,8 +21,8 @@ namespace dpr {
 DPR_API PoseResult find_camera(const Device& device, ShapeViews& views, std::size_t view,
                                PoseOptions options = {}, const PoseSolver::Callback& callback = {});
 
-/// Of a shape solver that bends a template to photographs: its faces stay, it is rather rigid, and its
-/// colours are left to the light.
+/// Options of a shape solver that bends a template to photographs: its faces stay, it is rather rigid, and
+/// its colours are left to the light.
 DPR_API ShapeOptions template_shape_options();
 
 /// The distant light, one for all views, in which the initial mesh explains them best: spherical harmonics to

@@ -30,7 +30,7 @@ DPR_API dvec3 vector_from_rotation(const dmat3& rotation);
 /// The angle between two rotations, degrees, in [0, 180].
 DPR_API double angle_degrees(const dmat3& a, const dmat3& b);
 
-/// What may be different about the light of the target.
+/// Unknowns of the target's light.
 enum class PoseLight {
   fixed,     ///< nothing: it is the scene's
   gain,      ///< a gain on the mesh's colours and an offset, by channel
@@ -51,15 +51,15 @@ struct LeastSquares {
   unsigned iterations = 10;  ///< > 0: at most, a level; four times as many while the best still falls
   float blur = 0.25F;        ///< > 0: of the edges, in pixels of the level
   float blur_end = 0.1F;     ///< > 0: the same at the very end
-  /// What the blur is of. Noise of the pixel takes less time, and finds fewer poses of objects of many small
-  /// parts.
+  /// The noise of the blur. Noise of the pixel takes less time, and finds fewer poses of objects of many
+  /// small parts.
   Noise noise = Noise::triangle;
-  /// For clutter and occlusion: r^2 / (1 + (r / scale)^2) of a pixel's colour difference r instead of r^2
-  /// (Geman & McClure 1985), so that what differs by more than the scale hardly counts, and more hypotheses
-  /// on the way.
+  /// Robust loss for clutter and occlusion: r^2 / (1 + (r / scale)^2) of a pixel's colour difference r
+  /// instead of r^2 (Geman & McClure 1985), so that pixels that differ by more than the scale hardly count.
+  /// More hypotheses are kept on the way.
   bool robust = false;
-  /// Of that: a colour difference; 0: four standard deviations of what the best hypotheses leave, from the
-  /// median of its size, but between 0.1 and 0.12, anew at every level.
+  /// Scale of the robust loss, a colour difference; 0: four standard deviations of what the best hypotheses
+  /// leave, from the median of its size, but between 0.1 and 0.12, anew at every level.
   float robust_scale = 0;
   /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
   /// not explain the target.
@@ -129,7 +129,7 @@ struct PoseResult : PoseHypothesis {
   unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose
   bool explained = false;   ///< see PoseOptions::explained
-  /// What was found along with the pose: fixed where the scene's own light explains the target.
+  /// Light found along with the pose: fixed if the scene's own light explains the target.
   PoseLight light = PoseLight::fixed;
   double seconds = 0;
   std::vector<PoseIteration> history;
@@ -147,7 +147,7 @@ class DPR_API PoseSolver {
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;
-  /// Of one descent, or through all levels: how often the callback may be called at most.
+  /// Upper bound of the callback's calls in one descent, or through all levels.
   unsigned most_iterations() const;
   /// From an initial pose. Of poses that explain the target equally well, the nearest to it is the result.
   /// Throws InvalidArgument if the initial rotation is none.

@@ -44,7 +44,8 @@ struct ViewGradient {
   std::vector<PoseGradient> transforms;  ///< [mesh]
 };
 
-/// Of a mesh, summed over its instances; all empty for an entry of Scene::meshes that is one of these.
+/// Gradients of a mesh, summed over its instances; all empty for an entry of Scene::meshes that is an
+/// instance.
 struct MeshGradient {
   std::vector<vec3> positions;  ///< [vertex] object space; empty if not requested
   std::vector<vec3> colors;     ///< [vertex] or [face], as the mesh has them; empty if not requested or white
@@ -63,13 +64,14 @@ struct ShapesGradient {
   std::vector<vec3> colors;     ///< [view][color]
 };
 
-/// What GradientRequest asked for; the rest is zero or empty. Bitwise the same from run to run on one device.
+/// The gradients that GradientRequest asked for; the rest is zero or empty. Bitwise the same from run to run
+/// on one device.
 struct SceneGradient {
   std::vector<MeshGradient> meshes;  ///< summed over the views; empty arrays where these have their own
   ShapesGradient shapes;
   std::vector<ViewGradient> views;
   dvec3 ambient{0.0};
-  // Of lights, summed over the views.
+  // Gradients of lights, summed over the views.
   std::vector<PointLightGradient> lights;
   std::vector<DirectionalLightGradient> directional;
   std::vector<SpotLightGradient> spot;
@@ -172,7 +174,7 @@ class DPR_API Renderer {
   /// evaluated on the last forward(). Throws InvalidArgument if the scene asks for no positions' gradient.
   SceneGradient backward(const ImageLoss& loss, const MeshLoss& mesh_loss);
 
-  /// Of the last forward(). Throws as image() does.
+  /// Statistics of the last forward(). Throws as image() does.
   RenderStatistics statistics() const;
   const Device& device() const;
 

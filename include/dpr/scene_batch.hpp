@@ -55,7 +55,7 @@ class DPR_API SceneBatch {
   /// All images at once, [view][height][width], RGBA. Blocks.
   void read_pixels(std::span<vec4> pixels) const;
 
-  /// For every scene, the gradients of the sum over its images and pixels of <grad_images, image>, RGBA, as
+  /// Every scene's gradients of the sum over its images and pixels of <grad_images, image>, RGBA, as
   /// Renderer::backward(). One image a view, of the batch's size. [scene]
   std::vector<SceneGradient> backward(std::span<const Image> grad_images);
   /// The same from [view][height][width], RGBA.

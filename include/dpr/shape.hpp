@@ -20,7 +20,7 @@
 
 namespace dpr {
 
-/// What is known of the camera that took an image: all; a camera that it is near; or nothing. The shape
+/// Knowledge of the camera that took an image: all; a camera that it is near; or nothing. The shape
 /// solver wants all: find_camera() (dpr/photographs.hpp) finds it.
 enum class CameraKnowledge { known, near, unknown };
 
@@ -37,7 +37,7 @@ struct ShapeView {
   Image depth = {}, normal = {};
 };
 
-/// What a shape is found from.
+/// Views from which a shape is found.
 struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
   vec3 background{0.0F};

@@ -1,4 +1,4 @@
-// What is random in the perturbed renderer, how strongly, and how its expectation is computed.
+// Smoothing of the perturbed renderer: its noise, the noise's scales, and the estimator of the expectation.
 #pragma once
 
 #include <concepts>
@@ -19,7 +19,7 @@ enum class Prior { gaussian, cauchy, logistic, gumbel, uniform };
 /// in it.
 enum class Composition { barrier, joint };
 
-/// What moves edges at random. triangle: every triangle's distances have noise of their own, so the image
+/// Noise that moves edges. triangle: every triangle's distances have noise of their own, so the image
 /// depends on how a surface is cut into triangles. pixel: the pixel's position has, in two dimensions, the
 /// same for all triangles: the rigid image, whose depths alone are perturbed, is convolved with the density
 /// of that noise. The image is the same for every tessellation of a surface, and its cost does not depend on
@@ -108,7 +108,7 @@ DPR_API float blur_radius(const Smoothing& smoothing);
 /// stays as it is: there sigma is no width, but what keeps the derivative at an edge finite.
 DPR_API void set_sigma(Smoothing& smoothing, float sigma);
 
-/// Whether either stage draws samples.
+/// True if either stage draws samples.
 DPR_API bool is_sampled(const Smoothing& smoothing);
 
 /// The rigid renderer itself, for targets and references: no blur, the nearest triangle wins, and of

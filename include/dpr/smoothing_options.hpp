@@ -10,7 +10,7 @@
 
 namespace dpr {
 
-/// What a file, a command line or a caller says of a smoothing; resolve_smoothing() finds the rest.
+/// Members of a smoothing that a file, a command line or a caller gives; resolve_smoothing() finds the rest.
 struct SmoothingOptions {
   std::optional<std::string> preset = {};
   std::optional<Prior> occupancy_prior = {}, depth_prior = {};
@@ -45,12 +45,11 @@ struct SmoothingOptions {
 DPR_API Smoothing resolve_smoothing(const SmoothingOptions& given, int width = 128, int height = 128,
                                     const std::optional<Smoothing>& otherwise = {});
 
-/// Whether no member of the family is described: nothing is given but, perhaps, the seed and the
-/// supersampling.
+/// True if nothing is given but, perhaps, the seed and the supersampling.
 DPR_API bool says_nothing(const SmoothingOptions& given);
 
-/// What `over`, such as a command line, leaves of `under`, such as a file, and adds to it: each option given
-/// replaces its like. A preset replaces all but the seed, an estimator those of both stages.
+/// The options of `under`, such as a file, with those of `over`, such as a command line, in their place. A
+/// preset replaces all but the seed, an estimator those of both stages.
 DPR_API SmoothingOptions overlay(const SmoothingOptions& under, const SmoothingOptions& over);
 
 }  // namespace dpr

@@ -69,7 +69,7 @@ struct SubdividedScene {
 /// edge that is halved is so for every face at it, also between vertices that only coincide, so that no
 /// cracks open. Counted are the faces that may be in an image and their edges as far as they are beyond
 /// znear; an edge is halved 24 times at most. Colours, textures, materials and texture coordinates follow.
-/// Where there are lights, and shading is not flat, so do normals: a mesh without any gets those that it
+/// So do normals, unless there are no lights or shading is flat: a mesh without any gets those that it
 /// shows, and scene.gradients asks for them where it asks for positions. Without a lens, and where nothing is
 /// off, a mesh is the same to the bit.
 ///

@@ -11,10 +11,10 @@
 
 namespace dpr {
 
-/// What lies beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels.
+/// Texture beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels.
 enum class Wrap { repeat, mirror, clamp };
 
-/// What a point between the centres of texels shows: the nearest texel; the four around it, by their
+/// Value between the centres of texels: the nearest texel; the four around it, by their
 /// distance; or those of the two levels of a pyramid of ever smaller images whose texels are next in size to
 /// the step between neighbouring pixels.
 enum class Filter { nearest, bilinear, trilinear };
