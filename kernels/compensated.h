@@ -3,10 +3,11 @@
 #define DPR_COMPENSATED_H
 
 /// Adds x to a sum and its running error (Neumaier 1974). Adding zero changes no bit of either. The
-/// comparison of vectors is all ones where it holds, as select() wants it, and that of scalars 1.
+/// comparison of vectors is all ones where it holds, as select() wants it, and that of scalars 1. Not
+/// contracted: x may be a product, of which both lines have to see the same rounded value.
 #define DPR_COMPENSATED_ADD(name, type)                                      \
   static inline void name(type* sum, type* error, type x) {                  \
-    const type t = *sum + x;                                                 \
+    _Pragma("OPENCL FP_CONTRACT OFF") const type t = *sum + x;               \
     *error += select((x - t) + *sum, (*sum - t) + x, fabs(*sum) >= fabs(x)); \
     *sum = t;                                                                \
   }

@@ -59,6 +59,7 @@ kernel void exchange_cameras(const uint count, const uint4 from, const uint orth
 kernel void exchange_map(const uint numbers, global const uint* restrict starts,
                          global const uint* restrict terms, global const float* restrict factors,
                          global const float* restrict sums, global float* restrict values) {
+#pragma OPENCL FP_CONTRACT OFF
   const uint i = (uint)get_global_id(0);
   if (i >= numbers) return;
   float sum = 0.0f, error = 0.0f;

@@ -3,6 +3,9 @@
 // function of the rounded coordinates, and a sample on the edge itself belongs to the triangle whose left or
 // upper edge it is. That is the sample moved to the right by less than any number, and down by much less, so
 // the rule holds at shared vertices too.
+//
+// Whatever takes part is not contracted: fused with the product that a coordinate is, a difference would be
+// one of another coordinate in each triangle that it is inlined for (tests/device/contraction.py).
 #ifndef DPR_OWNERSHIP_H
 #define DPR_OWNERSHIP_H
 
@@ -27,6 +30,7 @@
 
 /// a + b without error: the rounded sum, and what rounding took away (Knuth's two-sum).
 static inline float two_sum(float a, float b, float* error) {
+#pragma OPENCL FP_CONTRACT OFF
   const float sum = a + b, part = sum - a;
   *error = (a - (sum - part)) + (b - part);
   return sum;
@@ -71,6 +75,7 @@ static int exact_side(float2 a, float2 b, float2 p) {
 
 /// +1 where p lies to the left of a -> b, -1 to the right, 0 on the line.
 static inline int side_of_line(float2 a, float2 b, float2 p) {
+#pragma OPENCL FP_CONTRACT OFF
   const float u = (b.x - a.x) * (p.y - a.y), v = (b.y - a.y) * (p.x - a.x);
   const float side = u - v;
   // Written so that a NaN is looked at again.
