@@ -12,6 +12,8 @@
 #include <string_view>
 #include <thread>
 
+#include "cli/process.hpp"
+
 namespace dpr::bench {
 namespace {
 

@@ -1,8 +1,14 @@
 #include "base/module.hpp"
 
 #include <dlfcn.h>
-#include <link.h>
+#ifdef __APPLE__
+#include <mach-o/dyld.h>
+#else
+#include <sys/auxv.h>
+#endif
 
+#include <climits>
+#include <cstdint>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -12,16 +18,21 @@
 namespace dpr {
 namespace {
 
+/// The library or the program that an address lies in; zeros if there is none.
+Dl_info object_at(const void* address) {
+  Dl_info info{};
+  return dladdr(address, &info) != 0 ? info : Dl_info{};
+}
+
 /// The folder of the library or the program that holds this code.
 std::filesystem::path own_folder() {
-  Dl_info info{};
-  link_map* map = nullptr;
-  if (dladdr1(reinterpret_cast<const void*>(&module_function), &info, reinterpret_cast<void**>(&map),
-              RTLD_DL_LINKMAP) == 0) {
-    return {};
-  }
-  // The linker knows no file of the program itself.
-  const char* name = map->l_name[0] == '\0' ? "/proc/self/exe" : map->l_name;
+  const Dl_info own = object_at(reinterpret_cast<const void*>(&module_function));
+  std::filesystem::path name = own.dli_fname != nullptr ? own.dli_fname : "";
+#ifndef __APPLE__
+  // The linker calls the program itself by the first word of its command line, which need be no path.
+  const Dl_info program = object_at(reinterpret_cast<const void*>(getauxval(AT_PHDR)));
+  if (own.dli_fbase == program.dli_fbase) name = running_program();
+#endif
   std::error_code error;
   const std::filesystem::path file = std::filesystem::canonical(name, error);
   return error ? std::filesystem::path() : file.parent_path();
@@ -43,6 +54,17 @@ std::string last_error() {
 }
 
 }  // namespace
+
+std::filesystem::path running_program() {
+#ifdef __APPLE__
+  char path[PATH_MAX];
+  std::uint32_t size = sizeof path;
+  if (_NSGetExecutablePath(path, &size) != 0) throw std::runtime_error("the program's path is too long");
+  return path;
+#else
+  return "/proc/self/exe";
+#endif
+}
 
 void* module_function(const char* name, const char* function) {
   const std::string file = std::string("libdpr_") + name + "-" + DPR_VERSION + ".so";

@@ -15,7 +15,9 @@
 #include <memory>
 #include <string>
 
+#include "base/module.hpp"
 #include "check/self_test.hpp"
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -62,9 +64,10 @@ class Child {
  public:
   explicit Child(std::array<std::string, 3> arguments) {
     std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw IoError("pipe", std::strerror(errno));
+    if (pipe(ends.data()) != 0) throw IoError("pipe", std::strerror(errno));
+    for (const int end : ends) fcntl(end, F_SETFD, FD_CLOEXEC);
     output_.reset(fdopen(ends[0], "r"));
-    std::string name = "/proc/self/exe";
+    std::string name = running_program();
     char* const words[] = {name.data(), arguments[0].data(), arguments[1].data(), arguments[2].data(),
                            nullptr};
     posix_spawn_file_actions_t actions{};

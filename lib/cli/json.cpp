@@ -3,6 +3,7 @@
 
 #include <charconv>
 
+#include "base/from_chars.hpp"
 #include "base/output_file.hpp"
 
 namespace dpr::cli {
@@ -38,7 +39,7 @@ double number(float value) {
   char text[64];
   const char* end = std::to_chars(text, text + sizeof text, value).ptr;
   double result = static_cast<double>(value);
-  std::from_chars(text, end, result);
+  from_chars(text, end, result);
   return result;
 }
 

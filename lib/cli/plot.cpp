@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "base/output_file.hpp"
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {

@@ -1,6 +1,9 @@
 // Signals and streams of a program's process.
 #pragma once
 
+/// Of unistd.h, which macOS leaves to the program.
+extern "C" char** environ;
+
 namespace dpr::cli {
 
 /// To be called before anything else. A signal that ends the program removes its temporary files first; a

@@ -13,8 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/module.hpp"
 #include "cli/commands.hpp"
 #include "cli/completion.hpp"
+#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -27,7 +29,7 @@ struct Program {
 };
 
 std::filesystem::path file_of(const std::string& command) {
-  return std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("dpr-" + command);
+  return std::filesystem::canonical(running_program()).parent_path() / ("dpr-" + command);
 }
 
 [[noreturn]] void run(const Program& program, const std::vector<std::string>& arguments) {

@@ -1,11 +1,11 @@
 // Sizes, vectors and numbers from text, independent of the locale.
 #include "cli/text.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "base/checks.hpp"
+#include "base/from_chars.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -14,7 +14,7 @@ namespace {
 /// Reads a number and what must follow it (0: the end), and moves on. False if the text is not of that form.
 template <typename Number>
 bool take(const char*& at, const char* end, Number& number, char follower) {
-  const auto [stop, error] = std::from_chars(at, end, number);
+  const auto [stop, error] = from_chars(at, end, number);
   if (error != std::errc()) return false;
   if (follower == 0) return stop == end;
   if (stop == end || *stop != follower) return false;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +12,8 @@
 #include <string_view>
 #include <system_error>
 #include <vector>
+
+#include "base/from_chars.hpp"
 
 namespace dpr::scan {
 
@@ -71,7 +72,7 @@ template <typename Number>
 std::optional<Number> parse(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   Number value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  const auto [end, error] = from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size()) return {};
   return value;
 }
@@ -97,7 +98,7 @@ inline bool underflows(std::string_view word) {
 inline std::optional<float> parse_coordinate(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  const auto [end, error] = from_chars(word.data(), word.data() + word.size(), value);
   if (end != word.data() + word.size()) return {};
   if (error == std::errc::result_out_of_range && underflows(word)) return 0.0F;
   const auto coordinate = static_cast<float>(value);

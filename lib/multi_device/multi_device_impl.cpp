@@ -19,6 +19,15 @@ constexpr std::size_t k_chunks = 12;
 
 using Clock = std::chrono::steady_clock;
 
+/// A thread whose destructor waits for its end: std::jthread, which libc++ before 20 lacks.
+struct Thread : std::thread {
+  using std::thread::thread;
+  Thread(Thread&&) = default;
+  ~Thread() {
+    if (joinable()) join();
+  }
+};
+
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -135,7 +144,7 @@ void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work
   };
   const auto start = Clock::now();
   {
-    std::vector<std::jthread> threads;
+    std::vector<Thread> threads;
     try {
       for (std::size_t w = 1; w < workers.size(); ++w) threads.emplace_back(run, w);
     } catch (...) {  // no thread: those that run must not wait for those that never will

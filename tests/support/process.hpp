@@ -12,6 +12,9 @@
 #include <string>
 #include <vector>
 
+/// Of unistd.h, which macOS leaves to the program.
+extern "C" char** environ;
+
 namespace dpr::test {
 
 class Process {
