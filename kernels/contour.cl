@@ -236,8 +236,8 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
          (!has_other_face(record) || is_long(p, c, mesh_edges + other_face(record)));
 }
 
-/// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge). Inputs as
-/// contour_count, and
+/// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge), or one where
+/// there are none. Inputs as contour_count, and
 /// in   capacity    places that there are
 /// in   face_edges  uint[face]             see DPR_FACE_SIDES
 /// in   corner_starts  uint[vertex + 1]    runs of `corners`
@@ -256,11 +256,9 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
                          global const float4* restrict colors, global const uint* restrict offsets,
                          global uint* restrict pairs, global uint* restrict place_contour,
                          global uint* restrict place_tile, global uint* restrict places) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= p.views * c.edges) return;
-  const uint total = offsets[p.views * c.edges];
+  const uint i = (uint)get_global_id(0), total = offsets[p.views * c.edges];
   if (i == 0) pairs[0] = total > capacity ? 0 : total;
-  if (total > capacity || offsets[i] == offsets[i + 1]) return;
+  if (i >= p.views * c.edges || total > capacity || offsets[i] == offsets[i + 1]) return;
   const uint view = i / c.edges;
   const ContourScene s =
       scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);

@@ -194,8 +194,9 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
   const Incidence& corners = in.geometry.vertex_corners;
-  fill_(view_edges(in), in.p, params(in), to_uint(capacity), in.edges.edges, in.edges.face_edges,
-        corners.starts, corners.corners, in.facing, in.transform.ndc, in.transform.world,
+  // Without edges one work-item still writes the count.
+  fill_(std::max<std::size_t>(view_edges(in), 1), in.p, params(in), to_uint(capacity), in.edges.edges,
+        in.edges.face_edges, corners.starts, corners.corners, in.facing, in.transform.ndc, in.transform.world,
         in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
         pair_starts, pair_count, place_contour_, pair_tile, places_);
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,

@@ -47,6 +47,23 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(is_told({"--scene", "said.json", "--sigma", "1e-3"}));
   }
 
+  TEST_CASE("dpr render: faces without area are no more than invisible") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    folder.write("point.obj", "v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n");
+    folder.write("repeated.obj", "v 0 0 0\nv 1 0 0\nf 1 1 1\nf 1 2 2\nf 1 2 1\n");
+    for (const std::string name : {"point", "repeated"}) {
+      for (const std::string noise : {"triangle", "pixel"}) {
+        CAPTURE(name);
+        const auto outcome = run_command(
+            folder, {"render", name + ".obj", "-o", name + ".png", "--size", "16x16", "--noise", noise});
+        CAPTURE(outcome.err);
+        CHECK(outcome.status == 0);
+        CHECK(contains(outcome.err, "cannot be seen"));
+      }
+    }
+  }
+
   TEST_CASE("dpr render: --shading replaces the scene's") {
     if (is_skipped()) return;
     const TempDir folder;

@@ -242,6 +242,28 @@ TEST_SUITE("pipeline") {
     CHECK_THROWS_AS(static_cast<void>(backward(batch, short_one())), InvalidArgument);
   }
 
+  TEST_CASE("a mesh without area beside a good one leaves that as it is") {
+    const Scene good = scene_of(make_icosphere(1), width(), height());
+    Scene collapsed = good;
+    for (glm::vec3& position : collapsed.meshes[0].mesh.positions) position = glm::vec3(0.2F);
+    for (const Noise noise : {Noise::triangle, Noise::pixel}) {
+      std::vector<Scene> scenes{good, collapsed, good};
+      for (Scene& scene : scenes) scene.smoothing.noise = noise;
+      SceneBatch batch(open_device());
+      batch.set_scenes(scenes);
+      batch.forward();
+      const std::vector<Image> grads = random_images(3);
+      const std::vector<SceneGradient> found = batch.backward(grads);
+      Renderer alone(batch.device());
+      alone.set_scene(scenes[0]);
+      alone.forward();
+      for (const std::size_t s : {0, 2}) {
+        CHECK(same_bits(batch.image(s), alone.image()));
+        CHECK(same_bits(found[s], alone.backward(std::span(&grads[s], 1))));
+      }
+    }
+  }
+
   TEST_CASE("a batch is used again for other scenes") {
     std::vector<Scene> scenes = unlike_scenes();
     SceneBatch batch(open_device());
