@@ -263,7 +263,10 @@ kernel void blur_extents(const FrameParams p, global const uint* restrict tile_s
     last = is_covered ? x : last;
   }
   const uint begin = first > 0 ? (first - 1) * DPR_TILE : 0;
-  extents[row] = first == p.tiles_x ? (uint2)(0) : (uint2)(begin, (last + 2) * DPR_TILE);
+  const int is_empty = first == p.tiles_x;
+  // Number by number: LLVM 18, in PoCL 6, aborts at a vector that is selected.
+  extents[row].x = is_empty ? 0 : begin;
+  extents[row].y = is_empty ? 0 : (last + 2) * DPR_TILE;
 }
 
 /// Along columns. NDRange: one work-item per (image, block of output rows, vector of pixels).
