@@ -73,11 +73,11 @@ void require_count(std::size_t count, const char* argument) {
 
 /// The lights of a kind, or the textures of a mesh; few of either.
 template <class Item>
-std::span<const Item> span_of(const Item* items, std::size_t count, const std::string& argument) {
-  if (count > 0) deref(items, argument.c_str());
+std::span<const Item> span_of(const Item* items, std::size_t count, const char* argument) {
+  if (count > 0) deref(items, argument);
   constexpr std::size_t k_most = 1U << 16U;
   if (count > k_most)
-    throw InvalidArgument("count (" + argument + ")", std::to_string(count),
+    throw InvalidArgument("count (" + std::string(argument) + ")", std::to_string(count),
                           "at most " + std::to_string(k_most));
   return {items, count};
 }

@@ -62,7 +62,11 @@ std::vector<unsigned char> encode(const Image& image, const PixelFormat& format)
   // In a TIFF file this would make a second directory, and OpenImageIO could not read the file again.
   const bool is_tiff = format.extension.starts_with("tif");
   if (format.bytes && !is_tiff) spec.attribute("oiio:ColorSpace", format.srgb ? "sRGB" : "Linear");
-  spec.attribute("DateTime", "");  // none: equal images are equal files
+  // Equal images are equal files. An OpenEXR or TIFF file without a date would get the present one, and
+  // OpenImageIO 3 complains of an empty one.
+  spec.attribute("DateTime", "1970:01:01 00:00:00");
+  // From version 2.5 on rows of a PPM file would be flipped as those of a PFM file.
+  spec.attribute("pnm:pfmflip", 0);
   OIIO::Filesystem::IOVecOutput bytes;
   if (!output->set_ioproxy(&bytes) || !output->open("image." + format.extension, spec) ||
       !output->write_image(OIIO::TypeDesc::FLOAT, values_of(image, format).data()) || !output->close()) {

@@ -23,7 +23,8 @@ constexpr const char* k_source = R"(
 int main() {
   const cl::Context context(CL_DEVICE_TYPE_ALL);
   cl::CommandQueue queue(context, context.getInfo<CL_CONTEXT_DEVICES>().front());
-  cl::Program program(context, k_source, /*build*/ true);
+  cl::Program program(context, k_source);
+  program.build();
   cl::KernelFunctor<cl::Buffer, cl::Buffer, cl::Buffer> difference(program, "difference");
   cl::KernelFunctor<cl::Buffer, cl::Buffer> descend(program, "descend");
   const cl::Buffer target(context, CL_MEM_READ_WRITE, k_side * k_side * sizeof(cl_float4));

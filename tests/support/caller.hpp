@@ -45,8 +45,9 @@ struct Caller {
   /// A kernel of a program of the caller's own.
   cl::Kernel kernel(const char* source, const char* name) const {
     int error = CL_SUCCESS;
-    const cl::Program program(context, source, /*build*/ true, &error);
+    const cl::Program program(context, source, /*build*/ false, &error);
     REQUIRE(error == CL_SUCCESS);
+    REQUIRE(program.build() == CL_SUCCESS);
     return cl::Kernel(program, name);
   }
 
