@@ -24,7 +24,7 @@ test_limit=7200 # seconds for the tests of a row
 
 # The libraries, each in a folder of its own that the ICD loader is pointed to.
 intel=${DPR_INTEL:-}/lib/libintelocl.so
-rusticl=${DPR_RUSTICL:-/usr/lib/x86_64-linux-gnu}/libRusticlOpenCL.so.1
+rusticl=${DPR_RUSTICL:-/usr/lib/$(uname -m)-linux-gnu}/libRusticlOpenCL.so.1
 mkdir -p "$icds"/{pocl,intel,rusticl}
 cp /etc/OpenCL/vendors/pocl.icd "$icds/pocl/"
 echo "$intel" >"$icds/intel/intel.icd"
