@@ -1,6 +1,11 @@
 // Everything but the header with OpenCL types (dpr/opencl.hpp).
 #pragma once
 
+// Refused by name: a program whose containers have another layout than the library's links, and crashes.
+#if defined(_GLIBCXX_DEBUG)
+#error "dpr needs the standard library without _GLIBCXX_DEBUG (_GLIBCXX_ASSERTIONS, and dpr/dpr.h, go with it)"
+#endif
+
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/annealed_smoothing.hpp"
 #include "dpr/aov.hpp"

@@ -86,9 +86,11 @@ DPR_API dpr_status dpr_renderer_frame_history_view(dpr_renderer* renderer, dpr_b
 DPR_API dpr_status dpr_renderer_backward_on_device(dpr_renderer* renderer, const dpr_buffer* grad,
                                                    const dpr_events* events);
 /* The images, [view][height][width] of four floats; or a gradient of the last backward pass on the device, by
- * its name. Fills a struct that holds its size; valid as dpr/opencl_handles.hpp says. */
+ * its name. Fills a struct that holds its size; valid as dpr/opencl_handles.hpp says. Gradients share
+ * buffers: `byte_offset` receives where in its buffer a gradient begins, as the struct's member says too. */
 DPR_API dpr_status dpr_renderer_image_view(dpr_renderer* renderer, dpr_buffer* view);
-DPR_API dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view);
+DPR_API dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view,
+                                              size_t* byte_offset);
 /* Copies of them, to the caller's buffers. */
 DPR_API dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_buffer* images,
                                             const dpr_events* events);
@@ -110,7 +112,8 @@ DPR_API dpr_status dpr_attribute_frame_history(dpr_attribute* attribute, size_t*
 DPR_API dpr_status dpr_attribute_backward_on_device(dpr_attribute* attribute, const dpr_buffer* grad,
                                                     const dpr_events* events);
 DPR_API dpr_status dpr_attribute_image_view(dpr_attribute* attribute, dpr_buffer* view);
-DPR_API dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view);
+DPR_API dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view,
+                                               size_t* byte_offset);
 DPR_API dpr_status dpr_attribute_copy_images(dpr_attribute* attribute, const dpr_buffer* images,
                                              const dpr_events* events);
 DPR_API dpr_status dpr_attribute_copy_gradient(dpr_attribute* attribute, const char* name,

@@ -18,8 +18,13 @@ inline BufferSpan span_of(const cl::Buffer& buffer, std::size_t offset = 0, std:
   return {buffer(), offset, stride};
 }
 
-/// The buffer of a view, retained: it outlives the renderer's own use of it.
-inline cl::Buffer buffer_of(const BufferView& view) { return cl::Buffer(view.buffer, true); }
+/// A buffer of the library's, retained: it outlives the renderer's own use of it. Gradients share buffers, so
+/// that a kernel needs the offset too.
+struct BufferAt {
+  cl::Buffer buffer;
+  std::size_t offset = 0;  ///< bytes before the view's first vector
+};
+inline BufferAt buffer_of(const BufferView& view) { return {cl::Buffer(view.buffer, true), view.offset}; }
 
 /// Both live at least as long as the call that takes them. `done` lets go of what it held.
 inline Events events_of(const std::vector<cl::Event>& wait, cl::Event* done = nullptr) {

@@ -170,7 +170,7 @@ dpr_status dpr_attribute_backward_pixels(dpr_attribute* attribute, const float* 
   });
 }
 
-void dpr_attribute_destroy(dpr_attribute* attribute) { delete attribute; }
+void dpr_attribute_destroy(dpr_attribute* attribute) { dpr::c::destroy(attribute); }
 
 dpr_status dpr_attribute_set_values_from(dpr_attribute* attribute, const dpr_buffer* values,
                                          std::size_t vertices, const dpr_events* events) {
@@ -210,8 +210,13 @@ dpr_status dpr_attribute_image_view(dpr_attribute* attribute, dpr_buffer* view) 
   return guarded([&] { fill(view, dpr::image_view(dpr::c::images_of(attribute))); });
 }
 
-dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view) {
-  return guarded([&] { fill(view, dpr::gradient_view(dpr::c::images_of(attribute), &deref(name, "name"))); });
+dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view,
+                                       std::size_t* byte_offset) {
+  return guarded([&] {
+    deref(byte_offset, "byte_offset");
+    fill(view, dpr::gradient_view(dpr::c::images_of(attribute), &deref(name, "name")));
+    *byte_offset = view->byte_offset;
+  });
 }
 
 dpr_status dpr_attribute_copy_images(dpr_attribute* attribute, const dpr_buffer* images,

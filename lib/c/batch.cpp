@@ -26,9 +26,9 @@ void give_gradients(dpr_gradient** out, std::size_t count, dpr_batch* handle, co
     throw InvalidArgument("count (gradients)", std::to_string(count),
                           std::to_string(batch.scenes()) + ", one a scene");
   std::vector<SceneGradient> gradients = backward(batch);
-  std::vector<std::unique_ptr<dpr_gradient>> handles;
+  std::vector<std::unique_ptr<dpr_gradient, Destroy>> handles;
   for (std::size_t i = 0; i < count; ++i)
-    handles.push_back(std::make_unique<dpr_gradient>(arrays_of(batch.renderer(i), std::move(gradients[i]))));
+    handles.push_back(make_handle<dpr_gradient>(arrays_of(batch.renderer(i), std::move(gradients[i]))));
   for (std::size_t i = 0; i < count; ++i) out[i] = handles[i].release();
 }
 
@@ -96,7 +96,7 @@ dpr_status dpr_batch_backward_losses(dpr_batch* batch, const dpr_loss* loss,
       deref(mesh_losses, "mesh_losses");
       std::vector<const dpr::MeshLoss*> own;
       for (const dpr_mesh_loss* of_scene : std::span(mesh_losses, count))
-        own.push_back(of_scene ? &of_scene->loss : nullptr);
+        own.push_back(of_scene ? &deref(of_scene, "mesh_losses").loss : nullptr);
       return b.backward(deref(loss, "loss").loss, own);
     });
   });
@@ -119,4 +119,4 @@ dpr_status dpr_batch_backward_buffer(dpr_batch* batch, struct _cl_mem* grad, dpr
   });
 }
 
-void dpr_batch_destroy(dpr_batch* batch) { delete batch; }
+void dpr_batch_destroy(dpr_batch* batch) { dpr::c::destroy(batch); }

@@ -27,4 +27,4 @@ dpr_status dpr_device_name(const dpr_device* device, const char** name) {
   return guarded([&] { deref(name, "name") = deref(device, "device").device.info().name.c_str(); });
 }
 
-void dpr_device_destroy(dpr_device* device) { delete device; }
+void dpr_device_destroy(dpr_device* device) { dpr::c::destroy(device); }

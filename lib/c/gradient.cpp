@@ -111,4 +111,4 @@ dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, dou
   });
 }
 
-void dpr_gradient_destroy(dpr_gradient* gradient) { delete gradient; }
+void dpr_gradient_destroy(dpr_gradient* gradient) { dpr::c::destroy(gradient); }

@@ -1,6 +1,7 @@
 // What the handles of the C interface hold, and how its functions end: no exception leaves them.
 #pragma once
 
+#include <cfenv>
 #include <cstring>
 #include <memory>
 #include <span>
@@ -19,16 +20,19 @@
 #include "dpr/smoothing_options.hpp"
 
 struct dpr_device {
+  static constexpr const char* k_handle = "dpr_device";
   dpr::Device device;
 };
 
 struct dpr_scene {
+  static constexpr const char* k_handle = "dpr_scene";
   dpr::Scene scene;
   dpr::SmoothingOptions smoothing;             ///< what was set of it
   std::optional<dpr::Smoothing> of_file = {};  ///< what that changes, of a scene that was read
 };
 
 struct dpr_renderer {
+  static constexpr const char* k_handle = "dpr_renderer";
   /// A scene of a batch, which lives as long as one of its handles.
   struct OfBatch {
     std::shared_ptr<dpr::SceneBatch> batch;
@@ -38,22 +42,27 @@ struct dpr_renderer {
 };
 
 struct dpr_batch {
+  static constexpr const char* k_handle = "dpr_batch";
   std::shared_ptr<dpr::SceneBatch> batch;
 };
 
 struct dpr_loss {
+  static constexpr const char* k_handle = "dpr_loss";
   dpr::ImageLoss loss;
 };
 
 struct dpr_mesh_loss {
+  static constexpr const char* k_handle = "dpr_mesh_loss";
   dpr::MeshLoss loss;
 };
 
 struct dpr_attribute {
+  static constexpr const char* k_handle = "dpr_attribute";
   dpr::AttributeImages images;
 };
 
 struct dpr_gradient {
+  static constexpr const char* k_handle = "dpr_gradient";
   struct Array {
     std::string name;
     std::vector<double> values;
@@ -66,9 +75,22 @@ namespace dpr::c {
 /// Keeps the message of the exception that is being handled for dpr_last_error(); its status.
 dpr_status status_of_exception() noexcept;
 
+/// Puts the caller's floating-point environment aside: a division by zero would raise its traps.
+class QuietFloats {
+ public:
+  QuietFloats() { std::feholdexcept(&callers_); }
+  ~QuietFloats() { std::fesetenv(&callers_); }
+  QuietFloats(const QuietFloats&) = delete;
+  QuietFloats& operator=(const QuietFloats&) = delete;
+
+ private:
+  std::fenv_t callers_;
+};
+
 /// Runs a function's body; what it throws becomes a status.
 template <class Body>
 dpr_status guarded(const Body& body) noexcept {
+  const QuietFloats quiet;
   try {
     body();
     return DPR_SUCCESS;
@@ -77,17 +99,52 @@ dpr_status guarded(const Body& body) noexcept {
   }
 }
 
-/// What a pointer points to. Throws for NULL.
+// All handles that callers have are known, of whatever kind: a pointer that is none of them is never looked
+// into. By this a handle of another kind and one that is destroyed already are refused.
+
+/// `kind` is the handle's k_handle.
+void remember_handle(const void* handle, const char* kind);
+/// Throws InvalidArgument for what is not remembered as that kind.
+void require_handle(const void* handle, const char* kind, const char* argument);
+/// The same, and forgets it.
+void forget_handle(const void* handle, const char* kind);
+
+/// What a pointer points to. Throws for NULL, and for what is no handle where one is wanted.
 template <class Type>
 Type& deref(Type* pointer, const char* argument) {
   if (!pointer) throw InvalidArgument(argument, "NULL", "a pointer");
+  if constexpr (requires { Type::k_handle; }) require_handle(pointer, Type::k_handle, argument);
   return *pointer;
+}
+
+/// Without NULL; a handle that is destroyed already is left alone, with a message for dpr_last_error().
+template <class Handle>
+void destroy(Handle* handle) noexcept {
+  static_cast<void>(guarded([&] {
+    if (!handle) return;
+    forget_handle(handle, Handle::k_handle);
+    delete handle;
+  }));
+}
+
+struct Destroy {
+  template <class Handle>
+  void operator()(Handle* handle) const noexcept {
+    destroy(handle);
+  }
+};
+
+template <class Handle, class... Content>
+std::unique_ptr<Handle, Destroy> make_handle(Content&&... content) {
+  std::unique_ptr<Handle> made(new Handle{std::forward<Content>(content)...});
+  remember_handle(made.get(), Handle::k_handle);
+  return std::unique_ptr<Handle, Destroy>(made.release());
 }
 
 /// Hands a new handle to the caller, at the end of a body that has checked `out` at its begin.
 template <class Handle, class... Content>
 void give(Handle** out, Content&&... content) {
-  *out = new Handle{std::forward<Content>(content)...};
+  *out = make_handle<Handle>(std::forward<Content>(content)...).release();
 }
 
 /// The renderer of a handle. Throws for NULL, and for a scene that its batch does not have any more.

@@ -127,7 +127,7 @@ dpr_status dpr_loss_evaluate_batch(dpr_loss* loss, const dpr_batch* batch, doubl
   });
 }
 
-void dpr_loss_destroy(dpr_loss* loss) { delete loss; }
+void dpr_loss_destroy(dpr_loss* loss) { dpr::c::destroy(loss); }
 
 dpr_status dpr_mesh_loss_create(const dpr_device* device, const dpr_mesh_loss_weights* weights,
                                 const dpr_mesh* mesh, dpr_mesh_loss** loss) {
@@ -153,4 +153,4 @@ dpr_status dpr_mesh_loss_evaluate(dpr_mesh_loss* loss, const dpr_renderer* rende
   });
 }
 
-void dpr_mesh_loss_destroy(dpr_mesh_loss* loss) { delete loss; }
+void dpr_mesh_loss_destroy(dpr_mesh_loss* loss) { dpr::c::destroy(loss); }

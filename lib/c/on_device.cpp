@@ -141,8 +141,13 @@ dpr_status dpr_renderer_image_view(dpr_renderer* renderer, dpr_buffer* view) {
   return guarded([&] { fill(view, dpr::image_view(renderer_of(renderer))); });
 }
 
-dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view) {
-  return guarded([&] { fill(view, dpr::gradient_view(renderer_of(renderer), &deref(name, "name"))); });
+dpr_status dpr_renderer_gradient_view(dpr_renderer* renderer, const char* name, dpr_buffer* view,
+                                      std::size_t* byte_offset) {
+  return guarded([&] {
+    deref(byte_offset, "byte_offset");
+    fill(view, dpr::gradient_view(renderer_of(renderer), &deref(name, "name")));
+    *byte_offset = view->byte_offset;
+  });
 }
 
 dpr_status dpr_renderer_copy_images(dpr_renderer* renderer, const dpr_buffer* images,

@@ -173,4 +173,4 @@ dpr_status dpr_renderer_image_buffer(const dpr_renderer* renderer, struct _cl_me
   });
 }
 
-void dpr_renderer_destroy(dpr_renderer* renderer) { delete renderer; }
+void dpr_renderer_destroy(dpr_renderer* renderer) { dpr::c::destroy(renderer); }

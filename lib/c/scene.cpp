@@ -323,4 +323,4 @@ dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, s
   return guarded([&] { deref(scene, "scene").scene.gradients = dpr::c::to_request(names, count); });
 }
 
-void dpr_scene_destroy(dpr_scene* scene) { delete scene; }
+void dpr_scene_destroy(dpr_scene* scene) { dpr::c::destroy(scene); }

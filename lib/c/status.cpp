@@ -1,5 +1,8 @@
-// How calls of the C interface fail, and what they said.
+// How calls of the C interface fail, what they said, and which handles there are.
+#include <mutex>
 #include <new>
+#include <string_view>
+#include <unordered_map>
 
 #include "c/handles.hpp"
 #include "dpr/version.hpp"
@@ -18,7 +21,43 @@ dpr_status fail(dpr_status status, const char* message) noexcept {
   return status;
 }
 
+struct Handles {
+  std::mutex mutex;
+  std::unordered_map<const void*, const char*> kinds;
+};
+
+/// Lives as long as the process: handles may be destroyed by destructors of the caller's static objects.
+Handles& handles() {
+  static Handles& all = *new Handles;
+  return all;
+}
+
+std::unordered_map<const void*, const char*>::iterator found(Handles& all, const void* handle,
+                                                             std::string_view kind, const char* argument) {
+  const auto it = all.kinds.find(handle);
+  if (it != all.kinds.end() && it->second == kind) return it;
+  throw InvalidArgument(
+      argument,
+      it != all.kinds.end() ? std::string("a ") + it->second : "no handle, or one that is destroyed already",
+      "a " + std::string(kind));
+}
+
 }  // namespace
+
+void remember_handle(const void* handle, const char* kind) {
+  const std::lock_guard lock(handles().mutex);
+  handles().kinds.insert_or_assign(handle, kind);
+}
+
+void require_handle(const void* handle, const char* kind, const char* argument) {
+  const std::lock_guard lock(handles().mutex);
+  found(handles(), handle, kind, argument);
+}
+
+void forget_handle(const void* handle, const char* kind) {
+  const std::lock_guard lock(handles().mutex);
+  handles().kinds.erase(found(handles(), handle, kind, kind));
+}
 
 dpr_status status_of_exception() noexcept {
   try {

@@ -87,7 +87,7 @@ void mark_default(std::vector<FoundDevice>& found) {
 FoundDevices find_devices() {
   FoundDevices found;
   std::vector<cl::Platform> platforms;
-  const int error = cl::Platform::get(&platforms);
+  const int error = on_own_thread([&] { return cl::Platform::get(&platforms); });
   if (error == CL_PLATFORM_NOT_FOUND_KHR) return found;
   check_cl(error, "clGetPlatformIDs");
   const auto ask = [&](const auto& question) {
@@ -99,7 +99,7 @@ FoundDevices find_devices() {
   };
   for (const cl::Platform& platform : platforms) {
     std::vector<cl::Device> devices;
-    ask([&] { devices = devices_of(platform); });
+    ask([&] { devices = on_own_thread([&] { return devices_of(platform); }); });
     for (const cl::Device& device : devices) {
       ask([&] {
         FoundDevice entry{device, describe(platform, device)};

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "device/context.hpp"
+#include "device/info.hpp"
 #include "device/kernel.hpp"
 #include "device/kernel_sources.hpp"
 
@@ -59,7 +60,7 @@ const cl::Program& Device::Impl::program(std::string_view name, const std::strin
   int error = CL_SUCCESS;
   const cl::Program program(context, source, false, &error);
   check_cl(error, "clCreateProgramWithSource");
-  if (program.build(device, options.c_str()) != CL_SUCCESS) {
+  if (on_own_thread([&] { return program.build(device, options.c_str()); }) != CL_SUCCESS) {
     throw BuildError(std::string(file), info.name, options, build_log(program, device));
   }
   return programs_.emplace(key, program).first->second;

@@ -64,6 +64,10 @@ void require_events(const Device::Impl& device, const Events& events) {
     const cl::Event event(events.wait[i], true);
     if (cl_info<CL_EVENT_CONTEXT>(event, "clGetEventInfo")() != device.context())
       throw InvalidArgument(name, "an event of another context", "one of the device's own");
+    const cl_int status = cl_info<CL_EVENT_COMMAND_EXECUTION_STATUS>(event, "clGetEventInfo");
+    if (status < 0)  // what waits for it never runs
+      throw InvalidArgument(name, "an event that has failed with " + std::to_string(status),
+                            "one of work that runs, or has run");
   }
 }
 

@@ -441,7 +441,7 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   dpr_frame_room room = DPR_FRAME_ROOM_INIT;
   float read[FLOATS], gradient[9];
   cl_event set = NULL, copied = NULL;
-  size_t emptied = 1;
+  size_t emptied = 1, offset = 1;
   int i;
   cl_mem vertices = clCreateBuffer(context, CL_MEM_READ_ONLY, sizeof positions, NULL, NULL);
   cl_mem gradients = clCreateBuffer(context, CL_MEM_WRITE_ONLY, sizeof gradient, NULL, NULL);
@@ -463,8 +463,9 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   for (i = 0; i < 9; ++i) EXPECT((double)gradient[i] == expected[i]);
   EXPECT(clEnqueueReadBuffer(queue, view.buffer, CL_TRUE, 0, sizeof read, read, 0, NULL, NULL) == CL_SUCCESS);
   EXPECT(memcmp(read, image, sizeof read) == 0);
-  OK(dpr_renderer_gradient_view(renderer, "sigma", &view));
-  EXPECT(view.count == 1 && view.components == 1);
+  OK(dpr_renderer_gradient_view(renderer, "sigma", &view, &offset));
+  EXPECT(view.count == 1 && view.components == 1 && view.byte_offset == offset);
+  REFUSED(dpr_renderer_gradient_view(renderer, "sigma", &view, NULL), "byte_offset");
   OK(dpr_renderer_reserve(renderer, &room));
   room.fragments = (size_t)-1;
   REFUSED(dpr_renderer_reserve(renderer, &room), "fragments (reserve)");
@@ -479,7 +480,7 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   REFUSED(dpr_renderer_set_texcoords_from(renderer, 0, &from, NULL), "textures");
   REFUSED(dpr_renderer_set_transforms_from(renderer, &from, NULL), "transforms");
   REFUSED(dpr_renderer_copy_images(renderer, &to, NULL), "images");
-  REFUSED(dpr_renderer_gradient_view(renderer, "color", &view), "color");
+  REFUSED(dpr_renderer_gradient_view(renderer, "color", &view, &offset), "color");
   second.wait = NULL;
   REFUSED(dpr_renderer_forward_on_device(renderer, &second), "events.wait");
   to.size = sizeof to + 1;
@@ -498,7 +499,7 @@ static void test_attributes_on_device(cl_context context, cl_command_queue queue
   float depth[SIDE * SIDE], expected[SIDE * SIDE], image[FLOATS], pixels[FLOATS], gradient[9];
   double of_host[9];
   const float values[3] = {1, 2, 4};
-  size_t emptied = 1, i;
+  size_t emptied = 1, offset = 1, i;
   dpr_attribute *attribute = NULL, *numbers = NULL;
   dpr_gradient* host = NULL;
   cl_mem copied = clCreateBuffer(context, CL_MEM_READ_WRITE, sizeof image, NULL, NULL);
@@ -528,7 +529,7 @@ static void test_attributes_on_device(cl_context context, cl_command_queue queue
   OK(dpr_attribute_copy_gradient(attribute, "meshes[0].positions", &to, NULL));
   clEnqueueReadBuffer(queue, copied, CL_TRUE, 0, sizeof gradient, gradient, 0, NULL, NULL);
   for (i = 0; i < 9; ++i) EXPECT(fabs(gradient[i] - of_host[i]) < 1e-3 * (1 + fabs(of_host[i])));
-  OK(dpr_attribute_gradient_view(attribute, "sigma", &view));
+  OK(dpr_attribute_gradient_view(attribute, "sigma", &view, &offset));
   EXPECT(view.count == 1);
   OK(dpr_attribute_frame_history(attribute, &emptied, &room));
   EXPECT(emptied == 0 && room.fragments > 0);
@@ -540,10 +541,10 @@ static void test_attributes_on_device(cl_context context, cl_command_queue queue
   OK(dpr_attribute_forward_on_device(numbers, renderer, NULL));
   OK(dpr_attribute_image_view(numbers, &view));
   OK(dpr_attribute_backward_on_device(numbers, &view, NULL));
-  OK(dpr_attribute_gradient_view(numbers, "values", &view));
+  OK(dpr_attribute_gradient_view(numbers, "values", &view, &offset));
   EXPECT(view.count == 3 && view.components == 1);
   REFUSED(dpr_attribute_set_values_from(attribute, &to, 3, NULL), "depth");
-  REFUSED(dpr_attribute_gradient_view(attribute, "values", &view), "values");
+  REFUSED(dpr_attribute_gradient_view(attribute, "values", &view, &offset), "values");
   REFUSED(dpr_attribute_forward_on_device(attribute, NULL, NULL), "renderer");
   REFUSED(dpr_renderer_copy_aov(renderer, "uv", &to, NULL), "texture coordinates");
   REFUSED(dpr_renderer_aov_view(renderer, "deep", &view, NULL), "effective_faces");

@@ -12,9 +12,9 @@ constexpr const char* k_source = R"(
     const size_t i = get_global_id(0);
     grad[i] = (float4)(2.0f * (image[i] - target[i]).xyz, 0.0f) / (3.0f * get_global_size(0));
   }
-  kernel void descend(global const float4* grad, global float* colors) {
+  kernel void descend(global const float4* grad, uint first, global float* colors) {
     const size_t i = get_global_id(0);
-    const float3 step = 40.0f * grad[i].xyz;
+    const float3 step = 40.0f * grad[first + i].xyz;
     colors[3 * i] -= step.x;
     colors[3 * i + 1] -= step.y;
     colors[3 * i + 2] -= step.z;
@@ -26,7 +26,7 @@ int main() {
   cl::Program program(context, k_source);
   program.build();
   cl::KernelFunctor<cl::Buffer, cl::Buffer, cl::Buffer> difference(program, "difference");
-  cl::KernelFunctor<cl::Buffer, cl::Buffer> descend(program, "descend");
+  cl::KernelFunctor<cl::Buffer, cl_uint, cl::Buffer> descend(program, "descend");
   const cl::Buffer target(context, CL_MEM_READ_WRITE, k_side * k_side * sizeof(cl_float4));
   const cl::Buffer grad(context, CL_MEM_READ_WRITE, k_side * k_side * sizeof(cl_float4));
 
@@ -47,10 +47,12 @@ int main() {
   for (int i = 0; i < 80; ++i) {
     dpr::set_colors(renderer, 0, dpr::span_of(colors));
     dpr::forward_on_device(renderer);
-    difference(cl::EnqueueArgs(queue, pixels), dpr::buffer_of(dpr::image_view(renderer)), target, grad);
+    difference(cl::EnqueueArgs(queue, pixels), dpr::buffer_of(dpr::image_view(renderer)).buffer, target,
+               grad);
     dpr::backward_on_device(renderer, dpr::span_of(grad));
-    const dpr::BufferView gradient = dpr::gradient_view(renderer, "meshes[0].colors");  // float4 apart
-    descend(cl::EnqueueArgs(queue, faces), dpr::buffer_of(gradient), colors);
+    const auto [gradient, offset] = dpr::buffer_of(dpr::gradient_view(renderer, "meshes[0].colors"));
+    descend(cl::EnqueueArgs(queue, faces), gradient, static_cast<cl_uint>(offset / sizeof(cl_float4)),
+            colors);
   }
   queue.enqueueReadBuffer(colors, /*blocking*/ true, 0, bytes, values.data());
   const glm::vec3 seen = values[0], wanted = scene.meshes[0].mesh.face_colors[0];
