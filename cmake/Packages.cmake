@@ -2,6 +2,18 @@
 # libdprX.Y, the library; libdpr-image, what reads and writes image files; libdpr-dev; libdpr-torch and python3-dpr, the
 # operator and the Python package, where they are built; dpr, the command. Dependencies on other libraries are those that
 # dpkg-shlibdeps finds.
+# cpack runs this file too, before it packs: without these tools the packages would depend on nothing.
+if(CPACK_TEMPORARY_DIRECTORY)
+  foreach(tool IN ITEMS file dpkg-shlibdeps)
+    find_program(path_of_${tool} ${tool})
+    if(NOT path_of_${tool})
+      message(FATAL_ERROR "${tool} is missing, which finds what the packages depend on: apt-get install file dpkg-dev")
+    endif()
+  endforeach()
+  return()
+endif()
+
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_LIST_FILE})
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME dpr)
 set(CPACK_PACKAGE_CONTACT "The dpr project")

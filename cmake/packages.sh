@@ -8,8 +8,10 @@ dpr_packages_demo=(
   libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev libpng-dev nlohmann-json3-dev libcli11-dev
   gnuplot-nox
 )
-# The tests, and the reference manual.
-dpr_packages_tests=(doctest-dev clang clang-19 libclc-19 doxygen git pkg-config libzip-dev python3)
+# The tests, the reference manual, and Debian packages by cpack. Where a release has no clang-19, a test is skipped.
+dpr_packages_tests=(
+  doctest-dev clang clang-19 libclc-19 doxygen git pkg-config libzip-dev python3 file dpkg-dev
+)
 # The operator of libtorch and dpr learn.
 dpr_packages_learning=(libgloo-dev libtorch-dev libopenblas0-pthread python3-torch)
 # The tests under a simulator of the kernels.
@@ -26,7 +28,19 @@ missing_packages() {
   done
 }
 
-# install_packages SET...: demo, tests, learning, oclgrind, fuzzing.
+# Whether this release of the system has a package.
+is_packaged() { apt-cache show "$1" >/dev/null 2>&1; }
+
+# as_root COMMAND...: fails where there is no way to be root.
+as_root() {
+  if (($(id -u) == 0)); then
+    "$@"
+  else
+    command -v sudo >/dev/null && sudo "$@"
+  fi
+}
+
+# install_packages SET...: demo, tests, learning, oclgrind, fuzzing. What a release does not have is named and left out.
 install_packages() {
   local packages=() set
   for set in "$@"; do
@@ -35,30 +49,30 @@ install_packages() {
   done
   if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
     # Elsewhere the packages have other names: their installation is left to the user.
+    echo "Needed are, under the names this system gives them: ${packages[*]}" >&2
     local tool
     for tool in c++ cmake ninja; do
       if ! command -v "$tool" >/dev/null; then
-        echo "$tool is missing. Needed are, under the names this system gives them:" >&2
-        echo "  ${packages[*]}" >&2
+        echo "$tool is missing." >&2
         exit 1
       fi
     done
     return
   fi
 
-  local missing
+  local missing package available=() absent=()
   mapfile -t missing < <(missing_packages "${packages[@]}")
   if ((${#missing[@]} == 0)); then return; fi
-  local sudo=()
-  if (($(id -u) != 0)); then
-    if ! command -v sudo >/dev/null; then
-      echo "Missing packages, and neither root nor sudo to install them: ${missing[*]}" >&2
-      exit 1
-    fi
-    sudo=(sudo)
+  as_root apt-get update -q || echo "apt-get update failed: its lists of packages stay as they are." >&2
+  for package in "${missing[@]}"; do
+    if is_packaged "$package"; then available+=("$package"); else absent+=("$package"); fi
+  done
+  if ((${#absent[@]} > 0)); then echo "This release has no ${absent[*]}: what needs them is skipped."; fi
+  if ((${#available[@]} == 0)); then return; fi
+  if ! as_root true; then
+    echo "Missing packages, and neither root nor sudo to install them: ${available[*]}" >&2
+    exit 1
   fi
-  echo "Installing ${missing[*]}"
-  "${sudo[@]}" apt-get update -q
-  "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get install -q -y --no-install-recommends "${missing[@]}"
+  echo "Installing ${available[*]}"
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${available[@]}"
 }

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Compiles every kernel with every set of options that a stage builds it with, at 1, 8 and 16 lanes.
 
-compile_kernels.py lint CLANG FOLDER...         as strict OpenCL C 1.2; warnings are errors
-compile_kernels.py driver [--lanes N] FOLDER... to machine code, by the driver of the first OpenCL device
+compile_kernels.py lint CLANG KERNELS [MORE...]            as strict OpenCL C 1.2; warnings are errors
+compile_kernels.py driver [--lanes N...] KERNELS [MORE...] to machine code, by the driver of the first OpenCL device
+
+KERNELS is the folder with the headers, MORE other folders or files: with files the folder's own are left out.
 
 A compilation is a process of its own, so that a driver that aborts fails with its last words and the others are tried.
 """
@@ -19,7 +21,7 @@ LANES = [1, 8, 16]
 WIDTHS = [f"-DDPR_OCCUPANCY_WIDTH={width}" for width in range(3)]
 # Unlit surfaces are shade.cl's. One kind of light a time, none, and all.
 SHADING = [[f"-DDPR_SHADING={shading}", f"-DDPR_LIGHTS={lights}", f"-DDPR_BASE={base}"]
-           for shading, lights, base in itertools.product([1, 2], [0, 1, 2, 4, 7], ["DPR_BASE_OF_CORNERS", "DPR_BASE_OF_FRAGMENTS"])]
+           for shading, lights, base in itertools.product([1, 2, 3, 4], [0, 1, 2, 4, 7], ["DPR_BASE_OF_CORNERS", "DPR_BASE_OF_FRAGMENTS"])]
 
 
 def priors(kernels):
@@ -42,10 +44,10 @@ def option_sets(kernels):
 def compilations(folders, lanes):
     """Every (file, options)."""
     sets = option_sets(folders[0])
-    for folder in folders:
-        for file in sorted(folder.glob("*.cl")):
-            for count, options in itertools.product(lanes, sets.get(file.name, [[]])):
-                yield file, [f"-I{folders[0]}", f"-DDPR_LANES={count}", *options]
+    files = [path for path in folders if path.is_file()] or [file for folder in folders for file in sorted(folder.glob("*.cl"))]
+    for file in files:
+        for count, options in itertools.product(lanes, sets.get(file.name, [[]])):
+            yield file, [f"-I{folders[0]}", f"-DDPR_LANES={count}", *options]
 
 
 def check(opencl, function, *arguments):
