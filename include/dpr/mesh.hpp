@@ -56,17 +56,17 @@ struct Mesh {
 /// says in the message which mesh it is. O(vertices + faces + texels).
 DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 
-/// Reads OBJ, PLY, OFF or STL, once from front to back; the vertices are in the order of the file. Polygons
-/// become triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices,
-/// else of faces, white where others have one. The diffuse colours of OBJ materials are face colours, their
-/// textures (map_Kd) are the mesh's, and what they say of highlights (Ks, Ns, illum) its materials, if
-/// libraries and textures are regular files; dpr/notes.hpp tells what is left out. The normals of an OBJ are
-/// kept if every corner has one; those of a PLY's vertices, and their texture coordinates, if they are
-/// floats. STL has no shared vertices: equal positions become one, and facets with two equal corners are left
-/// out. The texture coordinates of an OBJ (u, v; v up) are kept if every corner has some, or where there are
-/// textures; then faces without coordinates get (0, 0) and no texture. Throws IoError where the file is
-/// missing, malformed, truncated, goes on after its end or, being a pipe or a device, does not end; and
-/// InvalidArgument where its content cannot be rendered.
+/// Reads OBJ, PLY, OFF or STL; vertices are in the order of the file. Polygons become triangle fans; non-
+/// manifold, duplicate and degenerate faces are kept, and the colours of vertices, else of faces, white where
+/// others have one. The diffuse colours of OBJ materials are face colours, their textures (map_Kd) are the
+/// mesh's, and what they say of highlights (Ks, Ns, illum) its materials, if libraries and textures are
+/// regular files; a PLY's textures (comment TextureFile) take the place of its colours, by its corners' or
+/// else its vertices' coordinates; dpr/notes.hpp tells what is left out. The normals of an OBJ are kept if
+/// every corner has one; a PLY's normals and texture coordinates, if they are floats. Equal positions of an
+/// STL become one, and facets with two equal corners are left out. The texture coordinates of an OBJ (u, v; v
+/// up) are kept if every corner has some, or where there are textures; then faces without coordinates get (0,
+/// 0) and no texture. Throws IoError where the file is missing, malformed, truncated, goes on after its end
+/// or has none; and InvalidArgument where its content cannot be rendered.
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face

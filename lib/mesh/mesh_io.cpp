@@ -84,7 +84,7 @@ Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& not
   const std::string extension = lower_case_extension(file);
   Mesh mesh;
   if (extension == ".obj") mesh = read_obj(file, bytes, notes);
-  if (extension == ".ply") mesh = read_ply(file, std::move(bytes));
+  if (extension == ".ply") mesh = read_ply(file, std::move(bytes), notes);
   if (extension == ".off") mesh = read_off(file, bytes);
   if (extension == ".stl") mesh = read_stl(file, bytes, notes);
   validate(mesh, file.string());

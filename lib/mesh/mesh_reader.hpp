@@ -26,7 +26,7 @@ Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& not
 
 // The formats. What they return may have no face or an index out of range: parse_mesh() checks that for all.
 Mesh read_obj(const std::filesystem::path& file, std::string_view text, Notes& notes);
-Mesh read_ply(const std::filesystem::path& file, std::string bytes);
+Mesh read_ply(const std::filesystem::path& file, std::string bytes, Notes& notes);
 Mesh read_off(const std::filesystem::path& file, std::string_view text);
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 
@@ -60,6 +60,12 @@ using ObjMaterials = std::map<std::string, ObjMaterial, std::less<>>;
 /// Adds the materials of an OBJ's library, beside which its textures are. Throws IoError where a colour or an
 /// option of a texture cannot be read.
 void read_mtl(const std::filesystem::path& file, std::string_view text, ObjMaterials& materials);
+
+/// Reason why a file beside a mesh is not read.
+inline std::string what_is_wrong(const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::exists(file, error) ? " is no regular file" : " is not there";
+}
 
 /// Appends a polygon as a fan of triangles about its first corner.
 inline void append_fan(std::span<const std::uint32_t> corners, std::vector<glm::uvec3>& triangles) {

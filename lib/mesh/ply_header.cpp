@@ -91,6 +91,8 @@ class PlyHeaderReader {
     if (lines_.next()) scan::split(lines_.line(), words_);
     if (words_.size() != 1 || (words_[0] != "ply" && words_[0] != "PLY")) fail("not a PLY file");
     for (next_line(); words_.empty() || words_[0] != "end_header"; next_line()) {
+      if (words_.size() > 2 && words_[0] == "comment" && words_[1] == "TextureFile")
+        header.textures.emplace_back(scan::behind(lines_.line(), words_[1]));
       if (words_.empty() || words_[0] == "comment" || words_[0] == "obj_info") continue;
       if (words_[0] == "format") {
         format();
@@ -192,9 +194,18 @@ class PlyHeaderReader {
       fail("expected the list vertex_indices as the first property of the element face");
     }
     header.face_colors = prepare_colors(face);
+    // By MeshLab.
+    Property* const texcoords = find(face, "texcoord");
+    header.has_corner_texcoords =
+        texcoords && !texcoords->list_count_type.empty() && is_floating(texcoords->type);
+    if (header.has_corner_texcoords) read_as(*texcoords, k_custom_corner_texcoords);
+    Property* const texture = find(face, "texnumber");
+    header.has_texture_numbers = texture && texture->list_count_type.empty() && texture->type == "int";
+    if (header.has_texture_numbers) read_as(*texture, k_custom_texture);
     rename(face, {"vertex_indices", "vertex_index"});
     header.has_custom_properties = has_lists(face) || header.vertex_colors.custom ||
-                                   header.face_colors.custom || header.has_texcoords || header.has_normals;
+                                   header.face_colors.custom || header.has_texcoords || header.has_normals ||
+                                   header.has_texture_numbers;
   }
 
   // Lists beside the corners.
@@ -286,11 +297,13 @@ class PlyHeaderReader {
       found[i] = find(element, std::string(names[i]));
       if (!found[i] || !found[i]->list_count_type.empty() || !is_floating(found[i]->type)) return false;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      found[i]->name = custom[i];
-      found[i]->is_read = true;
-    }
+    for (std::size_t i = 0; i < count; ++i) read_as(*found[i], custom[i]);
     return true;
+  }
+
+  static void read_as(Property& property, const char* name) {
+    property.name = name;
+    property.is_read = true;
   }
 
   static Property* find(Element& element, const std::string& name) {

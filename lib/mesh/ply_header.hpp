@@ -20,6 +20,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dpr {
 
@@ -30,6 +31,10 @@ inline constexpr std::array<const char*, 3> k_custom_colors{"dpr_red", "dpr_gree
 /// The same for texture coordinates and normals of vertices.
 inline constexpr std::array<const char*, 2> k_custom_texcoords{"dpr_u", "dpr_v"};
 inline constexpr std::array<const char*, 3> k_custom_normals{"dpr_nx", "dpr_ny", "dpr_nz"};
+
+/// Those of the corners of a face, in one list, and the number of the face's texture.
+inline constexpr const char* k_custom_corner_texcoords = "dpr_texcoord";
+inline constexpr const char* k_custom_texture = "dpr_texnumber";
 
 /// How the colours of an element arrive.
 struct ColorForm {
@@ -48,7 +53,9 @@ struct PlyHeader {
   bool has_custom_properties = false;
   std::size_t vertices = 0, polygons = 0;
   ColorForm vertex_colors, face_colors;
-  bool has_texcoords = false, has_normals = false;  ///< of vertices, as custom properties
+  bool has_texcoords = false, has_normals = false;                 ///< of vertices, as custom properties
+  bool has_corner_texcoords = false, has_texture_numbers = false;  ///< of faces, the same
+  std::vector<std::string> textures;                               ///< "comment TextureFile", as written
 };
 
 /// Throws IoError where the header is wrong, or the file too short for what it promises.

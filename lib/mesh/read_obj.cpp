@@ -272,12 +272,6 @@ class ObjReader {
     }
   }
 
-  /// Reason why a file is not read.
-  static std::string what_is_wrong(const std::filesystem::path& file) {
-    std::error_code error;
-    return std::filesystem::exists(file, error) ? " is no regular file" : " is not there";
-  }
-
   bool material_library(std::string_view name) {
     const std::filesystem::path library = file_.parent_path() / name;
     std::error_code error;

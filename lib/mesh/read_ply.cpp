@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <locale>
 #include <mutex>
+#include <numeric>
 #include <sstream>
 
 #include "dpr/error.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/ply_header.hpp"
 #include "mesh/ply_importer.hpp"
+#include "mesh/scan_text.hpp"
 #include "mesh/silent_openmesh.hpp"
 
 namespace dpr {
@@ -104,6 +106,91 @@ std::vector<glm::vec3> custom_vectors(PlyImporter& importer, const std::array<co
   return vectors;
 }
 
+/// Coordinates of the corners of polygons, 2 numbers each. Those of a polygon that has none, or too few, are
+/// left at k_no_texture, all of its triangles.
+template <typename Number>
+void take_corner_texcoords(PlyImporter& importer, Mesh& mesh) {
+  OpenMesh::FPropHandleT<std::vector<Number>> handle;
+  if (!importer.kernel()->get_property_handle(handle, k_custom_corner_texcoords)) return;
+  const std::vector<std::vector<Number>>& lists = importer.kernel()->property(handle).data_vector();
+  std::vector<std::uint32_t> corners;
+  std::size_t begin = 0;
+  for (std::size_t polygon = 0; polygon < importer.polygon_ends.size(); ++polygon) {
+    const std::size_t end = importer.polygon_ends[polygon];
+    corners.resize(end - begin + 2);
+    if (lists[polygon].size() == 2 * corners.size()) {
+      std::iota(corners.begin(), corners.end(), static_cast<std::uint32_t>(mesh.texcoords.size()));
+      for (std::size_t i = 0; i < corners.size(); ++i)
+        mesh.texcoords.emplace_back(lists[polygon][2 * i], lists[polygon][2 * i + 1]);
+      append_fan(corners, mesh.face_texcoords);
+    }
+    mesh.face_texcoords.resize(end, glm::uvec3(k_no_texture));
+    begin = end;
+  }
+}
+
+/// [face] the number of its texture in the file.
+std::vector<std::uint32_t> texture_numbers(const PlyHeader& header, PlyImporter& importer) {
+  std::vector<glm::vec3> of_polygons(importer.polygon_ends.size());
+  take_channel<int, OpenMesh::FPropHandleT<int>>(importer, k_custom_texture, 1, 0, of_polygons);
+  take_channel<double, OpenMesh::FPropHandleT<double>>(importer, k_custom_texture, 1, 0, of_polygons);
+  std::vector<std::uint32_t> numbers;
+  for (std::size_t i = 0; i < of_polygons.size(); ++i) {
+    const float number = of_polygons[i].x;
+    const bool is_one = number >= 0 && number < static_cast<float>(header.textures.size());
+    numbers.resize(importer.polygon_ends[i], is_one ? static_cast<std::uint32_t>(number) : k_no_texture);
+  }
+  return numbers;
+}
+
+/// Reads the textures that the header names, beside the file, for the faces that have coordinates in them.
+void take_textures(const std::filesystem::path& file, const PlyHeader& header, PlyImporter& importer,
+                   Mesh& mesh, Notes& notes) {
+  std::vector<std::uint32_t> known;  // [number in the file] among the mesh's
+  for (const std::string& name : header.textures) {
+    const std::filesystem::path path = file.parent_path() / std::filesystem::path(name);
+    std::error_code error;
+    const bool is_there = std::filesystem::is_regular_file(path, error);
+    if (is_there && !mesh.face_texcoords.empty()) {
+      known.push_back(static_cast<std::uint32_t>(mesh.textures.size()));
+      mesh.textures.push_back(read_texture(path));
+      continue;
+    }
+    known.push_back(k_no_texture);
+    notes.push_back(file.string() + ": the texture " + scan::quoted(name) + " (TextureFile)" +
+                    (is_there ? " is left out: there are no coordinates in it" : what_is_wrong(path)) +
+                    ": its faces have the colours of the file alone");
+  }
+  if (mesh.textures.empty()) return;
+  mesh.face_textures = texture_numbers(header, importer);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    std::uint32_t& number = mesh.face_textures[f];
+    if (number != k_no_texture) number = known[number];
+    if (mesh.face_texcoords[f][0] == k_no_texture) number = k_no_texture;
+  }
+  if (std::ranges::all_of(mesh.face_textures, [](std::uint32_t t) { return t == 0; }))
+    mesh.face_textures.clear();
+  if (mesh.vertex_colors.empty() && mesh.face_colors.empty()) return;
+  notes.push_back(file.string() + ": the colours are left out: there is a texture in their place");
+  mesh.vertex_colors.clear();
+  mesh.face_colors.clear();
+}
+
+/// Faces without coordinates get (0, 0) where others show a texture; where none does, there are coordinates of
+/// all faces or none.
+void complete_texcoords(Mesh& mesh) {
+  const auto is_without = [](const glm::uvec3& corners) { return corners[0] == k_no_texture; };
+  if (std::ranges::none_of(mesh.face_texcoords, is_without)) return;
+  if (mesh.textures.empty()) {
+    mesh.texcoords.clear();
+    mesh.face_texcoords.clear();
+    return;
+  }
+  const glm::uvec3 origin(static_cast<std::uint32_t>(mesh.texcoords.size()));
+  mesh.texcoords.emplace_back(0, 0);
+  std::ranges::replace_if(mesh.face_texcoords, is_without, origin);
+}
+
 /// Colours of polygons for each of their triangles.
 std::vector<glm::vec3> triangle_colors(const PlyImporter& importer) {
   std::vector<glm::vec3> colors;
@@ -114,7 +201,7 @@ std::vector<glm::vec3> triangle_colors(const PlyImporter& importer) {
 
 }  // namespace
 
-Mesh read_ply(const std::filesystem::path& file, std::string bytes) {
+Mesh read_ply(const std::filesystem::path& file, std::string bytes, Notes& notes) {
   const PlyHeader header = read_ply_header(file, bytes);
   bytes.replace(0, header.bytes, header.text);
   std::istringstream in(std::move(bytes));
@@ -130,7 +217,10 @@ Mesh read_ply(const std::filesystem::path& file, std::string bytes) {
   Mesh mesh;
   mesh.vertex_colors = std::move(importer.vertex_colors);
   if (mesh.vertex_colors.empty()) mesh.face_colors = triangle_colors(importer);
-  if (header.has_texcoords) {
+  if (header.has_corner_texcoords) {
+    take_corner_texcoords<float>(importer, mesh);
+    take_corner_texcoords<double>(importer, mesh);
+  } else if (header.has_texcoords) {
     for (const glm::vec3& uv : custom_vectors(importer, k_custom_texcoords)) mesh.texcoords.emplace_back(uv);
     mesh.face_texcoords = importer.triangles;
   }
@@ -140,6 +230,8 @@ Mesh read_ply(const std::filesystem::path& file, std::string bytes) {
   }
   mesh.positions = std::move(importer.positions);
   mesh.faces = std::move(importer.triangles);
+  take_textures(file, header, importer, mesh, notes);
+  complete_texcoords(mesh);
   return mesh;
 }
 

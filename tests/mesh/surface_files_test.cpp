@@ -32,6 +32,42 @@ void append_little(std::string& bytes, const auto& value) {
   bytes.append(parts.begin(), parts.end());
 }
 
+Texture two_texels(const glm::vec3& left, const glm::vec3& right) { return {2, 1, {left, right}}; }
+
+enum class Form { ascii, little, big };
+constexpr std::array k_forms{Form::ascii, Form::little, Form::big};
+
+/// A PLY whose numbers are written in any of its formats.
+struct PlyBody {
+  explicit PlyBody(Form of) : form(of) {
+    constexpr std::array<const char*, 3> k_names{"ascii", "binary_little_endian", "binary_big_endian"};
+    header = "ply\nformat " + std::string(k_names[static_cast<std::size_t>(of)]) + " 1.0\n";
+  }
+
+  void add(const auto& value) {
+    if (form == Form::ascii) {
+      numbers += std::to_string(value) + " ";
+      return;
+    }
+    std::string bytes;
+    append_little(bytes, value);
+    if (form == Form::big) std::ranges::reverse(bytes);
+    numbers += bytes;
+  }
+
+  void end_row() {
+    if (form == Form::ascii) numbers += "\n";
+  }
+
+  void add_corners(const std::vector<std::int32_t>& corners) {
+    add(static_cast<unsigned char>(corners.size()));
+    for (const std::int32_t corner : corners) add(corner);
+  }
+
+  Form form;
+  std::string header, numbers;
+};
+
 }  // namespace
 
 TEST_SUITE("unit") {
@@ -169,6 +205,91 @@ TEST_SUITE("unit") {
         CHECK(mesh.vertex_colors[1] == glm::vec3(1, 0, 0.2F));
       }
     }
+  }
+
+  TEST_CASE("PLY: a texture by the coordinates of vertices, in every format") {
+    const TempDir folder;
+    write_texture(folder / "two words.png", two_texels({1, 0, 0}, {0, 0, 1}));
+    for (const Form form : k_forms) {
+      PlyBody body(form);
+      body.header +=
+          "comment TextureFile two words.png\nelement vertex 3\nproperty float x\nproperty float y\n"
+          "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+          "property float texture_u\nproperty float texture_v\n" +
+          k_ply_faces;
+      for (const auto& [x, y] : {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}}) {
+        for (const float number : {x, y, 0.0F}) body.add(number);
+        for (const int byte : {10, 20, 30}) body.add(static_cast<unsigned char>(byte));
+        for (const float number : {x, y}) body.add(number);
+        body.end_row();
+      }
+      body.add_corners({0, 1, 2});
+      Notes notes;
+      const Mesh mesh = read_mesh(folder.write("mesh.ply", body.header + body.numbers), notes);
+      REQUIRE(mesh.textures.size() == 1);
+      CHECK(mesh.textures[0].texels[1] == glm::vec3(0, 0, 1));
+      CHECK(mesh.texcoords == std::vector<glm::vec2>{{0, 0}, {1, 0}, {0, 1}});
+      CHECK(mesh.face_texcoords == mesh.faces);
+      CHECK(mesh.face_textures.empty());
+      CHECK(mesh.vertex_colors.empty());
+      CHECK(has_note(notes, "colours are left out"));
+    }
+  }
+
+  TEST_CASE("PLY: textures by the coordinates of corners, numbered, in every format") {
+    const TempDir folder;
+    write_texture(folder / "a.png", two_texels({1, 0, 0}, {0, 0, 1}));
+    write_texture(folder / "b.png", two_texels({0, 1, 0}, {1, 1, 1}));
+    for (const Form form : k_forms) {
+      PlyBody body(form);
+      body.header +=
+          "comment TextureFile a.png\ncomment TextureFile gone.png\ncomment TextureFile b.png\n"
+          "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+          "element face 4\nproperty list uchar int vertex_indices\n"
+          "property list uchar float texcoord\nproperty int texnumber\nend_header\n";
+      for (const auto& [x, y] : {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}}) {
+        for (const float number : {x, y, 0.0F}) body.add(number);
+        body.end_row();
+      }
+      const auto add_face = [&](const std::vector<std::int32_t>& corners, const std::vector<float>& list,
+                                std::int32_t number) {
+        body.add_corners(corners);
+        body.add(static_cast<unsigned char>(list.size()));
+        for (const float value : list) body.add(value);
+        body.add(number);
+        body.end_row();
+      };
+      add_face({0, 1, 2, 3}, {0, 0, 1, 0, 1, 1, 0, 1}, 2);  // two triangles
+      add_face({0, 1, 2}, {}, 0);
+      add_face({1, 2, 3}, {0.5F, 0.25F, 1, 0, 1, 1}, 0);
+      add_face({1, 2, 3}, {0, 0, 1, 0, 1, 1}, 1);
+      Notes notes;
+      const Mesh mesh = read_mesh(folder.write("mesh.ply", body.header + body.numbers), notes);
+      REQUIRE(mesh.textures.size() == 2);
+      CHECK(mesh.textures[1].texels[0] == glm::vec3(0, 1, 0));
+      CHECK(mesh.face_textures == std::vector<std::uint32_t>{1, 1, k_no_texture, 0, k_no_texture});
+      REQUIRE(mesh.face_texcoords.size() == 5);
+      CHECK(mesh.texcoords[mesh.face_texcoords[1][1]] == glm::vec2(1, 1));
+      CHECK(mesh.texcoords[mesh.face_texcoords[2][0]] == glm::vec2(0));
+      CHECK(mesh.texcoords[mesh.face_texcoords[3][0]] == glm::vec2(0.5F, 0.25F));
+      CHECK(has_note(notes, "\"gone.png\" (TextureFile) is not there"));
+    }
+  }
+
+  TEST_CASE("PLY: a texture without coordinates is told, and the colours stay") {
+    const TempDir folder;
+    write_texture(folder / "a.png", two_texels({1, 0, 0}, {0, 0, 1}));
+    Notes notes;
+    const Mesh mesh = read_mesh(
+        folder.write("mesh.ply",
+                     "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty "
+                     "float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar "
+                     "green\nproperty uchar blue\n" +
+                         k_ply_faces + "0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"),
+        notes);
+    CHECK(mesh.textures.empty());
+    CHECK(mesh.vertex_colors.size() == 3);
+    CHECK(has_note(notes, "no coordinates in it"));
   }
 
   TEST_CASE("PLY: half of a pair of coordinates, or coordinates in whole numbers, are none") {
