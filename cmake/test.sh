@@ -10,7 +10,7 @@ if ((${#presets[@]} == 0)); then presets=(release); fi
 sets=(demo tests)
 for preset in "${presets[@]}"; do
   case $preset in
-    release) sets+=(learning) ;;
+    release | ci) sets+=(learning) ;;
     oclgrind) sets+=(oclgrind) ;;
     fuzz) sets+=(fuzzing) ;;
   esac
