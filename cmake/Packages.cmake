@@ -1,6 +1,6 @@
 # Debian packages by `cpack`, from a build with BUILD_SHARED_LIBS and the prefix /usr, as the preset "packages" has it:
-# libdprX.Y, the library; libdpr-image, what reads and writes image files; libdpr-dev; libdpr-torch and python3-dpr, the
-# operator and the Python package, where they are built; dpr, the command. Dependencies on other libraries are those that
+# libdprX.Y, the library; libdpr-image, what reads and writes image files; libdpr-dev; python3-dpr, the Python package, which
+# is of every architecture; dpr, the command. Dependencies on other libraries are those that
 # dpkg-shlibdeps finds.
 # cpack runs this file too, before it packs: without these tools the packages would depend on nothing.
 if(CPACK_TEMPORARY_DIRECTORY)
@@ -23,8 +23,8 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENTS_ALL library image development)
-if(TARGET dpr_torch)
-  list(APPEND CPACK_COMPONENTS_ALL torch python)
+if(DPR_BUILD_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
 endif()
 if(TARGET dpr_cli)
   list(APPEND CPACK_COMPONENTS_ALL tools)
@@ -46,10 +46,12 @@ dpr_package(library ${library} libs "the library")
 dpr_package(image libdpr-image libs "image files")
 dpr_package(development libdpr-dev libdevel "headers for C and C++" "${library} ${this_version}"
             "libdpr-image ${this_version}" ocl-icd-opencl-dev opencl-c-headers opencl-clhpp-headers libglm-dev)
-dpr_package(torch libdpr-torch libs "the operator of libtorch")
-dpr_package(python python3-dpr python "the Python package for PyTorch" "libdpr-torch ${this_version}" python3-torch)
+dpr_package(python python3-dpr python "the Python package" "${library} ${this_version}" python3 "python3-numpy (>= 1:1.23)")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 dpr_package(tools dpr graphics "the command" "libdpr-image ${this_version}")
 # Devices are the machine's choice.
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_RECOMMENDS "libdpr-image ${this_version}, pocl-opencl-icd | opencl-icd")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "pocl-opencl-icd | opencl-icd")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS python3-torch)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "pocl-opencl-icd | opencl-icd, gnuplot-nox")
 include(CPack)

@@ -12,7 +12,7 @@ dpr_packages_demo=(
 dpr_packages_tests=(
   doctest-dev clang clang-19 libclc-19 doxygen git pkg-config libzip-dev python3 file dpkg-dev
 )
-# The operator of libtorch and dpr learn.
+# dpr learn, and the tests of the Python package.
 dpr_packages_learning=(libgloo-dev libtorch-dev libopenblas0-pthread python3-torch)
 # The tests under a simulator of the kernels.
 dpr_packages_oclgrind=(oclgrind)

@@ -6,8 +6,8 @@
  * Threads may work at the same time on handles that nothing connects: each thread has a device, and what is
  * made from it, of its own.
  *
- * dpr/dpr_batch.h, batches of scenes, and dpr/dpr_on_device.h, buffers of the caller's, come with this
- * header.
+ * dpr/dpr_frame.h, views rendered from named arrays, dpr/dpr_batch.h, batches of scenes, and
+ * dpr/dpr_on_device.h, buffers of the caller's, come with this header.
  *
  * Arrays are copied. Matrices are row-major and act on column vectors; a colour is linear RGB, a pixel is
  * linear RGBA. Structs begin with their size: fill them by their DPR_..._INIT, so that a program which was
@@ -60,6 +60,21 @@ typedef struct dpr_gradient dpr_gradient;
 /* Opens a device: "" or NULL takes the best that can be used; "cpu", "gpu", an index as `dpr devices` lists
  * them, or a part of its name. */
 DPR_API dpr_status dpr_device_open(const char* selector, dpr_device** device);
+
+/* A device as `dpr devices` lists it. */
+typedef struct dpr_device_info {
+  size_t size;
+  const char *platform, *name, *vendor, *version, *driver;
+  const char* type; /* "cpu", "gpu" or "accelerator" */
+  size_t memory_bytes;
+  unsigned compute_units, lanes; /* lanes: width of the vectors that kernels are built with */
+  int is_default;                /* not 0: what "" takes, if it can be used */
+} dpr_device_info;
+
+/* How many devices there are; none is no error. */
+DPR_API dpr_status dpr_device_count(size_t* count);
+/* Fills a struct that holds its size. Texts are valid until the thread's next call of this. */
+DPR_API dpr_status dpr_device_describe(size_t index, dpr_device_info* info);
 
 /* Uses the caller's cl_context and in-order cl_command_queue, which are retained. Of an out-of-order queue it
  * takes the device alone, and makes an in-order queue beside it. */
@@ -404,6 +419,7 @@ DPR_API void dpr_attribute_destroy(dpr_attribute* attribute);
 #endif
 
 #include "dpr/dpr_batch.h"
+#include "dpr/dpr_frame.h"
 #include "dpr/dpr_on_device.h"
 
 #endif

@@ -32,7 +32,7 @@ struct SmoothingOptions {
 };
 
 /// The smoothing that the options describe, for images of `width` x `height`. Throws InvalidArgument where
-/// they describe none. Command line, scene and views files, and the torch operator all end here:
+/// they describe none. Command line, scene and views files, frames of named arrays all end here:
 /// 1. The preset says everything but the seed. Without one it is `otherwise` that does. Without either it is
 ///    the default, "pixel", where says_nothing() or the noise is that of the pixel, and "gaussian" where
 ///    anything else is given: a sigma alone is one of the triangles' noise.

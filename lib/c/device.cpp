@@ -13,6 +13,32 @@ dpr_status dpr_device_open(const char* selector, dpr_device** device) {
   });
 }
 
+dpr_status dpr_device_count(std::size_t* count) {
+  return guarded([&] { deref(count, "count") = dpr::list_devices().size(); });
+}
+
+dpr_status dpr_device_describe(std::size_t index, dpr_device_info* info) {
+  return guarded([&] {
+    std::vector<dpr::DeviceInfo> devices = dpr::list_devices();
+    if (index >= devices.size())
+      throw dpr::InvalidArgument("index", std::to_string(index), "below " + std::to_string(devices.size()));
+    thread_local dpr::DeviceInfo kept;
+    kept = std::move(devices[index]);
+    dpr_device_info found{};
+    found.platform = kept.platform.c_str();
+    found.name = kept.name.c_str();
+    found.vendor = kept.vendor.c_str();
+    found.version = kept.version.c_str();
+    found.driver = kept.driver.c_str();
+    found.type = kept.type.c_str();
+    found.memory_bytes = kept.memory_bytes;
+    found.compute_units = kept.compute_units;
+    found.lanes = kept.lanes;
+    found.is_default = kept.is_default ? 1 : 0;
+    dpr::c::fill(info, found, "info");
+  });
+}
+
 dpr_status dpr_device_adopt(struct _cl_context* context, struct _cl_command_queue* queue,
                             dpr_device** device) {
   return guarded([&] {

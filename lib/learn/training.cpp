@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <ostream>
 #include <random>
@@ -14,12 +15,11 @@
 #include "dpr/smoothing_options.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/evaluation.hpp"
+#include "learn/mesh_renderer.hpp"
 #include "learn/rank_group.hpp"
 #include "learn/resume.hpp"
 #include "mesh/adjacency.hpp"
 #include "smoothing/priors.hpp"
-#include "torch/errors.hpp"
-#include "torch/render.hpp"
 
 namespace dpr::learn {
 namespace {
@@ -112,8 +112,7 @@ class Trainer {
         ranks_(ranks),
         gradients_(ranks, network->parameters()),
         smoothing_(training_smoothing(options)),
-        renderer_(c10::make_intrusive<torch_op::BatchRenderer>(template_mesh().faces, k_image_size,
-                                                               k_image_size, smoothing_, device)),
+        renderer_(std::make_shared<MeshRenderer>(template_mesh().faces, k_image_size, smoothing_, device)),
         views_(view_matrices()),
         intrinsics_(intrinsics().expand({2 * options.batch / ranks->ranks().count, 4})),
         laplacian_(umbrella_operator(template_mesh())) {
@@ -125,7 +124,7 @@ class Trainer {
   StepRecord step(LoadedCheckpoint& run) {
     try {
       return try_step(run);
-    } catch (const torch_op::RenderError& error) {
+    } catch (const RenderError& error) {
       std::rethrow_exception(error.original());
     } catch (const c10::Error& error) {
       throw Error(error.what_without_backtrace());
@@ -173,9 +172,9 @@ class Trainer {
     const at::Tensor targets =
         torch::cat({inputs, load_images(dataset_, batch.others)}).permute({0, 2, 3, 1});
     const Reconstruction meshes = network->forward(inputs);
-    const at::Tensor images = torch_op::render(
-        renderer_, torch::cat({meshes.vertices, meshes.vertices}), torch::cat({meshes.colors, meshes.colors}),
-        views_.index_select(0, view_indices(batch)), intrinsics_, torch::zeros({3}));
+    const at::Tensor images = renderer_->render(torch::cat({meshes.vertices, meshes.vertices}),
+                                                torch::cat({meshes.colors, meshes.colors}),
+                                                views_.index_select(0, view_indices(batch)), intrinsics_);
     return compare(images, targets, meshes.vertices);
   }
 
@@ -202,7 +201,7 @@ class Trainer {
   RankGroupPtr ranks_;
   GradientAverage gradients_;
   Smoothing smoothing_;
-  c10::intrusive_ptr<torch_op::BatchRenderer> renderer_;
+  std::shared_ptr<MeshRenderer> renderer_;
   at::Tensor views_, intrinsics_, laplacian_;
 };
 

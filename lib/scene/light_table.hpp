@@ -1,5 +1,5 @@
 // Every kind of light once: its key in files, its members with their gradients, what the device sees of it.
-// Files, checks, uploads, gradients, the operator and tests walk this table.
+// Files, checks, uploads, gradients, frames of arrays and tests walk this table.
 #pragma once
 
 #include <array>

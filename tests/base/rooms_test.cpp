@@ -15,7 +15,7 @@ namespace {
 /// From the ground up.
 const std::vector<std::string> k_floors{"reference", "base",   "image",  "codecs",   "mesh", "smoothing",
                                         "scene",     "device", "stages", "renderer", "loss", "multi_device",
-                                        "solve",     "c",      "torch",  "check",    "cli",  "learn"};
+                                        "solve",     "c",      "batch",  "check",    "cli",  "learn"};
 
 std::ptrdiff_t floor_of(const std::string& folder) {
   return std::ranges::find(k_floors, folder) - k_floors.begin();

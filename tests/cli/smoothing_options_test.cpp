@@ -1,5 +1,5 @@
 // A smoothing is the same whoever describes it: the library's options, a scene file, the command line over a
-// file, and what the torch operator is told. Every preset with every kind of override.
+// file, and what frames of named arrays are told. Every preset with every kind of override.
 #include "dpr/smoothing_options.hpp"
 
 #include <doctest/doctest.h>

@@ -75,8 +75,10 @@ if [[ ${1:-} == --packages ]]; then
     /tmp/consumer/main /tmp/cube.png /tmp/cube.exr && /tmp/consumer/embedder'
 
   echo "== Python"
-  install /packages/libdpr-torch*.deb /packages/python3-dpr*.deb
-  inside 'cd /tmp && python3 /dpr/tests/torch/package_test.py 2>&1 | tail -3'
+  install /packages/python3-dpr*.deb
+  inside 'cd /tmp && python3 /dpr/tests/python/numpy_test.py 2>&1 | tail -3'
+  install python3-torch
+  inside 'cd /tmp && python3 /dpr/tests/python/package_test.py 2>&1 | tail -3'
   exit
 fi
 

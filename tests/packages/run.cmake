@@ -1,7 +1,7 @@
 # Makes the Debian packages of the source tree DPR in BUILD, installs them into an empty root below WORK by dpkg,
 # against the packages of this system, and builds and runs programs in C and C++20 with what is installed there; and the
-# command, and where the operator is one of the packages, its tests with PYTHON. GENERATOR and CXX are those of the build
-# tree, CONSUMER, C_PROGRAM, OPERATOR_TEST and PYTHON_TEST sources.
+# command, and with PYTHON the tests of the folder PYTHON_TESTS. GENERATOR and CXX are those of the build tree, CONSUMER and
+# C_PROGRAM sources.
 cmake_minimum_required(VERSION 3.25)
 function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
@@ -63,9 +63,9 @@ run(${C_COMPILER} -std=c99 -pedantic -Wall -Wextra -Werror ${C_PROGRAM} -o ${WOR
 run(${WORK}/from_c)
 
 run(${prefix}/bin/dpr devices)
-file(STRINGS ${WORK}/consumer/operator.txt operator)
-if(operator AND PYTHON)
-  run(${PYTHON} ${OPERATOR_TEST} ${operator})
+if(PYTHON)
   set(ENV{PYTHONPATH} ${prefix}/lib/python3/dist-packages)
-  run(${PYTHON} ${PYTHON_TEST})
+  foreach(name numpy package)
+    run(${PYTHON} ${PYTHON_TESTS}/${name}_test.py)
+  endforeach()
 endif()

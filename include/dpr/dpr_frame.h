@@ -1,0 +1,119 @@
+/* The C interface, continued: views of a mesh rendered by one call from arrays that have names, and gradients
+ * by the same names. What binds a language with arrays of its own needs nothing else; the Python package is
+ * made of it. dpr/dpr.h includes this.
+ *
+ *   vertices            [V, 3] or [N, V, 3]    world space, of every view by itself or the same in all
+ *   faces               [F, 3]                 whole numbers: indices of vertices
+ *   views               [N, 4, 4]              world to camera, OpenGL axes, acting on column vectors; affine
+ *   intrinsics          [N, 4]                 fx, fy, cx, cy in pixels from the corner of the top-left
+ * pixel; or [N, 9]                 the same, and OpenCV's k1, k2, p1, p2, k3 of the lens; or [N, 1]
+ * orthographic: world units from the lower to the upper edge colors              [V, 3] or [N, V, 3] linear
+ * RGB; or face_colors         [F, 3] or [N, F, 3]    white without either background          [3] linear RGB;
+ * black without texcoords           [V, 2], [F, 3, 2] of the faces' corners, or [T, 2] with face_texcoords
+ * [F, 3]                 whole numbers textures[0], ...    [H, W, 3]              linear RGB, row 0 on top;
+ * they need texcoords face_textures       [F]                    whole numbers, -1 for none; all have the
+ * first without materials.specular  [M, 3]                 1 without materials.shininess [M] those of the
+ * lights without face_materials      [F]                    whole numbers; all have the first without
+ *   lights.ambient      [3]                    0.5 without
+ *   lights.harmonics    [9, 3]
+ *   lights.point        [L, 9]                 position, diffuse, specular
+ *   lights.directional  [L, 9]                 direction, diffuse, specular
+ *   lights.spot         [L, 14]                position, direction, angle and inner angle in degrees,
+ * diffuse, specular sigma, gamma, alpha [] or [1]              instead of the settings'
+ *
+ * Textures and lights may have a leading dimension of 1. Outputs, and their gradients:
+ *
+ *   image               [N, height, width, 4]  linear RGB over the background, and alpha, the silhouette
+ *   depth, position, normal, texcoords         [N, height, width, 4], as dpr_attribute_create() has them:
+ * sums over the faces, weight times value, and in the last channel of the weights face_id             [N,
+ * height, width]     DPR_INT64: the face that weighs most, -1 on the background barycentrics        [N,
+ * height, width, 3]  of that face, and uv                  [N, height, width, 2] effective_faces     [N,
+ * height, width]     how many faces share a pixel
+ *
+ * The last four have no gradients. Errors name the array. All calls may come from several threads at once,
+ * those with one frame one after the other. OpenCL does not survive fork(): in a process forked from one that
+ * had opened a device they fail. */
+#ifndef DPR_DPR_FRAME_H
+#define DPR_DPR_FRAME_H
+
+#ifndef DPR_DPR_H
+#error "include dpr/dpr.h, which includes this"
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Of whole numbers either. */
+typedef enum dpr_element { DPR_FLOAT32 = 0, DPR_INT32 = 1, DPR_INT64 = 2 } dpr_element;
+
+/* Packed and row-major. */
+typedef struct dpr_array {
+  const char* name;
+  void* data;     /* read or filled during the call */
+  int element;    /* a dpr_element */
+  int dimensions; /* 0 to 4 */
+  size_t shape[4];
+} dpr_array;
+
+typedef struct dpr_frame dpr_frame;
+
+typedef struct dpr_frame_options {
+  size_t size;
+  const char* device; /* as dpr_device_open() takes it; opened once in a process */
+  int width, height;  /* pixels, 1 to 16384 */
+  /* "sigma=1e-3", by the names of dpr_frame_settings(), in any order. Without "znear" and "zfar" every view
+   * has powers of two around the depths of its vertices. */
+  const char* const* settings; /* [setting_count] */
+  size_t setting_count;
+  int is_lit;        /* not 0: lights, also where no array gives one */
+  size_t first_view; /* views of a larger batch that come before these: sampled noise is that of the batch */
+  const char* const*
+      gradients; /* [gradient_count], names of the arrays that backward passes may be asked for */
+  size_t gradient_count;
+} dpr_frame_options;
+
+#define DPR_FRAME_OPTIONS_INIT \
+  { sizeof(dpr_frame_options), NULL, 128, 128, NULL, 0, 0, 0, NULL, 0 }
+
+/* "preset, sigma, ...": the keys of "smoothing" in the scene format; "znear", "zfar" and "cull"; "shading"
+ * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp". */
+DPR_API const char* dpr_frame_settings(void);
+/* Whether size and settings can be rendered with. Opens no device. */
+DPR_API dpr_status dpr_frame_check(const dpr_frame_options* options);
+/* Renders, and seldom waits for the device. The frame holds buffers there, which the backward pass reads,
+ * until it is destroyed; then they are kept for later calls with the same faces and size. */
+DPR_API dpr_status dpr_frame_render(const dpr_frame_options* options, const dpr_array* arrays, size_t count,
+                                    dpr_frame** frame);
+/* Fills the arrays with the outputs that they name. Waits for the device. */
+DPR_API dpr_status dpr_frame_read(dpr_frame* frame, const dpr_array* outputs, size_t count);
+/* The gradients of sum <grads, outputs>. `grads` name outputs that were read before; `gradients` name arrays,
+ * have their shapes and are filled, with 0 where nothing depends on them. Those of views are of any affine
+ * matrices, with lights and of other outputs than the image of rigid motions. */
+DPR_API dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, size_t grad_count,
+                                      const dpr_array* gradients, size_t gradient_count);
+/* Not 0: no triangle of any view was rendered. */
+DPR_API dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty);
+DPR_API void dpr_frame_destroy(dpr_frame* frame);
+/* Frees what is kept on devices for later calls; what frames hold stays. */
+DPR_API dpr_status dpr_frames_release(void);
+
+/* Faces cut smaller where lenses bend their edges (dpr/subdivision.hpp), until no view shows a point further
+ * than `tolerance` pixels from where it is drawn. Of the arrays vertices [V, 3], faces, views and intrinsics.
+ */
+typedef struct dpr_cut dpr_cut;
+DPR_API dpr_status dpr_cut_create(const dpr_frame_options* options, const dpr_array* arrays, size_t count,
+                                  float tolerance, dpr_cut** cut);
+/* How many pieces and vertices there are now. */
+DPR_API dpr_status dpr_cut_size(const dpr_cut* cut, size_t* faces, size_t* vertices);
+/* Fills the arrays that are named: DPR_INT64 "faces" [face, 3], "face_of" [face], the face that each is a
+ * piece of, and "vertices_of" [vertex, 3], old vertices that each is a sum of, by DPR_FLOAT32
+ * "vertex_weights" [vertex, 3]. */
+DPR_API dpr_status dpr_cut_read(const dpr_cut* cut, const dpr_array* arrays, size_t count);
+DPR_API void dpr_cut_destroy(dpr_cut* cut);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

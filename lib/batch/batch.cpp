@@ -1,0 +1,242 @@
+// Arrays in, the renderer's launches, arrays out.
+#include "batch/batch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "batch/inputs.hpp"
+#include "dpr/aov.hpp"
+#include "dpr/error.hpp"
+#include "renderer/renderer_impl.hpp"
+
+namespace dpr::batch {
+namespace {
+
+constexpr std::array<std::string_view, 4> k_attributes{"depth", "position", "normal", "texcoords"};
+
+bool is_attribute(std::string_view output) {
+  return std::ranges::find(k_attributes, output) != k_attributes.end();
+}
+
+Attribute attribute_of(const NamedArray& output) { return parse_attribute(output.name, "outputs (batch)"); }
+
+/// One view that every valid smoothing goes with, and all lights.
+View neutral_view() {
+  constexpr float k_longest = 1e36F;  // of the lengths that renderer/finite.hpp lets pass, for any gamma
+  View view{{}, {glm::mat4(1.0F)}};
+  view.camera.znear = 1;
+  view.camera.zfar = k_longest;
+  return view;
+}
+
+/// Smoothing, lights and views, each of which its setter checks against the others. Until all are set some
+/// are those of the renderer's last batch, which need not go with these.
+void upload_settings(Renderer& renderer, std::span<const View> views, const std::optional<Lights>& lights,
+                     const Smoothing& smoothing, std::size_t first_view) {
+  const auto set = [&] {
+    renderer.set_smoothing(smoothing);
+    if (lights || renderer.scene().lights) renderer.set_lights(lights);
+    renderer.set_views(views, first_view);
+  };
+  try {
+    set();
+  } catch (const InvalidArgument&) {
+    renderer.set_views(std::array{neutral_view()});
+    set();
+  }
+}
+
+/// The vectors of an array, [n][3] or [view][n][3], once for every view.
+std::vector<glm::vec3> repeated(std::span<const glm::vec3> vectors, bool is_own, std::size_t views) {
+  std::vector<glm::vec3> all;
+  all.reserve(vectors.size() * (is_own ? 1 : views));
+  for (std::size_t v = 0; v < (is_own ? 1 : views); ++v)
+    all.insert(all.end(), vectors.begin(), vectors.end());
+  return all;
+}
+
+bool is_number(std::string_view name) { return name == "sigma" || name == "gamma" || name == "alpha"; }
+
+/// What the renderer computes for the gradients of these arrays.
+GradientRequest request_of(std::span<const std::string> names, bool with_affine_views) {
+  GradientRequest request{};
+  request.positions = request.colors = request.transform = request.camera = request.lights =
+      request.smoothing = request.background = false;
+  for (const std::string& name : names) {
+    request.positions |= name == "vertices" || (name == "views" && with_affine_views);
+    request.colors |= name == "colors" || name == "face_colors";
+    request.camera |= name == "intrinsics" || (name == "views" && !with_affine_views);
+    request.distortion |= name == "intrinsics";
+    request.background |= name == "background";
+    request.lights |= name.starts_with("lights.");
+    request.smoothing |= is_number(name);
+    request.texture |= name.starts_with("textures[");
+    request.texcoords |= name == "texcoords";
+    request.materials |= name.starts_with("materials.");
+  }
+  return request;
+}
+
+/// Of an attribute's images, which depend on nothing else.
+GradientRequest request_of_attribute(std::span<const std::string> names, Attribute attribute) {
+  GradientRequest request = request_of(names, false);
+  request.texcoords = request.texcoords && attribute == Attribute::texcoords;
+  request.colors = request.background = request.lights = request.texture = request.materials = false;
+  return request;
+}
+
+template <typename Value>
+Value* write_view(const std::vector<Value>& values, Value* out) {
+  return std::ranges::copy(values, out).out;
+}
+
+/// An output without gradients.
+void write_output(const std::vector<AuxiliaryOutputs>& views, const NamedArray& output) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const AuxiliaryOutputs& from = views[v];
+    const std::size_t pixels = from.face_id.size();
+    if (output.name == "face_id") {
+      const auto first = static_cast<std::int64_t*>(output.data) + v * pixels;
+      std::ranges::copy(from.face_id, first);
+    } else if (output.name == "barycentrics") {
+      write_view(from.barycentrics, static_cast<glm::vec3*>(output.data) + v * pixels);
+    } else if (output.name == "uv") {
+      if (from.uv.empty())
+        throw InvalidArgument("outputs (batch)", "uv", "an output of meshes without texture coordinates");
+      write_view(from.uv, static_cast<glm::vec2*>(output.data) + v * pixels);
+    } else {
+      write_view(from.effective_faces, static_cast<float*>(output.data) + v * pixels);
+    }
+  }
+}
+
+std::size_t channels_of(const std::string& output) {
+  if (output == "image" || is_attribute(output)) return 4;
+  if (output == "barycentrics") return 3;
+  if (output == "uv") return 2;
+  if (output == "face_id" || output == "effective_faces") return 0;
+  throw InvalidArgument(
+      "outputs (batch)", "'" + output + "'",
+      "image, depth, position, normal, texcoords, face_id, barycentrics, uv or effective_faces");
+}
+
+}  // namespace
+
+Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const BatchOptions& options)
+    : frame_(std::move(pool), make_topology(arrays, options.settings)), wanted_(options.gradients) {
+  const RenderSettings settings = with_numbers(options.settings, arrays);
+  const std::optional<Lights> lights = make_lights(arrays, options);
+  const std::vector<View> views = make_views(arrays, settings);
+  Renderer& renderer = frame_.renderer();
+  upload_settings(renderer, views, lights, settings.smoothing(), options.first_view);
+  renderer.set_cull(settings.cull());
+  const NamedArray* const background = find(arrays, "background");
+  renderer.set_background(background ? background->rows<const glm::vec3>()[0] : glm::vec3(0.0F));
+  upload_surface(renderer, arrays);
+
+  const auto vertices = require(arrays, "vertices").rows<const glm::vec3>();
+  const std::size_t count = renderer.scene().meshes[0].mesh.positions.size();
+  const bool needs_affine = !lights && std::ranges::find(wanted_, "views") != wanted_.end();
+  const bool is_own = vertices.size() > count;
+  if (needs_affine) vertices_ = repeated(vertices, is_own, views.size());
+  const bool own_shapes = views.size() > 1 && (is_own || needs_affine);
+  if (!own_shapes) renderer.set_positions(0, vertices);
+  const NamedArray* const given = find_colors(arrays);
+  const auto colors = given ? given->rows<const glm::vec3>() : std::span<const glm::vec3>();
+  const bool own_colors = given && views.size() > 1 && given->shape.size() == 3 && given->shape[0] > 1;
+  if (!own_colors) {
+    renderer.set_colors(0, given ? colors : std::vector<glm::vec3>(count, glm::vec3(1.0F)));
+  }
+  std::span<const glm::vec3> shapes;
+  if (own_shapes) shapes = needs_affine ? std::span<const glm::vec3>(vertices_) : vertices;
+  renderer.set_shapes(shapes, own_colors ? colors : std::span<const glm::vec3>());
+  renderer.forward();
+}
+
+void Batch::require_image(const NamedArray& array, std::size_t channels) {
+  const Renderer& renderer = frame_.renderer();
+  const std::size_t views = renderer.views().size(),
+                    height = static_cast<std::size_t>(renderer.scene().height),
+                    width = static_cast<std::size_t>(renderer.scene().width);
+  const std::string expected = "[" + std::to_string(views) + ", " + std::to_string(height) + ", " +
+                               std::to_string(width) +
+                               (channels ? ", " + std::to_string(channels) + "]" : "]");
+  const Element element = array.name == "face_id" ? Element::int64 : Element::float32;
+  if (channels) {
+    require_form(array, element, {{views, height, width, channels}}, expected);
+  } else {
+    require_form(array, element, {{views, height, width}}, expected);
+  }
+}
+
+void Batch::read(NamedArrays outputs) {
+  Renderer& renderer = frame_.renderer();
+  for (const NamedArray& output : outputs) require_image(output, channels_of(output.name));
+  std::vector<AuxiliaryOutputs> auxiliary;
+  for (const NamedArray& output : outputs) {
+    if (output.name == "image") {
+      renderer.read_pixels(output.rows<glm::vec4>());
+    } else if (is_attribute(output.name)) {
+      const Attribute attribute = attribute_of(output);
+      renderer.set_gradients(request_of_attribute(wanted_, attribute));
+      AttributeImages& images = frame_.attribute_images(attribute);
+      images.forward(renderer);
+      glm::vec4* next = output.rows<glm::vec4>().data();
+      for (std::size_t v = 0; v < renderer.views().size(); ++v)
+        next = std::ranges::copy(images.image(v).pixels, next).out;
+    } else {
+      if (auxiliary.empty()) {
+        for (std::size_t v = 0; v < renderer.views().size(); ++v)
+          auxiliary.push_back(auxiliary_outputs(renderer, v));
+      }
+      write_output(auxiliary, output);
+    }
+  }
+}
+
+void Batch::backward(NamedArrays grads, NamedArrays gradients) {
+  Renderer& renderer = frame_.renderer();
+  for (const NamedArray& gradient : gradients) {
+    if (std::ranges::find(wanted_, gradient.name) == wanted_.end())
+      throw InvalidArgument(argument(gradient), "a gradient that was not asked for when it was rendered",
+                            "one of those in `gradients` of the frame's options");
+    if (gradient.element != Element::float32) throw InvalidArgument(argument(gradient), "indices", "float32");
+    std::ranges::fill(gradient.rows<float>(), 0.0F);
+  }
+  for (const NamedArray& grad : grads) {
+    require_image(grad, channels_of(grad.name));
+    const auto pixels = grad.rows<const glm::vec4>();
+    if (grad.name == "image") {
+      const bool is_affine = !renderer.scene().lights;
+      renderer.set_gradients(request_of(wanted_, is_affine));
+      SceneGradient found = renderer.backward_pixels(pixels);
+      add_gradients(found, is_affine, gradients);
+    } else if (is_attribute(grad.name)) {
+      const Scene& scene = renderer.scene();
+      std::vector<Image> images(renderer.views().size(), Image(scene.width, scene.height));
+      const glm::vec4* next = pixels.data();
+      for (Image& image : images) {
+        std::copy_n(next, image.pixels.size(), image.pixels.begin());
+        next += image.pixels.size();
+      }
+      SceneGradient found = frame_.attribute_images(attribute_of(grad)).backward(images);
+      add_gradients(found, false, gradients);
+    } else {
+      throw InvalidArgument(argument(grad), "an output without gradients",
+                            "image, depth, position, normal or texcoords");
+    }
+  }
+}
+
+bool Batch::is_empty() {
+  const Renderer& renderer = frame_.renderer();
+  renderer.impl().require_forward("dpr_frame_is_empty");
+  // The statistics read a word of every triangle from the device, which only a frame without fragments needs.
+  if (renderer.impl().rasterize.frame_fragments > 0) return false;
+  const RenderStatistics statistics = renderer.statistics();
+  return statistics.faces_dropped == statistics.faces;
+}
+
+}  // namespace dpr::batch

@@ -1,0 +1,68 @@
+// Views of a mesh, or of meshes of one topology, rendered from named arrays; gradients by the same names.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "batch/named_arrays.hpp"
+#include "batch/render_settings.hpp"
+#include "batch/renderer_pool.hpp"
+#include "dpr/light.hpp"
+
+namespace dpr::batch {
+
+/// How arrays are rendered.
+struct BatchOptions {
+  const RenderSettings& settings;
+  /// Whether there are lights where no array gives any.
+  bool is_lit = false;
+  /// Of a larger batch, the views that come before these: sampled noise is that of the larger batch.
+  std::size_t first_view = 0;
+  /// Of the arrays whose gradients backward() may be asked for.
+  std::vector<std::string> gradients = {};
+};
+
+/// A rendered batch: the renderer whose buffers hold what the backward pass differentiates, until it is
+/// destroyed. Its arrays are those of dpr/dpr_frame.h.
+class Batch {
+ public:
+  /// Throws the library's errors. Arrays are read during the call.
+  Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const BatchOptions& options);
+
+  /// Fills the arrays with the outputs that they name.
+  void read(NamedArrays outputs);
+  /// The gradients of sum <grads, outputs>, by names of outputs and of arrays, into `gradients`.
+  void backward(NamedArrays grads, NamedArrays gradients);
+  /// Whether no triangle of any view was rendered.
+  bool is_empty();
+
+ private:
+  /// Throws InvalidArgument for another shape than the output's, whose pixels have so many channels; 0: a
+  /// number.
+  void require_image(const NamedArray& array, std::size_t channels);
+  /// `is_affine`: whether the gradients of the views' matrices are those of any affine ones, which come from
+  /// those of every view's vertices, where nothing else depends on the views. Lights, and what is measured in
+  /// world space, stay where they are: with them the gradients are those of rigid motions.
+  void add_gradients(SceneGradient& found, bool is_affine, NamedArrays gradients);
+  void add_gradient(SceneGradient& found, bool is_affine, const NamedArray& gradient);
+
+  Frame frame_;
+  std::vector<std::string> wanted_;
+  std::vector<glm::vec3> vertices_;  ///< [view][vertex], where the gradients of views need them
+};
+
+/// What subdivide_for_lens() finds for one mesh.
+struct CutFaces {
+  Faces faces;                            ///< the pieces
+  std::vector<std::uint32_t> face_of;     ///< [piece] the face that each is a piece of
+  Faces vertices_of;                      ///< [new vertex] old vertices that each is a combination of
+  std::vector<glm::vec3> vertex_weights;  ///< [new vertex]
+};
+
+/// Of the arrays vertices [V, 3], faces, views and intrinsics. Throws the library's errors.
+CutFaces cut_for_lens(NamedArrays arrays, const RenderSettings& settings, float tolerance);
+
+}  // namespace dpr::batch

@@ -1,0 +1,300 @@
+#include "batch/inputs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "base/checks.hpp"
+#include "base/name_list.hpp"
+#include "dpr/error.hpp"
+#include "scene/light_table.hpp"
+
+namespace dpr::batch {
+namespace {
+
+constexpr std::array<std::string_view, 3> k_numbers{"sigma", "gamma", "alpha"};
+
+std::vector<std::string_view> light_names() {
+  std::vector<std::string_view> names{"ambient", "harmonics"};
+  for_each_light_kind([&](auto kind) { names.push_back(kind.key); });
+  return names;
+}
+
+/// How many numbers a light of a kind has.
+template <typename Kind>
+std::size_t count_numbers(Kind) {
+  std::size_t count = 0;
+  const typename Kind::Light light;
+  Kind::for_each_member([&](std::string_view key, auto member, auto...) {
+    visit_numbers(key, light.*member, [&](std::string_view, float) { ++count; });
+  });
+  return count;
+}
+
+/// Of all but textures, which are counted.
+bool is_name(const std::string& name, std::size_t textures) {
+  static constexpr std::array<std::string_view, 11> k_names{
+      "vertices",   "faces",     "colors",         "face_colors",   "views",         "intrinsics",
+      "background", "texcoords", "face_texcoords", "face_textures", "face_materials"};
+  if (std::ranges::find(k_names, name) != k_names.end()) return true;
+  if (std::ranges::find(k_numbers, name) != k_numbers.end()) return true;
+  if (name == "materials.specular" || name == "materials.shininess") return true;
+  for (std::size_t i = 0; i < textures; ++i)
+    if (name == texture_name(i)) return true;
+  const std::vector<std::string_view> lights = light_names();
+  return name.starts_with("lights.") && std::ranges::find(lights, name.substr(7)) != lights.end();
+}
+
+std::size_t count_textures(NamedArrays arrays) {
+  std::size_t count = 0;
+  while (find(arrays, texture_name(count))) ++count;
+  return count;
+}
+
+// Numbers of a view's projection: the height of an orthographic one, the intrinsics, or these and the
+// coefficients of the lens.
+constexpr std::size_t k_orthographic = 1, k_pinhole = 4, k_lens = 9;
+
+void set_projection(Camera& camera, std::span<const float> k) {
+  if (k.size() == k_orthographic) {
+    camera.orthographic_height = k[0];
+    return;
+  }
+  camera.intrinsics = Intrinsics{k[0], k[1], k[2], k[3]};
+  if (k.size() == k_lens) camera.distortion = Distortion{k[4], k[5], k[6], k[7], k[8]};
+}
+
+int texture_side(std::size_t texels, const NamedArray& texture) {
+  if (texels >= 1 && texels <= checks::k_largest_side) return static_cast<int>(texels);
+  throw InvalidArgument(argument(texture), std::to_string(texels),
+                        "1 to " + std::to_string(checks::k_largest_side) + " texels a side");
+}
+
+/// A texture's mode, of a list of one for each texture, one for all, or none.
+template <typename Mode>
+Mode mode_of(const std::vector<Mode>& modes, std::size_t texture, std::size_t textures, const char* name,
+             Mode otherwise) {
+  if (modes.empty()) return otherwise;
+  if (modes.size() != 1 && modes.size() != textures) {
+    throw InvalidArgument(std::string(name) + " (batch)", std::to_string(modes.size()) + " words",
+                          "one, or one for each texture: " + std::to_string(textures));
+  }
+  return modes[modes.size() == 1 ? 0 : texture];
+}
+
+std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings& settings) {
+  const std::size_t count = count_textures(arrays);
+  const TextureForm usual;
+  std::vector<TextureForm> forms;
+  for (std::size_t i = 0; i < count; ++i) {
+    const NamedArray& texture = require(arrays, texture_name(i));
+    require_form(texture, Element::float32, {{k_any, k_any, 3}, {1, k_any, k_any, 3}},
+                 "[H, W, 3], or [N, H, W, 3] of each view by itself");
+    const std::size_t rows = texture.shape.size() - 3;
+    forms.push_back({texture_side(texture.shape[rows + 1], texture),
+                     texture_side(texture.shape[rows], texture),
+                     mode_of(settings.wraps(), i, count, "wrap", usual.wrap),
+                     mode_of(settings.filters(), i, count, "filter", usual.filter)});
+  }
+  return forms;
+}
+
+/// Texture coordinates and what refers to them: of vertices, of corners, or by indices.
+void take_texcoords(NamedArrays arrays, const Faces& faces, std::size_t vertices, Surface& surface) {
+  const NamedArray* const texcoords = find(arrays, "texcoords");
+  const NamedArray* const indices = find(arrays, "face_texcoords");
+  if (!texcoords) {
+    if (indices) throw InvalidArgument(argument(*indices), "them alone", "them beside texcoords");
+    return;
+  }
+  surface.texcoords = texcoords->count() / 2;
+  if (indices) {
+    require_floats(*texcoords, {k_any, 2}, "[T, 2], beside face_texcoords");
+    surface.face_texcoords = read_triples(*indices);
+    return;
+  }
+  const std::string of_faces = std::to_string(faces.size());
+  require_form(*texcoords, Element::float32, {{vertices, 2}, {faces.size(), 3, 2}},
+               "[" + std::to_string(vertices) + ", 2] or [" + of_faces + ", 3, 2], or face_texcoords beside");
+  if (texcoords->shape.size() == 2) {
+    surface.face_texcoords = faces;
+    return;
+  }
+  for (std::uint32_t i = 0; i < 3 * faces.size(); i += 3)
+    surface.face_texcoords.emplace_back(i, i + 1, i + 2);
+}
+
+std::size_t count_materials(NamedArrays arrays) {
+  const NamedArray* const specular = find(arrays, "materials.specular");
+  const NamedArray* const shininess = find(arrays, "materials.shininess");
+  if (specular) require_floats(*specular, {k_any, 3}, "[M, 3]");
+  if (!shininess) return specular ? specular->shape[0] : 0;
+  require_floats(*shininess, {k_any}, "[M]");
+  const std::size_t count = specular ? specular->shape[0] : shininess->shape[0];
+  require_floats(*shininess, {count}, "[" + std::to_string(count) + "], one for each specular");
+  return count;
+}
+
+std::vector<std::uint32_t> read_of_faces(NamedArrays arrays, std::string_view name, std::size_t faces,
+                                         std::int64_t least) {
+  const NamedArray* const indices = find(arrays, name);
+  return indices ? read_indices(*indices, faces, least) : std::vector<std::uint32_t>();
+}
+
+/// [view][n][3] or [n][3]: as many as `views`, or one.
+void require_batch(const NamedArray& array, std::size_t views, std::size_t count, const std::string& letter) {
+  require_form(array, Element::float32, {{count, 3}, {k_any, count, 3}},
+               "[" + letter + ", 3] or [N, " + letter + ", 3]");
+  if (array.shape.size() == 2 || array.shape[0] == 1 || array.shape[0] == views) return;
+  throw InvalidArgument(argument(array), text_of(array.shape),
+                        "1 or " + std::to_string(views) + ", one a view, in the first dimension");
+}
+
+}  // namespace
+
+std::string texture_name(std::size_t index) { return checks::element("textures", index); }
+
+const NamedArray* find_colors(NamedArrays arrays) {
+  const NamedArray* const colors = find(arrays, "colors");
+  return colors ? colors : find(arrays, "face_colors");
+}
+
+BatchSizes check_sizes(NamedArrays arrays) {
+  const std::size_t textures = count_textures(arrays);
+  for (const NamedArray& array : arrays) {
+    if (!is_name(array.name, textures)) {
+      const std::vector<std::string_view> lights = light_names();
+      if (array.name.starts_with("lights."))
+        throw InvalidArgument("lights (batch)", "'" + array.name.substr(7) + "'", one_of(lights));
+      if (array.name.starts_with("materials."))
+        throw InvalidArgument("materials (batch)", "'" + array.name.substr(10) + "'",
+                              "specular or shininess");
+      throw InvalidArgument("array (batch)", "\"" + array.name + "\"", "a name of dpr/dpr_frame.h");
+    }
+  }
+  const NamedArray& views = require(arrays, "views");
+  require_floats(views, {k_any, 4, 4}, "[N, 4, 4]");
+  const std::size_t count = views.shape[0];
+  if (count == 0) throw InvalidArgument(argument(views), text_of(views.shape), "at least one view");
+  const NamedArray& vertices = require(arrays, "vertices");
+  require_batch(vertices, count, k_any, "V");
+  const std::size_t of_mesh = vertices.shape[vertices.shape.size() - 2];
+  const std::string rows = std::to_string(count);
+  require_form(require(arrays, "intrinsics"), Element::float32,
+               {{count, k_pinhole}, {count, k_lens}, {count, k_orthographic}},
+               "[" + rows + ", 4] or [" + rows + ", 9] or [" + rows + ", 1]");
+  if (const NamedArray* const background = find(arrays, "background"))
+    require_floats(*background, {3}, "[3]");
+  if (find(arrays, "colors") && find(arrays, "face_colors"))
+    throw InvalidArgument("colors (batch)", "colors and face_colors", "one of them");
+  if (const NamedArray* const colors = find(arrays, "colors"))
+    require_batch(*colors, count, of_mesh, std::to_string(of_mesh));
+  const NamedArray& faces = require(arrays, "faces");
+  if (const NamedArray* const colors = find(arrays, "face_colors")) {
+    const std::size_t of_faces = faces.shape.empty() ? k_any : faces.shape[0];
+    require_batch(*colors, count, of_faces, std::to_string(of_faces));
+  }
+  return {count, of_mesh};
+}
+
+std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings) {
+  const NamedArray &matrices = require(arrays, "views"), &intrinsics = require(arrays, "intrinsics"),
+                   &vertices = require(arrays, "vertices");
+  const std::size_t count = matrices.shape[0], numbers = intrinsics.shape[1];
+  const auto positions = vertices.rows<const glm::vec3>();
+  const std::size_t of_mesh = vertices.shape[vertices.shape.size() - 2];
+  std::vector<View> views;
+  for (std::size_t v = 0; v < count; ++v) {
+    View view{{}, {glm::mat4(1.0F)}};
+    // Row-major here.
+    view.camera.view = glm::transpose(matrices.rows<const glm::mat4>()[v]);
+    set_projection(view.camera, intrinsics.rows<const float>().subspan(v * numbers, numbers));
+    const bool is_own = positions.size() > of_mesh;
+    settings.set_clipping(view.camera, positions.subspan(is_own ? v * of_mesh : 0, of_mesh));
+    views.push_back(view);
+  }
+  return views;
+}
+
+std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& options) {
+  const auto is_light = [](const NamedArray& array) { return array.name.starts_with("lights."); };
+  if (!options.is_lit && std::ranges::none_of(arrays, is_light)) return {};
+  Lights lights = options.settings.lights();
+  // [row][number], or a leading dimension of one view before.
+  const auto numbers_of = [&](std::string_view key, std::size_t rows, std::size_t numbers,
+                              const std::string& shape) {
+    const NamedArray* const array = find(arrays, "lights." + std::string(key));
+    if (!array) return std::span<const float>();
+    require_form(*array, Element::float32, {{rows, numbers}, {1, rows, numbers}}, shape);
+    return array->rows<const float>();
+  };
+  if (const NamedArray* const ambient = find(arrays, "lights.ambient")) {
+    require_form(*ambient, Element::float32, {{3}, {1, 3}}, "[3], or [N, 3] of each view by itself");
+    lights.ambient = ambient->rows<const glm::vec3>()[0];
+  }
+  const std::span<const float> harmonics = numbers_of("harmonics", k_harmonics, 3, "[9, 3]");
+  for (std::size_t i = 0; i < harmonics.size(); i += 3)
+    lights.harmonics.emplace_back(harmonics[i], harmonics[i + 1], harmonics[i + 2]);
+  for_each_light_kind([&](auto kind) {
+    const std::size_t count = count_numbers(kind);
+    const std::span<const float> numbers =
+        numbers_of(kind.key, k_any, count, "[L, " + std::to_string(count) + "]");
+    auto& list = lights.*kind.lights;
+    list.resize(numbers.size() / count);
+    const float* next = numbers.data();
+    for (auto& light : list) {
+      kind.for_each_member([&](std::string_view key, auto member, auto...) {
+        visit_numbers(key, light.*member, [&](std::string_view, float& number) { number = *next++; });
+      });
+    }
+  });
+  return lights;
+}
+
+Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
+  const BatchSizes sizes = check_sizes(arrays);
+  auto faces = std::make_shared<const Faces>(read_triples(require(arrays, "faces")));
+  Surface surface;
+  surface.textures = texture_forms(arrays, settings);
+  take_texcoords(arrays, *faces, sizes.vertices, surface);
+  const bool has_textures = !surface.textures.empty();
+  if (has_textures == (surface.texcoords == 0)) {
+    throw InvalidArgument(has_textures ? "texcoords (batch)" : "textures (batch)",
+                          has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
+  }
+  surface.materials = count_materials(arrays);
+  surface.face_textures = read_of_faces(arrays, "face_textures", faces->size(), -1);
+  surface.face_materials = read_of_faces(arrays, "face_materials", faces->size(), 0);
+  return {std::move(faces), sizes.vertices,    find(arrays, "face_colors") != nullptr,
+          settings.width(), settings.height(), std::move(surface)};
+}
+
+RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {
+  for (const std::string_view name : k_numbers) {
+    const NamedArray* const array = find(arrays, name);
+    if (!array) continue;
+    require_form(*array, Element::float32, {{}, {1}}, "[] or [1], a number");
+    settings.set(std::string(name), static_cast<double>(array->rows<const float>()[0]));
+  }
+  return settings;
+}
+
+void upload_surface(Renderer& renderer, NamedArrays arrays) {
+  const Mesh& mesh = renderer.scene().meshes[0].mesh;
+  if (!mesh.texcoords.empty())
+    renderer.set_texcoords(0, require(arrays, "texcoords").rows<const glm::vec2>());
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i)
+    renderer.set_texels(0, i, require(arrays, texture_name(i)).rows<const glm::vec3>());
+  if (mesh.materials.empty()) return;
+  std::vector<Material> materials(mesh.materials.size());
+  const NamedArray* const specular = find(arrays, "materials.specular");
+  const NamedArray* const shininess = find(arrays, "materials.shininess");
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    if (specular) materials[i].specular = specular->rows<const glm::vec3>()[i];
+    if (shininess) materials[i].shininess = shininess->rows<const float>()[i];
+  }
+  renderer.set_materials(0, materials);
+}
+
+}  // namespace dpr::batch

@@ -1,0 +1,33 @@
+// The library's types from named arrays. All throw InvalidArgument, which names the array, for what does not
+// fit.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "batch/batch.hpp"
+
+namespace dpr::batch {
+
+/// The names that arrays may have, and no other; and the counts of views and vertices.
+struct BatchSizes {
+  std::size_t views, vertices;
+};
+BatchSizes check_sizes(NamedArrays arrays);
+
+/// Affine matrices, projections, and planes around every view's vertices.
+std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings);
+/// None: colours as they are.
+std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& options);
+Topology make_topology(NamedArrays arrays, const RenderSettings& settings);
+/// The settings, with the numbers that are arrays.
+RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays);
+/// Vertices' or faces' colours; null: white.
+const NamedArray* find_colors(NamedArrays arrays);
+/// "textures[2]"
+std::string texture_name(std::size_t index);
+/// To a renderer of their topology.
+void upload_surface(Renderer& renderer, NamedArrays arrays);
+
+}  // namespace dpr::batch

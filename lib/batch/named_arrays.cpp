@@ -1,0 +1,108 @@
+#include "batch/named_arrays.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include "dpr/error.hpp"
+
+namespace dpr::batch {
+namespace {
+
+bool has_shape(const NamedArray& array, Shape shape) {
+  return std::ranges::equal(array.shape, shape,
+                            [](std::size_t got, std::size_t size) { return size == k_any || got == size; });
+}
+
+std::string_view name_of(Element element) {
+  switch (element) {
+    case Element::float32:
+      return "float32";
+    case Element::int32:
+      return "int32";
+    case Element::int64:
+      break;
+  }
+  return "int64";
+}
+
+/// All of them in the array's order.
+std::vector<std::uint32_t> read_all(const NamedArray& array, std::int64_t least) {
+  std::vector<std::uint32_t> indices(array.count());
+  const auto read = [&](const auto* values) {
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      const std::int64_t index = values[i];
+      if (index < least || index >= std::numeric_limits<std::uint32_t>::max())
+        throw InvalidArgument(argument(array), std::to_string(index),
+                              "indices from " + std::to_string(least) + " on");
+      indices[i] = static_cast<std::uint32_t>(index);
+    }
+  };
+  if (array.element == Element::int64) {
+    read(static_cast<const std::int64_t*>(array.data));
+  } else {
+    read(static_cast<const std::int32_t*>(array.data));
+  }
+  return indices;
+}
+
+void require_indices(const NamedArray& array, Shape shape, const std::string& expected) {
+  if (array.element == Element::float32)
+    throw InvalidArgument(argument(array), "float32", "int64 or int32, indices");
+  require_form(array, array.element, {shape}, expected);
+}
+
+}  // namespace
+
+std::size_t NamedArray::count() const {
+  return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+}
+
+std::string text_of(const std::vector<std::size_t>& shape) {
+  std::string text = "[";
+  for (const std::size_t size : shape) text.append(text.size() > 1 ? ", " : "").append(std::to_string(size));
+  return text + "]";
+}
+
+std::string argument(const NamedArray& array) { return array.name + " (batch)"; }
+
+const NamedArray* find(NamedArrays arrays, std::string_view name) {
+  const auto found = std::ranges::find(arrays, name, &NamedArray::name);
+  return found == arrays.end() ? nullptr : &*found;
+}
+
+const NamedArray& require(NamedArrays arrays, std::string_view name) {
+  if (const NamedArray* const found = find(arrays, name)) return *found;
+  throw InvalidArgument(std::string(name) + " (batch)", "none", "an array of this name");
+}
+
+void require_form(const NamedArray& array, Element element, std::initializer_list<Shape> shapes,
+                  const std::string& expected) {
+  if (array.element != element)
+    throw InvalidArgument(argument(array), std::string(name_of(array.element)),
+                          std::string(name_of(element)));
+  if (std::ranges::any_of(shapes, [&](Shape shape) { return has_shape(array, shape); })) return;
+  throw InvalidArgument(argument(array), text_of(array.shape), expected);
+}
+
+void require_floats(const NamedArray& array, Shape shape, const std::string& expected) {
+  require_form(array, Element::float32, {shape}, expected);
+}
+
+std::vector<glm::uvec3> read_triples(const NamedArray& array) {
+  require_indices(array, {k_any, 3}, "[F, 3]");
+  const std::vector<std::uint32_t> corners = read_all(array, 0);
+  std::vector<glm::uvec3> triples;
+  triples.reserve(corners.size() / 3);
+  for (std::size_t i = 0; i < corners.size(); i += 3)
+    triples.emplace_back(corners[i], corners[i + 1], corners[i + 2]);
+  return triples;
+}
+
+std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t count, std::int64_t least) {
+  require_indices(array, {count}, "[" + std::to_string(count) + "]");
+  return read_all(array, least);
+}
+
+}  // namespace dpr::batch

@@ -1,0 +1,158 @@
+#include "batch/renderer_pool.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "dpr/error.hpp"
+
+namespace dpr::batch {
+namespace {
+
+/// The process that opened the first device, 0 before. A fork has what an OpenCL implementation left in
+/// memory, but none of its threads: whoever calls it there waits for ever, also to release what there is.
+std::atomic<pid_t> opener{0};
+
+bool is_forked() {
+  const pid_t process = opener;
+  return process != 0 && process != getpid();
+}
+
+void require_own_process() {
+  if (!is_forked()) return;
+  throw InvalidArgument("process (OpenCL)", "a fork of one that had opened the device",
+                        "the start method \"spawn\", or a parent that renders nothing before it forks");
+}
+
+/// Numbers are yet to come.
+void add_surface(Mesh& mesh, const Surface& surface) {
+  mesh.texcoords.resize(surface.texcoords);
+  mesh.face_texcoords = surface.face_texcoords;
+  for (const TextureForm& form : surface.textures) {
+    const std::size_t texels = static_cast<std::size_t>(form.width) * static_cast<std::size_t>(form.height);
+    mesh.textures.push_back(
+        {form.width, form.height, std::vector<glm::vec3>(texels), form.wrap, form.filter});
+  }
+  mesh.face_textures = surface.face_textures;
+  mesh.materials.resize(surface.materials);
+  mesh.face_materials = surface.face_materials;
+}
+
+Scene scene_of(const Topology& topology) {
+  Scene scene;
+  scene.width = topology.width;
+  scene.height = topology.height;
+  Mesh mesh;
+  mesh.positions.resize(topology.vertices);
+  mesh.faces = *topology.faces;
+  (topology.face_colors ? mesh.face_colors : mesh.vertex_colors)
+      .resize(topology.face_colors ? mesh.faces.size() : topology.vertices);
+  add_surface(mesh, topology.surface);
+  scene.meshes.push_back({std::move(mesh)});
+  return scene;
+}
+
+}  // namespace
+
+bool Topology::operator==(const Topology& other) const {
+  return vertices == other.vertices && face_colors == other.face_colors && width == other.width &&
+         height == other.height && surface == other.surface &&
+         (faces == other.faces || *faces == *other.faces);
+}
+
+Device open_device_of_process(const std::string& selector) {
+  require_own_process();
+  Device device = open_device(selector);
+  opener = getpid();
+  return device;
+}
+
+RendererPool::~RendererPool() {
+  if (is_forked()) (void)state_.release();  // which is the parent's to release
+}
+
+PooledRenderer RendererPool::take(const Topology& topology) {
+  require_own_process();
+  {
+    const std::lock_guard lock(mutex_);
+    State& state = *state_;
+    const auto found = std::find_if(state.free.rbegin(), state.free.rend(),
+                                    [&](const Free& free) { return free.topology == topology; });
+    if (found != state.free.rend()) {
+      PooledRenderer renderer = std::move(found->renderer);
+      state.free.erase(std::next(found).base());
+      state.most_lent = std::max(state.most_lent, ++state.lent);
+      return renderer;
+    }
+  }
+  PooledRenderer renderer{Renderer(state_->device)};
+  renderer.renderer.set_scene(scene_of(topology));
+  const std::lock_guard lock(mutex_);
+  state_->most_lent = std::max(state_->most_lent, ++state_->lent);
+  return renderer;
+}
+
+void RendererPool::put_back(PooledRenderer renderer, Topology topology) {
+  std::list<Free> dropped;  // which outlives the lock: releasing buffers takes its time
+  const std::lock_guard lock(mutex_);
+  State& state = *state_;
+  --state.lent;
+  state.free.push_back({std::move(renderer), std::move(topology)});
+  if (state.free.size() > state.most_lent) dropped.splice(dropped.end(), state.free, state.free.begin());
+}
+
+void RendererPool::clear() {
+  require_own_process();
+  std::list<Free> dropped;
+  const std::lock_guard lock(mutex_);
+  dropped.swap(state_->free);
+}
+
+RendererPools& RendererPools::of_process() {
+  static auto* const pools = new RendererPools;
+  return *pools;
+}
+
+std::shared_ptr<RendererPool> RendererPools::get(const std::string& device) {
+  const std::lock_guard lock(mutex_);
+  std::shared_ptr<RendererPool>& pool = pools_[device];
+  if (!pool) pool = std::make_shared<RendererPool>(open_device_of_process(device));
+  return pool;
+}
+
+void RendererPools::clear() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [device, pool] : pools_) {
+    if (pool) pool->clear();
+  }
+}
+
+Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
+    : pool_(std::move(pool)),
+      topology_(std::move(topology)),
+      pooled_(std::make_unique<PooledRenderer>(pool_->take(topology_))) {}
+
+Frame::~Frame() {
+  if (is_forked()) {
+    (void)pooled_.release();
+    return;
+  }
+  try {
+    pool_->put_back(std::move(*pooled_), std::move(topology_));
+  } catch (...) {
+    // Without memory to keep the renderer it is let go.
+  }
+}
+
+Renderer& Frame::renderer() {
+  require_own_process();
+  return pooled_->renderer;
+}
+
+AttributeImages& Frame::attribute_images(Attribute attribute) {
+  return pooled_->attributes.try_emplace(attribute, renderer().device(), attribute).first->second;
+}
+
+}  // namespace dpr::batch

@@ -1,0 +1,192 @@
+"""What every front ends in: NumPy arrays rendered by frames of the library, and their gradients."""
+import collections
+import ctypes
+import functools
+import weakref
+
+import numpy as np
+
+from . import _library
+
+WITH_GRADIENTS = {"depth": 1, "position": 3, "normal": 3, "texcoords": 2}
+"""Outputs with gradients, and how many numbers a pixel of theirs has."""
+OTHERS = {"face_id": (), "barycentrics": (3,), "uv": (2,), "effective_faces": ()}
+NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer than znear, beyond zfar, culled, or without "
+                    "area")
+_OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
+"""Arrays that outputs beside the image depend on."""
+_LEAST_WEIGHT = 1e-12
+_ELEMENTS = {np.dtype(np.float32): 0, np.dtype(np.int32): 1, np.dtype(np.int64): 2}
+
+Spec = collections.namedtuple("Spec", "device width height is_lit settings outputs parts")
+"""All of a call but its arrays, as numbers, words and tuples of words: compilers of graphs take it as a constant. `parts`
+are "FRAME|SETTING", and "FRAME|NAME|LEAF|ROW|COUNT": an array of a frame is the LEAF-th of the call's, or a row of it,
+or the beginning of that; ROW and COUNT may be empty."""
+
+
+class Part(collections.namedtuple("Part", "name leaf row count")):
+    def of(self, array):
+        """What a frame has of an array; a view of its memory."""
+        if self.row is None:
+            return array
+        if self.name in ("views", "intrinsics"):
+            return array[self.row:self.row + 1]
+        return array[self.row][:self.count]
+
+
+@functools.lru_cache(maxsize=256)
+def _frames_of(parts):
+    """((settings, parts of a frame), ...)"""
+    frames = {}
+    for text in parts:
+        frame, name, *rest = text.split("|")
+        settings, own = frames.setdefault(int(frame), ([], []))
+        if rest:
+            own.append(Part(name, *(int(number) if number else None for number in rest)))
+        else:
+            settings.append(name)
+    return tuple((tuple(settings), tuple(own)) for settings, own in frames.values())
+
+
+def _words(words):
+    return (ctypes.c_char_p * len(words))(*(word.encode() for word in words)), len(words)
+
+
+def options_of(spec, settings=(), first_view=0, gradients=()):
+    """Options, which keep their words alive."""
+    options = _library.Options(ctypes.sizeof(_library.Options), spec.device.encode(), spec.width, spec.height)
+    options.settings, options.setting_count = _words([*spec.settings, *settings])
+    options.is_lit, options.first_view = spec.is_lit, first_view
+    options.gradients, options.gradient_count = _words(gradients)
+    return options
+
+
+def c_arrays(named):
+    """(name, packed array) pairs as (dpr_array[], count)."""
+    slots = (_library.Array * len(named))()
+    for slot, (name, array) in zip(slots, named):
+        slot.name, slot.data, slot.element = name.encode(), array.ctypes.data, _ELEMENTS[array.dtype]
+        slot.dimensions = array.ndim
+        slot.shape[:array.ndim] = array.shape
+    return slots, len(named)
+
+
+class _Frame:
+    """A dpr_frame, destroyed with this; not as the process ends, when the driver may be gone."""
+
+    def __init__(self, options, named):
+        handle = ctypes.c_void_p()
+        _library.call("dpr_frame_render", ctypes.byref(options), *c_arrays(named), ctypes.byref(handle))
+        self.handle = handle
+        weakref.finalize(self, _library.library.dpr_frame_destroy, handle).atexit = False
+
+    def is_empty(self):
+        result = ctypes.c_int()
+        _library.call("dpr_frame_is_empty", self.handle, ctypes.byref(result))
+        return bool(result.value)
+
+
+class Cut:
+    """A dpr_cut's arrays: faces, face_of, vertices_of, vertex_weights."""
+
+    def __init__(self, spec, named, tolerance):
+        handle = ctypes.c_void_p()
+        options = options_of(spec)
+        _library.call("dpr_cut_create", ctypes.byref(options), *c_arrays(named), tolerance, ctypes.byref(handle))
+        try:
+            faces, vertices = ctypes.c_size_t(), ctypes.c_size_t()
+            _library.call("dpr_cut_size", handle, ctypes.byref(faces), ctypes.byref(vertices))
+            self.faces, self.face_of = np.empty((faces.value, 3), np.int64), np.empty(faces.value, np.int64)
+            self.vertices_of = np.empty((vertices.value, 3), np.int64)
+            self.vertex_weights = np.empty((vertices.value, 3), np.float32)
+            _library.call("dpr_cut_read", handle, *c_arrays(list(vars(self).items())))
+        finally:
+            _library.library.dpr_cut_destroy(handle)
+
+
+def _means(name, sums):
+    """(values [..., channels], what they were divided by [..., 1]) from sums over the faces, weight times value, and of
+    their weights."""
+    values, weights = sums[..., :WITH_GRADIENTS[name]], sums[..., 3:]
+    divisor = np.linalg.norm(values, axis=-1, keepdims=True) if name == "normal" else weights
+    is_seen = (weights > _LEAST_WEIGHT) & (divisor > _LEAST_WEIGHT)
+    return np.where(is_seen, values, 0) / np.where(is_seen, divisor, 1), np.where(is_seen, divisor, np.inf)
+
+
+def _gradient_of_means(name, sums, grad):
+    """The gradient of the sums."""
+    values, divisor = _means(name, sums)
+    grad = grad.reshape(values.shape) / divisor
+    along = (grad * values).sum(-1, keepdims=True)
+    result = np.zeros_like(sums)
+    result[..., :values.shape[-1]] = grad - values * along if name == "normal" else grad
+    if name != "normal":
+        result[..., 3:] = -along
+    return result
+
+
+def shapes_of(spec, views):
+    """[(shape, type)] of the image and the outputs."""
+    size = (views, spec.height, spec.width)
+    channels = {name: () if count == 1 else (count,) for name, count in WITH_GRADIENTS.items()}
+    channels.update(OTHERS)
+    return [(size + (4,), np.float32)] + [(size + channels[name], np.int64 if name == "face_id" else np.float32)
+                                          for name in spec.outputs]
+
+
+class Rendered:
+    """A call's frames, and what they show.
+
+    outputs  [image, *those of spec.outputs]
+    """
+
+    def __init__(self, spec, arrays, wanted):
+        """arrays: of float32, int32 or int64; wanted: indices of those whose gradients gradients() may be asked for."""
+        arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
+        self.spec, self._shapes, self._frames = spec, [array.shape for array in arrays], []
+        frames = _frames_of(spec.parts)
+        views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
+        shapes = shapes_of(spec, len(views) if views.ndim else 0)
+        raw = {name: np.empty(shape[:3] + (4,) if name in WITH_GRADIENTS else shape, dtype)
+               for name, (shape, dtype) in zip(["image", *spec.outputs], shapes)}
+        for i, (settings, parts) in enumerate(frames):
+            rows = slice(i, i + 1) if len(frames) > 1 else slice(None)
+            gradients = [part.name for part in parts if part.leaf in wanted]
+            frame = _Frame(options_of(spec, settings, i, gradients),
+                           [(part.name, part.of(arrays[part.leaf])) for part in parts])
+            _library.call("dpr_frame_read", frame.handle, *c_arrays([(name, array[rows]) for name, array in raw.items()]))
+            self._frames.append((frame, parts, rows))
+        self._sums = {name: raw[name] for name in spec.outputs if name in WITH_GRADIENTS}
+        self.outputs = [_means(name, array)[0].reshape(shape) if name in WITH_GRADIENTS else array
+                        for (name, array), (shape, _) in zip(raw.items(), shapes)]
+
+    def constants(self, wanted):
+        """The outputs, as numbers of them, that depend on none of the wanted arrays."""
+        names = {part.name for _, parts, _ in self._frames for part in parts if part.leaf in wanted}
+        return [1 + i for i, name in enumerate(self.spec.outputs)
+                if name in OTHERS or not names & _OF_OUTPUTS]
+
+    def is_empty(self):
+        """Whether a frame shows no triangle."""
+        return any(frame.is_empty() for frame, _, _ in self._frames)
+
+    def gradients(self, grads, wanted):
+        """{index: gradient} of sum <grad, output>, of the outputs whose grad is not None."""
+        raw = {}
+        for name, grad in zip(["image", *self.spec.outputs], grads):
+            if grad is None or name in OTHERS:
+                continue
+            grad = np.asarray(grad, np.float32)
+            raw[name] = np.ascontiguousarray(grad if name == "image" else _gradient_of_means(name, self._sums[name], grad))
+        totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in wanted}
+        for frame, parts, rows in self._frames:
+            parts = [part for part in parts if part.leaf in totals]
+            # Where a frame has all of an array, and is the only one, it fills that.
+            found = [part.of(totals[part.leaf]) if len(self._frames) == 1 else np.empty_like(part.of(totals[part.leaf]))
+                     for part in parts]
+            _library.call("dpr_frame_backward", frame.handle, *c_arrays([(name, grad[rows]) for name, grad in raw.items()]),
+                          *c_arrays([(part.name, array) for part, array in zip(parts, found)]))
+            if len(self._frames) > 1:
+                for part, array in zip(parts, found):
+                    part.of(totals[part.leaf])[...] += array
+        return totals

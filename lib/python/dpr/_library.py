@@ -1,0 +1,145 @@
+"""libdpr: found, loaded, and called by ctypes, which lets other threads of Python run meanwhile."""
+import ctypes
+import glob
+import os
+import pathlib
+import warnings
+
+from ._version import VERSION
+
+_HOW_TO_GET_A_DRIVER = ("install one: `apt install ocl-icd-libopencl1 pocl-opencl-icd` on Debian and Ubuntu, `pip install` the wheel "
+                        "dpr_pocl, or that of a GPU's vendor")
+
+
+class Error(RuntimeError):
+    """What the library refuses or fails to do."""
+
+
+class InvalidArgument(Error, ValueError):
+    """An argument has a value that cannot be used."""
+
+
+class DeviceError(Error):
+    """An OpenCL call failed, or a kernel did not compile."""
+
+
+_ERRORS = {1: InvalidArgument, 3: DeviceError, 4: DeviceError, 5: MemoryError}
+"""By the values of dpr_status."""
+
+
+class Array(ctypes.Structure):
+    """dpr_array"""
+    _fields_ = [("name", ctypes.c_char_p), ("data", ctypes.c_void_p), ("element", ctypes.c_int),
+                ("dimensions", ctypes.c_int), ("shape", ctypes.c_size_t * 4)]
+
+
+class Options(ctypes.Structure):
+    """dpr_frame_options"""
+    _fields_ = [("size", ctypes.c_size_t), ("device", ctypes.c_char_p), ("width", ctypes.c_int),
+                ("height", ctypes.c_int), ("settings", ctypes.POINTER(ctypes.c_char_p)),
+                ("setting_count", ctypes.c_size_t), ("is_lit", ctypes.c_int), ("first_view", ctypes.c_size_t),
+                ("gradients", ctypes.POINTER(ctypes.c_char_p)), ("gradient_count", ctypes.c_size_t)]
+
+
+class DeviceInfo(ctypes.Structure):
+    """dpr_device_info"""
+    _fields_ = [("size", ctypes.c_size_t),
+                *((name, ctypes.c_char_p) for name in ("platform", "name", "vendor", "version", "driver", "type")),
+                ("memory_bytes", ctypes.c_size_t), ("compute_units", ctypes.c_uint), ("lanes", ctypes.c_uint),
+                ("is_default", ctypes.c_int)]
+
+
+_HANDLE, _SIZE = ctypes.c_void_p, ctypes.c_size_t
+_ARRAYS = [ctypes.POINTER(Array), _SIZE]
+_SIGNATURES = {
+    "dpr_device_count": [ctypes.POINTER(_SIZE)],
+    "dpr_device_describe": [_SIZE, ctypes.POINTER(DeviceInfo)],
+    "dpr_frame_check": [ctypes.POINTER(Options)],
+    "dpr_frame_render": [ctypes.POINTER(Options), *_ARRAYS, ctypes.POINTER(_HANDLE)],
+    "dpr_frame_read": [_HANDLE, *_ARRAYS],
+    "dpr_frame_backward": [_HANDLE, *_ARRAYS, *_ARRAYS],
+    "dpr_frame_is_empty": [_HANDLE, ctypes.POINTER(ctypes.c_int)],
+    "dpr_frames_release": [],
+    "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],
+    "dpr_cut_size": [_HANDLE, ctypes.POINTER(_SIZE), ctypes.POINTER(_SIZE)],
+    "dpr_cut_read": [_HANDLE, *_ARRAYS],
+}
+
+
+def _candidates():
+    """Where the library may be: as DPR_LIBRARY says, in the wheel, in the build tree, or the system's."""
+    if os.environ.get("DPR_LIBRARY"):
+        return [os.environ["DPR_LIBRARY"]]
+    package = pathlib.Path(__file__).parent
+    soname = "libdpr.so." + VERSION.rpartition(".")[0]
+    found = [path for folder in (package, package.parent.parent / "lib") for path in sorted(glob.glob(f"{folder}/{soname}*"))]
+    return found[:1] or [soname]
+
+
+def _load():
+    try:
+        import dpr_pocl  # brings a driver of its own, and says so to what libdpr loads
+    except ModuleNotFoundError:
+        pass
+    else:
+        dpr_pocl.activate()
+    (path,) = _candidates()
+    try:
+        library = ctypes.CDLL(path)
+    except OSError as error:
+        what, expected = "libdpr", "the package with its library, or its file in DPR_LIBRARY"
+        if "OpenCL" in str(error):
+            what, expected = "OpenCL", "the loader libOpenCL.so.1 and a driver; " + _HOW_TO_GET_A_DRIVER
+        raise ImportError(f"dpr: error: {what} (import dpr): got {error}, expected {expected}") from None
+    library.dpr_version.restype = library.dpr_last_error.restype = ctypes.c_char_p
+    version = library.dpr_version().decode()
+    if version != VERSION:
+        raise ImportError(f"dpr: error: libdpr (import dpr): got version {version} in {path}, expected {VERSION}")
+    library.dpr_frame_settings.restype = ctypes.c_char_p
+    for name, arguments in _SIGNATURES.items():
+        getattr(library, name).argtypes = arguments
+    for name in ("dpr_frame_destroy", "dpr_cut_destroy"):
+        getattr(library, name).argtypes, getattr(library, name).restype = [_HANDLE], None
+    return library
+
+
+def _warn_without_driver():
+    """By the files of the loaders alone: a driver that is asked for its devices starts threads, which no fork has."""
+    variables = ("OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "OPENCL_VENDOR_PATH")
+    folder = pathlib.Path("/etc/OpenCL/vendors")
+    if any(os.environ.get(name) for name in variables) or any(folder.glob("*.icd")):
+        return
+    warnings.warn(f"dpr: no OpenCL driver in {folder}: nothing can be rendered; {_HOW_TO_GET_A_DRIVER}", stacklevel=4)
+
+
+library = _load()
+_warn_without_driver()
+setting_names = tuple(library.dpr_frame_settings().decode().split(", "))
+
+
+def call(name, *arguments):
+    """Calls a function that returns a dpr_status."""
+    status = getattr(library, name)(*arguments)
+    if status:
+        raise _ERRORS.get(status, Error)("dpr: error: " + library.dpr_last_error().decode(errors="replace"))
+
+
+def devices():
+    """Every OpenCL device as a dictionary: index, platform, name, vendor, version, driver, type ("cpu", "gpu" or
+    "accelerator"), memory_bytes, compute_units, lanes (width of the kernels' vectors), is_default. Empty without a
+    driver. Drivers are loaded by this: processes forked from this one cannot render."""
+    count = ctypes.c_size_t()
+    call("dpr_device_count", ctypes.byref(count))
+    found = []
+    for index in range(count.value):
+        info = DeviceInfo(size=ctypes.sizeof(DeviceInfo))
+        call("dpr_device_describe", index, ctypes.byref(info))
+        values = {name: getattr(info, name) for name, _ in DeviceInfo._fields_[1:]}
+        values = {name: value.decode() if isinstance(value, bytes) else value for name, value in values.items()}
+        found.append({"index": index, **values, "is_default": bool(info.is_default)})
+    return found
+
+
+def release():
+    """Frees what is kept on devices for later calls; what graphs hold stays."""
+    call("dpr_frames_release")

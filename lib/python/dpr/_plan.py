@@ -1,0 +1,239 @@
+"""Arguments of a call as a list of arrays, and how frames are made of them."""
+import difflib
+
+from . import _arrays, _library
+from ._arrays import fail
+from ._frames import OTHERS, WITH_GRADIENTS, Spec
+
+_FLOATS = ("vertices", "colors", "face_colors", "texcoords")
+_INDICES = ("faces", "face_texcoords", "face_textures", "face_materials")
+_NUMBERS = ("sigma", "gamma", "alpha")
+
+
+def dictionary(name, given):
+    """The dictionary, or an empty one for None."""
+    if given is not None and not isinstance(given, dict):
+        fail(TypeError, name, type(given).__name__, "a dictionary")
+    for key in given or {}:
+        if not str(key).isidentifier():
+            fail(ValueError, name, repr(key), "names")
+    return given or {}
+
+
+def listed(given):
+    """A texture, or a word, as a list of one."""
+    if given is None:
+        return []
+    return list(given) if isinstance(given, (list, tuple)) else [given]
+
+
+def _has_views(array, dimensions):
+    return _arrays.is_array(array) and len(array.shape) == dimensions + 1
+
+
+def _light_dimensions(name):
+    return 1 if name == "ambient" else 2
+
+
+def _of_view(name, array, dimensions, view, count):
+    """A view's own, or what views have in common."""
+    if not _has_views(array, dimensions):
+        return array
+    if array.shape[0] != count:
+        fail(ValueError, name, list(array.shape), f"{count} in the first dimension, one a view")
+    return _Row(array, view, None)
+
+
+def setting(name, value):
+    """"sigma=0.001", of a value that has no gradient."""
+    if _arrays.is_array(value):
+        if getattr(value, "requires_grad", False):
+            fail(ValueError, name, "a tensor that requires a gradient", "a value without one: only sigma, gamma and "
+                 "alpha of a call, the tensors of meshes and cameras, background and lights have gradients")
+        value = value.item()
+    return f"{name}={value}"
+
+
+def require_names(given, known):
+    """Fails for a keyword that there is not, and tells the nearest."""
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            fail(InvalidName, "name", f'"{name}"', "one of " + ", ".join(known) + hint)
+
+
+class InvalidName(_library.InvalidArgument, TypeError):
+    """A keyword that there is not."""
+
+
+class _Row:
+    """What a view has of an array: a row, or the beginning of that. No list, which textures may be."""
+
+    def __init__(self, array, row, count):
+        self.array, self.row, self.count = array, row, count
+
+
+class Plan:
+    """The arrays of a call, `leaves`, each once, where they were given, `paths`, and the frames made of them."""
+
+    def __init__(self, copy):
+        self.copy, self.leaves, self.paths, self.parts = copy, [], [], []
+
+    def add(self, path, array, indices=False, which=()):
+        """(number, row, count) of an array that was given at the path, ("lights", "point") say; `which` is the index of
+        its mesh in a list."""
+        row = count = None
+        if isinstance(array, _Row):
+            array, row, count = array.array, array.row, array.count
+        else:
+            path = (*path[:1], *which, *path[1:])
+        if path in self.paths:  # of another view
+            return self.paths.index(path), row, count
+        words = [str(key) for key in path if not isinstance(key, int)]
+        name = ".".join(words) + (f"[{path[-1]}]" if words == ["textures"] else "")
+        if indices:
+            _arrays.require(name, array, ("int64", "int32"), "int64 or int32, indices")
+        else:
+            hint = f"; {name}.float() has its gradients too" if _arrays.module_of(array) == "torch" else ""
+            _arrays.require(name, array, ("float32",), "float32" + hint)
+        _arrays.require_on_cpu(name, array, self.copy)
+        self.leaves.append(array)
+        self.paths.append(path)
+        return len(self.leaves) - 1, row, count
+
+    def mesh(self, mesh, which=()):
+        """{name of an array of a frame: (number, row, count)} of a mesh, by the index `which` of a list of meshes."""
+        found = {}
+        for name in (*_FLOATS, *_INDICES):
+            if mesh[name] is not None or name in ("vertices", "faces"):
+                found[name] = self.add((name,), mesh[name], name in _INDICES, which)
+        for i, texture in enumerate(listed(mesh["textures"])):
+            found[f"textures[{i}]"] = self.add(("textures", i), texture, which=which)
+        for name, array in dictionary("materials", mesh["materials"]).items():
+            if array is not None:
+                found[f"materials.{name}"] = self.add(("materials", name), array, which=which)
+        return found
+
+    def frame(self, frame, arrays, wrap, filter):
+        """One more frame, of {name: (number, row, count)}."""
+        for name, given in (("wrap", listed(wrap)), ("filter", listed(filter))):
+            for word in given:
+                if not isinstance(word, str):
+                    fail(TypeError, name, repr(word), "a word, or a list of one a texture")
+                if not word.isalpha():
+                    fail(ValueError, name, repr(word), "a word")
+            if given and "textures[0]" in arrays:
+                self.parts.append(f"{frame}|{name}={','.join(given)}")
+        for name, (leaf, row, count) in arrays.items():
+            self.parts.append(f"{frame}|{name}|{leaf}|{'' if row is None else row}|{'' if count is None else count}")
+
+
+def _meshes_of_each(mesh, count):
+    """A mesh in several views as lists of one a view."""
+    lists = {name: [value] * count for name, value in mesh.items()}
+    for name in ("vertices", "colors", "face_colors"):
+        array = mesh[name]
+        if _has_views(array, 2) and array.shape[0] == 1:
+            lists[name] = [_Row(array, 0, None)] * count
+        else:
+            lists[name] = [_of_view(name, array, 2, i, count) for i in range(count)]
+    textures = listed(mesh["textures"])
+    lists["textures"] = [[_of_view("textures", texture, 3, i, count) for texture in textures] for i in range(count)]
+    return lists
+
+
+def _lists_of_meshes(meshes, count):
+    """The same of meshes that are lists already. Words and materials may be those of all."""
+    lists = {}
+    for name, given in meshes.items():
+        if given is None or isinstance(given, (str, dict)):
+            given = [given] * count
+        if name == "textures" and _has_views(given, 3):
+            given = [_Row(given, i, None) for i in range(given.shape[0])]
+        if not isinstance(given, (list, tuple)) or len(given) != count:
+            got = f"{len(given)} meshes" if isinstance(given, (list, tuple)) else type(given).__name__
+            fail(ValueError, name, got, f"a list of {count}, one a view, as faces are a list")
+        lists[name] = list(given)
+    return lists
+
+
+def _lists_of_padded(meshes):
+    """A padded batch as lists of the rows' beginnings."""
+    _arrays.require("faces", meshes["faces"], ("int64", "int32"), "int64 or int32, indices")
+    faces = _arrays.to_numpy(meshes["faces"])
+    face_counts = [int((mesh[:, 0] >= 0).sum()) for mesh in faces]
+    of_faces = [mesh[:count] for mesh, count in zip(faces, face_counts)]
+    if any((mesh < 0).any() for mesh in of_faces):
+        fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
+    vertex_counts = [int(mesh.max()) + 1 if len(mesh) else 0 for mesh in of_faces]
+    texcoords = meshes["texcoords"]
+    if _has_views(texcoords, 3):  # of corners
+        of_texcoords = face_counts
+    else:
+        of_texcoords = vertex_counts if meshes["face_texcoords"] is None else [None] * len(faces)
+    counts = {"vertices": vertex_counts, "colors": vertex_counts, "texcoords": of_texcoords, **dict.fromkeys(
+        ("faces", "face_colors", "face_texcoords", "face_textures", "face_materials"), face_counts)}
+    lists = dict(meshes)
+    for name, of_meshes in counts.items():
+        padded = meshes[name]
+        if not _arrays.is_array(padded):
+            continue
+        if padded.shape[0] != len(of_meshes):
+            fail(ValueError, name, f"{padded.shape[0]} in the first dimension", f"{len(of_meshes)}, as faces are padded")
+        lists[name] = [_Row(padded, i, count) for i, count in enumerate(of_meshes)]
+    return lists
+
+
+def of_call(renderer, mesh, views, intrinsics, background, lights, numbers, outputs, copy):
+    """(Spec, Plan) of Renderer.__call__()'s arguments."""
+    known = [*WITH_GRADIENTS, *OTHERS]
+    for name in outputs:
+        if name not in known:
+            fail(ValueError, "outputs", repr(name), ", ".join(known[:-1]) + " or " + known[-1])
+    if mesh["colors"] is not None and mesh["face_colors"] is not None:
+        fail(ValueError, "colors", "colors and face_colors", "one of them")
+    plan, settings, shared, of_views = Plan(copy), list(renderer._texts), {}, {}
+    of_views["views"], of_views["intrinsics"] = plan.add(("views",), views), plan.add(("intrinsics",), intrinsics)
+    if len(views.shape) != 3:
+        fail(_library.InvalidArgument, "views", list(views.shape), "[N, 4, 4]")
+    count, faces, lights_given = views.shape[0], mesh["faces"], dictionary("lights", lights)
+    if background is not None:
+        shared["background"] = plan.add(("background",), background)
+    for name, value in zip(_NUMBERS, numbers):
+        if _arrays.is_array(value):
+            shared[name] = plan.add((name,), value)
+        elif value is not None:
+            settings.append(setting(name, value))
+
+    if _has_views(faces, 2):
+        mesh = _lists_of_padded(mesh)
+    if isinstance(mesh["faces"], (list, tuple)):
+        lists = _lists_of_meshes(mesh, count)
+    elif any(_has_views(texture, 3) for texture in listed(mesh["textures"])) or \
+            any(_has_views(array, _light_dimensions(name)) for name, array in lights_given.items()):
+        lists = _meshes_of_each(mesh, count)
+    else:
+        lists = None
+        of_lights = {f"lights.{name}": plan.add(("lights", name), array) for name, array in lights_given.items()
+                     if array is not None}
+        plan.frame(0, {**plan.mesh(mesh), **of_views, **of_lights, **shared}, mesh["wrap"], mesh["filter"])
+    if lists is not None:
+        if count == 0:
+            fail(ValueError, "views", [0, 4, 4], "at least one view")
+        if len(intrinsics.shape) != 2 or intrinsics.shape[0] != count:
+            fail(ValueError, "intrinsics", list(intrinsics.shape), " or ".join(f"[{count}, {n}]" for n in (4, 9, 1)))
+        is_list = isinstance(mesh["faces"], (list, tuple))
+        for i in range(count):
+            own = {name: values[i] for name, values in lists.items()}
+            arrays = plan.mesh(own, (i,) if is_list else ())
+            for name, array in lights_given.items():
+                if array is not None:
+                    row = _of_view(f"lights.{name}", array, _light_dimensions(name), i, count)
+                    arrays[f"lights.{name}"] = plan.add(("lights", name), row)
+            for name, (leaf, _, _) in of_views.items():
+                arrays[name] = (leaf, i, None)
+            plan.frame(i, {**arrays, **shared}, own["wrap"], own["filter"])
+    spec = Spec(renderer.device, renderer.width, renderer.height, int(lights is not None), tuple(settings),
+                tuple(outputs), tuple(plan.parts))
+    return spec, plan

@@ -1,0 +1,253 @@
+"""Renderer, and render() in one call."""
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any, Callable, Dict, Iterable, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _arrays, _frames, _library, _numpy, _plan
+from ._subdivision import Subdivision, corner_texcoords
+
+Array = Any
+"""Of NumPy, PyTorch, JAX, or any library with DLPack."""
+Meshes = Union[Array, Sequence[Array]]
+"""An array, or a list of one a mesh."""
+
+
+def _compiles() -> bool:
+    return "torch" in sys.modules and _front_of_torch().is_compiling()
+
+
+def _front_of_torch():
+    from . import _torch
+    return _torch
+
+
+class Renderer:
+    """What stays the same from call to call: size of the images, smoothing, clipping, culling, shading, device.
+
+    width, height   of the images, pixels, 1 to 16384
+    device          OpenCL device: "" for DPR_DEVICE or else the best there is, "cpu", "gpu", a number, or a part of
+                    a name (dpr.devices())
+    settings        any key of a scene's "smoothing" (lib/cli/README.md), with a number or a word: preset ("pixel"
+                    unless given), sigma (in squared NDC by default), gamma, samples, ...; and
+        znear, zfar world units, between which triangles are rendered. Left out, every view has powers of two around the
+                    depths of its vertices, the near one at least 1/1024 of the far one. Triangles that reach beyond
+                    zfar are dropped whole; at znear they are clipped.
+        cull        "none", "back" or "front"
+        shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
+
+    A Renderer is pickled with its settings. Devices are opened, and kernels built, by the first call in a process.
+    Several threads may render with it at once. OpenCL does not survive fork(): a process forked after that gets an
+    error from a call; start it with "spawn", or render in the parent later. Frames of a graph hold buffers on the device
+    until the graph is freed; some buffers are kept for later calls with the same faces and size (release()).
+    """
+
+    def __init__(self, width: int, height: int, *, device: str = "", **settings: Union[float, str, None]):
+        settings = {"preset": "pixel", **settings}
+        self.width, self.height, self.device = width, height, device
+        self.settings = {name: value.item() if _checked(name, value) else value for name, value in settings.items()
+                         if value is not None}
+        self._texts = [_plan.setting(name, value) for name, value in self.settings.items()]
+        _plan.require_names(self.settings, _library.setting_names)
+        if not _compiles():
+            _library.call("dpr_frame_check", _frames.options_of(self._spec()))
+
+    def __repr__(self):
+        return f"dpr.Renderer({self.width}, {self.height}, device={self.device!r}, " + \
+            ", ".join(f"{name}={value!r}" for name, value in self.settings.items()) + ")"
+
+    def __call__(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, colors: Meshes = None,
+                 face_colors: Meshes = None, texcoords: Meshes = None, face_texcoords: Meshes = None,
+                 textures: Any = None, face_textures: Meshes = None, wrap: Union[str, Sequence[str]] = "repeat",
+                 filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None, face_materials: Meshes = None,
+                 background: Array = None, lights: Dict[str, Array] = None, sigma: Union[float, Array] = None,
+                 gamma: Union[float, Array] = None, alpha: Union[float, Array] = None, outputs: Iterable[str] = (),
+                 copy: bool = False, **misspelt: Any) -> Any:
+        """Renders N views of one mesh, of N shapes of one topology, or of N meshes.
+
+        vertices     [V, 3] or [N, V, 3], world space
+        faces        [F, 3], int64 or int32: indices of vertices
+        views        [N, 4, 4], world to camera, acting on column vectors; the camera looks down -z, y is up (OpenGL)
+        intrinsics   [N, 4], fx, fy, cx, cy in pixels from the corner of the top-left pixel (OpenCV's cx and cy plus
+                     0.5); [N, 9], the same and OpenCV's k1, k2, p1, p2, k3; [N, 1], orthographic: world units from
+                     the lower to the upper edge
+        colors       [V, 3] or [N, V, 3], linear RGB of the vertices; or
+        face_colors  [F, 3] or [N, F, 3], of the faces; white without either
+        texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
+        face_texcoords  [F, 3], int64 or int32: their indices
+        textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by
+                     itself. Colours multiply them
+        face_textures   [F], int64 or int32: the faces' textures, -1 for none; all have the first unless given
+        wrap         "repeat", "mirror" or "clamp", what lies beyond [0, 1]; a word, or a list of one a texture
+        filter       "nearest", "bilinear" or "trilinear", which has a pyramid of smaller images; likewise
+        materials    a dictionary of what highlights are multiplied by and their exponents: "specular" [M, 3] (1 if left
+                     out), "shininess" [M] (the lights' if left out)
+        face_materials  [F], int64 or int32: the faces' materials; all have the first unless given
+        background   [3], linear RGB; black unless given
+        lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
+                     [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"
+                     [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading
+                     N of each view by itself. Without a dictionary colours are as they are.
+        sigma, gamma, alpha   instead of the settings': numbers, or tensors of one number
+        outputs      names of "depth", "position", "normal", "texcoords", "face_id", "barycentrics", "uv",
+                     "effective_faces". The first four are those of what may cover a pixel, at full size wherever alpha
+                     is above 0: weigh them by alpha
+        copy         whether tensors on other devices are copied to the CPU, and the images back
+
+        Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and likewise of their
+        colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
+        may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices
+        [N, V, 3]. They are rendered one after the other, each with a node of its own in the graph; so are views that
+        have textures or lights by themselves.
+
+        Arrays are float32, or indices, of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the
+        same. Their memory is read where it is, if it is packed and on the CPU. With PyTorch and JAX the result is a
+        function of them with first derivatives; vjp() has those of all others.
+
+        Returns the images [N, height, width, 4]: linear RGB over the background, which is not to be blended by alpha
+        again, and alpha, the silhouette. With outputs, (images, {name: tensor}): depth [N, height, width] along the
+        view direction, world units; position and normal [N, height, width, 3], world space; texcoords
+        [N, height, width, 2]; all of these the mean by the faces' weights (the normal at length 1), 0 where these sum
+        to less than 1e-12. face_id [N, height, width], int64, of the face that weighs most, -1 on the background;
+        barycentrics [N, height, width, 3] and uv [N, height, width, 2] of that face; effective_faces, how many faces
+        share a pixel.
+
+        The images have first derivatives with respect to every float array above: those of the views are of any affine
+        matrices, with lights of rigid motions. Depth, position, normal and texcoords have those of vertices, views (of
+        rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how
+        much of it is seen, and cost about an image each, normals four. The other outputs have none. Errors name the
+        argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes and of what arrays hold,
+        dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as those have them. A
+        UserWarning tells that every triangle was dropped, but not from within torch.compile.
+        """
+        _plan.require_names(misspelt, _OF_A_CALL)
+        spec, plan = self._plan(vertices, faces, views, intrinsics, colors, face_colors, texcoords, face_texcoords,
+                                textures, face_textures, wrap, filter, materials, face_materials, background, lights,
+                                sigma, gamma, alpha, outputs, copy)
+        kinds = {_arrays.module_of(leaf) for leaf in plan.leaves}
+        if "torch" in kinds:
+            found, is_empty = _front_of_torch().render(spec, plan.leaves, copy)
+        elif "jax" in kinds:
+            from . import _jax
+            found, is_empty = _jax.render(spec, plan.leaves), False
+        else:
+            found, is_empty = _numpy.render(spec, plan.leaves)
+        if is_empty:
+            warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
+        return (found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]
+
+    def vjp(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, wrt: Iterable[str] = None,
+            **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
+        """What a call returns, and a function from gradients of that to gradients of its arrays.
+
+        The arguments are those of a call. wrt: names of those whose gradients are wanted, ("vertices", "lights") say;
+        all float arrays that are given unless it says otherwise.
+
+        Returns (result, pullback). pullback(grad_image, depth=grad_depth, ...) takes the gradient of the images, or None,
+        and those of outputs that have some, and returns a dictionary of arrays by the names of the arguments: of a list
+        a list, of lights and materials dictionaries. It may be called again; the frame's buffers stay on the device as
+        long as it is there. Raises ValueError for a name that is none of these, and another shape.
+
+            image, pullback = renderer.vjp(vertices, faces, views, intrinsics, wrt=["vertices"])
+            gradient = pullback(2 * (image - target) / image.size)["vertices"]
+        """
+        _plan.require_names(arguments, _OF_A_CALL)
+        given = {**_DEFAULTS, **arguments}
+        spec, plan = self._plan(vertices, faces, views, intrinsics, *(given[name] for name in _OF_A_CALL))
+        found, pullback, is_empty = _numpy.vjp(spec, plan, wrt)
+        if is_empty:
+            warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
+        return ((found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]), pullback
+
+    def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *, texcoords: Array = None,
+                  face_texcoords: Array = None, tolerance: float = 0.25, copy: bool = False) -> Subdivision:
+        """Cuts a mesh's faces where lenses bend their edges, which images draw straight between vertices.
+
+        vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a
+        point of one further than `tolerance` pixels from where it is drawn, for all faces at them, also between
+        vertices that only coincide. Without lenses nothing is cut. The result is right for meshes and cameras near
+        these: cut again when they have moved. With lights, normals are those of the pieces: new vertices have their
+        face's own, so that what coarse faces shade smoothly gets flat within them.
+
+        texcoords and face_texcoords, as a call takes them, come back as the pieces': `texcoords` [F', 3, 2] of the result,
+        with gradients of the given ones.
+
+        Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
+        """
+        plan = _plan.Plan(copy)
+        named = [("vertices", vertices, False), ("faces", faces, True), ("views", views, False),
+                 ("intrinsics", intrinsics, False)]
+        for name, array, is_index in named:
+            plan.add((name,), array, is_index)
+        _, _, tolerance = _plan.setting("tolerance", tolerance).partition("=")
+        arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(array))) for name, array, _ in named]
+        cut = Subdivision(self._spec(), arrays, float(tolerance), vertices)
+        if texcoords is None:
+            if face_texcoords is not None:
+                _arrays.fail(ValueError, "face_texcoords", "them alone", "them beside texcoords")
+            return cut
+        plan.add(("texcoords",), texcoords)
+        corners = corner_texcoords(texcoords, face_texcoords, arrays[1][1], arrays[0][1].shape[0])
+        cut.texcoords = cut.of_corners(corners)
+        return cut
+
+    def _spec(self):
+        return _frames.Spec(self.device, self.width, self.height, 0, tuple(self._texts), (), ())
+
+    def _plan(self, vertices, faces, views, intrinsics, colors, face_colors, texcoords, face_texcoords, textures,
+              face_textures, wrap, filter, materials, face_materials, background, lights, sigma, gamma, alpha, outputs,
+              copy):
+        mesh = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors,
+                "texcoords": texcoords, "face_texcoords": face_texcoords, "textures": textures,
+                "face_textures": face_textures, "wrap": wrap, "filter": filter, "materials": materials,
+                "face_materials": face_materials}
+        return _plan.of_call(self, mesh, views, intrinsics, background, lights, (sigma, gamma, alpha), outputs, copy)
+
+
+def _checked(name, value):
+    """Whether a setting is an array, of one number then."""
+    if _arrays.is_array(value):
+        _plan.setting(name, value)
+        return True
+    return False
+
+
+_DEFAULTS = Renderer.__call__.__kwdefaults__
+_OF_A_CALL = tuple(_DEFAULTS)
+
+
+def _split(arguments):
+    """(settings, keywords of a call)"""
+    _plan.require_names(arguments, (*_library.setting_names, *_OF_A_CALL))
+    return ({name: value for name, value in arguments.items() if name not in _OF_A_CALL},
+            {name: value for name, value in arguments.items() if name in _OF_A_CALL})
+
+
+def render(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
+           device: str = "", **arguments: Any) -> Any:
+    """Renderer(width, height, device=device, ...) and its call in one, with the keywords of both.
+
+    """
+    settings, of_call = _split(arguments)
+    return Renderer(width, height, device=device, **settings)(vertices, faces, views, intrinsics, **of_call)
+
+
+def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
+                    device: str = "", wrt: Iterable[str] = None, **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
+    """Renderer(width, height, device=device, ...) and its vjp() in one, with the keywords of both: see there."""
+    settings, of_call = _split(arguments)
+    return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
+
+
+def subdivide(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
+              texcoords: Array = None, face_texcoords: Array = None, tolerance: float = 0.25, copy: bool = False,
+              **settings: Union[float, str, None]) -> Subdivision:
+    """Renderer(width, height, **settings).subdivide(): see there."""
+    return Renderer(width, height, **settings).subdivide(vertices, faces, views, intrinsics, texcoords=texcoords,
+                                                         face_texcoords=face_texcoords, tolerance=tolerance, copy=copy)
+
+
+render.__doc__ += Renderer.__doc__ + "\n    The call:\n\n" + Renderer.__call__.__doc__

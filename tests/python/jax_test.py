@@ -1,0 +1,65 @@
+"""The Python package `dpr` with JAX."""
+import sys
+import unittest
+
+try:
+    import jax
+    import jax.numpy as jnp
+    import numpy as np
+except ImportError:
+    print("skipped: no jax")
+    sys.exit(0)
+
+import dpr
+from scenes import FACES, SIZE, SMOOTH, SQUARE, SQUARE_FACES, TETRAHEDRON, cameras, random, textured
+
+
+class JaxTest(unittest.TestCase):
+    def test_is_what_numpy_has(self):
+        views, intrinsics = cameras(2)
+        renderer, arguments = dpr.Renderer(SIZE, SIZE, **SMOOTH), textured()
+        weights = random(2, SIZE, SIZE, 4, seed=3) - 0.5
+        (image, outputs), pullback = renderer.vjp(SQUARE, SQUARE_FACES, views, intrinsics, **arguments,
+                                                  outputs=["depth", "face_id"])
+        expected = pullback(weights, depth=weights[..., 0])
+
+        def loss(vertices, textures, lights, views):
+            image, outputs = renderer(vertices, SQUARE_FACES, views, intrinsics, outputs=["depth", "face_id"],
+                                      **{**arguments, "textures": textures, "lights": lights})
+            seen = (image * weights).sum() + (outputs["depth"] * weights[..., 0]).sum()
+            return seen, (image, outputs)
+
+        given = (jnp.asarray(SQUARE), [jnp.asarray(t) for t in arguments["textures"]],
+                 {name: jnp.asarray(light) for name, light in arguments["lights"].items()}, jnp.asarray(views))
+        for transformed in (jax.value_and_grad, lambda *a, **k: jax.jit(jax.value_and_grad(*a, **k))):
+            (_, (found, its_outputs)), gradients = transformed(loss, argnums=(0, 1, 2, 3), has_aux=True)(*given)
+            np.testing.assert_array_equal(found, image)
+            np.testing.assert_array_equal(its_outputs["face_id"], outputs["face_id"])
+            for ours, theirs in [(gradients[0], expected["vertices"]), (gradients[1][0], expected["textures"][0]),
+                                 (gradients[2]["point"], expected["lights"]["point"]), (gradients[3], expected["views"])]:
+                self.assertGreater(np.abs(theirs).sum(), 0)
+                np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-5)
+
+    def test_training(self):
+        views, intrinsics = cameras(2)
+        renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)
+        target = renderer(jnp.asarray(TETRAHEDRON), FACES, views, intrinsics)
+        step = jax.jit(jax.value_and_grad(
+            lambda v, sigma: ((renderer(v, FACES, views, intrinsics, sigma=sigma) - target) ** 2).mean()))
+        vertices, losses = 0.7 * TETRAHEDRON + 0.1, []
+        for _ in range(60):
+            loss, gradient = step(vertices, jnp.float32(5e-3))
+            vertices = vertices - 0.02 * gradient / (jnp.abs(gradient).max() + 1e-9)
+            losses.append(float(loss))
+        self.assertLess(min(losses), 0.2 * losses[0])
+
+    def test_wrong_arguments(self):
+        views, intrinsics = cameras(1)
+        with self.assertRaisesRegex(TypeError, "vertices .* got int32, expected float32"):
+            dpr.render(jnp.zeros((4, 3), int), FACES, views, intrinsics, width=SIZE, height=SIZE)
+        with self.assertRaisesRegex(Exception, "expected .*V, 3"):
+            dpr.render(jnp.asarray(TETRAHEDRON)[:, 0], FACES, views, intrinsics, width=SIZE, height=SIZE)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
