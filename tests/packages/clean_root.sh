@@ -8,7 +8,7 @@
 #       Without STEP: demo check kernels unit. The last line is a row of the table in bench/README.md.
 #   tests/packages/clean_root.sh SUITE --packages FOLDER      the .deb files that cpack --preset packages wrote
 #
-# The root is kept, with what was built there and ccache's files, in ${DPR_ROOTS:-~/.cache/dpr/roots}/SUITE;
+# The root is kept, with ccache's files, in ${DPR_ROOTS:-~/.cache/dpr/roots}/SUITE;
 # that of the packages is SUITE-packages.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -92,18 +92,19 @@ declare -A results=()
 status=0
 for step in "${steps[@]}"; do
   case $step in
-    demo) command=./cmake/demo.sh ;;
+    # Built anew: objects of another checkout may look newer than the sources of this one.
+    demo) command='rm -rf build/demo; ./cmake/demo.sh' ;;
     check) command='build/demo/bin/dpr devices --check' ;;
     kernels)
       command='source cmake/packages.sh; install_packages demo tests
         python3 tests/device/compile_kernels.py driver kernels'
       ;;
     unit)
-      command='source cmake/packages.sh; install_packages demo tests
+      command='source cmake/packages.sh; install_packages demo tests; rm -rf build/release
         cmake --preset release -DDPR_BUILD_{BENCH,LEARN,TORCH}=OFF && cmake --build --preset release
         ctest --preset release -L unit'
       ;;
-    test) command=./cmake/test.sh ;;
+    test) command='rm -rf build/release; ./cmake/test.sh' ;;
     *)
       echo "no step $step" >&2
       exit 1
