@@ -32,6 +32,11 @@ using float4 = cl_float4;
 #define DPR_SORT_BLOCK 1024
 #endif
 
+/// Elements of a run of a sorted list that one work-item sums in order (runs.h), and slots for the sums of
+/// chunks of a list.
+#define DPR_RUN_CHUNK 512
+#define DPR_RUN_SLOTS(count) (2 * ((count) / DPR_RUN_CHUNK + 1))
+
 /// By which a pass of a sort orders, on devices of so many lanes.
 #define DPR_SORT_BITS(lanes) ((lanes) == 1 ? 4 : 8)
 

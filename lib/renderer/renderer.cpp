@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "dpr/error.hpp"
-#include "renderer/finite.hpp"
 #include "renderer/frame.hpp"
 #include "renderer/renderer_impl.hpp"
 
@@ -256,13 +255,6 @@ SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,
   return read_gradient();
 }
 
-SceneGradient Renderer::Impl::read_gradient() {
-  SceneGradient gradient = finish_summed_gradients(gradient_sums_.download());
-  read_mesh_gradients(gradient);
-  require_finite(gradient);
-  return gradient;
-}
-
 void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images) {
   enqueue_backward(grad_images);
   if (!gradient_map) gradient_map = make_gradient_map();
@@ -356,7 +348,7 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
-         (texels ? texels->bytes() : 0) + reduce.bytes() + (aov ? aov->bytes() : 0) +
+         (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + (aov ? aov->bytes() : 0) +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() +

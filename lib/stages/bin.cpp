@@ -13,7 +13,8 @@ void Bin::start() { scan_(pair_starts.size() - 1, pair_starts); }
 
 void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
   const std::size_t faces = pair_starts.size() - 1;
-  const std::size_t found = read_total(pair_starts, faces, "pairs of tiles and triangles (frame)");
+  const std::size_t found =
+      read_total(pair_starts, faces, "pairs of tiles and triangles (frame)", k_most_pairs);
   list(p, setup, found);
   settle(found);
 }
@@ -24,26 +25,26 @@ void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t 
 
 void Bin::settle(std::size_t known_pairs) {
   pairs = known_pairs;
-  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places})
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
     buffer->settle(known_pairs);
 }
 
 void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
   pairs = capacity;
   pair_count.resize(device_, 1);
-  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face_, &places})
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
-  fill_.sharing(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face_,
-                pair_tile, places);
+  fill_.sharing(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face, pair_tile,
+                places);
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
-  link_(pairs, n, pair_count, places, place_face_, pair_face, face_pairs);
+  link_(pairs, n, pair_count, places, place_face, pair_face, face_pairs);
 }
 
 std::size_t Bin::bytes() const {
   std::size_t bytes = scan_.bytes() + sort_.bytes();
-  for (const Buffer<cl_uint>* buffer : {&pair_count, &pair_face, &pair_tile, &tile_starts, &face_pairs,
-                                        &pair_starts, &place_face_, &places}) {
+  for (const Buffer<cl_uint>* buffer :
+       {&pair_count, &pair_face, &pair_tile, &tile_starts, &face_pairs, &pair_starts, &place_face, &places}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

@@ -2,12 +2,17 @@
 // by which gradients are gathered.
 #pragma once
 
+#include <limits>
+
 #include "device/kernel.hpp"
 #include "stages/scan.hpp"
 #include "stages/setup.hpp"
 #include "stages/sort.hpp"
 
 namespace dpr {
+
+/// Pairs whose gradients, nine numbers each, kernels index by 32 bits.
+inline constexpr std::size_t k_most_pairs = std::numeric_limits<cl_uint>::max() / 9;
 
 class Bin {
  public:
@@ -30,6 +35,7 @@ class Bin {
   Buffer<cl_uint> tile_starts;  ///< [view * tile + 1] runs of pairs
   Buffer<cl_uint> face_pairs;   ///< [place] the pairs of every face of every view, or DPR_NO_PAIR
   Buffer<cl_uint> pair_starts;  ///< [view * face + 1] runs of `face_pairs`
+  Buffer<cl_uint> place_face;   ///< [place] view * faces + face
   Buffer<cl_uint> places;       ///< [pair] where its face lists it
 
   std::size_t bytes() const;
@@ -44,7 +50,6 @@ class Bin {
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
   Scan scan_;
   Sort sort_;
-  Buffer<cl_uint> place_face_;  // [place]
 };
 
 }  // namespace dpr

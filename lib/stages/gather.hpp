@@ -22,12 +22,21 @@ class Gather {
   void over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
                   const Buffer<float>& partial, Buffer<float>& channels);
 
+  std::size_t bytes() const { return chunks_.capacity_bytes(); }
+
  private:
+  /// Of faces that may have more pairs than one work-item is to add.
+  void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels,
+                  const Buffer<float>& partial);
+
   Device::Impl& device_;
+  Kernel<cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>>
+      chunk_sums_;
   Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
-         Out<cl_float4>>
+         In<float>, Out<cl_float4>>
       corners_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> faces_;
+  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<float>> faces_;
+  Buffer<float> chunks_;  // [slot][channel]
 };
 
 }  // namespace dpr

@@ -1,6 +1,6 @@
 #include "stages/scan.hpp"
 
-#include <limits>
+#include <string>
 
 namespace dpr {
 
@@ -38,16 +38,16 @@ std::size_t Scan::bytes() const {
   return bytes;
 }
 
-void check_total(std::size_t total, const char* what) {
-  if (total >= std::numeric_limits<cl_uint>::max()) {
-    throw InvalidArgument(what, "more than 4294967294", "a smaller image, blur radius or mesh");
-  }
+void check_total(std::size_t total, const char* what, std::size_t most) {
+  if (total > most)
+    throw InvalidArgument(what, "more than " + std::to_string(most), "a smaller image, blur radius or mesh");
 }
 
-std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what) {
+std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what,
+                       std::size_t most) {
   cl_uint total = 0;
   offsets.download(std::span(&total, 1), count);
-  check_total(total, what);
+  check_total(total, what, most);
   return total;
 }
 

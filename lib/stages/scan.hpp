@@ -1,6 +1,7 @@
 // Exclusive prefix sums on the device, in place.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "device/kernel.hpp"
@@ -30,10 +31,14 @@ class Scan {
   std::vector<Buffer<cl_uint>> bases_;  // [level][chunk + 1] the scan of the chunks' sums
 };
 
-/// Throws InvalidArgument if a sum saturated: `what` were too many.
-void check_total(std::size_t total, const char* what);
+/// The largest total of a sum that has not saturated.
+inline constexpr std::size_t k_most_counted = std::numeric_limits<cl_uint>::max() - 1;
+
+/// Throws InvalidArgument where `what` are more than `most`.
+void check_total(std::size_t total, const char* what, std::size_t most = k_most_counted);
 
 /// The last element, read back and checked.
-std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what);
+std::size_t read_total(const Buffer<cl_uint>& offsets, std::size_t count, const char* what,
+                       std::size_t most = k_most_counted);
 
 }  // namespace dpr
