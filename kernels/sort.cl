@@ -2,7 +2,7 @@
 // still by face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on
 // the device; the host launches for the capacity of the buffers. A block is a work-item's on CPUs, which
 // count eight bits in their caches, and a work-group's on GPUs, which count four in local memory. Few
-// elements are sorted by one work-item instead, to the same order.
+// elements are sorted by one work-item or one group instead, to the same order.
 #include "group.h"
 
 #ifndef DPR_LANES
@@ -87,6 +87,62 @@ DPR_GROUP_KERNEL kernel void sort_scatter(const uint capacity, const uint shift,
   }
 }
 
+/// Sorts few elements of few keys. One work-group, in local memory: one launch instead of three a pass.
+/// in   last_key  the number of keys, from 0 on
+/// in   count     uint[1]       the number of elements, at most DPR_SORT_BLOCK
+/// in   keys      uint[count]
+/// in   values    uint[count]   move with their keys
+/// out  sorted_keys, sorted_values  uint[count]
+/// out  starts    uint[last_key + 1]  where each key's run begins in the sorted list
+DPR_GROUP_KERNEL kernel void sort_few(const uint last_key, global const uint* restrict count,
+                                      global const uint* restrict keys, global const uint* restrict values,
+                                      global uint* restrict sorted_keys, global uint* restrict sorted_values,
+                                      global uint* restrict starts) {
+  const uint each = DPR_EACH(DPR_SORT_BLOCK), of_counts = DPR_SORT_DIGITS;
+  local uint list_keys[2][DPR_SORT_BLOCK], order[2][DPR_SORT_BLOCK], group_sums[DPR_GROUP];
+  local uint counts[DPR_LOCAL_PLACES(DPR_SORT_DIGITS * DPR_GROUP)];  // [digit][work-item]
+  const uint item = (uint)get_local_id(0), here = min(count[0], (uint)DPR_SORT_BLOCK);
+  const uint first = item * each, last = min(here, first + each);
+  uint from = 0;
+  for (uint i = item; i < here; i += DPR_GROUP) {
+    list_keys[from][i] = keys[i];
+    order[from][i] = i;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint shift = 0; shift < 32 && (last_key - 1) >> shift != 0; shift += DPR_SORT_BITS(DPR_LANES)) {
+    for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[local_place(d * DPR_GROUP + item, of_counts)] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint i = first; i < last; ++i)
+      ++counts[local_place(sort_digit(list_keys[from][i], shift) * DPR_GROUP + item, of_counts)];
+    barrier(CLK_LOCAL_MEM_FENCE);
+    group_scan_chunk(counts, of_counts, group_sums);
+    for (uint i = first; i < last; ++i) {
+      const uint key = list_keys[from][i];
+      const uint target = counts[local_place(sort_digit(key, shift) * DPR_GROUP + item, of_counts)]++;
+      list_keys[1 - from][target] = key;
+      order[1 - from][target] = order[from][i];
+    }
+    from = 1 - from;
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  for (uint i = item; i < here; i += DPR_GROUP) {
+    sorted_keys[i] = list_keys[from][i];
+    sorted_values[i] = values[order[from][i]];
+  }
+  for (uint key = item; key <= last_key; key += DPR_GROUP) {
+    uint low = 0, high = here;
+    while (low < high) {
+      const uint middle = (low + high) / 2;
+      if (list_keys[from][middle] < key) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    starts[key] = low;
+  }
+}
+
 #else
 
 /// As above. One work-item per block.
@@ -120,19 +176,10 @@ kernel void sort_scatter(const uint capacity, const uint shift, global const uin
   }
 }
 
-#endif
-
-/// Sorts few elements of few keys by counting. One work-item.
-/// in   last_key  the number of keys, from 0 on
-/// in   count     uint[1]       the number of elements
-/// in   keys      uint[count]
-/// in   values    uint[count]   move with their keys
-/// out  sorted_keys, sorted_values  uint[count]
-/// out  starts    uint[last_key + 1]  where each key's run begins in the sorted list
-kernel void sort_serial(const uint last_key, global const uint* restrict count,
-                        global const uint* restrict keys, global const uint* restrict values,
-                        global uint* restrict sorted_keys, global uint* restrict sorted_values,
-                        global uint* restrict starts) {
+/// As above, by counting. One work-item.
+kernel void sort_few(const uint last_key, global const uint* restrict count, global const uint* restrict keys,
+                     global const uint* restrict values, global uint* restrict sorted_keys,
+                     global uint* restrict sorted_values, global uint* restrict starts) {
   if (get_global_id(0) != 0) return;
   const uint elements = count[0];
   for (uint key = 0; key <= last_key; ++key) starts[key] = 0;
@@ -148,6 +195,8 @@ kernel void sort_serial(const uint last_key, global const uint* restrict count,
   for (uint key = last_key; key > 0; --key) starts[key] = starts[key - 1];
   starts[0] = 0;
 }
+
+#endif
 
 /// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one
 /// more.

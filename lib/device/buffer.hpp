@@ -86,10 +86,13 @@ class Buffer {
   /// Blocks until everything enqueued before has run. Throws std::logic_error for elements that are not
   /// there.
   void download(std::span<T> values, std::size_t first = 0) const {
-    if (first > size() || values.size() > size() - first)
-      throw std::logic_error("more is read of a buffer than it holds");
-    if (values.empty()) return;
-    device_->read(buffer_, first * sizeof(T), std::as_writable_bytes(values));
+    check_read(values.size(), first);
+    if (!values.empty()) device_->read(buffer_, first * sizeof(T), std::as_writable_bytes(values));
+  }
+  /// The same as one of several reads, which does not block.
+  void download(std::span<T> values, std::size_t first, PendingReads& reads) const {
+    check_read(values.size(), first);
+    if (!values.empty()) reads.start(buffer_, first * sizeof(T), std::as_writable_bytes(values));
   }
   std::vector<T> download() const {
     std::vector<T> values(size());
@@ -124,6 +127,11 @@ class Buffer {
 
  private:
   static constexpr std::size_t k_padding = 16;  // the widest vector
+
+  void check_read(std::size_t count, std::size_t first) const {
+    if (first > size() || count > size() - first)
+      throw std::logic_error("more is read of a buffer than it holds");
+  }
 
   void allocate(Device::Impl& device, std::size_t count) {
     release();  // before there is a new one, so that both need not fit

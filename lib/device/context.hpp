@@ -58,8 +58,11 @@ struct Device::Impl {
     if (info.platform == "Oclgrind") clRetainMemObject(buffer());
   }
 
+  /// Host memory that writes may hold until they have run.
+  static constexpr std::size_t k_most_pending_bytes = std::size_t{1} << 24;
+
   /// Enqueues a write to a buffer, from a byte on. The bytes are copied, so that the host need not wait: over
-  /// a network a wait costs more than the copy. Of more than a mebibyte it does wait, and nothing is copied.
+  /// a network a wait costs more than the copy. Beyond k_most_pending_bytes it waits, and nothing is copied.
   void write(const cl::Buffer& buffer, std::size_t first, std::span<const std::byte> bytes);
   /// Blocks until everything enqueued before has run, and the bytes are here.
   void read(const cl::Buffer& buffer, std::size_t first, std::span<std::byte> bytes);
@@ -89,6 +92,25 @@ struct Device::Impl {
   std::map<std::string, cl::Program> programs_;
   std::mutex writes_mutex_;
   std::list<PendingWrite> writes_;
+};
+
+/// Reads that the host waits for together. Not thread-safe.
+class PendingReads {
+ public:
+  explicit PendingReads(Device::Impl& device) : device_(device) {}
+  ~PendingReads();
+  PendingReads(const PendingReads&) = delete;
+  PendingReads& operator=(const PendingReads&) = delete;
+
+  /// Does not block. The memory has to stay there until finish().
+  void start(const cl::Buffer& buffer, std::size_t first, std::span<std::byte> bytes);
+  /// Blocks until everything that was started is here.
+  void finish();
+
+ private:
+  Device::Impl& device_;
+  cl::Event last_;  // the queue is in order
+  bool is_pending_ = false;
 };
 
 /// The call that allocates a buffer, as its error names it: where the device has no buffers so large, with

@@ -1,4 +1,4 @@
-// Transfers between host and device, counted; small writes do not make the host wait.
+// Transfers between host and device, counted; writes do not make the host wait while few bytes are pending.
 #include "device/context.hpp"
 
 namespace dpr {
@@ -13,16 +13,17 @@ Device::Impl::~Impl() {
 }
 
 void Device::Impl::write(const cl::Buffer& buffer, std::size_t first, std::span<const std::byte> bytes) {
-  constexpr std::size_t k_most_copied = std::size_t{1} << 20;
   constexpr const char* k_call = "clEnqueueWriteBuffer";
   bytes_to_device += bytes.size();
-  if (bytes.size() > k_most_copied) {
+  const std::scoped_lock lock(writes_mutex_);
+  std::erase_if(writes_, [](const PendingWrite& write) { return write.has_run(); });
+  std::size_t pending = bytes.size();
+  for (const PendingWrite& write : writes_) pending += write.bytes.size();
+  if (pending > k_most_pending_bytes) {
     ++host_waits;
     check_cl(queue.enqueueWriteBuffer(buffer, CL_TRUE, first, bytes.size(), bytes.data()), k_call);
     return;
   }
-  const std::scoped_lock lock(writes_mutex_);
-  std::erase_if(writes_, [](const PendingWrite& write) { return write.has_run(); });
   writes_.push_back({std::vector(bytes.begin(), bytes.end()), cl::Event()});
   PendingWrite& write = writes_.back();
   const int error = queue.enqueueWriteBuffer(buffer, CL_FALSE, first, bytes.size(), write.bytes.data(),
@@ -36,6 +37,25 @@ void Device::Impl::read(const cl::Buffer& buffer, std::size_t first, std::span<s
   bytes_from_device += bytes.size();
   check_cl(queue.enqueueReadBuffer(buffer, CL_TRUE, first, bytes.size(), bytes.data()),
            "clEnqueueReadBuffer");
+}
+
+PendingReads::~PendingReads() {
+  if (is_pending_ && last_.wait() != CL_SUCCESS) device_.queue.finish();  // they write to the host's memory
+}
+
+void PendingReads::start(const cl::Buffer& buffer, std::size_t first, std::span<std::byte> bytes) {
+  check_cl(
+      device_.queue.enqueueReadBuffer(buffer, CL_FALSE, first, bytes.size(), bytes.data(), nullptr, &last_),
+      "clEnqueueReadBuffer");
+  is_pending_ = true;
+  device_.bytes_from_device += bytes.size();
+}
+
+void PendingReads::finish() {
+  if (!is_pending_) return;
+  ++device_.host_waits;
+  check_cl(last_.wait(), "clWaitForEvents");
+  is_pending_ = false;
 }
 
 }  // namespace dpr

@@ -2,7 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <memory>
 
+#include "renderer/finite.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/light_table.hpp"
 
@@ -10,21 +13,45 @@ namespace dpr {
 
 using glm::dvec3;
 
-namespace {
+/// Reads parts of joined buffers, with one wait for as many rows as a piece has: rows on the way are held
+/// beside the buffers and the results, when a frame holds the most.
+class RowReads {
+ public:
+  explicit RowReads(Device::Impl& device) : reads_(device) {}
 
-/// A mesh's part of a joined buffer. In pieces: what is on the way is held beside both, when a frame holds
-/// the most.
-std::vector<glm::vec3> read_range(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count) {
-  std::vector<cl_float4> values(std::min(count, k_rows_of_piece));
-  std::vector<glm::vec3> result;
-  result.reserve(count);
-  while (result.size() < count) {
-    const std::span<cl_float4> piece(values.data(), std::min(values.size(), count - result.size()));
-    buffer.download(piece, first + result.size());
-    for (const cl_float4& v : piece) result.emplace_back(v.s[0], v.s[1], v.s[2]);
+  /// All values of a buffer.
+  void add(const Buffer<float>& buffer, std::span<float> out) { buffer.download(out, 0, reads_); }
+  /// Appends rows to `out`, until finish() at the latest.
+  template <class Vector>
+  void add(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count, std::vector<Vector>& out) {
+    out.reserve(count);
+    for (const std::size_t end = first + count; first < end;) {
+      if (used_ == k_rows_of_piece) finish();
+      const std::span<cl_float4> piece(rows_.get() + used_, std::min(k_rows_of_piece - used_, end - first));
+      buffer.download(piece, first, reads_);
+      arrivals_.emplace_back([piece, &out] {
+        for (const cl_float4& v : piece) out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
+      });
+      used_ += piece.size();
+      first += piece.size();
+    }
   }
-  return result;
-}
+
+  void finish() {
+    reads_.finish();
+    for (const std::function<void()>& take : arrivals_) take();
+    arrivals_.clear();
+    used_ = 0;
+  }
+
+ private:
+  std::unique_ptr<cl_float4[]> rows_ = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
+  PendingReads reads_;  // destroyed first, since reads write to the rows
+  std::size_t used_ = 0;
+  std::vector<std::function<void()>> arrivals_;
+};
+
+namespace {
 
 /// A mesh without colours of its own is white.
 bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
@@ -66,35 +93,40 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
     gather.over_views(frame, bin, geometry->materials, shade.grad_materials, material_channels);
 }
 
-void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient) {
+SceneGradient Renderer::Impl::read_gradient() {
+  std::vector<float> sums(gradient_sums_.size());
+  SceneGradient by_mesh;
+  by_mesh.meshes.resize(scene.meshes.size());
+  RowReads reads(device.impl());
+  reads.add(gradient_sums_, sums);
+  read_mesh_gradients(by_mesh, reads);
+  reads.finish();
+  SceneGradient gradient = finish_summed_gradients(sums, std::move(by_mesh));
+  require_finite(gradient);
+  return gradient;
+}
+
+void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, RowReads& rows) const {
   const bool own_positions = frame.position_stride != 0, own_colors = frame.color_stride != 0;
-  if (scene.gradients.positions && own_positions) {
-    gradient.shapes.positions = read_range(transform.grad_positions, 0, transform.grad_positions.size());
-  }
-  if (wants_colors() && own_colors) gradient.shapes.colors = read_range(grad_colors, 0, grad_colors.size());
+  if (scene.gradients.positions && own_positions)
+    rows.add(transform.grad_positions, 0, transform.grad_positions.size(), gradient.shapes.positions);
+  if (wants_colors() && own_colors) rows.add(grad_colors, 0, grad_colors.size(), gradient.shapes.colors);
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     if (scene.meshes[m].instance_of) continue;
     const MeshRange& range = geometry->meshes[m];
     const Mesh& mesh = scene.meshes[m].mesh;
-    if (scene.gradients.positions && !own_positions) {
-      gradient.meshes[m].positions =
-          read_range(transform.grad_positions, range.first_position, range.vertices);
-    }
-    if (scene.gradients.colors && has_colors(mesh) && !own_colors) {
-      gradient.meshes[m].colors = read_range(grad_colors, range.first_color, range.colors);
-    }
-    if (wants_texcoords()) {
-      for (const glm::vec3& uv : read_range(grad_texcoords, range.first_texcoord, range.texcoords))
-        gradient.meshes[m].texcoords.emplace_back(uv);
-    }
-    if (wants_normals()) {
-      gradient.meshes[m].normals = read_range(shade.grad_given_normals, range.first_normal, range.normals);
-    }
+    MeshGradient& out = gradient.meshes[m];
+    if (scene.gradients.positions && !own_positions)
+      rows.add(transform.grad_positions, range.first_position, range.vertices, out.positions);
+    if (scene.gradients.colors && has_colors(mesh) && !own_colors)
+      rows.add(grad_colors, range.first_color, range.colors, out.colors);
+    if (wants_texcoords()) rows.add(grad_texcoords, range.first_texcoord, range.texcoords, out.texcoords);
+    if (wants_normals()) rows.add(shade.grad_given_normals, range.first_normal, range.normals, out.normals);
     if (!scene.gradients.texture) continue;
+    out.textures.resize(mesh.textures.size());
     for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
       const shared::Texture& t = geometry->textures.list[range.first_texture + i];
-      gradient.meshes[m].textures.push_back(
-          read_range(texels->grad, t.first, std::size_t{t.width} * t.height));
+      rows.add(texels->grad, t.first, std::size_t{t.width} * t.height, out.textures[i]);
     }
   }
 }
@@ -252,10 +284,10 @@ void Renderer::Impl::add_sums(std::span<const Summation> all) {
   for (std::size_t i = 0; i < all.size(); ++i) reduce.add(all[i], gradient_sums_, summed_.all()[i]->first);
 }
 
-SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sums) const {
+SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sums,
+                                                      SceneGradient gradient) const {
   const GradientRequest& wanted = scene.gradients;
   const auto list = [&](const SumList& of) { return sums.subspan(of.first, of.count()); };
-  SceneGradient gradient;
   gradient.meshes.resize(scene.meshes.size());
   gradient.views.resize(views.size());
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());

@@ -64,6 +64,8 @@ using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buf
 /// or nowhere, until it asks.
 enum class FrameSizes { read, kept };
 
+class RowReads;
+
 /// Rows that are on the way between the host's three floats and the device's four at a time: 2 MiB of these.
 inline constexpr std::size_t k_rows_of_piece = std::size_t{1} << 17;
 
@@ -224,8 +226,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
   void add_sums(std::span<const Summation> all);
-  void read_mesh_gradients(SceneGradient& gradient);
-  SceneGradient finish_summed_gradients(std::span<const float> sums) const;
+  void read_mesh_gradients(SceneGradient& gradient, RowReads& rows) const;
+  /// Adds what was summed to the gradients of the meshes' arrays.
+  SceneGradient finish_summed_gradients(std::span<const float> sums, SceneGradient gradient = {}) const;
   GradientMap make_gradient_map() const;
   /// From sums by channel to `grad_materials`.
   void join_material_gradients();

@@ -4,10 +4,11 @@
 
 namespace dpr {
 
-std::size_t sorted_at_once(const Device::Impl& device) {
-  constexpr std::size_t k_of_a_cpu = 16384;  // 20 microseconds; a launch takes 5 to 10
-  constexpr std::size_t k_of_a_gpu = 256;    // whose work-items are slow by themselves
-  return device.info.lanes == 1 ? k_of_a_gpu : k_of_a_cpu;
+bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::size_t key_count) {
+  constexpr std::size_t k_of_a_work_item = 16384;  // 20 microseconds; a launch takes 5 to 10
+  constexpr std::size_t k_keys_of_a_group = 4096;  // 64 bisections a work-item
+  if (device.info.lanes != 1) return capacity + key_count <= k_of_a_work_item;
+  return capacity <= DPR_SORT_BLOCK && key_count <= k_keys_of_a_group;
 }
 
 Sort::Sort(Device::Impl& device)
@@ -16,7 +17,7 @@ Sort::Sort(Device::Impl& device)
       histogram_(device, "sort.cl", "sort_histogram"),
       scatter_(device, "sort.cl", "sort_scatter"),
       ranges_(device, "sort.cl", "sort_ranges"),
-      serial_(device, "sort.cl", "sort_serial") {}
+      few_(device, "sort.cl", "sort_few") {}
 
 void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::size_t key_count,
                       Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
@@ -28,8 +29,8 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     std::swap(keys, other_keys_);
     std::swap(values, other_values_);
   };
-  if (capacity > 0 && capacity + key_count <= sorted_at_once(device_)) {
-    serial_(1, last_key, count, keys, values, other_keys_, other_values_, starts);
+  if (capacity > 0 && is_sorted_at_once(device_, capacity, key_count)) {
+    few_.in_groups(1, last_key, count, keys, values, other_keys_, other_values_, starts);
     exchange();
     return;
   }

@@ -6,8 +6,8 @@
 
 namespace dpr {
 
-/// So many elements one work-item sorts, sooner than the many that share them can be launched.
-std::size_t sorted_at_once(const Device::Impl& device);
+/// Whether one work-item, or on a GPU one group, sorts them sooner than the launches of a sort by many take.
+bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::size_t key_count);
 
 class Sort {
  public:
@@ -31,7 +31,7 @@ class Sort {
   Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>>
       scatter_;
   Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> ranges_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> serial_;
+  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> few_;
   Buffer<cl_uint> offsets_, other_keys_, other_values_;
 };
 

@@ -3,13 +3,18 @@
 // first.
 #include <doctest/doctest.h>
 
+#include <map>
+#include <string>
 #include <vector>
 
+#include "device/profile.hpp"
 #include "dpr/dpr.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
+#include "support/reduced.hpp"
+#include "support/variable.hpp"
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
@@ -129,6 +134,51 @@ TEST_SUITE("pipeline") {
     REQUIRE(device.impl().queue.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, image.pixels.data()) ==
             CL_SUCCESS);
     CHECK(same_bits(image, fresh.image()));
+  }
+
+  TEST_CASE("host waits: a backward pass waits for all its gradients at once") {
+    for (const Scene& scene : {test_scene(), sampled_scene(), joint_scene()}) {
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
+      renderer.forward();
+      renderer.image();
+      const std::atomic<std::size_t>& waits = renderer.device().impl().host_waits;
+      const std::size_t before = waits;
+      const SceneGradient gradient = renderer.backward(std::span(&grad, 1));
+      CHECK(waits - before == 1);
+      CHECK(!gradient.meshes[0].positions.empty());
+      CHECK(!gradient.meshes[0].colors.empty());
+    }
+  }
+
+  TEST_CASE("host waits: launches of a step on a device of one lane") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::test::Variable one_lane("DPR_LANES", "1");
+    Scene scene;
+    scene.smoothing = smoothing_preset("pixel", 128, 128);
+    scene.camera = orbit_camera(6.7F, 30.0F, 120.0F);
+    scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
+    const auto step = [&] {
+      renderer.set_positions(0, scene.meshes[0].mesh.positions);
+      renderer.forward();
+      renderer.backward(std::span(&grad, 1));
+    };
+    step();
+    Profile profile(renderer.device());
+    step();
+    std::map<std::string, int> launches;
+    for (const Profile::Launch& launch : profile.take()) ++launches[launch.file];
+    std::size_t all = 0;
+    for (const auto& [file, count] : launches) {
+      MESSAGE(file << ": " << count);
+      all += static_cast<std::size_t>(count);
+    }
+    CHECK(launches["sort.cl"] + launches["scan.cl"] <= 8);
+    CHECK(all <= 60);
   }
 
   TEST_CASE("host waits: a frame that no budget allows is refused by whoever asks for it") {
