@@ -155,8 +155,10 @@ TEST_SUITE("bench-smoke") {
                           &twice.backward_evaluations}) {
       *value *= 2;
     }
+    const Smoothing triangles = smoothing_preset("gaussian");
     for (const char* const stage : {"rasterize", "shade", "occupancy", "aggregate"}) {
-      const auto once = bench::stage_cost(stage, work, {}), doubled = bench::stage_cost(stage, twice, {});
+      const auto once = bench::stage_cost(stage, work, triangles),
+                 doubled = bench::stage_cost(stage, twice, triangles);
       REQUIRE(once);
       CHECK(doubled->forward.flops == doctest::Approx(2 * once->forward.flops));
       CHECK(doubled->backward.bytes == doctest::Approx(2 * once->backward.bytes));
@@ -166,6 +168,7 @@ TEST_SUITE("bench-smoke") {
     Smoothing cauchy = smoothing_preset("gaussian");
     cauchy.occupancy_prior = Prior::cauchy;
     CHECK_FALSE(bench::stage_cost("occupancy", work, cauchy));
+    CHECK_FALSE(bench::stage_cost("occupancy", work, smoothing_preset("pixel", 64, 64)));
   }
 
   TEST_CASE("peaks are above what any program needs, and the device's queue is put back") {
