@@ -8,6 +8,7 @@
 
 #include "cli/completion.hpp"
 #include "compare.hpp"
+#include "device_ranking.hpp"
 #include "dpr/error.hpp"
 #include "measure_command.hpp"
 #include "report/report.hpp"
@@ -55,6 +56,7 @@ void run(const BenchOptions& options, const CommonOptions& common) {
     throw InvalidArgument("files (command line)", "\"" + options.files.front() + "\"",
                           "none without --report");
   }
+  if (!options.measure.devices.empty()) return rank_devices(options.measure, common);
   run_bench(options.measure, common);
 }
 
@@ -87,6 +89,9 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
   command
       .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")
       ->type_name("NAME");
+  command.add_option("--devices", options.devices, "Rank every device on one workload (default: sphere256)")
+      ->check(CLI::IsMember({"all"}))
+      ->type_name("all");
   command.add_option("-o,--output", options.output, "Results, or the comparison, as JSON")->type_name("FILE");
   command.add_option("--csv", options.csv, "Results as comma-separated values, a line a row")
       ->type_name("FILE");

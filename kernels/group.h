@@ -11,9 +11,9 @@
 
 #define DPR_GROUP_KERNEL __attribute__((reqd_work_group_size(DPR_GROUP, 1, 1)))
 
-/// Of a kernel that is one on GPUs alone: of one work-item per element, whose work-items help each other
-/// there, launched by Kernel::sharing(), or of one work-item for what is a group's there, by
-/// Kernel::in_groups().
+/// Attribute of a kernel that runs in such groups on GPUs alone. It has one work-item per element, and the
+/// work-items of a group help each other; or one work-item on a CPU does what a group does on a GPU
+/// (Kernel::in_groups()).
 #if DPR_LANES == 1
 #define DPR_SHARING_KERNEL DPR_GROUP_KERNEL
 #else

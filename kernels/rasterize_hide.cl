@@ -33,13 +33,9 @@ static inline void take_hidden(const TilePairs pairs, uint pair, ulong whole, ul
 
 #if DPR_LANES == 1
 
-#if DPR_GROUP != DPR_TILE * DPR_TILE
-#error "a work-item has a sample of a tile"
-#endif
-
-/// The depth behind which nothing is seen of the work-item's sample: that of the pair whose furthest corner
-/// is nearest. The group reads as many pairs at once as it has work-items.
-static inline float hiding_depth(const TilePairs pairs, uint first, uint last, float reach,
+/// The depth behind which nothing is seen of a sample: that of the pair whose furthest corner is nearest. The
+/// group reads as many pairs at once as it has work-items.
+static inline float hiding_depth(const TilePairs pairs, uint first, uint last, float reach, uint sample,
                                  local uint2* masks, local float* depths) {
   const uint item = (uint)get_local_id(0);
   float end = INFINITY;
@@ -50,25 +46,26 @@ static inline float hiding_depth(const TilePairs pairs, uint first, uint last, f
       depths[item] = hides_from(pairs.triangles + pairs.face[chunk + item], reach);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint k = 0; k < count; ++k) end = whole_mask(masks[k]) >> item & 1 ? lesser(end, depths[k]) : end;
+    for (uint k = 0; k < count; ++k) end = whole_mask(masks[k]) >> sample & 1 ? lesser(end, depths[k]) : end;
     barrier(CLK_LOCAL_MEM_FENCE);
   }
   return end;
 }
 
-/// Takes what is hidden out of the pairs of a tile. To be called by all of a group.
+/// Takes what is hidden out of the pairs of a tile. To be called by all of a group. `ends` has room for the
+/// samples of a tile, `masks` and `depths` for the work-items.
 static inline void hide(const TilePairs pairs, uint first, uint last, float reach, local uint2* masks,
-                        local float* depths) {
+                        local float* depths, local float* ends) {
   const uint item = (uint)get_local_id(0);
-  const float end = hiding_depth(pairs, first, last, reach, masks, depths);
-  depths[item] = end;
+  for (uint sample = item; sample < DPR_TILE * DPR_TILE; sample += DPR_GROUP)
+    ends[sample] = hiding_depth(pairs, first, last, reach, sample, masks, depths);
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint pair = first + item; pair < last; pair += DPR_GROUP) {
     const ulong whole = whole_mask(pairs.masks[pair]);
     const float nearest = nearest_depth(pairs.triangles + pairs.face[pair]);
     ulong hidden = 0;
     for (ulong rest = whole; rest != 0; rest &= rest - 1)
-      hidden |= nearest > depths[63 - clz(rest & -rest)] ? rest & -rest : 0;
+      hidden |= nearest > ends[63 - clz(rest & -rest)] ? rest & -rest : 0;
     take_hidden(pairs, pair, whole, hidden);
   }
 }
@@ -156,10 +153,10 @@ DPR_SHARING_KERNEL kernel void rasterize_hide(
   const uint tiles = p.tiles_x * p.tiles_y;
 #if DPR_LANES == 1
   local uint2 covered[DPR_GROUP];
-  local float depths[DPR_GROUP];
+  local float depths[DPR_GROUP], ends[DPR_TILE * DPR_TILE];
   const uint tile = (uint)get_group_id(0), first = tile_starts[tile], last = tile_starts[tile + 1];
   if (last - first < 2) return;  // all of the group: what is alone in a tile hides nothing
-  hide(pairs, first, last, reach / views[tile / tiles].inverse_range, covered, depths);
+  hide(pairs, first, last, reach / views[tile / tiles].inverse_range, covered, depths, ends);
 #else
   const uint tile = (uint)get_global_id(0);
   if (tile >= p.views * tiles) return;

@@ -21,8 +21,13 @@ using float4 = cl_float4;
 /// Tiles are 8x8 pixels: a tile's coverage by a triangle is one 64-bit mask.
 #define DPR_TILE 8
 
-/// Work-items of a group that works together (group.h).
+/// Work-items of a group that works together (group.h). On devices or for kernels with smaller groups the
+/// host asks for fewer: a power of two, no less than DPR_LEAST_GROUP, which is the number of digits that a
+/// GPU sorts by.
+#ifndef DPR_GROUP
 #define DPR_GROUP 64
+#endif
+#define DPR_LEAST_GROUP 16
 
 /// Counts of a prefix sum, and elements of a sort, that one work-item handles in order, or one group.
 #ifndef DPR_SCAN_CHUNK

@@ -34,9 +34,12 @@ std::vector<const Json*> rows_where(const Json& results, const std::function<boo
 
 bool is_sweep(const Json& row) { return row["workload"].get<std::string>().starts_with("sweep-"); }
 
-/// A file's name in legends: its device, and its commit if there are several files.
+/// A file's name in legends: its device, by platform and driver too, because a machine's processor may have
+/// several; and its commit if there are several files.
 std::string label_of(const Json& results, std::size_t files) {
-  const std::string device = results["device"]["name"].get<std::string>();
+  const Json& info = results["device"];
+  const std::string device = info["name"].get<std::string>() + " (" + info.value("platform", "no platform") +
+                             ", driver " + info.value("driver", "unknown") + ")";
   constexpr std::size_t k_short_commit = 7;
   return files > 1 ? device + ", " + results["commit"].get<std::string>().substr(0, k_short_commit) : device;
 }

@@ -19,8 +19,10 @@ struct DeviceInfo {
   std::size_t max_allocation_bytes = 0;
   unsigned lanes = 1;               ///< width of the vectors the kernels are built with
   bool shares_host_memory = false;  ///< as CPUs and integrated GPUs do
-  bool is_default = false;          ///< what open_device("") takes, if it can be used
-  std::string default_reason;       ///< why it is the default; empty for the others
+  /// Time of a small frame and its gradients, as remembered from the device's first use; 0: not known.
+  double frame_milliseconds = 0;
+  bool is_default = false;     ///< what open_device("") takes, if it can be used
+  std::string default_reason;  ///< why it is the default; empty for the others
   /// Devices that were preferred to an opened default and could not be used, each with its reason, a
   /// sentence.
   std::vector<std::string> passed_over;
@@ -65,9 +67,13 @@ class DPR_API Device {
 /// one with memory of its own before others, or else an accelerator, or else a CPU; "cpu" and "gpu" take the
 /// first of that type; a number the index in list_devices(); anything else the first whose platform, name or
 /// version contains it, ignoring case. Of several devices the best are tried with a small kernel first: one
-/// that cannot be used is passed over, and the DeviceInfo of the device opened says so. Results are bitwise
-/// the same on one device only: others round differently. Throws InvalidArgument if none matches, DeviceError
-/// if none exists.
+/// that cannot be used is passed over, and the DeviceInfo of the device opened says so. Among equals the
+/// fastest is taken. The first use of a driver tries the kernels of a frame in a process of its own, the dpr
+/// command, if that is installed with the library, and remembers how they fared: a driver that aborts does
+/// not end this process, narrower lanes or the next device are used instead (DPR_TRIAL=off: no trial;
+/// DPR_CACHE_DIR: where it is remembered). Results are bitwise the same on one device only: others round
+/// differently. Throws InvalidArgument if none matches, DeviceError if none exists or the driver fails at
+/// every width.
 DPR_API Device open_device(const std::string& selector = "");
 
 }  // namespace dpr

@@ -77,4 +77,13 @@ void* module_function(const char* name, const char* function) {
   return found;
 }
 
+std::filesystem::path command_file() {
+  const std::filesystem::path own = own_folder();
+  for (const std::filesystem::path& folder : {own, own / DPR_PROGRAM_FOLDER, own / "../bin"}) {
+    std::error_code error;
+    if (!own.empty() && std::filesystem::is_regular_file(folder / "dpr", error)) return folder / "dpr";
+  }
+  return {};
+}
+
 }  // namespace dpr

@@ -13,4 +13,8 @@ std::filesystem::path running_program();
 /// system looks. Throws std::runtime_error with the reason.
 void* module_function(const char* name, const char* function);
 
+/// The dpr command of the same installation, or build: beside the library (or the program, if the library is
+/// part of it), or where the installation has its programs. Empty where there is none.
+std::filesystem::path command_file();
+
 }  // namespace dpr

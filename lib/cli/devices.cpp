@@ -7,8 +7,10 @@
 
 #include "cli/commands.hpp"
 #include "cli/device_check.hpp"
+#include "cli/device_trial.hpp"
 #include "cli/json.hpp"
 #include "device/choose_device.hpp"
+#include "device/pocl_cache.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
 
@@ -28,6 +30,7 @@ Json device_to_json(const DeviceInfo& info) {
           {"max_allocation_bytes", info.max_allocation_bytes},
           {"shares_host_memory", info.shares_host_memory},
           {"lanes", info.lanes},
+          {"frame_milliseconds", info.frame_milliseconds},
           {"default", info.is_default},
           {"default_reason", info.default_reason}};
 }
@@ -41,12 +44,14 @@ void print(const DeviceInfo& info) {
   std::printf("   compute units  %u\n", info.compute_units);
   std::printf("   memory         %.1f GiB\n", static_cast<double>(info.memory_bytes) / k_gibibyte);
   std::printf("   lanes          %u\n", info.lanes);
+  if (info.frame_milliseconds > 0) std::printf("   small frame    %.1f ms\n", info.frame_milliseconds);
   if (info.is_default) std::printf("   default        %s\n", info.default_reason.c_str());
 }
 
 struct DevicesOptions {
   bool as_json = false, checks = false;
   std::optional<std::size_t> rows_of;  // print_check_rows()
+  std::optional<std::string> trial;    // run_trial()
 };
 
 /// All, or those that --device names.
@@ -67,6 +72,7 @@ void require_passed(const std::string& failed) {
 
 void run(const DevicesOptions& options, const std::string& selectors) {
   if (options.rows_of) return print_check_rows(*options.rows_of);
+  if (options.trial) return run_trial(*options.trial);
   Json list = Json::array();
   std::string failed;
   const std::vector<DeviceInfo> devices = chosen_devices(selectors);
@@ -84,7 +90,9 @@ void run(const DevicesOptions& options, const std::string& selectors) {
   if (options.as_json) {
     std::printf("%s", to_text(list).c_str());
   } else if (devices.empty()) {
-    std::printf("No OpenCL device. On Debian, pocl-opencl-icd makes the CPU one.\n");
+    const std::string failure = pocl_cache_failure();
+    std::printf("No OpenCL device. On Debian, pocl-opencl-icd makes the CPU one.\n%s%s", failure.c_str(),
+                failure.empty() ? "" : "\n");
   }
   require_passed(failed);
 }
@@ -99,6 +107,7 @@ void add_devices_command(CLI::App& application, CommonOptions& common) {
   command->add_flag("--check", options->checks,
                     "Compare every stage with a reference in double precision, in some seconds a device");
   command->add_option("--check-rows", options->rows_of)->group("");  // for --check itself
+  command->add_option("--trial", options->trial)->group("");         // for the library
   command->add_option("--device", common.device, "These alone, a list (default: all)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST");
   add_output_options(*command, common);

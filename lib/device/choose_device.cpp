@@ -1,11 +1,13 @@
 #include "device/choose_device.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "base/name_list.hpp"
 #include "device/context.hpp"
@@ -16,6 +18,17 @@ namespace {
 int rank(const DeviceInfo& info) {
   if (info.type == "gpu") return info.shares_host_memory ? 1 : 0;
   return info.type == "accelerator" ? 2 : 3;
+}
+
+/// Whether the time of a frame is known of the device and of its equals, of which there are some.
+bool is_measured(std::span<const DeviceInfo> devices, const DeviceInfo& info) {
+  std::size_t equals = 0;
+  for (const DeviceInfo& other : devices) {
+    if (rank(other) != rank(info)) continue;
+    if (other.frame_milliseconds <= 0) return false;
+    ++equals;
+  }
+  return equals > 1;
 }
 
 std::string lower(std::string text) {
@@ -53,21 +66,27 @@ bool names_one(std::span<const DeviceInfo> devices, const std::string& text) {
 std::vector<std::size_t> by_preference(std::span<const DeviceInfo> devices) {
   std::vector<std::size_t> order(devices.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return rank(devices[i]); });
+  const auto preference = [&](std::size_t i) {
+    const DeviceInfo& info = devices[i];
+    return std::pair(rank(info), is_measured(devices, info) ? info.frame_milliseconds : 0.0);
+  };
+  std::ranges::stable_sort(order, {}, preference);
   return order;
 }
 
-std::string reason_of_preference(const DeviceInfo& info) {
-  switch (rank(info)) {
-    case 0:
-      return "the first GPU with memory of its own";
-    case 1:
-      return "the first GPU";
-    case 2:
-      return "the first accelerator: there is no GPU";
-    default:
-      return "the first CPU: there is no GPU or accelerator";
+std::vector<std::size_t> best_equals(std::span<const DeviceInfo> devices) {
+  std::vector<std::size_t> equals;
+  for (const std::size_t i : by_preference(devices)) {
+    if (equals.empty() || rank(devices[i]) == rank(devices[equals.front()])) equals.push_back(i);
   }
+  return equals;
+}
+
+std::string reason_of_preference(const DeviceInfo& info, std::span<const DeviceInfo> devices) {
+  constexpr std::array k_kinds{"GPU with memory of its own", "GPU", "accelerator: there is no GPU",
+                               "CPU: there is no GPU or accelerator"};
+  return std::string("the ") + (is_measured(devices, info) ? "fastest " : "first ") +
+         k_kinds[static_cast<std::size_t>(rank(info))];
 }
 
 bool matches(const DeviceInfo& info, const std::string& selector) {
@@ -124,6 +143,17 @@ std::string device_names(std::span<const DeviceInfo> devices) {
   return list;
 }
 
+namespace {
+
+/// The device, whose notes begin with these.
+Device noted(Device device, const std::vector<std::string>& passed_over) {
+  std::vector<std::string>& notes = device.impl().info.passed_over;
+  notes.insert(notes.begin(), passed_over.begin(), passed_over.end());
+  return device;
+}
+
+}  // namespace
+
 Device open_best(std::span<const DeviceInfo> devices, const std::function<Device(std::size_t, bool)>& open) {
   std::vector<std::string> passed_over;
   const std::vector<std::size_t> order = by_preference(devices);
@@ -132,18 +162,14 @@ Device open_best(std::span<const DeviceInfo> devices, const std::function<Device
       passed_over.push_back(devices[position].name + " is not used: " + error.what());
     };
     try {
-      Device device = open(position, true);
-      device.impl().info.passed_over = std::move(passed_over);
-      return device;
+      return noted(open(position, true), passed_over);
     } catch (const DeviceError& error) {
       pass_over(error);
     } catch (const BuildError& error) {
       pass_over(error);
     }
   }
-  Device device = open(order.back(), false);
-  device.impl().info.passed_over = std::move(passed_over);
-  return device;
+  return noted(open(order.back(), false), passed_over);
 }
 
 }  // namespace dpr

@@ -12,11 +12,14 @@
 namespace dpr {
 
 /// Positions in `devices`, the best first: GPUs with memory of their own, other GPUs, accelerators, CPUs;
-/// among equals in their order.
+/// among equals by the time of a frame, or in their order where that is not known of all.
 std::vector<std::size_t> by_preference(std::span<const DeviceInfo> devices);
 
+/// Positions of the best and its equals: of its type, with memory of their own if it has.
+std::vector<std::size_t> best_equals(std::span<const DeviceInfo> devices);
+
 /// Why a device is preferred, e.g. "the first GPU with memory of its own".
-std::string reason_of_preference(const DeviceInfo& info);
+std::string reason_of_preference(const DeviceInfo& info, std::span<const DeviceInfo> devices);
 
 /// Whether a selector names the device: "cpu" and "gpu" its type, a number its index, anything else a part of
 /// its platform, name or version, ignoring case. Empty: whether it is the default.

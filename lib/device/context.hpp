@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <list>
 #include <map>
 #include <mutex>
@@ -31,7 +32,7 @@ struct TransferCounts {
   std::size_t host_waits = 0;  ///< blocking calls
 };
 
-/// May be used from several threads, except for `profile`.
+/// May be used from several threads, except for `profile` and `before_work`.
 struct Device::Impl {
   Impl() = default;
   /// Waits for the writes that are still under way.
@@ -44,13 +45,22 @@ struct Device::Impl {
   cl::CommandQueue queue;
   DeviceInfo info;
   Profile* profile = nullptr;  ///< where launches are timed
+  /// Called before a program is built, with its file, and before a kernel is launched, with its name, when
+  /// everything before has run: how a trial (trial.hpp) knows what ended it.
+  std::function<void(std::string_view)> before_work;
+  /// Whether binaries of programs are remembered (store.hpp).
+  bool keeps_binaries = false;
 
-  /// The program that holds a kernel file, built once for each set of options. Throws BuildError.
+  /// The program that holds a kernel file, built once for each set of options; or its binary, where it is
+  /// remembered. Throws BuildError.
   const cl::Program& program(std::string_view name, const std::string& options);
 
   /// Work-items of a work-group, for kernels without barriers. Constant, because PoCL compiles a kernel anew
   /// for each work-group size.
   std::size_t local_size() const { return info.type == "cpu" ? 32 : 128; }
+
+  /// Work-items of the groups that kernels with barriers run in: DPR_GROUP, or as many as the device allows.
+  unsigned group_size = 0;
 
   /// To be called before a buffer is let go. oclgrind 21.10 takes a new buffer for initialised as far as an
   /// old one of the same number was, so there none is ever released.
@@ -88,6 +98,8 @@ struct Device::Impl {
     bool has_run() const;
   };
 
+  cl::Program build(std::string_view file, const std::string& options) const;
+
   std::mutex mutex_;
   std::map<std::string, cl::Program> programs_;
   std::mutex writes_mutex_;
@@ -119,6 +131,12 @@ std::string allocation_name(const DeviceInfo& info, std::size_t bytes);
 
 /// Describes a device of a platform; index, default and lanes are filled in by list_devices().
 DeviceInfo describe(const cl::Platform& platform, const cl::Device& device);
+
+/// The text of a kernel file that is built: with what it includes in place.
+std::string program_source(std::string_view file);
+
+/// The file that holds the kernels of a frame.
+constexpr std::string_view k_frame_file = "frame.cl";
 
 /// A Device around the caller's own objects, see dpr/opencl_handles.hpp.
 Device make_device(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& queue);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdlib>
 #include <optional>
 #include <span>
@@ -11,11 +12,15 @@
 #include "device/context.hpp"
 #include "device/info.hpp"
 #include "device/kernel.hpp"
+#include "device/pocl_cache.hpp"
+#include "device/trial.hpp"
 #include "dpr/multi_device.hpp"
 #include "dpr/opencl_handles.hpp"
 
 namespace dpr {
 namespace {
+
+constexpr const char* k_pocl = "Portable Computing Language";
 
 struct FoundDevice {
   cl::Device device;
@@ -51,6 +56,16 @@ std::optional<unsigned> lanes_of_environment() {
   return *wanted;
 }
 
+/// The lanes to use, the best first.
+std::vector<unsigned> lanes_to_try(unsigned best) {
+  std::vector<unsigned> list{best};
+  if (lanes_of_environment()) return list;
+  for (const unsigned lanes : {8U, 1U}) {
+    if (lanes < best) list.push_back(lanes);
+  }
+  return list;
+}
+
 /// Vectors as wide as the device's registers pay on CPUs; a GPU's lanes are its work-items.
 unsigned choose_lanes(const DeviceInfo& info, const cl::Device& device) {
   if (const auto lanes = lanes_of_environment()) return *lanes;
@@ -78,9 +93,23 @@ std::vector<DeviceInfo> infos_of(const std::vector<FoundDevice>& found) {
 }
 
 void mark_default(std::vector<FoundDevice>& found) {
-  DeviceInfo& best = found[by_preference(infos_of(found)).front()].info;
+  const std::vector<DeviceInfo> infos = infos_of(found);
+  DeviceInfo& best = found[by_preference(infos).front()].info;
   best.is_default = true;
-  best.default_reason = reason_of_preference(best);
+  best.default_reason = reason_of_preference(best, infos);
+}
+
+/// Kernels with barriers run in groups of DPR_GROUP, or of what the device allows. Throws DeviceError for a
+/// device on which they cannot run.
+unsigned choose_group(const DeviceInfo& info, const cl::Device& device) {
+  if (info.lanes > 1) return DPR_GROUP;  // there a work-item works alone
+  const std::size_t most = device_info<CL_DEVICE_MAX_WORK_GROUP_SIZE>(device);
+  if (most < DPR_LEAST_GROUP) {
+    throw DeviceError(CL_INVALID_WORK_GROUP_SIZE, info.name + ", whose work-groups have at most " +
+                                                      std::to_string(most) + " work-items: dpr needs " +
+                                                      std::to_string(DPR_LEAST_GROUP));
+  }
+  return static_cast<unsigned>(std::bit_floor(std::min<std::size_t>(most, DPR_GROUP)));
 }
 
 /// A platform or device that does not answer is passed over: the others can be used.
@@ -108,8 +137,19 @@ FoundDevices find_devices() {
       });
     }
   }
+  const Store store;
+  for (FoundDevice& entry : found.devices) {
+    if (const auto trial = remembered_trial(entry.info, store))
+      entry.info.frame_milliseconds = trial->milliseconds;
+  }
   if (!found.devices.empty()) mark_default(found.devices);
   return found;
+}
+
+/// Of a machine without devices: PoCL may be there, and offer none.
+std::string hint() {
+  const std::string failure = pocl_cache_failure();
+  return failure.empty() ? "" : "; or if it is installed: " + failure;
 }
 
 /// The caller's word, or else the environment's, and what messages call it.
@@ -154,6 +194,10 @@ Device make_device(const cl::Device& device, const cl::Context& context, const c
   impl->context = context;
   impl->queue = queue;
   impl->info = describe(cl::Platform(device_info<CL_DEVICE_PLATFORM>(device)), device);
+  impl->group_size = choose_group(impl->info, device);
+  // PoCL keeps what it compiles itself, and for a binary compiles every kernel for groups of any size: 48 s
+  // for the kernels of a frame. oclgrind compiles nothing.
+  impl->keeps_binaries = impl->info.platform != k_pocl && impl->info.platform != "Oclgrind";
   impl->memory_budget = default_memory_budget(impl->info);
   return Device(std::move(impl));
 }
@@ -168,13 +212,34 @@ cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device
   return queue;
 }
 
+/// Opens a device in the widest lanes in which its driver does not fail, as far as that is known.
 Device open_found(const FoundDevice& found) {
-  int error = CL_SUCCESS;
-  const cl::Context context(found.device, nullptr, nullptr, nullptr, &error);
-  check_cl(error, "clCreateContext");
-  Device device = make_device(found.device, context, make_queue(context, found.device));
-  device.impl().info = found.info;
-  return device;
+  DeviceInfo info = found.info;
+  if (info.platform == k_pocl) {
+    if (const std::string failure = pocl_cache_failure(); !failure.empty())
+      throw DeviceError(CL_DEVICE_NOT_AVAILABLE, failure);
+  }
+  const Store store;
+  for (const unsigned lanes : lanes_to_try(info.lanes)) {
+    info.lanes = lanes;
+    const auto trial = try_device(info, store);
+    if (trial && !trial->failure.empty()) {
+      info.passed_over.push_back(trial->failure);
+      continue;
+    }
+    int error = CL_SUCCESS;
+    const cl::Context context(found.device, nullptr, nullptr, nullptr, &error);
+    check_cl(error, "clCreateContext");
+    Device device = make_device(found.device, context, make_queue(context, found.device));
+    if (trial) info.frame_milliseconds = trial->milliseconds;
+    device.impl().info = info;
+    device.impl().group_size = choose_group(info, found.device);
+    return device;
+  }
+  std::string failures;
+  for (const std::string& failure : info.passed_over) failures += (failures.empty() ? "" : "; ") + failure;
+  throw BuildError(std::string(k_frame_file), info.platform + ", driver " + info.driver,
+                   "-DDPR_LANES=" + std::to_string(info.lanes), failures);
 }
 
 /// Builds and runs a small kernel. Throws DeviceError or BuildError where that fails, or gives what is wrong.
@@ -183,9 +248,21 @@ void try_out(const Device& device) {
   Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum(device.impl(), "scan.cl", "scan_sum");
   const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values));
   Buffer<cl_uint> sums(device.impl(), 1);
-  sum(1, static_cast<cl_uint>(k_values.size()), values, sums);
+  sum.in_groups(1, static_cast<cl_uint>(k_values.size()), values, sums);
   if (sums.download()[0] != 4321)
     throw DeviceError(CL_INVALID_KERNEL, "a first kernel, which gives a wrong sum");
+}
+
+/// The devices, and how fast those are that are preferred to the others alike, where there are several.
+std::vector<DeviceInfo> measured(std::vector<DeviceInfo> infos) {
+  const std::vector<std::size_t> equals = best_equals(infos);
+  if (equals.size() < 2) return infos;
+  const Store store;
+  for (const std::size_t position : equals) {
+    if (const auto trial = try_device(infos[position], store))
+      infos[position].frame_milliseconds = trial->milliseconds;
+  }
+  return infos;
 }
 
 }  // namespace
@@ -194,7 +271,8 @@ Device open_device(const std::string& selector) {
   const auto [wanted, where] = Wanted(selector);
   const auto [found, failure] = find_devices();
   if (wanted.empty() && !found.empty()) {
-    Device device = open_best(infos_of(found), [&entries = found](std::size_t position, bool is_tried) {
+    const std::vector<DeviceInfo> infos = measured(infos_of(found));
+    Device device = open_best(infos, [&entries = found](std::size_t position, bool is_tried) {
       Device candidate = open_found(entries[position]);
       if (is_tried) try_out(candidate);
       return candidate;
@@ -208,7 +286,7 @@ Device open_device(const std::string& selector) {
   if (chosen != found.end()) return open_found(*chosen);
   if (failure) throw DeviceError(*failure);  // what does not answer may be what is asked for
   if (found.empty())
-    throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd");
+    throw DeviceError(CL_DEVICE_NOT_FOUND, "looking for an OpenCL device: install pocl-opencl-icd" + hint());
   const std::vector<DeviceInfo> infos = infos_of(found);
   const bool is_list = names_several(infos, wanted);
   throw InvalidArgument(

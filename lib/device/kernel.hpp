@@ -1,5 +1,6 @@
 // Typed kernel launches: a wrong number, order or type of arguments does not compile; a signature that
-// differs from the kernel's source fails by name when the kernel is made, before its first launch.
+// differs from the kernel's source fails by name when the kernel is made, before its first launch. Groups are
+// no larger than the device allows for the kernel.
 #pragma once
 
 #include <array>
@@ -40,7 +41,7 @@ inline constexpr std::string_view k_cl_type_name<cl_float4> = "float4";
 template <>
 inline constexpr std::string_view k_cl_type_name<cl_uint4> = "uint4";
 
-/// What a kernel's source must say of an argument.
+/// What a kernel's source says of an argument.
 struct ArgumentType {
   std::string name;
   bool is_pointer, is_const;
@@ -76,9 +77,18 @@ struct Argument<Out<T>> : BufferArgument<T> {
   static ArgumentType type() { return {std::string(k_cl_type_name<T>) + "*", true, false}; }
 };
 
-/// Throws std::logic_error naming kernel and argument where the source differs from the signature.
-void check_signature(const cl::Kernel& kernel, const std::string& name,
-                     std::span<const ArgumentType> expected);
+/// A kernel of a program, and its work-groups.
+struct BuiltKernel {
+  cl::Kernel kernel;
+  std::size_t group = 0;  ///< work-items that its source asks for; 0: any number
+  std::size_t local = 0;  ///< work-items of the groups that it is launched in
+};
+
+/// Builds a kernel; one that asks for larger groups than the device runs it in is built for smaller ones.
+/// Throws BuildError, DeviceError, and std::logic_error naming kernel and argument where the source differs
+/// from the signature.
+BuiltKernel build_kernel(Device::Impl& device, std::string_view file, const std::string& name,
+                         const std::string& options, std::span<const ArgumentType> signature);
 
 }  // namespace detail
 
@@ -100,53 +110,36 @@ class Kernel {
  public:
   Kernel(Device::Impl& device, std::string_view file, const char* name, const std::string& options = "")
       : device_(&device), file_(file), name_(name) {
-    int error = CL_SUCCESS;
-    kernel_ = cl::Kernel(device.program(file, build_options(device, options)), name, &error);
-    if (error != CL_SUCCESS) throw DeviceError(error, "clCreateKernel " + name_);
-    const std::array<ArgumentType, sizeof...(Args)> expected{detail::Argument<Args>::type()...};
-    detail::check_signature(kernel_, name_, expected);
+    const std::array<ArgumentType, sizeof...(Args)> signature{detail::Argument<Args>::type()...};
+    built_ = detail::build_kernel(device, file, name_, options, signature);
   }
 
   /// Enqueues a range of work-items, rounded up to whole work-groups: kernels guard their range. Nothing for
   /// an empty one.
   void operator()(const Range& range, const typename detail::Argument<Args>::Value&... args) {
-    const std::size_t local = device_->local_size();
-    enqueue({range.first, (range.count + local - 1) / local * local}, local, args...);
+    const std::size_t local = built_.local;
+    enqueue({range.first, (range.count + local - 1) / local * local}, args...);
   }
 
-  /// For kernels of one work-item per element, whose work-items help each other on GPUs: in groups of
-  /// DPR_GROUP.
-  void sharing(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
-    if (device_->info.lanes == 1) {
-      enqueue((count + DPR_GROUP - 1) / DPR_GROUP * DPR_GROUP, DPR_GROUP, args...);
-    } else {
-      (*this)(count, args...);
-    }
-  }
-
-  /// For kernels that are written twice: on GPUs a work-group of DPR_GROUP does what on CPUs one work-item
-  /// does.
+  /// For kernels that are written twice: on GPUs a work-group does what on CPUs one work-item does.
   void in_groups(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
-    if (device_->info.lanes == 1) {
-      enqueue(count * DPR_GROUP, DPR_GROUP, args...);
-    } else {
-      (*this)(count, args...);
-    }
+    (*this)(built_.group > 0 ? count * built_.group : count, args...);
   }
 
  private:
-  /// Whole groups of `local` work-items.
-  void enqueue(const Range& range, std::size_t local, const typename detail::Argument<Args>::Value&... args) {
+  /// Whole groups.
+  void enqueue(const Range& range, const typename detail::Argument<Args>::Value&... args) {
     if (range.count == 0) return;
+    if (device_->before_work) device_->before_work(name_);
     unsigned index = 0;
-    (check_argument(detail::Argument<Args>::set(kernel_, index++, args)), ...);
+    (check_argument(detail::Argument<Args>::set(built_.kernel, index++, args)), ...);
     cl::Event finished;
     const int error = device_->queue.enqueueNDRangeKernel(
-        kernel_, cl::NDRange(range.first), cl::NDRange(range.count), cl::NDRange(local), nullptr,
+        built_.kernel, cl::NDRange(range.first), cl::NDRange(range.count), cl::NDRange(built_.local), nullptr,
         device_->profile != nullptr ? &finished : nullptr);
     if (error != CL_SUCCESS) {
       throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(range.count) +
-                                   " work-items in groups of " + std::to_string(local));
+                                   " work-items in groups of " + std::to_string(built_.local));
     }
     if (device_->profile != nullptr) device_->profile->record(file_, name_, finished);
   }
@@ -157,7 +150,7 @@ class Kernel {
 
   Device::Impl* device_;
   std::string file_, name_;
-  cl::Kernel kernel_;
+  detail::BuiltKernel built_;
 };
 
 }  // namespace dpr

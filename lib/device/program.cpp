@@ -6,6 +6,7 @@
 #include "device/info.hpp"
 #include "device/kernel.hpp"
 #include "device/kernel_sources.hpp"
+#include "device/store.hpp"
 
 namespace dpr {
 namespace {
@@ -33,9 +34,8 @@ void append_source(std::string_view name, std::set<std::string, std::less<>>& in
 
 /// The file to build for a kernel file: those that frame.cl includes share a program.
 std::string_view program_file(std::string_view name) {
-  constexpr std::string_view k_frame = "frame.cl";
   const std::string include = "#include \"" + std::string(name) + "\"";
-  return kernel_file(k_frame).find(include) != std::string_view::npos ? k_frame : name;
+  return kernel_file(k_frame_file).find(include) != std::string_view::npos ? k_frame_file : name;
 }
 
 std::string build_log(const cl::Program& program, const cl::Device& device) {
@@ -44,7 +44,57 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
   return log;
 }
 
+/// The binary of the one device that the program is built for; empty where the driver has none.
+std::string binary_of(const cl::Program& program, const cl::Device& device) {
+  std::vector<cl::Device> devices;
+  std::vector<std::vector<unsigned char>> binaries;
+  if (program.getInfo(CL_PROGRAM_DEVICES, &devices) != CL_SUCCESS ||
+      program.getInfo(CL_PROGRAM_BINARIES, &binaries) != CL_SUCCESS)
+    return "";
+  for (std::size_t i = 0; i < std::min(devices.size(), binaries.size()); ++i) {
+    if (devices[i]() == device()) return {binaries[i].begin(), binaries[i].end()};
+  }
+  return "";
+}
+
+/// The program of a binary. Null where the driver does not take it.
+cl::Program program_of(const std::string& binary, const cl::Context& context, const cl::Device& device,
+                       const std::string& options) {
+  int error = CL_SUCCESS;
+  cl::Program program(context, {device}, {{binary.begin(), binary.end()}}, nullptr, &error);
+  return error == CL_SUCCESS && program.build(device, options.c_str()) == CL_SUCCESS ? program
+                                                                                     : cl::Program();
+}
+
 }  // namespace
+
+std::string program_source(std::string_view file) {
+  std::string source;
+  std::set<std::string, std::less<>> included;
+  append_source(file, included, source);
+  return source;
+}
+
+cl::Program Device::Impl::build(std::string_view file, const std::string& options) const {
+  const std::string source = program_source(file);
+  const Store store;
+  const bool is_kept = keeps_binaries && store.is_on();
+  const std::string key =
+      is_kept ? device_key(info) + options + "\n" + std::string(file) + " " + hash_text(source) : "";
+  if (const auto binary = is_kept ? store.load(key) : std::nullopt) {
+    if (cl::Program known = program_of(*binary, context, device, options); known() != nullptr) return known;
+  }
+  if (before_work) before_work(file);
+  int error = CL_SUCCESS;
+  cl::Program program(context, source, false, &error);
+  check_cl(error, "clCreateProgramWithSource");
+  if (on_own_thread([&] { return program.build(device, options.c_str()); }) != CL_SUCCESS) {
+    throw BuildError(std::string(file), info.name, options, build_log(program, device));
+  }
+  if (const std::string binary = is_kept ? binary_of(program, device) : ""; !binary.empty())
+    store.save(key, binary);
+  return program;
+}
 
 const cl::Program& Device::Impl::program(std::string_view name, const std::string& options) {
   const std::scoped_lock lock(mutex_);
@@ -52,18 +102,8 @@ const cl::Program& Device::Impl::program(std::string_view name, const std::strin
   const std::string_view file = options == build_options(*this) ? program_file(name) : name;
   const std::string key = std::string(file) + " " + options;
   const auto known = programs_.find(key);
-  if (known != programs_.end()) return known->second;
-
-  std::string source;
-  std::set<std::string, std::less<>> included;
-  append_source(file, included, source);
-  int error = CL_SUCCESS;
-  const cl::Program program(context, source, false, &error);
-  check_cl(error, "clCreateProgramWithSource");
-  if (on_own_thread([&] { return program.build(device, options.c_str()); }) != CL_SUCCESS) {
-    throw BuildError(std::string(file), info.name, options, build_log(program, device));
-  }
-  return programs_.emplace(key, program).first->second;
+  return known != programs_.end() ? known->second
+                                  : programs_.emplace(key, build(file, options)).first->second;
 }
 
 }  // namespace dpr

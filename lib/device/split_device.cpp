@@ -27,7 +27,10 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units) {
     const cl::CommandQueue queue(context, part, cl_command_queue_properties{0}, &error);
     check_cl(error, "clCreateCommandQueue");
     devices.push_back(make_device(part, context, queue));
-    devices.back().impl().info.index = info.index;
+    Device::Impl& impl = devices.back().impl();
+    impl.info.index = info.index;
+    impl.info.lanes = info.lanes;  // where the driver fails with more
+    impl.group_size = device.impl().group_size;
   }
   return devices;
 }

@@ -1,6 +1,6 @@
 // Fingerprint of a fit's views, start and options, by which a checkpoint is recognised.
+#include "base/hash.hpp"
 #include "scene/light_table.hpp"
-#include "solve/hash.hpp"
 #include "solve/shape_state.hpp"
 
 namespace dpr {

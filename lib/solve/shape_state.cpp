@@ -9,10 +9,10 @@
 #include <string>
 #include <string_view>
 
+#include "base/hash.hpp"
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
-#include "solve/hash.hpp"
 
 namespace dpr {
 namespace {

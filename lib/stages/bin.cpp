@@ -35,8 +35,8 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
-  fill_.sharing(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face, pair_tile,
-                places);
+  fill_(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face, pair_tile,
+        places);
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
   link_(pairs, n, pair_count, places, place_face, pair_face, face_pairs);
 }

@@ -11,8 +11,7 @@ void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, cons
   kept.resize(device_, count);
   counts.resize(device_, count + 1);
   triangles.resize(device_, count);
-  forward_.sharing(count, p, views.cameras, geometry.face_vertices, ndc, hidden, facing, kept, counts,
-                   triangles);
+  forward_(count, p, views.cameras, geometry.face_vertices, ndc, hidden, facing, kept, counts, triangles);
 }
 
 }  // namespace dpr

@@ -57,6 +57,19 @@ TEST_SUITE("unit") {
     CHECK(by_preference(std::vector{k_devices[0]}) == std::vector<std::size_t>{0});
   }
 
+  TEST_CASE("choice of a device: among equals the fastest, where the time of a frame is known of all") {
+    std::vector<DeviceInfo> devices = k_devices;
+    devices[3].frame_milliseconds = 5;
+    CHECK(dpr::best_equals(devices) == std::vector<std::size_t>{3, 4});
+    CHECK(by_preference(devices) == std::vector<std::size_t>{3, 4, 2, 1, 0});
+    CHECK(dpr::reason_of_preference(devices[3], devices) == "the first GPU with memory of its own");
+    devices[4].frame_milliseconds = 2;
+    devices[0].frame_milliseconds = 1;
+    CHECK(by_preference(devices) == std::vector<std::size_t>{4, 3, 2, 1, 0});
+    CHECK(dpr::reason_of_preference(devices[4], devices) == "the fastest GPU with memory of its own");
+    CHECK(dpr::reason_of_preference(devices[0], devices) == "the first CPU: there is no GPU or accelerator");
+  }
+
   TEST_CASE("choice of a device: the best, tried first") {
     Opener opener{.unusable = {}};
     const Device device = open_best(k_devices, std::ref(opener));

@@ -43,6 +43,7 @@ Function k_functions[] = {
     {"clCreateKernel", CL_OUT_OF_RESOURCES},
     {"clGetKernelInfo", CL_OUT_OF_RESOURCES},
     {"clGetKernelArgInfo", CL_OUT_OF_RESOURCES},
+    {"clGetKernelWorkGroupInfo", CL_OUT_OF_RESOURCES},
     {"clSetKernelArg", CL_OUT_OF_RESOURCES},
     {"clEnqueueNDRangeKernel", CL_OUT_OF_RESOURCES},
     {"clEnqueueReadBuffer", CL_OUT_OF_RESOURCES},
@@ -350,6 +351,10 @@ DPR_FAULTY(cl_int, clGetKernelArgInfo,
            (cl_kernel kernel, cl_uint arg_indx, cl_kernel_arg_info param_name, size_t param_value_size,
             void* param_value, size_t* param_value_size_ret),
            kernel, arg_indx, param_name, param_value_size, param_value, param_value_size_ret)
+DPR_FAULTY(cl_int, clGetKernelWorkGroupInfo,
+           (cl_kernel kernel, cl_device_id device, cl_kernel_work_group_info param_name,
+            size_t param_value_size, void* param_value, size_t* param_value_size_ret),
+           kernel, device, param_name, param_value_size, param_value, param_value_size_ret)
 DPR_FAULTY(cl_int, clSetKernelArg,
            (cl_kernel kernel, cl_uint arg_index, size_t arg_size, const void* arg_value), kernel, arg_index,
            arg_size, arg_value)

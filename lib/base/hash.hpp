@@ -1,4 +1,4 @@
-// A number that differs, with all likelihood, where what it was made of differs.
+// Hash of data.
 #pragma once
 
 #include <cstddef>

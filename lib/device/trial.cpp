@@ -1,0 +1,156 @@
+#include "device/trial.hpp"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "base/module.hpp"
+#include "device/context.hpp"
+
+/// Of unistd.h, which macOS leaves to the program.
+extern "C" char** environ;
+
+namespace dpr {
+namespace {
+
+constexpr std::string_view k_runs = "runs ", k_fails = "fails ", k_started = "started";
+
+bool is_switched_off() {
+  const char* const wanted = std::getenv("DPR_TRIAL");
+  return wanted != nullptr && std::string_view(wanted) == "off";
+}
+
+std::string key_of(const DeviceInfo& info) { return "trial " + trial_name(info) + "\n" + device_key(info); }
+
+/// Whether a process ended by itself, rather than by a user or for want of memory.
+bool is_crash(int signal) {
+  constexpr std::array k_crashes{SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE};
+  return std::ranges::find(k_crashes, signal) != k_crashes.end();
+}
+
+/// This process' environment for the trial, which opens the device with these lanes, and without a trial.
+std::vector<std::string> environment_of(const DeviceInfo& info) {
+  std::vector<std::string> variables{"DPR_TRIAL=off", "DPR_LANES=" + std::to_string(info.lanes)};
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string_view text = *variable;
+    if (!text.starts_with("DPR_TRIAL=") && !text.starts_with("DPR_LANES=")) variables.emplace_back(text);
+  }
+  return variables;
+}
+
+std::vector<char*> pointers(std::vector<std::string>& words) {
+  std::vector<char*> list;
+  for (std::string& word : words) list.push_back(word.data());
+  list.push_back(nullptr);
+  return list;
+}
+
+/// The trial's process: what it printed, and how it ended.
+struct Ending {
+  std::string kernel, text;  // the last that was begun; the driver's last line
+  double milliseconds = 0;
+  int status = 0;  // of waitpid()
+};
+
+void read_lines(std::FILE* file, Ending& ending) {
+  char* line = nullptr;
+  std::size_t room = 0;
+  for (ssize_t length = 0; (length = getline(&line, &room, file)) >= 0;) {
+    std::string_view text(line, static_cast<std::size_t>(length));
+    if (text.ends_with('\n')) text.remove_suffix(1);
+    constexpr std::string_view k_begins = "begins ", k_milliseconds = "milliseconds ";
+    if (text.starts_with(k_begins)) {
+      ending.kernel = text.substr(k_begins.size());
+    } else if (text.starts_with(k_milliseconds)) {
+      ending.milliseconds = std::strtod(text.data() + k_milliseconds.size(), nullptr);
+    } else if (!text.empty()) {
+      ending.text = text;
+    }
+  }
+  std::free(line);
+}
+
+std::optional<Ending> run_trial(const DeviceInfo& info, const std::filesystem::path& command) {
+  std::array<int, 2> ends{};
+#ifdef __APPLE__
+  if (pipe(ends.data()) != 0) return std::nullopt;
+  for (const int end : ends) fcntl(end, F_SETFD, FD_CLOEXEC);
+#else
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) return std::nullopt;  // at once: other threads may start processes
+#endif
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> output(fdopen(ends[0], "r"), std::fclose);
+  std::vector<std::string> words{command.string(), "devices", "--trial", trial_name(info)};
+  std::vector<std::string> variables = environment_of(info);
+  posix_spawn_file_actions_t actions{};
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  pid_t process = 0;
+  const int error = posix_spawn(&process, words[0].c_str(), &actions, nullptr, pointers(words).data(),
+                                pointers(variables).data());
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  if (error != 0) return std::nullopt;
+  Ending ending;
+  read_lines(output.get(), ending);
+  while (waitpid(process, &ending.status, 0) < 0) {
+    if (errno != EINTR) return std::nullopt;  // a host that ignores SIGCHLD
+  }
+  return ending;
+}
+
+std::string describe(const DeviceInfo& info, const Ending& ending) {
+  constexpr std::size_t k_most_characters = 160;  // of a line that may be a stack trace's
+  std::string failure = info.name + " (" + info.platform + ", driver " + info.driver + ") is not used with " +
+                        std::to_string(info.lanes) + " lanes: its driver ends the process at " +
+                        (ending.kernel.empty() ? std::string(k_frame_file) : ending.kernel) + ", " +
+                        strsignal(WTERMSIG(ending.status));
+  if (!ending.text.empty()) failure += " (" + ending.text.substr(0, k_most_characters) + ")";
+  return failure;
+}
+
+}  // namespace
+
+std::string trial_name(const DeviceInfo& info) {
+  return hash_text(device_key(info) + program_source(k_frame_file));
+}
+
+std::optional<Trial> remembered_trial(const DeviceInfo& info, const Store& store) {
+  const std::optional<std::string> found = store.load(key_of(info));
+  if (!found) return std::nullopt;
+  if (found->starts_with(k_fails)) return Trial{0, found->substr(k_fails.size())};
+  if (!found->starts_with(k_runs)) return std::nullopt;
+  return Trial{std::strtod(found->c_str() + k_runs.size(), nullptr), ""};
+}
+
+std::optional<Trial> try_device(const DeviceInfo& info, const Store& store) {
+  if (is_switched_off()) return std::nullopt;
+  if (auto known = remembered_trial(info, store)) return known;
+  const std::filesystem::path command = command_file();
+  if (command.empty()) return std::nullopt;
+  const std::string key = key_of(info);
+  store.save(key, k_started);
+  if (store.load(key) != k_started) return std::nullopt;  // every start would try anew
+  const auto ending = run_trial(info, command);
+  if (!ending) return std::nullopt;
+  if (WIFSIGNALED(ending->status) && is_crash(WTERMSIG(ending->status))) {
+    store.save(key, std::string(k_fails) + describe(info, *ending));
+  } else if (WIFEXITED(ending->status) && WEXITSTATUS(ending->status) == 0 && ending->milliseconds > 0) {
+    store.save(key, std::string(k_runs) + std::to_string(ending->milliseconds));
+  }
+  return remembered_trial(info, store);
+}
+
+}  // namespace dpr
