@@ -3,9 +3,8 @@
 // normals differ there, or their textures or their places in these, or their materials. Listed by tile, like
 // triangles: pairs of tile and contour, counted, listed in the order of the edges, sorted by tile, linked.
 //
-// Vertices that coincide belong together, whatever their indices; the host pairs the faces at an edge once.
-// Where both faces have vertices of their own, there are two edges, one on each face's: as long as they
-// coincide one of them stands for both, and when they part each is a boundary.
+// Faces are neighbours by the vertices that they share or, at edges where each has vertices of its own, where
+// these coincide (edges.cl): then there are two edges, one on each face's, and one of them stands for both.
 //
 // Where faces cross the near plane, edges end there, and what the plane cuts of a face is a boundary: the
 // cuts of all faces are numbered behind the edges of the scene.
@@ -85,9 +84,6 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
     const uint4 other = s.faces[other_face(edge)];
     is_split = !(other.x == edge.x || other.y == edge.x || other.z == edge.x) ||
                !(other.x == edge.y || other.y == edge.y || other.z == edge.y);
-    if (is_split && (corner_at(other, edge.x, s.ndc) == 3 || corner_at(other, edge.y, s.ndc) == 3)) {
-      return sides.own != 0 ? DPR_OCCLUDES : DPR_NO_CONTOUR;
-    }
     if (is_split && !stands_for_both(edge, s.facing)) return DPR_NO_CONTOUR;
   }
   if (sides.own != -sides.other) return DPR_OCCLUDES;
@@ -142,7 +138,7 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 }
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
-/// in   edges        uint2[edge]           of the scene; see DPR_EDGE_FLAG
+/// in   edges        uint2[edge]           of the scene, or of every view; see DPR_EDGE_FLAG
 /// in   facing       uchar[view][face]     as setup and clipping leave it
 /// in   ndc, world   float4[view][vertex]
 /// in   faces, face_colors  uint4[face]    vertices and colours of the corners
@@ -308,7 +304,7 @@ kernel void contour_gather(const FrameParams p, const ContourParams c, global co
   const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / c.edges;
   const uint own = contour - view * c.edges;
   if (own >= c.mesh_edges || edge_pairs[pair_starts[contour]] != pair) return;
-  const uint4 record = record_of(edges[own], faces);
+  const uint4 record = record_of(edges_of_shape(p, view, c.mesh_edges, edges)[own], faces);
   const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
   global const uint* starts = pair_starts + view * c.edges;
   uint first = DPR_NO_MESH_EDGE;

@@ -147,6 +147,9 @@ using float4 = cl_float4;
 #define DPR_EDGE_FLAG 0x80000000u
 #define DPR_EDGE_SEAM 0x40000000u
 
+/// In place of an open edge where a list of them ends.
+#define DPR_NO_OPEN_EDGE 0xffffffffu
+
 /// Edges are numbered in the order of their sides. Every face has the number of its first edge times
 /// DPR_FACE_SIDES, and bit k set where side k is an edge's; DPR_NO_MESH_EDGE in place of the number of one.
 #define DPR_FACE_SIDES 8
@@ -315,6 +318,16 @@ typedef struct Slot {
   float grad;      /* joint: transparency in front of a cluster's first, -1 for the others; then dL/dweight */
   uint fragment;   /* or DPR_BACKGROUND_SLOT */
 } Slot;
+
+/// An edge whose face is alone with its vertices: what has to be known of two before they are joined.
+typedef struct OpenEdge {
+  DPR_SHARED_NAME(OpenEdge)
+  uint side;        /* 3 * face + the corner at which it begins */
+  uint texture;     /* of the mesh's, or DPR_NO_TEXTURE */
+  uint material;    /* of the mesh's */
+  uint is_periodic; /* places a whole number apart are one */
+  float4 places;    /* of its two ends in the texture, in periods */
+} OpenEdge;
 
 /// What contours are looked for.
 typedef struct ContourParams {

@@ -60,6 +60,7 @@ struct Events {
 // keep the values that the host has given. The host does not know where vertices are then: every frame is
 // prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
 // closed mesh: until Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
+// Faces with vertices of their own are one surface where these coincide, found anew on the device.
 
 /// Positions of a mesh of the scene: [vertex] of three floats, object space.
 DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,

@@ -297,9 +297,13 @@ void ImageLoss::Impl::evaluate(const FrameImages& images) {
 }
 
 double ImageLoss::Impl::finish(std::uint64_t number) {
-  frame_number = number;
   double total = 0;
   for (const double value : per_view) total += value / static_cast<double>(views);
+  if (!std::isfinite(total)) {
+    throw InvalidArgument("images and targets (ImageLoss::evaluate)", "a loss of " + checks::text(total),
+                          "smaller numbers, whose squares and sums single precision holds");
+  }
+  frame_number = number;
   return total;
 }
 

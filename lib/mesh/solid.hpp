@@ -1,4 +1,4 @@
-// Parts of a mesh that bound a solid, and the side of their faces on which it lies.
+// Whether a mesh bounds a solid, and on which side of its faces that lies.
 #pragma once
 
 #include <span>
@@ -11,22 +11,19 @@ namespace dpr {
 class Solid {
  public:
   Solid() = default;
-  /// `edges` are those of the faces: make_welded_edges().
+  /// `edges` are those of the faces: make_edges().
   Solid(std::span<const WeldedEdge> edges, std::size_t faces);
 
-  /// True if all faces belong to such parts.
-  bool is_closed() const { return is_closed_; }
-  /// True if they still do after vertices have moved: coincident ones may have parted.
-  bool is_closed_at(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
   /// +1 where the faces of all parts wind counter-clockwise as seen from outside, -1 clockwise: the sign of
-  /// the parts' volumes. 0 where they differ, or one is not closed or not finite.
+  /// the parts' volumes. 0 where they differ, or one is not closed or not finite. A part of faces with
+  /// vertices of their own is closed where those coincide. O(faces).
   int winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
 
  private:
-  bool is_closed_ = false;
-  std::vector<WeldedEdge> split_edges_;  // whose faces have vertices of their own there
-  std::size_t parts_ = 0;
-  std::vector<std::uint32_t> part_of_face_;  // empty where there is one part
+  bool may_be_closed_ = false;
+  std::vector<WeldedEdge> open_edges_;
+  std::vector<std::uint32_t> patch_of_face_;  // joined by vertices; empty where all are one
+  std::uint32_t patches_ = 0;
 };
 
 }  // namespace dpr

@@ -1,10 +1,18 @@
 #include "mesh/welded_edges.hpp"
 
+#include <algorithm>
+#include <tuple>
+
 #include "mesh/face_sides.hpp"
 #include "mesh/weld.hpp"
 
 namespace dpr {
 namespace {
+
+template <class Corner>
+bool has_repeated(const Corner& a, const Corner& b, const Corner& c) {
+  return a == b || b == c || c == a;
+}
 
 WeldedEdge lone_edge(std::span<const glm::uvec3> faces, const FaceSide& side) {
   const glm::uvec3& face = faces[side.face()];
@@ -15,32 +23,69 @@ WeldedEdge lone_edge(std::span<const glm::uvec3> faces, const FaceSide& side) {
           .other = {}};
 }
 
-void add_pair(std::span<const glm::uvec3> faces, const std::vector<std::uint32_t>& welded,
-              const FaceSide& own_side, const FaceSide& other_side, std::vector<WeldedEdge>& edges) {
-  WeldedEdge own = lone_edge(faces, own_side), other = lone_edge(faces, other_side);
-  own.other = other.face;
-  other.other = own.face;
-  own.same_direction = other.same_direction = welded[own.first] == welded[other.first];
-  own.shares_vertices = own.same_direction ? own.first == other.first && own.second == other.second
-                                           : own.first == other.second && own.second == other.first;
-  edges.push_back(own);
-  if (!own.shares_vertices) edges.push_back(other);
-}
+/// An open edge by the places of its ends, in order.
+struct PlacedEdge {
+  std::uint32_t low, high, edge;
+};
 
 }  // namespace
 
-std::vector<WeldedEdge> make_welded_edges(std::span<const glm::vec3> positions,
-                                          std::span<const glm::uvec3> faces) {
-  const std::vector<std::uint32_t> first = weld(positions);
+std::vector<WeldedEdge> make_edges(std::span<const glm::uvec3> faces, std::size_t vertices) {
+  std::vector<FaceSide> all = sorted_sides(faces, vertices);
+  std::erase_if(all, [&](const FaceSide& side) {
+    const glm::uvec3& face = faces[side.face()];
+    return has_repeated(face.x, face.y, face.z);
+  });
   std::vector<WeldedEdge> edges;
   edges.reserve(faces.size() * 3 / 2);
-  for_each_edge(sorted_sides(weld(faces, first), positions.size()), [&](std::span<const FaceSide> sides) {
-    if (sides.size() == 2 && sides[0].face() != sides[1].face()) {
-      add_pair(faces, first, sides[0], sides[1], edges);
-    } else {
-      for (const FaceSide& side : sides) edges.push_back(lone_edge(faces, side));
+  for_each_edge(all, [&](std::span<const FaceSide> sides) {
+    if (sides.size() == 2) {
+      WeldedEdge& edge = edges.emplace_back(lone_edge(faces, sides[0]));
+      edge.other = sides[1].face();
+      edge.same_direction = lone_edge(faces, sides[1]).first == edge.first;
+      edge.shares_vertices = true;
+      return;
     }
+    for (const FaceSide& side : sides) edges.push_back(lone_edge(faces, side));
+    edges.back().is_open = sides.size() == 1;
   });
+  return edges;
+}
+
+void join_open(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces,
+               std::span<WeldedEdge> edges) {
+  std::vector<std::uint32_t> open;
+  std::vector<glm::vec3> ends;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const glm::uvec3& face = faces[edges[e].face];
+    if (!edges[e].is_open || has_repeated(positions[face.x], positions[face.y], positions[face.z])) continue;
+    open.push_back(e);
+    ends.insert(ends.end(), {positions[edges[e].first], positions[edges[e].second]});
+  }
+  const std::vector<std::uint32_t> place = weld(ends);
+  std::vector<PlacedEdge> placed;
+  placed.reserve(open.size());
+  for (std::uint32_t i = 0; i < open.size(); ++i) {
+    const auto [low, high] = std::minmax(place[2 * i], place[2 * i + 1]);
+    placed.push_back({low, high, i});
+  }
+  const auto key = [](const PlacedEdge& edge) { return std::tie(edge.low, edge.high); };
+  std::ranges::sort(placed, {},
+                    [](const PlacedEdge& edge) { return std::tie(edge.low, edge.high, edge.edge); });
+  for (auto first = placed.begin(), last = first; first != placed.end(); first = last) {
+    while (last != placed.end() && key(*last) == key(*first)) ++last;
+    if (last - first != 2) continue;
+    WeldedEdge &a = edges[open[first[0].edge]], &b = edges[open[first[1].edge]];
+    a.other = b.face;
+    b.other = a.face;
+    a.same_direction = b.same_direction = place[2 * first[0].edge] == place[2 * first[1].edge];
+  }
+}
+
+std::vector<WeldedEdge> make_welded_edges(std::span<const glm::vec3> positions,
+                                          std::span<const glm::uvec3> faces) {
+  std::vector<WeldedEdge> edges = make_edges(faces, positions.size());
+  join_open(positions, faces, edges);
   return edges;
 }
 

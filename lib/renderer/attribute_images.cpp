@@ -190,6 +190,7 @@ void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
 
 void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
   Renderer::Impl& r = renderer.impl();
+  r.has_moved = r.has_moved || r.frame.position_stride != 0;
   r.frame.position_stride = 0;
   r.near_plane.set_boxes_of_views({});
   const bool by_corner = domain() == AttributeDomain::corners;
@@ -215,6 +216,7 @@ void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
   rows_.move(positions_, source.views.size(), source.geometry->view_positions, r.views.size(),
              r.geometry->view_positions);
   r.frame.position_stride = r.frame.vertices;
+  r.has_moved = true;
   std::vector<BoxCorners> boxes;
   for (std::size_t pass = 0; pass < passes(); ++pass)
     std::ranges::copy(source.near_plane.boxes_of_views(), std::back_inserter(boxes));

@@ -16,8 +16,7 @@ void BackFaces::forget(std::size_t mesh) noexcept {
 
 void BackFaces::measure(State& state, const Mesh& mesh) {
   state.is_measured = true;
-  const bool is_closed = state.solid.is_closed_at(mesh.positions, mesh.faces);
-  state.winding = is_closed ? state.solid.winding(mesh.positions, mesh.faces) : 0;
+  state.winding = state.solid.winding(mesh.positions, mesh.faces);
   if (state.winding != 0) state.box = box_corners(mesh.positions);
 }
 

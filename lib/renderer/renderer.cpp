@@ -89,12 +89,17 @@ void Renderer::Impl::build_pyramids() {
 }
 
 void Renderer::Impl::find_edges() {
-  if (!pixel_noise || pixel_noise->edges) return;
-  pixel_noise->edges.emplace(device.impl(), scene, geometry->meshes, shape_of_first_view());
-  pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
-  for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
-    if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
+  if (!pixel_noise) return;
+  if (!pixel_noise->edges) {
+    pixel_noise->edges.emplace(device.impl(), scene);
+    pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
+    for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
+      if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
+    }
+    has_moved = true;
   }
+  if (has_moved) pixel_noise->edges->join(frame, *geometry);
+  has_moved = false;
 }
 
 /// Of views with shapes of their own none are known to be hidden.
@@ -121,15 +126,6 @@ void Renderer::Impl::set_up() {
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden_, bin.pair_starts);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup, bin.pair_starts);
   bin.start();
-}
-
-std::vector<glm::vec3> Renderer::Impl::shape_of_first_view() const {
-  std::vector<cl_float4> values(geometry->position_count);
-  geometry->positions_of(frame).download(values);
-  std::vector<glm::vec3> shape;
-  shape.reserve(values.size());
-  for (const cl_float4& v : values) shape.emplace_back(v.s[0], v.s[1], v.s[2]);
-  return shape;
 }
 
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
@@ -355,7 +351,9 @@ std::size_t Renderer::Impl::bytes() const {
          grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
          grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
-         (gradient_map ? gradient_map->bytes() : 0);
+         (gradient_map ? gradient_map->bytes() : 0) + aov_surface.capacity_bytes() +
+         aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
+         all_views_.starts.capacity_bytes() + (corner_texcoords ? corner_texcoords->bytes() : 0);
 }
 
 }  // namespace dpr

@@ -20,6 +20,7 @@ void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) 
 
 void Renderer::Impl::forget_positions(std::size_t mesh) noexcept {
   near_plane.forget(mesh);
+  has_moved = true;
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
 }
 
@@ -74,6 +75,7 @@ void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
   frame.color_stride = color_stride;
   near_plane.set_boxes_of_views({});
   if (positions) near_plane.forget_views();
+  has_moved = true;
   rendered = false;
 }
 

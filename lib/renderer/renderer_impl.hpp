@@ -139,8 +139,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::size_t bytes() const;
 
   Scene scene;
-  bool rendered = false;                // the stages hold the frame of the current scene, or it is on the way
-  std::optional<FrameCounts> capacity;  // of the last frame, until it is known to fit
+  bool has_moved = true;  // vertices have, since the edges were joined; or which of them the frame reads
+  bool rendered = false;  // the stages hold the frame of the current scene, or it is on the way
+  std::optional<FrameCounts> capacity;     // of the last frame, until it is known to fit
   std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
   std::optional<FrameCounts> reserved;     // by the caller
   std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
@@ -209,7 +210,6 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void find_edges();
   void hide_back_faces();
   void set_up();
-  std::vector<glm::vec3> shape_of_first_view() const;
   std::optional<FrameCounts> expected_capacity() const;
   void forward_within(const FrameCounts& expected, FrameSizes sizes);
   void forward_measured();

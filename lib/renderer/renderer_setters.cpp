@@ -216,6 +216,7 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {
   if (prepared.frame.views != frame.views) last_counts.reset();
+  has_moved = has_moved || prepared.frame.position_stride != frame.position_stride;
   gradient_map.reset();
   std::swap(static_cast<ViewSet&>(*this), prepared);
   near_plane.set_boxes_of_views({});
@@ -281,6 +282,7 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   near_plane.set_boxes_of_views(std::move(boxes));
   frame.position_stride = positions.empty() ? 0 : static_cast<cl_uint>(geometry->position_count);
   frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
+  has_moved = true;
   rendered = false;
 }
 
@@ -302,6 +304,7 @@ void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> 
   replace(geometry->positions, geometry->meshes[mesh].first_position, positions);
   std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
   near_plane.move(mesh);
+  has_moved = true;
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
   rendered = false;
 }

@@ -49,6 +49,10 @@ struct RowMap {
   std::size_t rows = 0, shown = 0;
   Buffer<cl_uint> row_of;            ///< [shown]
   Buffer<cl_uint> starts, shown_by;  ///< [row + 1], [shown]
+
+  std::size_t bytes() const {
+    return row_of.capacity_bytes() + starts.capacity_bytes() + shown_by.capacity_bytes();
+  }
 };
 
 /// Rows of the caller's or the scene's, and positions, at what is shown.
@@ -90,6 +94,7 @@ class CornerTexcoords {
   bool empty() const { return map.rows == 0; }
   /// Takes the coordinates in force, which for textured meshes the device has.
   void update(const Geometry& geometry, Exchange& exchange);
+  std::size_t bytes() const { return map.bytes() + values.capacity_bytes(); }
 
   RowMap map;                      ///< shown by corners, face after face
   Buffer<float> values;            ///< [texcoord][2]

@@ -2,11 +2,10 @@
 #pragma once
 
 #include <optional>
-#include <span>
 
 #include "device/kernel.hpp"
 #include "dpr/light.hpp"
-#include "mesh/solid.hpp"
+#include "stages/edges.hpp"
 #include "stages/geometry.hpp"
 #include "stages/scan.hpp"
 #include "stages/sort.hpp"
@@ -14,26 +13,12 @@
 
 namespace dpr {
 
-/// The edges of the scene's meshes on the device.
-struct Edges {
-  /// `positions` are [position], object space: what coincides there belongs together.
-  Edges(Device::Impl& device, const Scene& scene, std::span<const MeshRange> meshes,
-        std::span<const glm::vec3> positions);
-
-  std::size_t count = 0;
-  std::vector<Solid> solids;   ///< [mesh], for the first who wants them
-  Buffer<cl_uint2> edges;      ///< [edge] see DPR_EDGE_FLAG
-  Buffer<cl_uint> face_edges;  ///< [face] see DPR_FACE_SIDES
-
-  std::size_t bytes() const;
-};
-
 /// Everything of a frame that contours are found by.
 struct ContourInputs {
   const shared::FrameParams& p;
   const DeviceViews& views;
   const Geometry& geometry;
-  const Edges& edges;
+  const Edges& edges;  ///< joined where vertices lie
   const Transform& transform;
   const Buffer<cl_uchar>& facing;              ///< [view][face] Setup::facing
   const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set

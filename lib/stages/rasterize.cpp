@@ -255,12 +255,8 @@ Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) 
   return *band;
 }
 
-FrameCounts Rasterize::capacity_for(const FrameCounts& counts, const Bin& bin) const {
-  const auto capacity = [](std::size_t count, std::size_t made_for) {
-    return std::min(with_headroom(count), std::max(count, made_for));
-  };
-  return {capacity(counts.pairs, bin.pair_face.capacity()), capacity(counts.fragments, distance.capacity()),
-          counts.contours};
+FrameCounts Rasterize::capacity_for(const FrameCounts& counts, const Bin& /*bin*/) const {
+  return {with_headroom(counts.pairs), with_headroom(counts.fragments), counts.contours};
 }
 
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,

@@ -26,7 +26,7 @@ class ContourFrame {
       : geometry(device_impl(), scene_of(mesh)),
         transform(device_impl()),
         setup(device_impl()),
-        edges(device_impl(), scene_of(mesh), geometry.meshes, mesh.positions),
+        edges(device_impl(), scene_of(mesh)),
         contour(device_impl()),
         antialias(device_impl()) {
     p.views = p.meshes = 1;
@@ -49,12 +49,14 @@ class ContourFrame {
     place(mesh.positions);
   }
 
-  /// Moves the vertices; what belongs together stays as it was.
+  /// Moves the vertices.
   void place(const std::vector<glm::vec3>& positions) {
     std::vector<cl_float4> values;
     for (const glm::vec3& v : positions) values.push_back({{v.x, v.y, v.z, 0.0F}});
     transform.ndc.upload(device_impl(), values);
     transform.world.upload(device_impl(), values);
+    geometry.positions.upload(device_impl(), values);
+    edges.join(p, geometry);
   }
 
   /// Sets the faces up as they are now.

@@ -1,0 +1,164 @@
+#include "stages/edges.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "image/texture_words.hpp"
+
+namespace dpr {
+namespace {
+
+std::uint32_t texture_of(const Mesh& mesh, std::uint32_t face) {
+  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+}
+
+/// Whether two coordinates are one place of a texture.
+bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
+  const float period = period_of(wrap);
+  if (period == 0) return a == b;
+  const glm::vec2 periods = (a - b) / period;
+  return periods == glm::round(periods);
+}
+
+/// Which corner of a face a vertex is.
+int corner_of(const Mesh& mesh, std::uint32_t face, std::uint32_t vertex) {
+  int corner = 0;
+  while (corner < 2 && mesh.faces[face][corner] != vertex) ++corner;
+  return corner;
+}
+
+/// Whether the texture jumps at the edge between two faces.
+bool is_seam(const Mesh& mesh, const WeldedEdge& edge) {
+  if (mesh.textures.empty()) return false;
+  const std::uint32_t own = edge.face, other = *edge.other, texture = texture_of(mesh, own);
+  if (texture != texture_of(mesh, other)) return true;
+  if (texture == k_no_texture) return false;
+  const auto coordinate = [&](std::uint32_t face, std::uint32_t vertex) {
+    return mesh.texcoords[mesh.face_texcoords[face][corner_of(mesh, face, vertex)]];
+  };
+  return std::ranges::any_of(std::array{edge.first, edge.second}, [&](std::uint32_t end) {
+    return !is_same_place(coordinate(own, end), coordinate(other, end), mesh.textures[texture].wrap);
+  });
+}
+
+/// Whether what the mesh says of how it is lit jumps at the edge between two faces: their materials, or the
+/// normals that it gives.
+bool light_may_jump(const Mesh& mesh, const WeldedEdge& edge) {
+  const std::uint32_t own = edge.face, other = *edge.other;
+  if (material_of(mesh, own) != material_of(mesh, other)) return true;
+  if (mesh.face_normals.empty()) return false;
+  return std::ranges::any_of(std::array{edge.first, edge.second}, [&](std::uint32_t end) {
+    return mesh.normals[mesh.face_normals[own][corner_of(mesh, own, end)]] !=
+           mesh.normals[mesh.face_normals[other][corner_of(mesh, other, end)]];
+  });
+}
+
+cl_uint side_of(const WeldedEdge& edge, std::size_t first_face) {
+  return 3 * (to_uint(first_face) + edge.face) + edge.corner;
+}
+
+cl_uint2 row_of(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_face) {
+  cl_uint2 row{{side_of(edge, first_face), DPR_NO_FACE}};
+  if (!edge.other) return row;
+  row.s[1] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
+  if (mesh.vertex_colors.empty() && !mesh.face_colors.empty()) row.s[0] |= DPR_EDGE_FLAG;
+  if (is_seam(mesh, edge)) row.s[0] |= DPR_EDGE_SEAM;
+  if (light_may_jump(mesh, edge)) row.s[1] |= DPR_EDGE_SEAM;
+  return row;
+}
+
+shared::OpenEdge open_edge(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_face) {
+  shared::OpenEdge open{};
+  open.side = side_of(edge, first_face);
+  open.texture = mesh.textures.empty() ? k_no_texture : texture_of(mesh, edge.face);
+  open.material = to_uint(material_of(mesh, edge.face));
+  if (open.texture == k_no_texture) return open;
+  const float period = period_of(mesh.textures[open.texture].wrap);
+  const auto place = [&](std::uint32_t corner) {
+    const glm::vec2& uv = mesh.texcoords[mesh.face_texcoords[edge.face][static_cast<int>(corner % 3)]];
+    return period == 0 ? uv : uv / period;
+  };
+  const glm::vec2 first = place(edge.corner), second = place(edge.corner + 1U);
+  open.is_periodic = period == 0 ? 0 : 1;
+  open.places = {{first.x, first.y, second.x, second.y}};
+  return open;
+}
+
+/// Numbers a mesh's edges from `count` on, in the order of their sides: see DPR_FACE_SIDES.
+std::vector<cl_uint> number_edges(std::span<const WeldedEdge> edges, std::size_t faces, std::size_t count) {
+  std::vector<cl_uint> numbers(faces);
+  for (const WeldedEdge& edge : edges) numbers[edge.face] |= 1U << edge.corner;
+  for (cl_uint& of_face : numbers) {
+    const cl_uint sides = of_face;
+    of_face |= to_uint(count) * DPR_FACE_SIDES;
+    count += static_cast<std::size_t>(std::popcount(sides));
+  }
+  return numbers;
+}
+
+/// As kernels/contour.h has it.
+std::size_t number_of(const WeldedEdge& edge, std::span<const cl_uint> numbers) {
+  const cl_uint sides = numbers[edge.face], before = sides & ((1U << edge.corner) - 1);
+  return sides / DPR_FACE_SIDES + static_cast<std::size_t>(std::popcount(before));
+}
+
+}  // namespace
+
+Edges::Edges(Device::Impl& device, const Scene& scene)
+    : device_(device), list_(device, "edges.cl", "edges_list"), join_(device, "edges.cl", "edges_join") {
+  constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
+  std::vector<cl_uint2> rows;
+  std::vector<cl_uint> all_numbers;
+  std::vector<shared::OpenEdge> open;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    const std::size_t first_face = all_numbers.size();
+    if (first_face + mesh.faces.size() > k_most) {
+      throw InvalidArgument("faces (scene)", "more than " + std::to_string(k_most),
+                            "at most that many with noise of the pixel");
+    }
+    const std::vector<WeldedEdge> of_mesh = make_edges(mesh.faces, mesh.positions.size());
+    const std::vector<cl_uint> numbers = number_edges(of_mesh, mesh.faces.size(), rows.size());
+    rows.resize(rows.size() + of_mesh.size());
+    for (const WeldedEdge& edge : of_mesh) {
+      rows[number_of(edge, numbers)] = row_of(mesh, edge, first_face);
+      if (edge.is_open) open.push_back(open_edge(mesh, edge, first_face));
+    }
+    all_numbers.insert(all_numbers.end(), numbers.begin(), numbers.end());
+    solids.emplace_back(of_mesh, mesh.faces.size());
+  }
+  count = rows.size();
+  if (rows.empty()) rows.emplace_back();  // never read, but an argument all the same
+  edges.upload(device, rows);
+  face_edges.upload(device, all_numbers);
+  open_.upload(device, open);
+}
+
+void Edges::join(const shared::FrameParams& p, const Geometry& geometry) {
+  const std::size_t copies = p.position_stride != 0 ? p.views : 1, open = open_.size();
+  const std::size_t rows = std::max<std::size_t>(count, 1);
+  if (edges.size() != copies * rows) {
+    Buffer<cl_uint2> copied(device_, copies * rows);
+    edges.resize(device_, rows);
+    for (std::size_t copy = 0; copy < copies; ++copy) edges.copy_to(copied, copy * rows);
+    std::swap(edges, copied);
+  }
+  if (open == 0) return;
+  const std::size_t buckets = std::bit_ceil(open);
+  heads_.resize(device_, copies * buckets);
+  next_.resize(device_, copies * open);
+  heads_.fill(DPR_NO_OPEN_EDGE);
+  const cl_uint4 sizes{{to_uint(copies), to_uint(open), to_uint(buckets), 0}};
+  list_(copies * open, p, sizes, open_, geometry.face_vertices, geometry.places, geometry.positions_of(p),
+        heads_, next_);
+  join_(copies * open, p, sizes, to_uint(count), open_, geometry.face_vertices, geometry.places,
+        geometry.positions_of(p), heads_, next_, face_edges, edges);
+}
+
+std::size_t Edges::bytes() const {
+  return edges.capacity_bytes() + face_edges.capacity_bytes() + open_.capacity_bytes() +
+         heads_.capacity_bytes() + next_.capacity_bytes();
+}
+
+}  // namespace dpr

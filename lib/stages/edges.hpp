@@ -1,0 +1,42 @@
+// The edges of the scene's meshes on the device, with the faces that meet there.
+#pragma once
+
+#include <vector>
+
+#include "device/kernel.hpp"
+#include "mesh/solid.hpp"
+#include "stages/geometry.hpp"
+
+namespace dpr {
+
+class Edges {
+ public:
+  /// By the vertices that faces share. Throws InvalidArgument for more faces than can be numbered.
+  Edges(Device::Impl& device, const Scene& scene);
+
+  /// Joins those that coincide where vertices lie now. To be called before edges are read, after positions
+  /// have changed, or p.position_stride or, where that is set, p.views. Does not wait for the device.
+  void join(const shared::FrameParams& p, const Geometry& geometry);
+
+  std::size_t count = 0;
+  std::vector<Solid> solids;   ///< [mesh], for the first who wants them
+  Buffer<cl_uint2> edges;      ///< [edge] see DPR_EDGE_FLAG; [view][edge] where p.position_stride is set
+  Buffer<cl_uint> face_edges;  ///< [face] see DPR_FACE_SIDES
+
+  std::size_t bytes() const;
+
+ private:
+  void add(const Mesh& mesh, std::size_t first_face);
+
+  Device::Impl& device_;
+  Kernel<shared::FrameParams, cl_uint4, In<shared::OpenEdge>, In<cl_uint4>, In<shared::MeshPlace>,
+         In<cl_float4>, Out<cl_uint>, Out<cl_uint>>
+      list_;
+  Kernel<shared::FrameParams, cl_uint4, cl_uint, In<shared::OpenEdge>, In<cl_uint4>, In<shared::MeshPlace>,
+         In<cl_float4>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint2>>
+      join_;
+  Buffer<shared::OpenEdge> open_;  // [open edge]
+  Buffer<cl_uint> heads_, next_;
+};
+
+}  // namespace dpr
