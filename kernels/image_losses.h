@@ -8,9 +8,8 @@
 //
 //   <name>_add(pixel, sums)               writes what a pixel adds to them
 //   <name>_gradient(weight, pixel, sums)  weight times its derivative by the pixel's RGBA, from the sums of
-//   the
-//                                         view; of RGB, times the number of pixels and colour channels of a
-//                                         view
+//                                         the view; of RGB, times the number of pixels and colour channels
+//                                         of a view
 //
 // and on the host
 //

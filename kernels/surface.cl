@@ -98,8 +98,7 @@ static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float
 /// out  grad_colors     float[pair][9]  RGB of the corners' colours, summed over the pair's fragments
 /// out  grad_texcoords  float[pair][9]  u, v of the corners, and 0
 /// out  grad_steps      float[pair][9]  of the levels of detail's q_k along x, along y, and depths; not
-/// written
-///      for faces whose texture has one level
+///                                      written for faces whose texture has one level
 kernel void surface_backward(const FrameParams p, const uint last_pair, const uint adds,
                              global const uint* restrict pair_face,
                              global const uint* restrict fragment_starts,

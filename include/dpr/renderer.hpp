@@ -86,8 +86,8 @@ DPR_API void add(SceneGradient& to, const SceneGradient& from);
 
 struct RenderStatistics {
   std::size_t faces = 0;  ///< triangles times views
-  std::size_t faces_dropped =
-      0;  ///< of those: nearer than znear, beyond zfar, culled, without area, outside the image
+  /// Faces nearer than znear, beyond zfar, culled, without area, or outside the image.
+  std::size_t faces_dropped = 0;
   std::size_t pairs = 0;         ///< (8x8 tile, triangle) pairs
   std::size_t fragments = 0;     ///< (pixel, triangle) pairs within the blur radius
   std::size_t bands = 0;         ///< that the device's memory budget made of the frame

@@ -83,9 +83,8 @@ struct Smoothing {
 /// prior (its density is no exp(-nu), so it has no score), and one sampled and one exact stage in the joint
 /// composition.
 /// - A variable width needs the uniform prior, the exact estimator, Euclidean distances, the joint
-/// composition
-///   (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy says where
-///   such noise ends). A width of zero needs the exact estimator.
+///   composition (in the barrier an occupancy of nearly 0 still has weight) and a blur_radius (no occupancy
+///   says where such noise ends). A width of zero needs the exact estimator.
 /// - Antithetic draws need symmetric priors, so not Gumbel's, and an even number of samples.
 /// - leave_one_out needs at least 2 samples; with antithetic draws 4, since it leaves out the pair: the other
 ///   half's value is correlated with the score. With stratified draws it is refused: every other sample's
@@ -131,8 +130,7 @@ DPR_API Smoothing rigid_smoothing();
 ///   that no perturbation explains, and which are left out: gradients that would raise the loss are dropped,
 ///   and delta I at an edge that two triangles share is the difference of the two
 /// - "paper_gaussian" (36), "paper_cauchy" (35): both stages of one prior, sampled 8 times as in (11) and
-/// (14),
-///   blur radius 9.21 sigma: the published program
+///   (14), blur radius 9.21 sigma: the published program
 /// - "gaussian": Gaussian noise of the triangles in the barrier, exact: (36), (10); sigma 1e-3, gamma 1e-2
 /// - "joint_gaussian": the joint composition, exact: the expectation of (3) under (8)
 /// - "pixel": the default above, Gaussian noise of the pixel's position, joint composition, exact; gamma is

@@ -4,8 +4,8 @@
 // - a number that it cannot read is a zero, and at the end of the file it goes on with zeros;
 // - colours in floats are cut to eight bits, downwards; those of other types, and 300 in a text, wrap around;
 // - a list other than the corners is skipped as if it were one number, unless custom properties are
-//   asked for;
-//   then it is allocated at the length it claims, and in a text a property of type uchar is one character;
+//   asked for; then it is allocated at the length it claims, and in a text a property of type uchar is one
+//   character;
 // - lists may be counted by uint8, uint16, uchar and int alone;
 // - a normal that is not in floats is not skipped at all;
 // - a header that never ends is read for ever.

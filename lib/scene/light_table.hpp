@@ -20,8 +20,7 @@ inline constexpr std::array<std::string_view, 4> k_shadings{"flat", "phong", "go
 /// - key, lights, gradients: its list in files, in Lights and in SceneGradient
 /// - needs: bits of DPR_LIGHTS that its kernels are built with
 /// - for_each_member(visit): visit(key, member, member of the gradient, channel, slope) in the order of
-/// files,
-///   slope(light) being the derivative of what the channel has the gradient of
+///   files, slope(light) being the derivative of what the channel has the gradient of
 /// - to_device(light)
 template <typename Light>
 struct LightKind;

@@ -26,9 +26,8 @@ struct BlurKernel {
 };
 
 /// @param prior  its density, or rather the product of its densities along the two axes, is that of the
-/// noise. Densities
-///               end at the prior's pixel_reach and are scaled to an integral of 1. On the raster they keep
-///               their variance, however small the scale: at 0 the raster is left as it is.
+///               noise. Densities end at the prior's pixel_reach and are scaled to an integral of 1. On the
+///               raster they keep their variance, however small the scale: at 0 the raster is left as it is.
 /// @param scale  of the noise in pixels
 /// @param supersampling  1, 2 or 4
 /// Throws InvalidArgument, for the Gumbel prior too: it is not symmetric, so that it would shift the image.

@@ -3,8 +3,7 @@
 //
 //   DPR_FAULT=NAME:N   the N-th call of NAME fails; NAME may end in '*', as clEnqueue*
 //   DPR_FAULT_LOG=FILE at its end the process writes "NAME CALLS" of every function there, and of the one
-//   that
-//                      failed " failed"
+//                      that failed " failed"
 //   DPR_LOST_QUEUE=Q:N the N-th call on the Q-th command queue that is made (from 0) fails, and all after
 //                      it, as if its device had vanished
 //   DPR_SKIPPED_KERNEL=NAME  launches of that kernel do nothing, and nothing says so

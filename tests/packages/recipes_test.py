@@ -12,6 +12,7 @@ options = set(re.findall(r"option\((DPR_BUILD_\w+)", (root / "CMakeLists.txt").r
 assert json.loads((recipes / "vcpkg/dpr/vcpkg.json").read_text())["version"] == version
 assert re.search(r'version: "(.*)"', (recipes / "conda/recipe.yaml").read_text())[1] == version
 conanfile = (recipes / "conan/conanfile.py").read_text()
+assert f"version = {{{version}}}" in (root / ".github/CITATION.bib").read_text()
 compile(conanfile, "conanfile.py", "exec")
 parts = re.search(r"for part in \((.*)\)", conanfile)[1]
 named = {"DPR_BUILD_" + part for part in re.findall(r'"(\w+)"', parts)}
