@@ -37,7 +37,7 @@ typedef enum dpr_status {
 /* Message of the thread's last call that failed; "" before. Valid until the thread's next call that fails. */
 DPR_API const char* dpr_last_error(void);
 
-/* "0.2.0": of the library that runs. */
+/* "0.3.0": of the library that runs. */
 DPR_API const char* dpr_version(void);
 
 /* OpenCL's own, whose header need not be included. */
