@@ -37,8 +37,9 @@ struct Length {
     return length;
   }
 
-  /// Room for it in a buffer that has none yet: a sixteenth more for what varies.
-  std::size_t first_room() const { return varies ? count + count / 16 : count; }
+  /// Elements of a buffer that is allocated for the first time: with headroom for lengths that vary between
+  /// frames, so that the next frame, whose capacity includes that headroom, finds room.
+  std::size_t first_room() const { return varies || !is_known ? with_headroom(count) : count; }
 
   std::size_t count;
   bool is_known = true, varies = false;

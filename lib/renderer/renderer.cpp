@@ -132,8 +132,8 @@ void Renderer::Impl::set_up() {
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts && !reserved) return std::nullopt;
   const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
-  FrameCounts expected = rasterize.capacity_for(counts, bin);
-  if (pixel_noise) expected.contours = pixel_noise->contour.capacity_for(counts.contours);
+  const FrameCounts expected{with_headroom(counts.pairs), with_headroom(counts.fragments),
+                             with_headroom(counts.contours)};
   if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= device.memory_budget())
     return std::nullopt;
   return expected;

@@ -54,10 +54,6 @@ void Contour::settle(std::size_t known_pairs) {
     buffer->settle(known_pairs);
 }
 
-std::size_t Contour::capacity_for(std::size_t count) const {
-  return with_headroom(count);
-}
-
 void Contour::count(const ContourInputs& in) {
   if (view_edges(in) > std::numeric_limits<cl_uint>::max() / DPR_CONTOUR_FLAGS) {
     throw InvalidArgument("edges (frame)", std::to_string(view_edges(in)),

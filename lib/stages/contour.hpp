@@ -40,8 +40,6 @@ class Contour {
   std::size_t read_count() const;
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
-  /// Room for so many and a few more, in the buffers that are there.
-  std::size_t capacity_for(std::size_t count) const;
   /// Adds the gradients of the pairs' ends to those of the vertices; where faces are clipped, those of ends
   /// on the near plane to `grad_clip`, as Transform::backward() has it.
   void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,

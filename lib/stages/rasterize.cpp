@@ -255,10 +255,6 @@ Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) 
   return *band;
 }
 
-FrameCounts Rasterize::capacity_for(const FrameCounts& counts, const Bin& /*bin*/) const {
-  return {with_headroom(counts.pairs), with_headroom(counts.fragments), counts.contours};
-}
-
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                          const Bin& bin, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {

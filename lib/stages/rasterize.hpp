@@ -82,8 +82,6 @@ class Rasterize {
   Band settle(const shared::FrameParams& p, const FrameCounts& counts);
   /// Of a frame that cover() counted.
   FrameCounts counted() const;
-  /// For so much and a little more, but no more than the buffers have.
-  FrameCounts capacity_for(const FrameCounts& counts, const Bin& bin) const;
   /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
   /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
   std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,

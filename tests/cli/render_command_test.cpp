@@ -59,7 +59,7 @@ TEST_SUITE("pipeline") {
             folder, {"render", name + ".obj", "-o", name + ".png", "--size", "16x16", "--noise", noise});
         CAPTURE(outcome.err);
         CHECK(outcome.status == 0);
-        CHECK(contains(outcome.err, "cannot be seen"));
+        CHECK(contains(outcome.out, "cannot be seen"));
       }
     }
   }
