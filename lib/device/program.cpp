@@ -38,6 +38,13 @@ std::string_view program_file(std::string_view name) {
   return kernel_file(k_frame_file).find(include) != std::string_view::npos ? k_frame_file : name;
 }
 
+/// Options without the size of work-groups.
+std::string without_group(std::string options) {
+  const std::size_t at = options.find(" -DDPR_GROUP=");
+  if (at != std::string::npos) options.erase(at, options.find(' ', at + 1) - at);
+  return options;
+}
+
 std::string build_log(const cl::Program& program, const cl::Device& device) {
   std::string log;
   program.getBuildInfo(device, CL_PROGRAM_BUILD_LOG, &log);
@@ -98,8 +105,10 @@ cl::Program Device::Impl::build(std::string_view file, const std::string& option
 
 const cl::Program& Device::Impl::program(std::string_view name, const std::string& options) {
   const std::scoped_lock lock(mutex_);
-  // Options of its own make a file a program of its own.
-  const std::string_view file = options == build_options(*this) ? program_file(name) : name;
+  // A file with options of its own is a program of its own. Kernels of a frame in smaller groups come from the
+  // frame's source too: two kernels that count and list the same tiles must round alike.
+  const bool is_of_frame = without_group(options) == without_group(build_options(*this));
+  const std::string_view file = is_of_frame ? program_file(name) : name;
   const std::string key = std::string(file) + " " + options;
   const auto known = programs_.find(key);
   return known != programs_.end() ? known->second

@@ -134,7 +134,9 @@ class Rasterize {
   /// The tiles of a row.
   std::vector<TileStart> tile_starts(const shared::FrameParams& p, const Bin& bin, std::size_t row) const;
   void rebase(const Band& next);
-  Length length(std::size_t count) const { return counted_ ? Length(count) : Length::at_most(count); }
+  Length length(std::size_t count) const {
+    return counted_ ? Length::varying(count) : Length::at_most(count);
+  }
   void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
              const ContourCount& contours);
 
