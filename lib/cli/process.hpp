@@ -1,7 +1,7 @@
 // Signals and streams of a program's process.
 #pragma once
 
-/// Of unistd.h, which macOS leaves to the program.
+/// Declared here because macOS' unistd.h does not.
 extern "C" char** environ;
 
 namespace dpr::cli {

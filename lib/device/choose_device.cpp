@@ -20,7 +20,7 @@ int rank(const DeviceInfo& info) {
   return info.type == "accelerator" ? 2 : 3;
 }
 
-/// Whether the time of a frame is known of the device and of its equals, of which there are some.
+/// True if the device has equals, and a frame's time is known of all of them.
 bool is_measured(std::span<const DeviceInfo> devices, const DeviceInfo& info) {
   std::size_t equals = 0;
   for (const DeviceInfo& other : devices) {

@@ -21,8 +21,8 @@ std::vector<std::size_t> best_equals(std::span<const DeviceInfo> devices);
 /// Why a device is preferred, e.g. "the first GPU with memory of its own".
 std::string reason_of_preference(const DeviceInfo& info, std::span<const DeviceInfo> devices);
 
-/// Whether a selector names the device: "cpu" and "gpu" its type, a number its index, anything else a part of
-/// its platform, name or version, ignoring case. Empty: whether it is the default.
+/// True if a selector names the device: "cpu" and "gpu" its type, a number its index, anything else a part of
+/// its platform, name or version, ignoring case. An empty selector names the default.
 bool matches(const DeviceInfo& info, const std::string& selector);
 
 /// A device of a list, or equal parts of it.
@@ -31,7 +31,7 @@ struct DeviceChoice {
   unsigned parts = 1;
 };
 
-/// Whether the text is a list or asks for parts, rather than naming one of the devices as it stands.
+/// True if the text is a list or asks for parts, rather than naming one of the devices as it stands.
 bool names_several(std::span<const DeviceInfo> devices, const std::string& selectors);
 
 /// The devices that such a text names. Each item takes the first that matches and is not taken yet. Throws

@@ -1,4 +1,4 @@
-// What a Device holds: its OpenCL context and queue, the programs built for it, and the count of its memory.
+// State of a Device: its OpenCL context and queue, the programs built for it, and the count of its memory.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ inline void check_cl(int code, std::string_view where) {
   if (code != CL_SUCCESS) throw DeviceError(code, std::string(where));
 }
 
-/// What goes between host and device, and how often the host waits for it.
+/// Bytes between host and device, and how often the host waits.
 struct TransferCounts {
   std::size_t bytes_to_device = 0, bytes_from_device = 0;
   std::size_t host_waits = 0;  ///< blocking calls
@@ -48,7 +48,7 @@ struct Device::Impl {
   /// Called before a program is built, with its file, and before a kernel is launched, with its name, when
   /// everything before has run: how a trial (trial.hpp) knows what ended it.
   std::function<void(std::string_view)> before_work;
-  /// Whether binaries of programs are remembered (store.hpp).
+  /// True if binaries of programs are remembered (store.hpp).
   bool keeps_binaries = false;
 
   /// The program that holds a kernel file, built once for each set of options; or its binary, where it is
@@ -91,7 +91,7 @@ struct Device::Impl {
   std::atomic<std::size_t> memory_budget = 0;
 
  private:
-  /// What a write reads until it has run.
+  /// Bytes that a write reads until it has run.
   struct PendingWrite {
     std::vector<std::byte> bytes;
     cl::Event finished;

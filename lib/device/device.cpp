@@ -45,7 +45,7 @@ std::string type_name(cl_device_type type) {
 /// The widths that kernels are written and tested for.
 constexpr std::array k_lanes{1U, 8U, 16U};
 
-/// What the environment wants in place of the width that suits the device: for tests and measurements.
+/// Vector width that DPR_LANES asks for in place of the device's own: for tests and measurements.
 std::optional<unsigned> lanes_of_environment() {
   const char* const text = std::getenv("DPR_LANES");
   if (text == nullptr) return std::nullopt;
@@ -146,7 +146,7 @@ FoundDevices find_devices() {
   return found;
 }
 
-/// Of a machine without devices: PoCL may be there, and offer none.
+/// Hint for a machine without devices: PoCL may be installed and offer none.
 std::string hint() {
   const std::string failure = pocl_cache_failure();
   return failure.empty() ? "" : "; or if it is installed: " + failure;

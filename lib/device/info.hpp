@@ -1,4 +1,4 @@
-// What OpenCL objects say of themselves.
+// Queries of OpenCL objects.
 #pragma once
 
 #include <cfenv>

@@ -11,7 +11,7 @@ namespace dpr {
 
 namespace {
 
-/// What a device needs beside the standard options.
+/// Compiler options that a device needs beside the standard ones.
 std::string quirks(const DeviceInfo& info) {
   // oclgrind 21.10 stops at LLVM intrinsics that only optimised code holds
   // (llvm.experimental.noalias.scope.decl), and takes vectors of 64 bytes for uninitialised when they are

@@ -41,7 +41,7 @@ inline constexpr std::string_view k_cl_type_name<cl_float4> = "float4";
 template <>
 inline constexpr std::string_view k_cl_type_name<cl_uint4> = "uint4";
 
-/// What a kernel's source says of an argument.
+/// An argument's type, as a kernel's source has it.
 struct ArgumentType {
   std::string name;
   bool is_pointer, is_const;
@@ -121,7 +121,7 @@ class Kernel {
     enqueue({range.first, (range.count + local - 1) / local * local}, args...);
   }
 
-  /// For kernels that are written twice: on GPUs a work-group does what on CPUs one work-item does.
+  /// Launches a kernel that is written twice: a work-group of a GPU does the work of one work-item of a CPU.
   void in_groups(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
     (*this)(built_.group > 0 ? count * built_.group : count, args...);
   }

@@ -1,4 +1,4 @@
-// What is remembered of devices from one start of a program to the next: the binaries of programs, and how
+// Store of facts about devices that outlives the program: the binaries of programs, and how
 // drivers fared with the kernels.
 #pragma once
 

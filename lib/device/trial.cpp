@@ -18,7 +18,7 @@
 #include "base/module.hpp"
 #include "device/context.hpp"
 
-/// Of unistd.h, which macOS leaves to the program.
+/// Declared here because macOS' unistd.h does not.
 extern "C" char** environ;
 
 namespace dpr {
@@ -33,7 +33,7 @@ bool is_switched_off() {
 
 std::string key_of(const DeviceInfo& info) { return "trial " + trial_name(info) + "\n" + device_key(info); }
 
-/// Whether a process ended by itself, rather than by a user or for want of memory.
+/// True if a process crashed by itself, rather than being ended by a user or for want of memory.
 bool is_crash(int signal) {
   constexpr std::array k_crashes{SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE};
   return std::ranges::find(k_crashes, signal) != k_crashes.end();

@@ -9,7 +9,7 @@
 namespace dpr::learn {
 namespace {
 
-// What the layers of network.cpp are; to be changed with them.
+// Description of the layers of network.cpp; change both together.
 constexpr const char* k_architecture =
     "dpr single-image reconstruction 1: 64-128-256, 1024-1024-512, 642 vertices";
 

@@ -1,4 +1,4 @@
-// What a training leaves behind: the network, the optimizer, and how it went.
+// Checkpoint of a training: the network, the optimizer, and the losses so far.
 #pragma once
 
 #include <torch/torch.h>

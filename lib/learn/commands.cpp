@@ -27,7 +27,7 @@ namespace {
 using learn::Dataset;
 using learn::Split;
 
-/// Where data is, and of which classes.
+/// Folder and classes of the data.
 struct DataOptions {
   std::string folder;
   std::vector<std::string> classes;
@@ -163,7 +163,7 @@ void print_result(const std::string& folder, const learn::TrainingResult& result
   }
 }
 
-/// Of a list of devices the ranks of a machine take one after the other, by turns.
+/// The ranks of a machine take the devices of the list in turn.
 Device device_of(const CommonOptions& common, const learn::Ranks& ranks) {
   if (ranks.count == 1) return open_device(common);
   const std::vector<Device> devices = open_devices(common);

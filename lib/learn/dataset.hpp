@@ -1,7 +1,7 @@
 // Images and voxels of many objects, in the files that the authors of NMR and SoftRas distribute for
 // ShapeNet.
 //
-// For each class and split of a folder (Kato et al. 2018, mesh_reconstruction/make_dataset.py and datasets.py
+// Each class and split of a folder has two files (Kato et al. 2018, make_dataset.py and datasets.py
 // of hiroharu-kato/mesh_reconstruction; Liu et al. 2019, examples/recon/datasets.py of ShichenLiu/SoftRas):
 //   <synset>_<split>_images.npz   uint8 [object][24][4][64][64]  RGBA over black
 //   <synset>_<split>_voxels.npz   bool or uint8 [object][32][32][32]

@@ -1,4 +1,4 @@
-// What shapes are drawn at random from: lengths, choices and colours.
+// Random lengths, choices and colours, from which shapes are drawn.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class Draw {
   int integer(int low, int high) {
     return std::min(high, low + static_cast<int>(between(0, 1) * static_cast<float>(high - low + 1)));
   }
-  /// Of any hue, neither black nor white.
+  /// Colour of any hue, neither black nor white.
   glm::vec3 color() {
     const float hue = between(0, 6), strength = between(0.25F, 0.85F), value = between(0.45F, 0.95F);
     const auto channel = [&](float shift) {

@@ -19,7 +19,7 @@ struct GenerateOptions {
   std::uint64_t seed = 1;
 };
 
-/// What rendering and voxelising one object gives, in the order of the files.
+/// Images and voxels of one object, in the order of the files.
 struct Example {
   std::vector<std::uint8_t> images;  ///< [24][4][64][64]
   std::vector<std::uint8_t> voxels;  ///< [32][32][32]

@@ -38,7 +38,7 @@ struct TrainingOptions {
   Ranks ranks;                         ///< of which this process is one
 };
 
-/// What is said of a run as it goes.
+/// Progress of a run, reported as it goes.
 struct TrainingProgress {
   std::size_t step = 0;
   double loss = 0;
@@ -80,7 +80,7 @@ struct ClassIou {
   double sphere = 0;  ///< what the sphere that the network starts from has
 };
 
-/// What a checkpoint came to.
+/// Quality of a checkpoint's network.
 struct Evaluation {
   std::string method;          ///< that it was trained with
   std::uint64_t seed = 1;      ///< of its training

@@ -17,7 +17,7 @@ namespace dpr::learn {
 /// Torch's error, with the library's that it was.
 class RenderError : public c10::Error {
  public:
-  /// Of the exception that is being handled.
+  /// Call this while the exception is being handled; original() keeps it.
   explicit RenderError(const dpr::Error& error);
   std::exception_ptr original() const { return original_; }
 

@@ -79,7 +79,7 @@ class Member {
   std::uint64_t size_ = 0;
 };
 
-/// What stands behind 'key': in a header, up to one of the characters.
+/// Text behind `'key':` in a header, up to the first character of `end`.
 std::string_view value_of(std::string_view header, std::string_view key, std::string_view end) {
   const std::size_t at = header.find(key);
   if (at == std::string_view::npos) return {};

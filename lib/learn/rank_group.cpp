@@ -143,7 +143,7 @@ struct GradientAverage::Bucket {
   at::Tensor values;        // the gradients of its parameters, one after the other
   std::size_t missing = 0;  // of the backward pass that runs
   c10::intrusive_ptr<c10d::Work> sum;
-  /// What puts a gradient in its place, with our hook.
+  /// Autograd nodes that put a gradient in its place; our hooks are on them.
   std::vector<std::shared_ptr<torch::autograd::Node>> accumulators;
 };
 

@@ -1,4 +1,4 @@
-// What ranks exchange while they train, by libtorch's c10d.
+// Communication between ranks while they train, by libtorch's c10d.
 #pragma once
 
 #include <torch/torch.h>
@@ -29,9 +29,9 @@ class RankGroup : public torch::CustomClassHolder {
   /// Begins a sum, which finish() ends; `values` is left alone until then.
   c10::intrusive_ptr<c10d::Work> begin_sum(at::Tensor values) const;
   void finish(c10d::Work& work) const;
-  /// Whether it is so on any of them.
+  /// True if `here` is true on any rank.
   bool any(bool here) const;
-  /// What rank 0 gives.
+  /// Sends rank 0's bytes to every rank.
   std::string share(std::string bytes) const;
 
  private:
@@ -44,10 +44,10 @@ using RankGroupPtr = c10::intrusive_ptr<RankGroup>;
 /// Gradients of the mean of the ranks' losses. They are exchanged in buckets, each as soon as the
 /// backward pass has the last gradient of it, while that pass goes on.
 ///
-/// What c10d::Reducer does. Debian's libtorch 1.13 has that class without the headers that its own includes.
+/// Takes the place of c10d::Reducer, whose header includes others that Debian's libtorch 1.13 lacks.
 class GradientAverage {
  public:
-  /// Of parameters that every backward pass reaches once. They get gradients that stay in place.
+  /// Every backward pass must reach each parameter once. Parameters get gradients that stay in place.
   GradientAverage(RankGroupPtr ranks, const std::vector<at::Tensor>& parameters);
   ~GradientAverage();
   GradientAverage(const GradientAverage&) = delete;

@@ -226,7 +226,7 @@ Ranks ranks_of(const Environment& environment) {
   constexpr Variable k_rank{"RANK", "SLURM_PROCID"}, k_size{"WORLD_SIZE", "SLURM_NTASKS"},
       k_local{"LOCAL_RANK", "SLURM_LOCALID"}, k_address{"MASTER_ADDR"}, k_port{"MASTER_PORT"};
   constexpr int k_most_ports = 65535;
-  // What Slurm sets is no request yet: it does so in every job.
+  // Slurm's variables alone are no request, because Slurm sets them in every job.
   const bool is_alone = std::ranges::none_of(
       std::initializer_list<const char*>{k_rank.name, k_size.name, k_address.name, k_port.name},
       [&](const char* name) { return environment(name) != nullptr; });

@@ -16,13 +16,13 @@ struct Ranks {
   int local_rank = 0;      ///< of those on this machine
   std::string address;     ///< of rank 0's machine
   std::uint16_t port = 0;  ///< there
-  /// Whether the launcher itself listens at that port, as torchrun may, and its number of restarts, which
+  /// True if the launcher itself listens at that port, as torchrun may; its number of restarts, which
   /// then keeps the attempts apart.
   bool launcher_listens = false;
   std::string restarts = "0";
   std::chrono::seconds timeout{120};  ///< for the others to answer
 
-  /// Of `total` things in order, those of this rank: first() to last() - 1. No two ranks share one.
+  /// This rank's share of `total` ordered items: first() to last() - 1. No two ranks share an item.
   std::size_t first(std::size_t total) const { return total * static_cast<std::size_t>(rank) / whole(); }
   std::size_t last(std::size_t total) const { return total * (static_cast<std::size_t>(rank) + 1) / whole(); }
 
@@ -33,13 +33,13 @@ struct Ranks {
 /// The value of an environment variable, or null.
 using Environment = std::function<const char*(const char* variable)>;
 
-/// What RANK, WORLD_SIZE, LOCAL_RANK, MASTER_ADDR and MASTER_PORT say, as torchrun sets them; alone where
+/// Reads RANK, WORLD_SIZE, LOCAL_RANK, MASTER_ADDR and MASTER_PORT, as torchrun sets them; a single rank where
 /// none of them is set. With MASTER_ADDR and MASTER_PORT from the user, the others are also taken from srun's
 /// SLURM_PROCID, SLURM_NTASKS and SLURM_LOCALID. Throws InvalidArgument where they are not complete, or no
 /// numbers in range.
 Ranks ranks_of(const Environment& environment);
 
-/// What an error of a rank begins with that is only the consequence of another rank's end.
+/// Prefix of errors that are only the consequence of another rank's end.
 inline constexpr std::string_view k_lost_contact = "contact (dpr learn)";
 
 /// Runs this program with its own arguments again, `count` times on this machine, with the variables above,

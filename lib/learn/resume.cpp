@@ -34,7 +34,7 @@ void require_same(const std::filesystem::path& file, const std::string& found, c
                         expected + " as asked for, or another folder");
 }
 
-/// What rank 0 has in its folder, if anything.
+/// Checkpoint in rank 0's folder, if there is one, sent to every rank.
 LoadedCheckpoint load_of_rank_0(const std::filesystem::path& file, double learning_rate,
                                 const RankGroup& ranks) {
   if (ranks.ranks().rank != 0) {

@@ -9,7 +9,7 @@
 
 namespace dpr::learn {
 
-/// What a step depends on beside its number and the learning rate, which may change on the way.
+/// Settings that determine a step, without its number and the learning rate, which may change on the way.
 std::string settings_of(const TrainingOptions& options, const Dataset& training);
 
 /// Throws InvalidArgument on every rank that is to train otherwise than rank 0.

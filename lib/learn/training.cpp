@@ -150,7 +150,7 @@ class Trainer {
     return record;
   }
 
-  /// Of all ranks, whose batches are of the same size.
+  /// Mean over all ranks, whose batches have the same size.
   StepRecord record_of(const at::Tensor& losses) const {
     const at::Tensor means = losses.detach().to(torch::kDouble);
     ranks_->sum(means);

@@ -288,7 +288,7 @@ class PlyHeaderReader {
     return {!native, native, in_bytes ? 255.0 : 1.0};
   }
 
-  // Whether the element has all of these in floats; then they get the names under which they pass.
+  // True if the element has all of these as floats; the function then renames them so that they pass.
   template <std::size_t count>
   static bool prepare_floats(Element& element, const std::array<std::string_view, count>& names,
                              const std::array<const char*, count>& custom) {

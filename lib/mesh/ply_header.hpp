@@ -1,6 +1,6 @@
-// What a PLY file's header says, and the header that OpenMesh reads instead.
+// Parsed header of a PLY file, and the header that OpenMesh reads instead.
 //
-// What OpenMesh 9 does with such a file:
+// OpenMesh 9 treats such a file so:
 // - a number that it cannot read is a zero, and at the end of the file it goes on with zeros;
 // - colours in floats are cut to eight bits, downwards; those of other types, and 300 in a text, wrap around;
 // - a list other than the corners is skipped as if it were one number, unless custom properties are
@@ -43,7 +43,7 @@ struct ColorForm {
   double one = 1;       ///< what stands for the full intensity in a custom property
 };
 
-/// What is known of a file before its body is read.
+/// Contents of a header, known before the body is read.
 struct PlyHeader {
   std::string text;       ///< for OpenMesh
   std::size_t bytes = 0;  ///< of the header in the file

@@ -1,4 +1,4 @@
-// Where OpenMesh's reader of PLY puts what it reads: straight into a mesh.
+// Importer through which OpenMesh's PLY reader writes straight into a mesh.
 //
 // OpenMesh's own importer fills a halfedge mesh: it refuses faces that would make an edge non-manifold, or
 // adds them again with copies of their vertices. This one records vertices and polygons in the order of the

@@ -60,7 +60,7 @@ inline void split(std::string_view line, std::vector<std::string_view>& words) {
   }
 }
 
-/// What a line holds behind a word of it, without the spaces around: a name that may have spaces inside.
+/// Rest of a line behind one of its words, trimmed: a name that may have spaces inside.
 inline std::string_view behind(std::string_view line, std::string_view word) {
   std::string_view rest = line.substr(static_cast<std::size_t>(word.data() + word.size() - line.data()));
   while (!rest.empty() && is_space(rest.front())) rest.remove_prefix(1);
@@ -77,7 +77,7 @@ std::optional<Number> parse(std::string_view word) {
   return value;
 }
 
-/// Of a decimal number that no double can hold: whether it is too small for one, not too large.
+/// True if a decimal number that no double can hold is too small, false if it is too large.
 inline bool underflows(std::string_view word) {
   const std::size_t exponent_at = std::min(word.find_first_of("eE"), word.size());
   const std::string_view mantissa = word.substr(0, exponent_at);

@@ -1,4 +1,4 @@
-// Whether a mesh bounds a solid, and on which side of its faces that lies.
+// Test of whether a mesh bounds a solid, and of the side of its faces on which the solid lies.
 #pragma once
 
 #include <span>

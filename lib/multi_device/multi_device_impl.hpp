@@ -1,4 +1,4 @@
-// What a MultiDeviceRenderer holds: the scene, a renderer for each device, and what is known of the devices.
+// State of a MultiDeviceRenderer: the scene, a renderer for each device, and the devices' measured speeds.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ struct OwnLoss {
   unsigned levels = 1;
   std::vector<Attributes> attributes;
 
-  /// Of a chunk's views.
+  /// Makes the loss of a chunk's views.
   ImageLoss make(const Device& device, const Chunk& chunk) const;
 };
 struct OwnMeshLoss {
@@ -85,7 +85,7 @@ struct MultiDeviceRenderer::Impl {
 
   void require_views(const char* caller) const;
 
-  /// Of so many views; the same whatever devices there are. None has more views than a frame may have.
+  /// Chunks of `count` views, the same for every list of devices. No chunk exceeds a frame's limit of views.
   std::vector<Chunk> chunks_of(std::size_t count) const;
 
   /// Some of the views, in chunks.
