@@ -19,6 +19,7 @@ void run_shapes(const Settings& settings);
 void run_lights(const Settings& settings);
 void run_textures(const Settings& settings);
 void run_photograph(const Settings& settings);
+void run_derivative(const Settings& settings);
 
 std::span<const Experiment> experiments() {
   static constexpr Experiment k_experiments[] = {
@@ -35,7 +36,9 @@ std::span<const Experiment> experiments() {
        run_shapes},
       {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights},
       {"textures", "A texture found from 24 lit views of a known shape, from grey", run_textures},
-      {"photograph", "A face's template bent to a photograph: camera, light, then shape", run_photograph}};
+      {"photograph", "A face's template bent to a photograph: camera, light, then shape", run_photograph},
+      {"derivative", "An image, its derivative by a turn, and a loss's gradient on the surface",
+       run_derivative}};
   return k_experiments;
 }
 

@@ -71,6 +71,17 @@ TEST_SUITE("bench-smoke") {
     CHECK(data["psnr"].get<double>() > data["start_psnr"].get<double>());
   }
 
+  TEST_CASE("derivative: the image's difference by a turn is what the backward pass gives") {
+    const TempDir folder;
+    const Json data = run(folder, "derivative");
+    if (data.is_null()) return;
+    const auto by_differences = data["along_derivative_by_differences"].get<double>();
+    CHECK(by_differences > 0);
+    constexpr double k_of_few_pixels = 0.2;  // 1% at the size of the README's picture
+    CHECK(data["along_derivative_by_backward"].get<double>() ==
+          doctest::Approx(by_differences).epsilon(k_of_few_pixels));
+  }
+
   TEST_CASE("lights: every kind has its errors") {
     const TempDir folder;
     const Json data = run(folder, "lights");

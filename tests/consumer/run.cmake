@@ -46,7 +46,7 @@ if(NOT CXX_FLAGS MATCHES "-fsanitize=")
   find_program(C_COMPILER NAMES cc gcc clang REQUIRED)
   execute_process(COMMAND ${PKG_CONFIG} --static --cflags --libs dpr OUTPUT_VARIABLE flags COMMAND_ERROR_IS_FATAL ANY)
   separate_arguments(flags UNIX_COMMAND "${flags}")
-  run(${C_COMPILER} ${SOURCE}/../examples/from_c.c -o ${WORK}/c_by_pkg_config ${flags})
+  run(${C_COMPILER} ${SOURCE}/../../include/examples/from_c.c -o ${WORK}/c_by_pkg_config ${flags})
 endif()
 
 run(${CMAKE_COMMAND} -S ${SOURCE}/subproject -B ${WORK}/subproject ${options} "-DCMAKE_CXX_FLAGS=${CXX_FLAGS} -Wall -Werror"

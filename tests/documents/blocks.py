@@ -6,7 +6,8 @@ blocks.py run DOCUMENT --source DIR --build DIR --work DIR [--program FILE] [--p
                                     everything else, in an empty folder that looks like the repository's root
 
 Blocks of other languages (console, text) are not tried. A block after a line <!-- file: NAME --> is written to that file;
-one after <!-- shows: NAME --> must be that file of the repository, which is tried elsewhere.
+one after <!-- shows: NAME --> must be that file of the repository, which is tried elsewhere; one after
+<!-- quotes: NAME --> must be lines of it that follow one another.
 """
 import argparse
 import json
@@ -43,7 +44,7 @@ def blocks(document):
             language, marker = None, None
         elif language is not None:
             text.append(line)
-        elif comment := re.match(r"<!-- (file|shows): (\S+) -->", line):
+        elif comment := re.match(r"<!-- (file|shows|quotes): (\S+) -->", line):
             marker = comment.groups()
     if language is not None:
         sys.exit(f"{document}: a block is not closed")
@@ -63,12 +64,12 @@ def write_cpp(document, output):
     output.write_text(source)
 
 
-def make_programs(folder, build):
+def make_programs(folder, build, is_reduced):
     """The programs under their names, with what reduces them."""
     folder.mkdir()
     for program in ("dpr", "dpr_experiments", "dpr_pose_table"):
         cases = []
-        for command, options in REDUCED.items():
+        for command, options in REDUCED.items() if is_reduced else ():
             words = command.split()
             if words[0] != program:
                 continue
@@ -84,9 +85,9 @@ def run(arguments):
     shutil.rmtree(work, ignore_errors=True)
     (work / "build").mkdir(parents=True)
     (work / "build/release").symlink_to(build)
-    for folder in ("bench", "tests"):
+    for folder in ("bench", "include", "tests"):
         (work / folder).symlink_to(arguments.source.resolve() / folder)
-    make_programs(work / "programs", build)
+    make_programs(work / "programs", build, not arguments.full)
     environment = {**os.environ, "PATH": f"{(work / 'programs').resolve()}:{os.environ['PATH']}",
                    "PYTHONPATH": "build/release/python"}
 
@@ -104,6 +105,9 @@ def run(arguments):
             (work / name).write_text(text)
         elif action == "shows" and text != (arguments.source / name).read_text():
             sys.exit(f"{where} is not {name}")
+        elif action == "quotes" and "\n" + text not in "\n" + (arguments.source / name).read_text():
+            sys.exit(f"{where} is not in {name}")
+        tried += action in ("shows", "quotes")
         if language == "json":
             try:
                 json.loads(text)
@@ -111,7 +115,7 @@ def run(arguments):
                 sys.exit(f"{where}: {error}")
         elif language == "sh":
             call(where, "bash", "-euo", "pipefail", "-c", text)
-        elif language == "python":
+        elif language == "python" and action != "file":
             python += "\n" * (first - 1 - python.count("\n")) + text
         tried += language in ("json", "sh", "python")
     if python and arguments.python:
@@ -136,6 +140,7 @@ for option in ("--source", "--build", "--work"):
     try_all.add_argument(option, type=pathlib.Path, required=True)
 try_all.add_argument("--program", type=pathlib.Path)
 try_all.add_argument("--python")
+try_all.add_argument("--full", action="store_true", help="commands as they are, not reduced for a test")
 try_all.set_defaults(action=run)
 chosen = parser.parse_args()
 chosen.action(chosen)

@@ -70,7 +70,7 @@ if [[ ${1:-} == --packages ]]; then
   echo "== C and C++20"
   install /packages/libdpr-dev*.deb g++ cmake ninja-build pkg-config
   # shellcheck disable=SC2016 # the inner shell's
-  inside 'cc -std=c99 -Wall -Werror tests/examples/from_c.c -o /tmp/from_c $(pkg-config --cflags --libs dpr) && /tmp/from_c'
+  inside 'cc -std=c99 -Wall -Werror include/examples/from_c.c -o /tmp/from_c $(pkg-config --cflags --libs dpr) && /tmp/from_c'
   inside 'cmake -S tests/consumer -B /tmp/consumer -G Ninja >/dev/null && cmake --build /tmp/consumer >/dev/null &&
     /tmp/consumer/main /tmp/cube.png /tmp/cube.exr && /tmp/consumer/embedder'
 

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Draws the pictures of include/examples by running the tutorials in full. From the repository's root, after
+# `cmake --build --preset release`; the tutorial in PyTorch needs a python3 that has torch.
+#
+#   bench/report/tutorials.sh [TUTORIAL...]    pose mesh texture shading light unless given
+set -euo pipefail
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+pictures=$PWD/include/examples/pictures
+mkdir -p "$pictures"
+
+# draw NAME COLUMNS WIDTH HEIGHT PICTURE LABEL ...: pictures of that size in rows, a label above each.
+draw() {
+  local name=$1 columns=$2 width=$3 height=$4 plots=() labels=() n=0
+  shift 4
+  local total=$((columns * (width + 2))) rows=$(($# / 2 / columns))
+  while (($#)); do
+    local x=$((n % columns * (width + 2))) y=$(((rows - 1 - n / columns) * (height + 20)))
+    plots+=("\"$1\" binary filetype=png origin=($x,$y) with rgbimage")
+    labels+=("set label $((n + 1)) \"$2\" at $((x + 5)),$((y + height + 9))")
+    n=$((n + 1))
+    shift 2
+  done
+  gnuplot <<END
+set terminal pngcairo size $total,$((rows * (height + 20))) font "sans,10"
+set output "$pictures/$name.png"
+unset key; unset tics; unset border; unset colorbox
+set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0
+set xrange [-0.5:$total-0.5]; set yrange [-0.5:$((rows * (height + 20)))-0.5]
+$(printf '%s\n' "${labels[@]}")
+plot $(IFS=,; echo "${plots[*]}")
+END
+}
+
+(($#)) || set -- pose mesh texture shading light
+for name in "$@"; do
+  program=build/release/bin/dpr_document_tutorial_$name
+  options=()
+  [[ -x $program ]] && options+=(--program "$program")
+  [[ $name == shading ]] && options+=(--python "$(command -v python3)")
+  python3 tests/documents/blocks.py run "include/examples/$name.md" --source . --build build/release \
+    --work "$work/$name" --full "${options[@]}"
+  cd "$work/$name"
+  case $name in
+    pose) draw pose 4 144 144 pose/target.png "the photograph" pose/start.png "the start" \
+      pose/end.png "the pose found" found.png "in the light found" ;;
+    mesh) draw mesh 1 782 96 fit/targets.png "eight of the views" fit/results.png "the mesh found, from the same sides" ;;
+    texture) draw texture 4 160 160 truth.png "the picture" step0.png "step 0" step10.png "step 10" step60.png "step 60" ;;
+    shading) draw shading 3 160 160 truth.png "the picture" start.png "the first guess" found.png "found" ;;
+    light) draw light 2 160 160 spot.png "the spot" change.png "as its cone grows" ;;
+  esac
+  cd - >/dev/null
+done
