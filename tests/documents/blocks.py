@@ -2,6 +2,7 @@
 """The code in the documents, tried: C++ becomes a program, commands and Python are run, JSON is parsed.
 
 blocks.py cpp DOCUMENT OUTPUT.cpp   the C++ blocks of a document, one after the other, as one main()
+blocks.py links ROOT                every link in the documents below a folder leads to a file, and to a heading
 blocks.py run DOCUMENT --source DIR --build DIR --work DIR [--program FILE] [--python FILE]
                                     everything else, in an empty folder that looks like the repository's root
 
@@ -128,6 +129,42 @@ def run(arguments):
         sys.exit(f"{arguments.document} has nothing to try")
 
 
+def headings(document):
+    """Anchors as GitHub makes them, of the lines that are headings and not code."""
+    in_code, found = False, set()
+    for line in document.read_text().splitlines():
+        in_code ^= line.lstrip().startswith("```")
+        if line.startswith("#") and not in_code:
+            found.add(re.sub(r"[^\w\- ]", "", line.lstrip("#").strip().lower()).replace(" ", "-"))
+    return found
+
+
+def documents_of(root):
+    """All but what is built, and the one that is to fail."""
+    for folder, folders, files in os.walk(root):
+        folders[:] = [name for name in folders if name not in ("build", ".git")]
+        for name in files:
+            if name.endswith(".md") and (name != "broken.md" or pathlib.Path(folder) == root):
+                yield pathlib.Path(folder) / name
+
+
+def check_links(root):
+    broken, count = [], 0
+    for document in documents_of(root):
+        text = "\n".join(line for line in document.read_text().splitlines() if not line.startswith("    "))
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            if re.match(r"\w+:", target):
+                continue
+            count += 1
+            path, _, anchor = target.partition("#")
+            file = document.parent / path if path else document
+            if not file.exists() or (anchor and anchor not in headings(file)):
+                broken.append(f"{document.relative_to(root)}: {target}")
+    if broken or count == 0:
+        sys.exit("\n".join(["broken links:", *broken]))
+    print(f"{count} links")
+
+
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 modes = parser.add_subparsers(required=True)
 cpp = modes.add_parser("cpp")
@@ -142,5 +179,8 @@ try_all.add_argument("--program", type=pathlib.Path)
 try_all.add_argument("--python")
 try_all.add_argument("--full", action="store_true", help="commands as they are, not reduced for a test")
 try_all.set_defaults(action=run)
+links = modes.add_parser("links")
+links.add_argument("root", type=pathlib.Path)
+links.set_defaults(action=lambda a: check_links(a.root.resolve()))
 chosen = parser.parse_args()
 chosen.action(chosen)
