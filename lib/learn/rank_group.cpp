@@ -67,7 +67,7 @@ c10::intrusive_ptr<c10d::Store> open_store(const Ranks& ranks) {
   return c10::make_intrusive<c10d::PrefixStore>("dpr/" + ranks.restarts, store);
 }
 
-c10::intrusive_ptr<c10d::ProcessGroup> connect_to_others(const Ranks& ranks) {
+c10::intrusive_ptr<Exchange> connect_to_others(const Ranks& ranks) {
   using c10d::ProcessGroupGloo;
   constexpr int k_threads =
       4;  // so that the sums of batch normalisation do not queue behind those of gradients
@@ -89,7 +89,7 @@ c10::intrusive_ptr<c10d::ProcessGroup> connect_to_others(const Ranks& ranks) {
 
 #else
 
-c10::intrusive_ptr<c10d::ProcessGroup> connect_to_others(const Ranks& ranks) {
+c10::intrusive_ptr<Exchange> connect_to_others(const Ranks& ranks) {
   throw InvalidArgument("ranks (dpr learn)", std::to_string(ranks.count) + " in a build without Gloo",
                         "a build with it: libgloo-dev, and cmake --preset release");
 }

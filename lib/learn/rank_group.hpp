@@ -2,7 +2,12 @@
 #pragma once
 
 #include <torch/torch.h>
+#include <torch/version.h>
+#if TORCH_VERSION_MAJOR < 2
 #include <torch/csrc/distributed/c10d/ProcessGroup.hpp>
+#else
+#include <torch/csrc/distributed/c10d/Backend.hpp>
+#endif
 
 #include <memory>
 #include <string>
@@ -11,6 +16,13 @@
 #include "learn/ranks.hpp"
 
 namespace dpr::learn {
+
+/// The class that Gloo's exchanges derive from.
+#if TORCH_VERSION_MAJOR < 2
+using Exchange = c10d::ProcessGroup;
+#else
+using Exchange = c10d::Backend;
+#endif
 
 /// The connections of a rank to the others; none of one that is alone, for which the operations below do
 /// nothing. All ranks call the same operations in the same order. Each throws Error, beginning with
@@ -36,7 +48,7 @@ class RankGroup : public torch::CustomClassHolder {
 
  private:
   Ranks ranks_;
-  c10::intrusive_ptr<c10d::ProcessGroup> group_;
+  c10::intrusive_ptr<Exchange> group_;
 };
 
 using RankGroupPtr = c10::intrusive_ptr<RankGroup>;
