@@ -80,7 +80,7 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
   CLI::Option* const workload =
       command
           .add_option("--workload", options.workloads,
-                      "What to measure, may be repeated; all but sweeps if left out")
+                      "Workload to measure, may be repeated; all but sweeps if left out")
           ->type_name("NAME");
   std::vector<std::string_view> names = bench::workload_names();
   std::ranges::copy(bench::sweep_names(), std::back_inserter(names));

@@ -25,7 +25,7 @@ function(list_symbols variable file regex)
 endfunction()
 list_symbols(shown shown.txt "(GLOBAL|WEAK) +DEFAULT +[0-9]+ +(${patterns})")
 list_symbols(unique unique.txt "UNIQUE +[A-Z]+ +[0-9]+ +")
-# Of the visibilities that objects ask for a linker takes the narrowest.
+# A linker takes the narrowest of the visibilities that objects ask for.
 list(TRANSFORM shown REPLACE "(.+)" ".hidden \\1\n.long \\1\n")
 list(JOIN shown "" references)
 file(WRITE ${work}/hidden.s ".section .note.GNU-stack,\"\",@progbits\n.section .hide\n${references}")

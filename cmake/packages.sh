@@ -28,7 +28,7 @@ missing_packages() {
   done
 }
 
-# Whether this release of the system has a package.
+# True if this release of the system has a package.
 is_packaged() { apt-cache show "$1" >/dev/null 2>&1; }
 
 # as_root COMMAND...: fails where there is no way to be root.

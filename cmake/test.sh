@@ -17,7 +17,7 @@ for preset in "${presets[@]}"; do
 done
 install_packages "${sets[@]}"
 
-# What some presets need that not every release has.
+# Packages of some presets that not every release has.
 declare -A needed=([oclgrind]=oclgrind [fuzz]=clang++-14)
 
 summary=()

@@ -16,7 +16,7 @@ QUIET = 1.25  # the most that the median of undisturbed runs is above the fastes
 
 
 def tests(folder):
-    """How many cases passed, of how many, and the names of the others; nothing where none was run."""
+    """Passed cases, all cases, and the names of the others; nothing where none was run."""
     file = folder / "tests.xml"
     if not file.exists():
         return {}
@@ -29,7 +29,7 @@ def tests(folder):
 
 
 def self_test(folder):
-    """What `dpr devices --json --check` printed; the differences are of exact stages alone: samples have errors."""
+    """Output of `dpr devices --json --check`; the differences are of exact stages alone: samples have errors."""
     device = json.loads((folder / "check.json").read_text())[0]
     rows = device["check"]["rows"]
     exact = [row for row in rows if "worst" in row and "sampled" not in row["stage"] and "contour" not in row["stage"]]

@@ -77,7 +77,7 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
 void add_device_options(CLI::App& command, CommonOptions& options) {
   command
       .add_option("--device", options.device,
-                  "Which OpenCL device (default: DPR_DEVICE, else a GPU, else an accelerator, else a CPU)")
+                  "OpenCL device (default: DPR_DEVICE, else a GPU, else an accelerator, else a CPU)")
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
   command
       .add_option("--memory-budget", options.memory_budget,
@@ -91,7 +91,7 @@ void allow_several_devices(CLI::App& command) {
   command.get_option("--device")
       ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST")
       ->description(
-          "Which OpenCL devices, a list: each takes a part of every batch. DEVICE/N: N equal parts of it "
+          "List of OpenCL devices: each takes a part of every batch. DEVICE/N: N equal parts of a device "
           "(default: DPR_DEVICE, else one GPU, else an accelerator, else a CPU)");
 }
 

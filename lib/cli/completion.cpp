@@ -124,7 +124,7 @@ void add_completion_command(CLI::App& application) {
   CLI::App* command = application.add_subcommand(
       "completion", "Prints a script with which the shell completes dpr's arguments");
   const auto shell = std::make_shared<std::string>();
-  command->add_option("SHELL", *shell, "Which shell")->required()->type_name("bash");
+  command->add_option("SHELL", *shell, "Shell to write the script for")->required()->type_name("bash");
   command->footer("Example: source <(dpr completion bash)");
   command->callback([shell, &application] { run(*shell, application); });
 }

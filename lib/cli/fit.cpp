@@ -201,7 +201,7 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   };
   add("--levels", solver.levels, "Levels of resolution, each with half the pixels of the next on a side",
       "N");
-  add("--iterations", solver.iterations, "How many steps a level", "N");
+  add("--iterations", solver.iterations, "Steps a level", "N");
   add("--batch", solver.batch, "Views that a step looks at, in turn", "N");
   add("--chunk", solver.chunk,
       "Views that a device renders together; 0: all of a step on one device, a twelfth on several. The last "
@@ -211,19 +211,19 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   add("--remesh-interval", solver.remesh_interval,
       "Steps between two remeshings, in the first half of a level; 0: the faces stay", "N");
   add("--blur", solver.blur,
-      "Of the edges, in pixels of the level, at its beginning; with a smoothing given, it begins blur / "
+      "Blur of the edges at a level's beginning, in its pixels; with a smoothing given, it begins blur / "
       "blur-end times as wide",
       "FLOAT");
   add("--blur-end", solver.blur_end, "The same at its end", "FLOAT");
-  add("--schedule", options.schedule, "How the blur shrinks: steadily, or while less of it means less loss",
-      "anneal|adaptive");
-  add("--steps", options.steps, "How vertices move: with their neighbours, or each on its own",
+  add("--schedule", options.schedule,
+      "Way the blur shrinks: steadily, or while a smaller blur means less loss", "anneal|adaptive");
+  add("--steps", options.steps, "Motion of vertices: with their neighbours, or each on its own",
       "large|direct");
-  add("--lambda", solver.lambda, "How far large steps take neighbours along", "FLOAT");
+  add("--lambda", solver.lambda, "Reach over which large steps take neighbours along", "FLOAT");
   add("--learning-rate", solver.learning_rate, "Size of the steps of vertices, in radii of the first sphere",
       "FLOAT");
   add("--learning-rate-end", solver.learning_rate_end,
-      "Of all steps, at a level's end, of those at its beginning", "FLOAT");
+      "Size of all steps at a level's end over that at its beginning", "FLOAT");
   add("--color-learning-rate", solver.color_learning_rate, "Size of the steps of colours", "FLOAT");
   add("--rigidity", solver.rigidity,
       "Weight of the mean squared strain against the start; with --remesh-interval 0", "FLOAT");
@@ -283,7 +283,7 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR");
   command
       ->add_option("--checkpoint", options->checkpoint,
-                   "Where to go on from if it is there, and to leave checkpoints")
+                   "File to go on from, if it exists, and to leave checkpoints in")
       ->type_name("FILE");
   add_solver_options(*command, *options);
   add_loss_options(*command, options->solver);

@@ -101,7 +101,7 @@ void add_gradient_command(CLI::App& application, CommonOptions& common) {
   const auto options = std::make_shared<GradientOptions>();
   command->add_option("--scene", options->scene, "Scene file")->required()->type_name("S.json");
   command->add_option("--target", options->target, "Image to compare with")->required()->type_name("T.exr");
-  command->add_option("--loss", options->loss, "Which loss; mse by default")->type_name(joined(loss_names()));
+  command->add_option("--loss", options->loss, "Loss; mse by default")->type_name(joined(loss_names()));
   command->add_option("-o,--output", options->output, "Gradients to write")->required()->type_name("G.json");
   add_lens_options(*command, options->lens);
   add_common_options(*command, common);

@@ -7,7 +7,7 @@ namespace dpr::cli {
 void add_lens_options(CLI::App& command, LensSubdivisionOptions& options) {
   command
       .add_option("--lens-tolerance", options.tolerance,
-                  "How far from where the scene's lens shows it a point of an edge may be drawn, in pixels: "
+                  "Most pixels between a point of an edge as it is drawn and as the scene's lens shows it: "
                   "faces are cut until none is further; 0.25 by default, inf leaves faces whole")
       ->type_name("FLOAT");
 }

@@ -159,18 +159,19 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
   add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
   add("--level-iterations", method.iterations,
-      "How many steps a level, more while the best pose still improves; 10 by default", "N");
-  add("--blur", method.blur, "Of the edges, in pixels of the level; 0.25 by default", "FLOAT");
+      "Steps a level, more while the best pose still improves; 10 by default", "N");
+  add("--blur", method.blur, "Blur of the edges, in pixels of the level; 0.25 by default", "FLOAT");
   add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
   add("--robust", method.robust_scale,
-      "For clutter and occlusion: pixels of other colours hardly count; a number is the colour difference "
+      "Weighs pixels of other colours (clutter, occlusion) hardly at all; a number is the colour difference "
       "from which on, else the residuals tell",
       "[FLOAT]")
       ->expected(0, 1);
   command
       .add_option(
           "--light", options.light,
-          "Of the target: harmonics, by default, finds any distant light, gain one that differs in colour "
+          "Light of the target: harmonics, by default, finds any distant light, gain one that differs in "
+          "colour "
           "and brightness alone, where the scene's own light does not explain the target; fixed does not "
           "look")
       ->group(k_least_squares_group)
@@ -191,12 +192,12 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
   const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
     return command.add_option(name, value, description)->group(k_descent_group)->type_name(type);
   };
-  add("--loss", options.loss, "What is made small; mse by default", joined(loss_names()).c_str());
-  add("--iterations", method.iterations, "How many steps; 200 by default, 800 with --schedule adaptive", "N");
+  add("--loss", options.loss, "Loss that is made small; mse by default", joined(loss_names()).c_str());
+  add("--iterations", method.iterations, "Steps; 200 by default, 800 with --schedule adaptive", "N");
   add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
-  add("--optimizer", options.optimizer, "How steps are made; adam by default", "adam|sgd");
+  add("--optimizer", options.optimizer, "Optimizer of the steps; adam by default", "adam|sgd");
   add("--schedule", options.schedule,
-      "How the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
+      "Way the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
       "anneal by "
       "default",
       "anneal|adaptive");
@@ -223,7 +224,7 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           ->type_name("RX,RY,RZ");
   command->add_flag("--search", options->search, "Nothing is known of the rotation")->excludes(initial);
   command->add_flag("--translation", options->solver.solve_translation, "Look for the translation too");
-  command->add_option("--method", options->method, "How the pose is found; least_squares by default")
+  command->add_option("--method", options->method, "Method that finds the pose; least_squares by default")
       ->type_name("least_squares|descent");
   command->add_option("-o,--output", options->output, "Pose to write")->required()->type_name("P.json");
   command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")

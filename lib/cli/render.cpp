@@ -187,18 +187,17 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
                    "Leaves out faces that wind clockwise in the image (back), the others (front), or none")
       ->type_name("none|back|front");
   command
-      ->add_option(
-          "--shading", options->shading,
-          "Where light is computed: by face (flat), vertex (gouraud) or pixel (phong, the default, and "
-          "blinn); instead of the scene's")
+      ->add_option("--shading", options->shading,
+                   "Evaluation of light: by face (flat), vertex (gouraud) or pixel (phong, the default, and "
+                   "blinn); instead of the scene's")
       ->type_name("flat|gouraud|phong|blinn");
   command
       ->add_option("--elevation", options->elevation,
-                   "Of the camera fitted to MESH, in degrees above the horizon; 25 by default")
+                   "Degrees above the horizon of the camera fitted to MESH; 25 by default")
       ->type_name("FLOAT");
   command
       ->add_option("--azimuth", options->azimuth,
-                   "Of the camera fitted to MESH, in degrees from +z towards +x; 35 by default")
+                   "Degrees from +z towards +x of the camera fitted to MESH; 35 by default")
       ->type_name("FLOAT");
   command
       ->add_option(

@@ -55,7 +55,9 @@ void add_checkpoint(CLI::App& command, std::string& file) {
 }
 
 void add_split(CLI::App& command, std::string& split) {
-  command.add_option("--split", split, "Which objects")->capture_default_str()->type_name("train|val|test");
+  command.add_option("--split", split, "Split of the data")
+      ->capture_default_str()
+      ->type_name("train|val|test");
 }
 
 std::vector<std::size_t> class_indices(const std::vector<std::string>& words) {
@@ -224,7 +226,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
                    "Folder of the run; where it holds a checkpoint, that goes on")
       ->required()
       ->type_name("DIR");
-  command->add_option("--method", o.method, "How it renders: a preset of the smoothing")
+  command->add_option("--method", o.method, "Preset of the smoothing to render with")
       ->capture_default_str()
       ->type_name(joined(learn::training_methods()));
   command->add_option("--minutes", o.minutes, "Time for this run, 0 for as long as it takes")
@@ -240,7 +242,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
   command->add_option("--batch", o.batch, "Images a step, of all ranks")
       ->capture_default_str()
       ->type_name("N");
-  command->add_option("--learning-rate", o.learning_rate, "Of Adam")
+  command->add_option("--learning-rate", o.learning_rate, "Learning rate of Adam")
       ->capture_default_str()
       ->type_name("FLOAT");
   command
@@ -251,13 +253,13 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
       ->type_name("FLOAT");
   command->add_option("--gamma", o.gamma, "Scale of the depth noise (default: the same)")->type_name("FLOAT");
   command->add_option("--palette", o.palette, "Colours of a palette")->capture_default_str()->type_name("N");
-  command->add_option("--silhouette-weight", o.weights.silhouette, "Of the silhouette's IoU")
+  command->add_option("--silhouette-weight", o.weights.silhouette, "Weight of the silhouette's IoU")
       ->capture_default_str()
       ->type_name("FLOAT");
-  command->add_option("--color-weight", o.weights.color, "Of the colours' L1")
+  command->add_option("--color-weight", o.weights.color, "Weight of the colours' L1")
       ->capture_default_str()
       ->type_name("FLOAT");
-  command->add_option("--laplacian-weight", o.weights.laplacian, "Of the Laplacian")
+  command->add_option("--laplacian-weight", o.weights.laplacian, "Weight of the Laplacian")
       ->capture_default_str()
       ->type_name("FLOAT");
   command
@@ -277,7 +279,7 @@ void add_train_command(CLI::App& application, CommonOptions& common) {
   command->get_option("--device")
       ->type_name("cpu|gpu|INDEX|SUBSTRING|LIST")
       ->description(
-          "Which OpenCL device; of a list the ranks of a machine take one each (default: DPR_DEVICE, else a "
+          "OpenCL device; the ranks of a machine take one each of a list (default: DPR_DEVICE, else a "
           "GPU, else "
           "an accelerator, else a CPU)");
   command->footer("Example: dpr learn train --data data -o run --minutes 30");
@@ -362,7 +364,7 @@ void add_show_command(CLI::App& application, CommonOptions& common) {
   add_checkpoint(*command, options->checkpoint);
   add_data(*command, options->data);
   add_split(*command, options->split);
-  command->add_option("--object", options->object, "Which object of every class")
+  command->add_option("--object", options->object, "Number of the object of every class")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->type_name("N");

@@ -25,13 +25,13 @@ void for_each_option(Visit&& visit) {
   visit("sigma", "Scale of the distance noise, in the unit of the distance", &O::sigma);
   visit("gamma", "Scale of the depth noise; depth is 1 at znear, 0 at zfar", &O::gamma);
   visit("alpha", "Weight of the barrier", &O::alpha);
-  visit("composition", "How occupancy and depth combine", &O::composition);
-  visit("estimator", "How both expectations are computed", &O::estimator);
+  visit("composition", "Combination of occupancy and depth", &O::composition);
+  visit("estimator", "Computation of both expectations", &O::estimator);
   visit("occupancy_estimator", "Overrides the estimator for the occupancy", &O::occupancy_estimator);
   visit("aggregation_estimator", "Overrides the estimator for the aggregation", &O::aggregation_estimator);
   visit("samples", "Draws of Monte Carlo", &O::samples);
   visit("variance_reduction", "Control variate of sampled gradients", &O::variance_reduction);
-  visit("draws", "How the samples' noise is drawn", &O::draws);
+  visit("draws", "Way the samples' noise is drawn", &O::draws);
   visit("seed", "Seed of everything random", &O::seed);
   visit("occupancy_threshold", "Sets the blur radius where none is given", &O::occupancy_threshold);
   visit("blur_radius", "Triangles further from a pixel are not there", &O::blur_radius);
@@ -40,7 +40,7 @@ void for_each_option(Visit&& visit) {
   visit("occupancy_width", "Width of the distance noise: sigma, up to the pixel, or none",
         &O::occupancy_width);
   visit("noise",
-        "What moves edges at random: each triangle's distances, or the pixel's position. pixel where nothing "
+        "Noise that moves edges: each triangle's distances, or the pixel's position. pixel where nothing "
         "is said of the smoothing, triangle where anything else is",
         &O::noise);
   visit("supersampling", "Rigid samples of a pixel along each axis (1, 2 or 4), of the pixel's noise",

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 unsigned mode_of(const fs::path& file) { return static_cast<unsigned>(fs::status(file).permissions()); }
 
-/// For its life, new files have these permissions taken away.
+/// Takes these permissions away from new files while the object lives.
 class Umask {
  public:
   explicit Umask(mode_t mask) : before_(umask(mask)) {}

@@ -1,4 +1,4 @@
-// What the benchmark measures: every workload is one that the library renders, a row has all its figures, the
+// Measurements of the benchmark: every workload is one that the library renders, a row has all its figures, the
 // work it counts is there, and a row that fails is told as such.
 #include "measure.hpp"
 

@@ -700,8 +700,7 @@ static int differs(const dpr_renderer* renderer, const float* image) {
   return memcmp(pixels, image, sizeof pixels) != 0;
 }
 
-/* What a renderer takes without a new scene is what a new scene has: normals, materials, lights and the rest.
- */
+/* A renderer's setters leave the state that a new scene would: normals, materials, lights and the rest. */
 static void test_setters(const dpr_device* device) {
   const float normals[] = {0, 0, 1}, turned[] = {0.3f, 0.2f, 1}, grey[] = {0.5f, 0.5f, 0.5f};
   const uint32_t first[] = {0, 0, 0}, beyond[] = {0, 1, 0}, of_face[] = {0};
@@ -828,7 +827,7 @@ static void test_mesh_loss(const dpr_device* device, const dpr_scene* scene) {
   dpr_renderer_destroy(renderer);
 }
 
-/* What a pixel shows: by auxiliary outputs, and by images of attributes with their gradients. */
+/* Auxiliary outputs, and images of attributes with their gradients. */
 static void test_attributes(const dpr_device* device, const dpr_scene* scene) {
   const size_t middle = SIDE * SIDE / 2 + SIDE / 2;
   const float heat[3] = {1, 1, 1};
@@ -967,7 +966,7 @@ static void expect_gradient_alone(const dpr_device* device, const dpr_scene* sce
   dpr_renderer_destroy(renderer);
 }
 
-/* What a batch refuses; `batch` has been rendered with two scenes of one view each. */
+/* A batch refuses these; `batch` has been rendered with two scenes of one view each. */
 static void test_wrong_batches(dpr_batch* batch, const dpr_scene* const* scenes) {
   float pixels[2 * FLOATS] = {0};
   dpr_gradient* gradients[2] = {NULL, NULL};
@@ -1067,7 +1066,7 @@ static void test_batch(const dpr_device* device, dpr_scene* scene) {
   dpr_gradient_destroy(gradients[0]);
   dpr_gradient_destroy(gradients[1]);
 
-  /* What a scene's renderer sets is in force with the next forward pass. */
+  /* The setters of a scene's renderer are in force with the next forward pass. */
   for (i = 0; i < 9; ++i) smaller[i] = 0.5f * positions[i];
   OK(dpr_renderer_set_positions(renderer, 0, smaller, 9));
   REFUSED(dpr_batch_read_image(batch, pixels, 2 * FLOATS), "scenes[0]");

@@ -16,7 +16,7 @@ using dpr::test::run_command;
 using dpr::test::run_program;
 using dpr::test::TempDir;
 
-/// What bash would offer for the last of the words.
+/// Candidates that bash would offer for the last of the words.
 std::vector<std::string> candidates(const TempDir& folder, const std::vector<std::string>& words) {
   std::string script = "source ./completion; COMP_WORDS=(";
   for (const std::string& word : words) script += dpr::test::quoted(word) + " ";

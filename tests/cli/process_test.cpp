@@ -1,4 +1,4 @@
-// What a program owes those who run it: it says when its words are lost, ends as its signals ask, leaves no
+// Manners of the program: it says when its words are lost, ends as its signals ask, leaves no
 // temporary files, and writes where it is told.
 #include "cli/process.hpp"
 

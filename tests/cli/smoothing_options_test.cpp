@@ -25,7 +25,7 @@ namespace {
 
 constexpr int k_width = 300, k_height = 200;
 
-/// What the tests put beside a preset: each is the "smoothing" of a scene file.
+/// Values that the tests put beside a preset: each is the "smoothing" of a scene file.
 const std::vector<json> k_overrides{
     json::object(),
     {{"sigma", 1e-4}},
@@ -105,7 +105,7 @@ Smoothing by_values(const json& smoothing, bool is_reversed) {
   return resolve_smoothing(options, k_width, k_height);
 }
 
-/// What the renderer sees of a smoothing, or why it is refused.
+/// The smoothing as the renderer sees it, or the reason of its refusal.
 template <typename Resolve>
 std::string outcome(Resolve resolve, Smoothing& smoothing) {
   try {

@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Whether an OpenCL call that fails within the library is its own error, not one of this program's bindings.
+/// True if an OpenCL call that fails within the library is its own error, not one of this program's bindings.
 bool errors_are_the_librarys() {
   try {
     dpr::adopt_device(nullptr, nullptr);
@@ -21,7 +21,7 @@ bool errors_are_the_librarys() {
   return false;
 }
 
-/// Whether a call that fails in this program throws.
+/// True if a call that fails in this program throws.
 bool errors_are_thrown_here() {
   try {
     cl::Context().getInfo<CL_CONTEXT_DEVICES>();

@@ -2,7 +2,7 @@
 # loads few libraries.
 cmake_minimum_required(VERSION 3.25)
 
-# What is marked: the name before the parenthesis of a function, or that of a class.
+# The marked names: the one before the parenthesis of a function, or that of a class.
 file(GLOB headers ${HEADERS}/*.h ${HEADERS}/*.hpp)
 list(REMOVE_ITEM headers ${HEADERS}/export.h)  # which defines the mark
 set(marked "")

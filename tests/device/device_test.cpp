@@ -88,7 +88,7 @@ TEST_SUITE("unit") {
         CHECK(open_device().info().index == info.index);
       }
       {
-        // What the caller asks for counts more than the environment.
+        // The caller's choice counts more than the environment.
         const Variable other("DPR_DEVICE", "no such device");
         CHECK(open_device(std::to_string(info.index)).info().index == info.index);
         CHECK_THROWS_AS(open_device(""), InvalidArgument);

@@ -42,7 +42,7 @@ void add_kernels(const std::string& source, Kernels& kernels) {
   }
 }
 
-/// Whether a kernel's text has the word, or that of a kernel which it refers to.
+/// True if a kernel's text has the word, or that of a kernel which it refers to.
 bool says(const Kernels& kernels, const std::string& name, const std::string& word,
           std::set<std::string>& seen) {
   if (!seen.insert(name).second) return false;

@@ -194,7 +194,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(SecondCrossing, slope2)};
 }
 
-/// What the device says of every entry.
+/// Offsets and sizes of every entry on the device.
 std::vector<cl_uint> device_values(const std::vector<Entry>& all, const std::string& header) {
   std::string text =
       header +

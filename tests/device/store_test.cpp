@@ -1,4 +1,4 @@
-// What is remembered between starts: whole or not at all, bounded, and never in the way.
+// Store between starts: whole or not at all, bounded, and never in the way.
 #include "device/store.hpp"
 
 #include <doctest/doctest.h>

@@ -20,7 +20,7 @@ import stat
 import subprocess
 import sys
 
-# What makes a command of a document short enough for a test.
+# Options that make a command of a document short enough for a test.
 REDUCED = {
     "dpr fit": "--iterations 4",
     "dpr bench --workload": "--repetitions 1 --max-seconds 0.01",

@@ -73,7 +73,7 @@ std::size_t armed_calls = 0;  // of that name, until one fails
 bool has_failed = false;
 thread_local int depth = 0;  // of calls, which may call each other
 
-/// What a command queue is made to do.
+/// Fault of a command queue.
 struct QueueFault {
   std::size_t calls_left = 0;  // until it is lost; 0: it is not to be
   bool is_lost = false;
@@ -107,7 +107,7 @@ cl_command_queue queue_of(First first, Rest... rest) {
   }
 }
 
-/// Whether the queue's device has vanished; if not, and if the call waits, it takes its time.
+/// True if the queue's device has vanished; if not, and if the call waits, it takes its time.
 bool is_lost(cl_command_queue queue, bool waits) {
   unsigned delay = 0;
   {
@@ -123,7 +123,7 @@ bool is_lost(cl_command_queue queue, bool waits) {
   return false;
 }
 
-/// Whether a call returns no sooner than the device has done something.
+/// True if a call returns no sooner than the device has done something.
 template <class... Args>
 bool waits(std::string_view name, Args... args) {
   if (name == "clWaitForEvents" || name == "clFinish") return true;
@@ -158,7 +158,7 @@ struct Environment {
   }
 } environment;
 
-/// Whether this call is the one to fail.
+/// True if this call is the one to fail.
 bool fails(Function& function) {
   ++function.calls;
   const std::scoped_lock lock(fault_mutex);
@@ -168,7 +168,7 @@ bool fails(Function& function) {
   return true;
 }
 
-/// What the function returns when it fails: an error code, or null and the code where an argument says.
+/// Result of a function that fails: an error code, or null and the code where an argument says.
 template <class Result, class... Args>
 Result failure(int error, Args... args) {
   if constexpr (std::is_same_v<Result, cl_int>) {
@@ -210,7 +210,7 @@ Result call(Function& function, Result (*real)(Args...), Args... args) {
   return result;
 }
 
-/// Whether the environment wants that the kernel is not run.
+/// True if the environment wants that the kernel is not run.
 bool is_skipped(cl_kernel kernel) {
   static const char* const skipped = std::getenv("DPR_SKIPPED_KERNEL");
   if (skipped == nullptr) return false;

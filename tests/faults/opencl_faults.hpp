@@ -26,7 +26,7 @@ extern "C" std::size_t dpr_opencl_calls(const char* name);
 extern "C" void dpr_lose_queue(void* queue, std::size_t nth);
 /// From now on every call on a command queue that waits takes so much longer, as over a network.
 extern "C" void dpr_slow_queue(void* queue, unsigned microseconds);
-/// Whether the calling thread is within an OpenCL call.
+/// True if the calling thread is within an OpenCL call.
 extern "C" bool dpr_is_within_opencl();
 
 }  // namespace dpr::test

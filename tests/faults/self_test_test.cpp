@@ -30,7 +30,7 @@ const std::vector<SkippedKernel> k_kernels{
     {"image_loss_backward", {"image_loss, backward "}},
     {"mesh_loss_gather", {"mesh_loss, backward "}},
     {"aggregate_forward", {"aggregate "}},
-    // What it leaves, other kernels index by: on a CPU the process may end.
+    // Other kernels index by the numbers that it leaves: on a CPU the process may end.
     {"bin_fill", {"setup, bin, rasterize ", "after reduce "}},
 };
 
@@ -41,7 +41,7 @@ Outcome check_with(const std::string& fault) {
                       program_path("DPR_CLI"), "devices", "--check", "--device", "cpu"});
 }
 
-/// Whether a line that begins so says FAIL.
+/// True if a line that begins so says FAIL.
 bool fails(const std::string& out, const std::string& row) {
   std::istringstream lines(out);
   for (std::string line; std::getline(lines, line);) {
@@ -64,7 +64,7 @@ TEST_SUITE("robustness") {
       CAPTURE(outcome.out);
       CHECK(outcome.status == 2);
       CHECK(is_error_line(outcome.err));
-      // What the memory held before may be no number: then all of a frame's gradients are refused together.
+      // The memory may have held no number before: then all of a frame's gradients are refused together.
       CHECK((std::ranges::any_of(skipped.rows, [&](const auto& row) { return fails(outcome.out, row); }) ||
              fails(outcome.out, "transform to aggregate ")));
     }

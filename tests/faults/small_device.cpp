@@ -108,7 +108,7 @@ int refuse(const std::string& kernel, const std::string& why, int error) {
   return error;
 }
 
-/// What a launch asks for that there is not: an error.
+/// Error of a launch that asks for more than there is.
 int check_launch(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t* local_size) {
   cl_device_id device = nullptr;
   clGetCommandQueueInfo(queue, CL_QUEUE_DEVICE, sizeof device, static_cast<void*>(&device), nullptr);

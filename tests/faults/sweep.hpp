@@ -43,7 +43,7 @@ class Armed {
   const FaultKind& kind_;
 };
 
-/// What became of an operation with a fault.
+/// Ending of an operation with a fault.
 enum class Ending { done, failed };
 
 /// Calls prepare(), then operation() with the n-th call failing, then check(ending, n): for every n, or for

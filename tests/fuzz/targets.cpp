@@ -15,7 +15,7 @@
 namespace dpr::fuzz {
 namespace {
 
-/// What scenes and views may name, and where content lies that is read by the name of a file.
+/// Folder with the files that scenes and views may name, and of content that is read by the name of a file.
 const test::TempDir& folder() {
   static const struct Folder {
     test::TempDir temporary;
@@ -81,7 +81,7 @@ void read_shape_checkpoint(std::string_view content) {
   if (again.positions != read.positions || again.faces != read.faces) throw std::logic_error("another mesh");
 }
 
-/// What is read is what is written of it.
+/// Reads an array; what is written of the array must read as the same.
 void read_npz_bytes(std::string_view content) {
   const learn::ByteArray read = learn::read_npz(folder().write("a.npz", content));
   learn::write_npz(folder() / "again.npz", read.shape, read.values);

@@ -13,8 +13,8 @@ struct Target {
 
 std::span<const Target> targets();
 
-/// Whether the reader takes the content. Of what it throws, only the library's errors, in one line that C
-/// strings hold whole, mean that it does not; everything else goes on to the caller.
+/// True if the reader takes the content, false if it throws one of the library's errors, in one line that C
+/// strings hold whole; everything else goes on to the caller.
 bool accepts(const Target& target, std::string_view content);
 
 }  // namespace dpr::fuzz

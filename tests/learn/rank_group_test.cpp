@@ -1,4 +1,4 @@
-// What ranks exchange, against the same computed from the whole: the ranks are threads here.
+// Exchange between ranks, against the same computed from the whole: the ranks are threads here.
 #include "learn/rank_group.hpp"
 
 #include <doctest/doctest.h>

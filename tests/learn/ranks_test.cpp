@@ -1,4 +1,4 @@
-// What a launcher tells the processes that train together.
+// Variables by which a launcher tells processes that they train together.
 #include "learn/ranks.hpp"
 
 #include <doctest/doctest.h>

@@ -1,4 +1,4 @@
-// What kind of surface a mesh is: closed, open, torn, turned inside out in parts.
+// Kinds of surfaces: closed, open, torn, turned inside out in parts.
 #include "mesh/mesh_facts.hpp"
 
 #include <doctest/doctest.h>

@@ -45,7 +45,7 @@ class Random {
   std::mt19937 engine_;
 };
 
-// Of all magnitudes, with many that are equal.
+// A number of any magnitude; many are equal.
 float coordinate(Random& random) {
   if (random.one_in(3)) return static_cast<float>(random.below(4));
   const int exponent = random.one_in(4) ? static_cast<int>(random.below(200)) - 100 : 0;

@@ -1,4 +1,4 @@
-// What mesh files say of surfaces beside colours: materials and normals of OBJ, normals and texture
+// Surfaces in mesh files beside colours: materials and normals of OBJ, normals and texture
 // coordinates of PLY.
 #include <doctest/doctest.h>
 

@@ -17,7 +17,7 @@ fi
 mkdir -p "$root/dpr"
 git ls-files -co --exclude-standard -z -- CMakeLists.txt CMakePresets.json cmake include kernels lib |
   tar --null -T - -c | tar -x -C "$root/dpr"
-# What drivers ask about the machine.
+# Drivers ask these about the machine.
 trap 'umount "$root/proc" "$root/sys"' EXIT
 mount -t proc proc "$root/proc"
 mount -t sysfs -o ro sysfs "$root/sys"

@@ -82,7 +82,7 @@ if [[ ${1:-} == --packages ]]; then
   exit
 fi
 
-# What of a step's output is a result.
+# The part of a step's output that is a result.
 declare -A fact=([demo]='to [0-9.]* degrees' [check]='[0-9]* comparisons' [kernels]='[0-9]* compilations.*'
   [unit]='[0-9]* tests failed out of [0-9]*' [test]='[0-9]* tests failed out of [0-9]*')
 

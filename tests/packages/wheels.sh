@@ -17,7 +17,7 @@ if (($# > 1)); then
   cp README.md "$root/dpr/"
   cp tests/packages/wheels.sh "$root/dpr/tests/packages/"
   cp "$wheels"/*.whl "$root/dpr/wheels/"
-  # What drivers ask about the machine.
+  # Drivers ask these about the machine.
   trap 'umount "$root/proc" "$root/sys"' EXIT
   mount -t proc proc "$root/proc"
   mount -t sysfs -o ro sysfs "$root/sys"

@@ -35,7 +35,7 @@ Scene two_meshes(int width, int height) {
   return scene;
 }
 
-/// Where the ray through a pixel's centre meets a face, camera space: depth and barycentrics.
+/// Hit of the ray through a pixel's centre on a face, camera space: depth and barycentrics.
 struct Hit {
   double depth = std::numeric_limits<double>::infinity();
   std::int32_t face = -1;

@@ -41,7 +41,7 @@ Scene soup_scene(int width, int height, Composition composition) {
   return scene;
 }
 
-/// What a corner of a face shows.
+/// Value that a corner of a face shows.
 using CornerValue =
     std::function<Vec3d(const reference::Scene& scene, const reference::PreparedScene& prepared,
                         std::size_t face, std::size_t corner)>;
@@ -53,7 +53,7 @@ Vec3d world_normal(const reference::PreparedScene& prepared, std::size_t face) {
       reference::cross(prepared.vertices[f[1]].world - a, prepared.vertices[f[2]].world - a));
 }
 
-/// Of scenes with one mesh.
+/// Values of scenes with one mesh.
 CornerValue corner_value(Attribute attribute) {
   return [=](const reference::Scene& scene, const reference::PreparedScene& prepared, std::size_t face,
              std::size_t corner) -> Vec3d {

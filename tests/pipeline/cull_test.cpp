@@ -13,7 +13,7 @@ using dpr::test::reduced;
 
 namespace {
 
-/// Whether a face winds clockwise in the image: what of it lies beyond the near plane does.
+/// True if a face winds clockwise in the image: what of it lies beyond the near plane does.
 bool is_back(const reference::PreparedScene& prepared, std::size_t face) {
   const std::vector<reference::Vec3d> corners = reference::visible_corners(prepared, face);
   double area = 0;

@@ -1,4 +1,4 @@
-// What the tests of determinism render, and whether images and gradients are the same, bit by bit.
+// Scenes of the tests of determinism, and the comparison of images and gradients bit by bit.
 #pragma once
 
 #include <cstring>

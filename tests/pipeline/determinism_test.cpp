@@ -27,7 +27,7 @@ bool is_finite(const Result& result) {
   return true;
 }
 
-/// What a renderer holds that grows with the fragments of a band, without what every buffer has for the loads
+/// Bytes of a renderer that grow with the fragments of a band, without those that every buffer has for loads
 /// of whole vectors.
 std::size_t fragment_memory(const Renderer::Impl& m) {
   constexpr std::size_t k_padding = 32 * sizeof(float);

@@ -1,5 +1,5 @@
-// What lies so far behind an opaque triangle that nothing is seen of it has no fragments: the frame with all
-// of them.
+// Samples so far behind an opaque triangle that nothing is seen of them have no fragments: the frame equals
+// the one with all fragments.
 #include <doctest/doctest.h>
 
 #include <limits>

@@ -1,4 +1,4 @@
-// What the joint composition promises: its exact image is the mean of rigid images whose distances and depths
+// Promises of the joint composition: its exact image is the mean of rigid images whose distances and depths
 // are perturbed, and its colour and alpha agree, since what no triangle covers is the background.
 #include <doctest/doctest.h>
 
@@ -27,7 +27,7 @@ namespace {
 
 /// How many standard errors a mean, and how many standard deviations a sum of squares, may be away.
 constexpr double k_standard_errors = 4;
-/// What single precision and the quadrature of the exact renderer may add to a pixel.
+/// Error of a pixel by single precision and the quadrature of the exact renderer.
 constexpr double k_rounding = 2e-6;
 /// No noise is drawn for a distance of so many sigma: in a thousand million draws none is that large
 /// (2e-19 each).

@@ -27,7 +27,7 @@ namespace {
 
 /// How many standard errors a mean may be away: for a right estimator once in 16,000 figures.
 constexpr double k_standard_errors = 4;
-/// What single precision and the quadrature of the exact renderer may add, relative to the figure's own size.
+/// Error by single precision and the quadrature of the exact renderer, relative to the figure's own size.
 constexpr double k_rounding = 1e-4;
 
 /// One vector of a render: the image's colours, or a block of gradients.
@@ -127,7 +127,7 @@ Scene test_scene(Prior prior, int size) {
   return scene;
 }
 
-/// What is sampled in one comparison.
+/// Settings of one comparison.
 struct Case {
   Composition composition;
   Prior prior;
@@ -253,7 +253,7 @@ TEST_SUITE("statistical") {
         ++count;
         if (z > worst) worst_name = name + ", " + figures[i].name;
         worst = std::max(worst, z);
-        // What must not pass: a figure of twice the length, or with the other sign.
+        // A figure of twice the length, or with the other sign, must not pass.
         const double wrong =
             std::min(deviation(2 * mean, 2 * error, expected), deviation(-mean, error, expected));
         power[figures[i].name] = std::max(power[figures[i].name], wrong);
@@ -301,7 +301,7 @@ TEST_SUITE("statistical") {
     const Sample few = sample(device, scene, grad, figures, 64);
     scene.smoothing.samples = 64;
     const Sample many = sample(device, scene, grad, figures, 64);
-    // Of 64 seeds a standard error is known to 9%.
+    // A standard error of 64 seeds is known to 9%.
     REQUIRE(figures[0].name == "image");
     CHECK(few.standard_error[0] / many.standard_error[0] > 1.5);
     CHECK(few.standard_error[0] / many.standard_error[0] < 2.7);

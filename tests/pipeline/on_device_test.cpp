@@ -167,7 +167,7 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("on device: noise on the pixel") {
-    // Of a mesh that is not closed: of one that is, the ordinary path leaves out what looks away.
+    // The mesh is not closed: of a closed one the ordinary path leaves out faces that look away.
     Scene scene = scene_of(random_soup(9, 4), reduced(24, 9), reduced(20, 8));
     scene.smoothing = smoothing_preset("pixel");
     scene.smoothing.sigma = 2e-3F;

@@ -50,7 +50,7 @@ Scene cut_triangle(const std::vector<glm::vec3>& corners) {
   return scene;
 }
 
-/// What is left is a quadrilateral, and a triangle.
+/// Triangles of which the near plane leaves a quadrilateral, and a triangle.
 std::vector<Scene> cut_triangles() {
   return {cut_triangle({{-0.8F, -0.5F, -3.0F}, {0.9F, -0.6F, -3.5F}, {0.15F, 0.6F, 0.4F}}),
           cut_triangle({{-0.4F, -0.3F, 0.2F}, {1.9F, 1.1F, -4.5F}, {-0.2F, 0.5F, 0.5F}})};
@@ -149,8 +149,8 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
   return list;
 }
 
-/// Where contours meet, what they take of the samples around has an error of second order in the samples'
-/// distance: of the geometry's gradients a share that falls as the resolution grows, more where corners are
+/// Contours that meet take colours of the samples around with an error of second order in the samples'
+/// distance: a share of the geometry's gradients that falls as the resolution grows, more where corners are
 /// sharp, and most where the near plane cuts surfaces open that hide parts of each other.
 struct Tolerance {
   double geometry, others;  // times the squared width

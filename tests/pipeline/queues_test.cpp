@@ -34,7 +34,7 @@ std::vector<float> moving_positions(const Mesh& mesh, int frames) {
   return all;
 }
 
-/// What every frame gives on its own, by way of the host: the gradient of half the sum of the squared image.
+/// Gradients of every frame alone, by way of the host: of half the sum of the squared image.
 std::vector<float> expected_gradients(const Scene& scene, const std::vector<float>& positions) {
   Renderer renderer(open_device());
   renderer.set_scene(scene);

@@ -19,7 +19,7 @@ using dpr::test::reduced;
 
 namespace {
 
-// What counts as equal. The Cauchy prior's heavy tails cost digits.
+// Tolerances. The Cauchy prior's heavy tails cost digits.
 constexpr double k_image_largest = 1e-4;
 constexpr double k_image_mean = 1e-6;
 constexpr double k_block = 1e-3;

@@ -43,7 +43,7 @@ std::vector<double> numbers(const std::vector<glm::vec3>& list) {
   return values;
 }
 
-/// Of a pixel's fragments: dL/dz and dL/ds in scales of their noise, one after the other.
+/// Gradients of a pixel's fragments: dL/dz and dL/ds in scales of their noise, one after the other.
 std::vector<double> scaled_fragment_gradients(const Renderer& renderer) {
   const Renderer::Impl& m = renderer.impl();
   const std::vector<float> depth = m.aggregate.grad_depth.download(),
@@ -106,7 +106,7 @@ TEST_SUITE("statistical") {
       positions.add(numbers(gradient.meshes[0].positions));
       gamma.add({gradient.gamma});
     }
-    // Of 64 and 200 replicates deviations are known to 9% and 5%; their root mean squares far better.
+    // Deviations of 64 and 200 replicates are known to 9% and 5%; their root mean squares far better.
     const double loose = reduced(30, 100) / 100.0, tight = reduced(10, 40) / 100.0;
     CHECK(error.image_rms() == doctest::Approx(rms(image.all())).epsilon(tight));
     CHECK(rms(numbers(error.images[0])) == doctest::Approx(error.image_rms()).epsilon(1e-6));

@@ -55,7 +55,7 @@ std::vector<glm::vec4> joined(const std::vector<Image>& images) {
   return pixels;
 }
 
-/// What the scenes' own renderers give, which have been rendered.
+/// Gradients of the scenes' own renderers, which have been rendered.
 std::vector<SceneGradient> gradients_alone(std::vector<Renderer>& alone, std::span<const Image> weights) {
   std::vector<SceneGradient> gradients;
   for (Renderer& renderer : alone) {

@@ -1,4 +1,4 @@
-// What a renderer has rendered before leaves no trace: every scene has the bits of a fresh renderer after
+// Earlier renders leave no trace: every scene has the bits of a fresh renderer after
 // every other, by whatever way its shape comes; and what is held is told.
 #include <doctest/doctest.h>
 

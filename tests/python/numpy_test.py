@@ -36,7 +36,7 @@ class OfDlpack:
 
 
 def run(code, **environment):
-    """What a Python that has the package says, and its status."""
+    """Output and status of a Python that has the package."""
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300,
                             env={**os.environ, **environment})
     return result.returncode, result.stdout + result.stderr
@@ -44,7 +44,7 @@ def run(code, **environment):
 
 class NumpyTest(unittest.TestCase):
     def check_gradient(self, name, change, wrt, arguments, settings=SMOOTH, tolerance=2e-3):
-        """Of a sum of pixels, along a direction: against its difference. `change(arguments, step)` moves the arrays and
+        """Compares a sum of pixels' gradient along a direction with its difference. `change(arguments, step)` moves the arrays and
         gives the direction's scalar product with a gradient."""
         renderer = dpr.Renderer(SIZE, SIZE, **settings)
         weights = random(2, SIZE, SIZE, 4, seed=3) - 0.5

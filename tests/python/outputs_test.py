@@ -28,7 +28,7 @@ class OutputsTest(RenderTest):
         return total
 
     def test_values(self):
-        """Of a wall before the camera, and of what has no gradient."""
+        """Values of a wall before the camera, and outputs without a gradient."""
         views, intrinsics = cameras(2)
         wall = torch.tensor([[-9.0, -9.0, 0.0], [9.0, -9.0, 1.0], [0.0, 9.0, 0.0]])
         corners = torch.tensor([[0.0, 0.0], [1.0, 0.0], [0.5, 2.0]])

@@ -41,7 +41,7 @@ def random(*shape, seed=1):
 
 
 def image_of(renderer):
-    """What a process of its own renders."""
+    """Images that a process of its own renders."""
     return renderer(TETRAHEDRON, FACES, *cameras(1))
 
 
@@ -53,7 +53,7 @@ def put_image_or_error(queue, renderer):
 
 
 def in_process(method, renderer):
-    """What put_image_or_error() finds in a process that is started by that method."""
+    """Result of put_image_or_error() in a process that is started by that method."""
     context = multiprocessing.get_context(method)
     queue = context.Queue()
     process = context.Process(target=put_image_or_error, args=(queue, renderer))

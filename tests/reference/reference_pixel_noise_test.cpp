@@ -16,7 +16,7 @@ using namespace dpr::reference;
 
 namespace {
 
-/// Of an image that is not higher than wide NDC is (x, y) at depth 1.
+/// Scene of an image that is not higher than wide, in which NDC is (x, y) at depth 1.
 Scene flat_scene(int width, int height) {
   Scene scene;
   scene.width = width;

@@ -1,4 +1,4 @@
-/// What the tests of the reference renderer share: fixed random numbers, packing of parameters, moved
+/// Support shared by the tests of the reference renderer: fixed random numbers, packing of parameters, moved
 /// matrices.
 #pragma once
 

@@ -176,7 +176,7 @@ TEST_SUITE("robustness") {
     check_no_image();
     renderer.forward();
     CHECK(is_finite(renderer.image()));
-    // What changes the scene makes the last image history.
+    // A change of the scene ends the last image.
     renderer.set_positions(0, scene.meshes[0].mesh.positions);
     check_no_image();
     renderer.forward();

@@ -70,7 +70,7 @@ struct Worst {
   double edge = 0, inside = 0;
 };
 
-/// Of the faces wholly before the camera.
+/// Worst error of the faces wholly before the camera.
 Worst worst_drawn(const Scene& scene) {
   constexpr int k_steps = 12;
   Worst worst;

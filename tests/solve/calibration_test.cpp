@@ -131,7 +131,7 @@ Vector flat(const SceneGradient& gradient) {
   return result;
 }
 
-/// What differs from the pictures, and its gradient in units.
+/// Difference from the pictures, and its gradient in units.
 class Objective {
  public:
   Objective(const Device& device, const Scene& scene, const std::vector<Image>& pictures)
@@ -155,7 +155,7 @@ class Objective {
   Vector unit_;
 };
 
-/// What Broyden, Fletcher, Goldfarb & Shanno's steps know of the curvature: the inverse of the Hessian.
+/// Curvature that Broyden, Fletcher, Goldfarb & Shanno's steps know: the inverse of the Hessian.
 class InverseHessian {
  public:
   explicit InverseHessian(const Vector& gradient) { restart(gradient); }

@@ -328,7 +328,7 @@ TEST_SUITE("statistical") {
   }
 
   TEST_CASE("leave-one-out over stratified draws would be biased") {
-    // What is refused: the mean of the others knows which stratum is left.
+    // Stratified draws are refused: the mean of the others knows which stratum is left.
     const Product f;
     const std::vector<double> exact = exact_figures(f, Prior::gaussian).all();
     Statistics biased;

@@ -96,7 +96,7 @@ glm::dvec2 place_in_picture(const dpr::Camera& camera, const ShapeViews& views, 
   return ndc * (0.5 * std::min(views.width, views.height));
 }
 
-/// Of the vertices in the two pictures, pixels, root mean square.
+/// Root mean square distance of the vertices in the two pictures, pixels.
 double distance_pixels(const ShapeViews& views, const Mesh& a, const dpr::Camera& camera_a, const Mesh& b,
                        const dpr::Camera& camera_b) {
   double sum = 0;

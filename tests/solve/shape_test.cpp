@@ -81,7 +81,7 @@ struct Measured {
   dpr::Image depth, normal;
 };
 
-/// What a perfect sensor sees of a mesh.
+/// Measurements of a mesh by a perfect sensor.
 Measured measured(const dpr::Device& device, const Mesh& mesh, const dpr::Camera& camera) {
   dpr::Scene scene;
   scene.width = scene.height = reduced(32, 8);

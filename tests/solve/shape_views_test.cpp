@@ -13,7 +13,7 @@ namespace {
 using dpr::Image;
 using dpr::test::TempDir;
 
-/// Whether the image, written in a format, is taken to show a silhouette.
+/// True if the image, written in a format, is taken to show a silhouette.
 bool shows_silhouette(const Image& image, const std::string& name) {
   const TempDir folder;
   dpr::write_image(folder / name, image);

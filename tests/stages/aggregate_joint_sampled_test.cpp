@@ -89,7 +89,7 @@ struct JointSamples {
   SyntheticFrame::Gradients gradients;
 };
 
-/// What the exact composition says: occupancies from the distances, and by their chain rule back to them.
+/// Result of the exact composition: occupancies from the distances, and the chain rule back to distances.
 struct Exact {
   Exact(const SyntheticPixel& pixel, const Smoothing& smoothing) {
     const auto prior = static_cast<ref::Prior>(smoothing.occupancy_prior);

@@ -96,7 +96,7 @@ struct Run {
     buffer.fill(cl_float4{{dpr::test::k_poison, 0, 0, dpr::test::k_poison}});
   }
 
-  /// What the extents need of the frame whose samples the raster are.
+  /// Parameters that the extents need, of the frame whose samples the raster holds.
   dpr::shared::FrameParams frame(const Case& c) const {
     dpr::shared::FrameParams p{};
     p.views = static_cast<cl_uint>(size.views);
@@ -210,7 +210,7 @@ std::vector<double> reference_image(const Case& c, double scale, int margin, con
   return apply(matrix(c.height), matrix(c.width), raster);
 }
 
-/// Whether the density is smooth enough to be sampled.
+/// True if the density is smooth enough to be sampled.
 bool has_reference(const Case& c) { return c.prior != Prior::uniform && c.scale * c.supersampling >= 1; }
 
 }  // namespace
@@ -247,7 +247,7 @@ TEST_SUITE("unit") {
     Run run(c);
     run.tile_starts.upload(run.device, std::vector<cl_uint>(run.tile_count(c) + 1, 0));
     run.blur.find_extents(run.frame(c), run.tile_starts);
-    // Of a raster that is not all alike, so that means are told from samples.
+    // The raster is not all alike, so that means are told from samples.
     for (const cl_float4& pixel : run.forward()) {
       CHECK(std::ranges::any_of(run.raster, [&](const cl_float4& sample) {
         return std::memcmp(&sample, &pixel, sizeof pixel) == 0;

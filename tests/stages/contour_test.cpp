@@ -77,7 +77,7 @@ Expected expected_contours(const Mesh& mesh) {
   return expected;
 }
 
-/// What the stage lists, and in which tiles.
+/// Contours that the stage lists, and their tiles.
 struct Found {
   std::map<Segment, std::set<cl_uint>> occludes, creases;
   std::size_t pairs = 0;

@@ -64,7 +64,7 @@ TEST_SUITE("unit") {
     Buffer<float> packed(device.impl(), 6);
     exchange.take({source.cl_buffer()(), 0, 3, 3}, 2, packed, 3);
     CHECK(packed.download() == std::vector<float>{1, 0, 0, 0, 2, 3});
-    // Of integers too, every bit: these are small numbers beyond floats', and one that is none.
+    // Integers keep every bit too: these are small numbers beyond floats', and one that is no number.
     const Buffer<cl_uint> integers(device.impl(), std::vector<cl_uint>{5, 0xffffffffU, 0x7f800001U});
     Buffer<cl_uint> copied(device.impl(), 3);
     exchange.give({integers.cl_buffer()(), 0, 1, 1}, 3, {copied.cl_buffer()(), 0, 1, 1});

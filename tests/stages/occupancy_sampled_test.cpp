@@ -191,7 +191,7 @@ TEST_SUITE("statistical") {
   }
 
   TEST_CASE("sampled occupancy: pixels, faces and seeds draw noise of their own") {
-    // Of two faces at distance zero the occupancies are binomial and independent: their correlation vanishes.
+    // The occupancies of two faces at distance zero are binomial and independent: their correlation vanishes.
     OccupancySamples samples({0.0F, 0.0F}, fragment_count());
     const auto run = [&](std::uint64_t seed) {
       samples.run(sampled_occupancy(Prior::gaussian, k_plain, 16, seed));

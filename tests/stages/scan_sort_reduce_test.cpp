@@ -223,7 +223,7 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("reduce: what a plain sum loses is kept") {
-    // Of one slot: 64 items apart, the slots' stride. The exact sum is the number of ones.
+    // Ones of one slot, 64 items apart, the slots' stride. The exact sum is their number.
     for (const std::size_t times : {1, 64, 640}) {
       std::vector<float> values;
       for (const float value : {1e8F, 1.0F, -1e8F}) values.insert(values.end(), times, value);

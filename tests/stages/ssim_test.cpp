@@ -115,7 +115,7 @@ TEST_SUITE("gradient") {
         image.rgba[i] = value - k_step;
         const double less = reference::mean_ssim(image, target, mask);
         image.rgba[i] = value;
-        // Of the mean over two views.
+        // The loss is the mean over two views.
         const double expected = -2 * (more - less) / (2 * k_step) / 2;
         const auto got = static_cast<double>(found.grad[view * pixels + i / 4].s[i % 4]);
         error += (got - expected) * (got - expected);

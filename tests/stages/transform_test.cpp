@@ -127,7 +127,7 @@ struct TransformErrors {
   Worst world, positions, model, camera, projection, distortion;
 };
 
-/// What a vertex adds to the sums of every channel. `flip` is 1, or -1 for a wrong sign of two of them.
+/// Terms of a vertex in the sums of every channel. `flip` is 1, or -1 for a wrong sign of two of them.
 std::vector<double> channels_of(const ref::TransformGradient& g, double flip) {
   std::vector<double> channels;
   const auto add = [&](const ref::Vec3d& v, double sign) {

@@ -1,4 +1,4 @@
-// What the library's blur kernel does along one axis, as a dense matrix in double precision.
+// The library's blur along one axis, as a dense matrix in double precision.
 #pragma once
 
 #include <cstddef>

@@ -33,7 +33,7 @@ struct Caller {
                       values.data());
   }
 
-  /// What a buffer holds, once the events have come and the queue is done.
+  /// Content of a buffer once the events have come and the queue is done.
   template <class T = float>
   std::vector<T> read(const cl::Buffer& buffer, const std::vector<cl::Event>& after = {}) const {
     std::vector<T> values(buffer.getInfo<CL_MEM_SIZE>() / sizeof(T));

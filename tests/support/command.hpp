@@ -21,7 +21,7 @@ inline std::string program_path(const char* variable) {
   return path;
 }
 
-/// Whether a test has no program to run, and says so.
+/// True if a test has no program to run, and says so.
 inline bool is_skipped(const char* variable = "DPR_CLI") {
   if (!program_path(variable).empty()) return false;
   MESSAGE("skipped: " << variable << " is not set, or DPR_TEST_REDUCED is");

@@ -1,4 +1,4 @@
-// Where the files are that tests compare with.
+// Folder of the files that tests compare with.
 #pragma once
 
 #include <filesystem>

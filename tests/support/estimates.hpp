@@ -29,7 +29,7 @@ struct Estimate {
   double mean() const { return sum / static_cast<double>(count); }
   double variance() const { return std::max(squares / static_cast<double>(count) - mean() * mean(), 0.0); }
   double standard_error() const { return std::sqrt(variance() / static_cast<double>(count - 1)); }
-  /// Whether the mean is within four standard errors of `exact`, or the estimates all agree with it.
+  /// True if the mean is within four standard errors of `exact`, or the estimates all agree with it.
   bool agrees_with(double exact) const {
     return std::abs(mean() - exact) <= 4 * standard_error() + 1e-6 * std::max(1.0, std::abs(exact));
   }

@@ -7,7 +7,7 @@
 
 namespace dpr::test {
 
-/// For its life no file that this process writes grows beyond so many bytes: writing more fails.
+/// Limits the files that this process writes to so many bytes while the object lives: writing more fails.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

@@ -1,4 +1,4 @@
-// What an expression throws, as text, so that a test can say what a message must name.
+// Message that an expression throws, so that a test can say what it must name.
 #pragma once
 
 #include <doctest/doctest.h>

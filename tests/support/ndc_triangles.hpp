@@ -78,7 +78,7 @@ class NdcStages {
     params.perspective_correct = frame.perspective_correct ? 1 : 0;
   }
 
-  /// What lies that much behind another triangle, normalised depth, is left out from now on.
+  /// Leaves out samples that lie that much behind another triangle, normalised depth, from now on.
   void hide(float reach) { rasterize.hiding.emplace(reach, views_.cameras); }
   void set_up() { setup.forward(params, views_, geometry_, ndc_, hidden_, bin.pair_starts); }
   void list_pairs() {

@@ -24,10 +24,10 @@ class Network {
   Network(const Network&) = delete;
   Network& operator=(const Network&) = delete;
 
-  /// Whether this machine let us.
+  /// True if this machine allowed the network.
   bool is_made() const { return is_made_; }
   static std::string address(int machine) { return "10.213.7." + std::to_string(1 + machine); }
-  /// What a command line begins with to run there.
+  /// Prefix of a command line that runs there.
   std::vector<std::string> prefix(int machine) const { return {"ip", "netns", "exec", name(machine)}; }
   /// From now on everything that is sent is lost, and nobody is told.
   bool cut() const { return run("ip -n " + name(1) + " link set " + interface(1) + " down"); }

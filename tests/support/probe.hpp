@@ -23,7 +23,7 @@ inline const Device& test_device() {
 
 inline Device::Impl& device_impl() { return test_device().impl(); }
 
-/// What output buffers hold before a launch that should fill them.
+/// Content of output buffers before a launch that should fill them.
 inline constexpr float k_poison = std::numeric_limits<float>::quiet_NaN();
 
 template <class T>

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-/// Of unistd.h, which macOS leaves to the program.
+/// Declared here because macOS' unistd.h does not.
 extern "C" char** environ;
 
 namespace dpr::test {

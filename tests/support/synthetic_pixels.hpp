@@ -24,7 +24,7 @@ inline constexpr float k_znear = 1, k_zfar = 100;
 
 inline float log_of(float occupancy) { return occupancy > 0 ? std::log(occupancy) : DPR_LOG_ZERO; }
 
-/// What the kernel reads, as the reference takes it: the same floats.
+/// Inputs of the kernel as the reference takes them: the same floats.
 inline std::vector<reference::FragmentInput> reference_fragments(const SyntheticPixel& pixel) {
   std::vector<reference::FragmentInput> inputs;
   for (const SyntheticFragment& f : pixel) {
@@ -133,7 +133,7 @@ class SyntheticFrame {
   /// poisoned before.
   struct Gradients {
     std::vector<std::vector<float>> depth, log_occupancy, red, green, blue;  // [pixel][fragment]
-    // Of the sampled joint composition alone: [pixel][fragment] and [pixel].
+    // Inputs of the sampled joint composition alone: [pixel][fragment] and [pixel].
     std::vector<std::vector<float>> distance;
     std::vector<float> sigma;
     std::vector<float> gamma, alpha;    // [pixel]

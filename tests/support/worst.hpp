@@ -8,7 +8,7 @@
 
 namespace dpr::test {
 
-/// What is not a number is infinitely wrong, so that no comparison passes because it could not be made.
+/// Worst error of comparisons. NaN is infinitely wrong, so that no comparison passes because of one.
 struct Worst {
   double error = 0;
   std::string where = "nowhere";

@@ -1,4 +1,4 @@
-"""What every front ends in: NumPy arrays rendered by frames of the library, and their gradients."""
+"""Core of every front: NumPy arrays rendered by frames of the library, and their gradients."""
 import collections
 import ctypes
 import functools
@@ -26,7 +26,7 @@ or the beginning of that; ROW and COUNT may be empty."""
 
 class Part(collections.namedtuple("Part", "name leaf row count")):
     def of(self, array):
-        """What a frame has of an array; a view of its memory."""
+        """A frame's part of an array; a view of its memory."""
         if self.row is None:
             return array
         if self.name in ("views", "intrinsics"):
@@ -167,7 +167,7 @@ class Rendered:
                 if name in OTHERS or not names & _OF_OUTPUTS]
 
     def is_empty(self):
-        """Whether a frame shows no triangle."""
+        """True if a frame shows no triangle."""
         return any(frame.is_empty() for frame, _, _ in self._frames)
 
     def gradients(self, grads, wanted):
@@ -181,7 +181,7 @@ class Rendered:
         totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in wanted}
         for frame, parts, rows in self._frames:
             parts = [part for part in parts if part.leaf in totals]
-            # Where a frame has all of an array, and is the only one, it fills that.
+            # The only frame that has all of an array fills that array.
             found = [part.of(totals[part.leaf]) if len(self._frames) == 1 else np.empty_like(part.of(totals[part.leaf]))
                      for part in parts]
             _library.call("dpr_frame_backward", frame.handle, *c_arrays([(name, grad[rows]) for name, grad in raw.items()]),

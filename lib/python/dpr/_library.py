@@ -12,7 +12,7 @@ _HOW_TO_GET_A_DRIVER = ("install one: `apt install ocl-icd-libopencl1 pocl-openc
 
 
 class Error(RuntimeError):
-    """What the library refuses or fails to do."""
+    """Error of the library."""
 
 
 class InvalidArgument(Error, ValueError):
@@ -67,7 +67,7 @@ _SIGNATURES = {
 
 
 def _candidates():
-    """Where the library may be: as DPR_LIBRARY says, in the wheel, in the build tree, or the system's."""
+    """Places of the library: as DPR_LIBRARY says, in the wheel, in the build tree, or the system's."""
     if os.environ.get("DPR_LIBRARY"):
         return [os.environ["DPR_LIBRARY"]]
     package = pathlib.Path(__file__).parent

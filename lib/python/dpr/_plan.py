@@ -68,7 +68,7 @@ class InvalidName(_library.InvalidArgument, TypeError):
 
 
 class _Row:
-    """What a view has of an array: a row, or the beginning of that. No list, which textures may be."""
+    """A view's part of an array: a row, or the beginning of one. No list, which textures may be."""
 
     def __init__(self, array, row, count):
         self.array, self.row, self.count = array, row, count

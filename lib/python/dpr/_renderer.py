@@ -11,7 +11,7 @@ from . import _arrays, _frames, _library, _numpy, _plan
 from ._subdivision import Subdivision, corner_texcoords
 
 Array = Any
-"""Of NumPy, PyTorch, JAX, or any library with DLPack."""
+"""Array of NumPy, PyTorch, JAX, or any library with DLPack."""
 Meshes = Union[Array, Sequence[Array]]
 """An array, or a list of one a mesh."""
 
@@ -26,7 +26,7 @@ def _front_of_torch():
 
 
 class Renderer:
-    """What stays the same from call to call: size of the images, smoothing, clipping, culling, shading, device.
+    """Settings that stay the same from call to call: image size, smoothing, clipping, culling, shading, device.
 
     width, height   of the images, pixels, 1 to 16384
     device          OpenCL device: "" for DPR_DEVICE or else the best there is, "cpu", "gpu", a number, or a part of
@@ -141,7 +141,7 @@ class Renderer:
 
     def vjp(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, wrt: Iterable[str] = None,
             **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
-        """What a call returns, and a function from gradients of that to gradients of its arrays.
+        """Result of a call, and a function from gradients of the result to gradients of the call's arrays.
 
         The arguments are those of a call. wrt: names of those whose gradients are wanted, ("vertices", "lights") say;
         all float arrays that are given unless it says otherwise.
@@ -208,7 +208,7 @@ class Renderer:
 
 
 def _checked(name, value):
-    """Whether a setting is an array, of one number then."""
+    """True if a setting is an array, of one number then."""
     if _arrays.is_array(value):
         _plan.setting(name, value)
         return True

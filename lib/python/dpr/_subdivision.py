@@ -20,7 +20,7 @@ class Subdivision:
         self.texcoords = None
 
     def of_vertices(self, values):
-        """What vertices have, [V, C] or [N, V, C], positions and colours say, at the new ones: [V', C] or [N, V', C].
+        """Values of vertices, [V, C] or [N, V, C], such as positions, at the new vertices: [V', C] or [N, V', C].
 
         A weighted sum of old values, through which gradients flow back to them.
         """
@@ -31,12 +31,12 @@ class Subdivision:
         return first + second + third
 
     def of_faces(self, values):
-        """What faces have, [F, C] or [N, F, C], at the pieces: [F', C] or [N, F', C]."""
+        """Values of faces, [F, C] or [N, F, C], at the pieces: [F', C] or [N, F', C]."""
         _require_rows(values, len(self._old_faces), "a face")
         return values[..., _arrays.like(values, self._cut.face_of), :]
 
     def of_corners(self, values):
-        """What corners of the old faces have, [F, 3, C], at the pieces' corners: [F', 3, C].
+        """Values of the old faces' corners, [F, 3, C], at the pieces' corners: [F', 3, C].
 
         A weighted sum of the values at the corners of the same old face, so that seams between faces stay.
         """

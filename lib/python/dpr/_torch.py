@@ -27,7 +27,7 @@ def _require_first_derivative():
 
 
 def _gradients(rendered, grads, tensors, wanted):
-    """Of each tensor, None where not wanted."""
+    """Gradient of each tensor, None where not wanted."""
     found = rendered.gradients([None if grad is None else _arrays.to_numpy(grad) for grad in grads], wanted)
     return [_tensor(found[i]) if i in found else None for i in range(len(tensors))]
 
@@ -84,7 +84,7 @@ def _spec_of(text):
 
 
 _rendered = {}
-"""What compiled graphs hold, by the number in a tensor that they pass on; forgotten with the tensor's memory."""
+"""State of compiled graphs, by the number in a tensor that they pass on; forgotten with the tensor's memory."""
 _numbers = itertools.count()
 
 
