@@ -1,4 +1,4 @@
-// How much work a frame is, in the units of the cost table (costs.hpp).
+// Work of a frame, in the units of the cost table (costs.hpp).
 #pragma once
 
 #include "dpr/renderer.hpp"

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint64_t k_seed = 1;
 constexpr float k_noise = 0.01F;  // standard deviation of the target's, beside that of 8 bits
 constexpr double k_first_rate = 0.1, k_last_rate = 1e-3;
-// That an angle and a position move where a colour or a direction moves by 1.
+// Steps of an angle and of a position where a colour or a direction moves by 1.
 constexpr double k_degrees_of_a_step = 20, k_length_of_a_step = 4;
 
 /// Uniform numbers that are the same with every standard library.

@@ -52,7 +52,7 @@ class JsonNode {
   /// A whole number of at most that value; negative ones are refused.
   std::uint64_t whole_number(std::uint64_t most) const;
 
-  /// How messages call this value: "sigma (FILE)" and the like.
+  /// Name of this value in messages: "sigma (FILE)" and the like.
   std::string name() const;
   /// Throws InvalidArgument about this value.
   [[noreturn]] void fail(const std::string& got, const std::string& expected) const;

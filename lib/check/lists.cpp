@@ -26,7 +26,7 @@ Buffer<cl_uint> uploaded(Device::Impl& device, const std::vector<cl_uint>& value
   return Buffer<cl_uint>(device, std::span<const cl_uint>(values));
 }
 
-/// How many differ; all where the lengths do.
+/// Number of entries that differ; all where the lengths do.
 double differing(const std::vector<cl_uint>& found, const std::vector<cl_uint>& expected) {
   if (found.size() != expected.size()) return static_cast<double>(expected.size());
   std::size_t count = 0;

@@ -31,7 +31,7 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
                                   int width, int height, glm::vec3 background = glm::vec3(0),
                                   const std::optional<Lights>& lights = {});
 
-/// How far a shape is off what its views have measured, where it is seen: means of absolute differences of
+/// Difference of a shape from its views' measurements, where it is seen: means of absolute differences of
 /// depths, world units, and of normals' components. None: no view has measured them, or nothing is seen.
 struct MeasuredDifferences {
   std::optional<double> depth, normal;

@@ -1,4 +1,4 @@
-// Which materials and textures an OBJ file names.
+// Materials and textures that an OBJ file names.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// How far long work has come: a bar on a terminal, plain lines elsewhere.
+// Progress of long work: a bar on a terminal, plain lines elsewhere.
 #pragma once
 
 #include <chrono>

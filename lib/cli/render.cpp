@@ -117,7 +117,7 @@ void set_shading(Scene& scene, const std::string& word) {
   scene.lights->shading = shading;
 }
 
-/// How many triangles there are, and what became of them.
+/// Prints the number of triangles, and of those that were dropped.
 void print_triangles(const RenderOptions& options, const Scene& scene, const RenderStatistics& statistics) {
   std::size_t faces = 0;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) faces += mesh_of(scene, i).faces.size();

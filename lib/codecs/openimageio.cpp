@@ -32,7 +32,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& file) {
   return input;
 }
 
-// Which of the file's channels is red, green, blue and alpha; -1 where there is none.
+// Numbers of the file's channels that are red, green, blue and alpha; -1 where there is none.
 std::array<int, 4> channels_of(const OIIO::ImageSpec& spec) {
   if (spec.nchannels == 1) return {0, 0, 0, -1};
   if (spec.nchannels == 2) return {0, 0, 0, 1};

@@ -22,7 +22,7 @@ inline cl_uint to_uint(std::size_t value) {
   return static_cast<cl_uint>(value);
 }
 
-/// How many elements a buffer holds: a number, or an upper bound where so far only the device knows it; and
+/// Number of a buffer's elements, or an upper bound where so far only the device knows the number; and
 /// whether it is likely to be another one in the next frame, by a little.
 struct Length {
   Length(std::size_t count_) : count(count_) {}
@@ -120,7 +120,7 @@ class Buffer {
     return length_.count;
   }
   Length length() const { return length_; }
-  /// How many elements fit without growing.
+  /// Number of elements that fit without growing.
   std::size_t capacity() const { return capacity_ - std::min(capacity_, 2 * k_padding); }
   std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
   const cl::Buffer& cl_buffer() const { return buffer_; }

@@ -1,4 +1,4 @@
-// Which device is taken: by the caller's word, or the best that can be used.
+// Choice of a device: by the caller's word, or the best that can be used.
 #pragma once
 
 #include <cstddef>

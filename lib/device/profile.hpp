@@ -1,4 +1,4 @@
-// How long every kernel of a device runs, by OpenCL's own events.
+// Times of a device's kernels, by OpenCL's own events.
 #pragma once
 
 #include <string>

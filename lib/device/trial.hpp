@@ -1,4 +1,4 @@
-// How a device fares with the kernels of a frame, tried once in a process of its own: a driver that aborts
+// Trial of a device with the kernels of a frame, once in a process of its own: a driver that aborts
 // ends that one. The process is the dpr command, which is executed anew: a fork of a process whose OpenCL
 // implementation has threads and locks could hang, or crash where the driver is without fault.
 #pragma once

@@ -59,7 +59,7 @@ struct ImageLoss::Impl {
   float weight(std::size_t view, std::size_t loss) const {
     return view_weights[view * shared::DPR_LOSS_COUNT + loss];
   }
-  /// How many views gradients are those of a mean over: `views` at first, or a batch that these are part of.
+  /// Number of views in the mean whose gradients are taken: `views` at first, or a batch that has these.
   void set_views_of_mean(std::size_t count);
   const Buffer<cl_float4>& grad_image() const { return levels.front().grad_image; }
 
@@ -84,7 +84,7 @@ struct ImageLoss::Impl {
   void add_values(const Level& level);
   /// A loss that counts in some view.
   bool is_used(std::size_t loss) const { return (used >> loss & 1U) != 0; }
-  /// How many sums the losses before it need that count.
+  /// Number of sums of the losses in use before this one.
   std::size_t sums_before(std::size_t loss) const;
 
   Device device;

@@ -30,7 +30,7 @@ Mesh read_ply(const std::filesystem::path& file, std::string bytes, Notes& notes
 Mesh read_off(const std::filesystem::path& file, std::string_view text);
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 
-/// How a material of OBJ reflects light, as far as it is said.
+/// Reflection of light by a material of OBJ, as far as the file says.
 struct ObjReflection {
   std::optional<glm::vec3> diffuse, specular;  ///< Kd, Ks
   std::optional<float> shininess;              ///< Ns

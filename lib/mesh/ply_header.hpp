@@ -36,7 +36,7 @@ inline constexpr std::array<const char*, 3> k_custom_normals{"dpr_nx", "dpr_ny",
 inline constexpr const char* k_custom_corner_texcoords = "dpr_texcoord";
 inline constexpr const char* k_custom_texture = "dpr_texnumber";
 
-/// How the colours of an element arrive.
+/// Form in which the colours of an element arrive.
 struct ColorForm {
   bool custom = false;  ///< as custom properties
   bool native = false;  ///< as OpenMesh's colours

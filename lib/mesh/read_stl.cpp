@@ -56,7 +56,7 @@ Number little_endian(std::string_view bytes, std::size_t offset) {
   return std::bit_cast<Number>(bits);
 }
 
-/// How many bytes the number of facets promises.
+/// Bytes that the number of facets promises.
 std::uint64_t binary_size(std::string_view bytes) {
   return k_binary_header +
          std::uint64_t{little_endian<std::uint32_t>(bytes, k_binary_header - 4)} * k_binary_facet;

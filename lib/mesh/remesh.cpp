@@ -130,7 +130,7 @@ void collapse_short_edges(Halfedges& m, double shortest, double longest) {
   m.garbage_collection();
 }
 
-/// How far the valences of the four vertices of two faces are from those of a regular mesh if the edge's own
+/// Distance of the valences of two faces' four vertices from those of a regular mesh if the edge's own
 /// ends lose that many edges, and those across gain them.
 int irregularity(const Halfedges& m, const std::array<VertexHandle, 4>& vertices, int moved) {
   constexpr int k_regular = 6, k_regular_at_border = 4;

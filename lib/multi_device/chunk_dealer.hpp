@@ -1,4 +1,4 @@
-// Which device renders which chunk of a batch.
+// Assignment of a batch's chunks to devices.
 #pragma once
 
 #include <condition_variable>
@@ -18,7 +18,7 @@ struct Chunk {
 /// Views [0, views) in chunks of `size`, the last of what remains.
 std::vector<Chunk> make_chunks(std::size_t views, std::size_t size);
 
-/// How fast a device is, as far as it is known from the chunks that it has rendered.
+/// Speed of a device, as far as it is known from the chunks that the device has rendered.
 struct Pace {
   bool is_warm = false;         ///< has rendered a chunk; in the first kernels are built, so it is not timed
   double seconds_per_view = 0;  ///< 0: not known

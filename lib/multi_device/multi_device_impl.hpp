@@ -14,7 +14,7 @@
 
 namespace dpr {
 
-/// How often each part of the scene has been set.
+/// Number of times that each part of the scene has been set.
 struct Versions {
   std::uint64_t scene = 0, smoothing = 0, lights = 0;
   std::vector<std::uint64_t> positions, colors, texcoords, normals, materials;  // [mesh]

@@ -6,7 +6,7 @@
 
 namespace dpr::reference {
 
-/// How much pixels count in a window about one of them, and the constants, for values from 0 to 1.
+/// Weights of pixels in a window about one of them, and the constants, for values from 0 to 1.
 struct SsimWindow {
   static constexpr int radius = 5;
   static constexpr double deviation = 1.5, c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;

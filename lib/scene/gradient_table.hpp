@@ -33,7 +33,7 @@ inline bool is_per_view(GradientOf of) {
   return of == GradientOf::view || of == GradientOf::mesh_in_view || of == GradientOf::all_views;
 }
 
-/// Which of them: a view, and a mesh or light; 0 where there is one.
+/// Number of the view, and of the mesh or light; 0 where there is one.
 struct GradientIndex {
   std::size_t view = 0, item = 0;
 };
@@ -60,7 +60,7 @@ std::span<const GradientRow> gradient_rows();
 /// True if the input of a row's array exists in the scene, or in its view if the row is a view's.
 bool exists(const GradientRow& row, GradientIndex index, const Scene& scene, std::span<const View> views);
 
-/// How many arrays of a row a gradient has.
+/// Number of a gradient's arrays in a row.
 GradientIndex count_arrays(const GradientRow& row, const SceneGradient& gradient);
 
 /// Adds the numbers of one array to those of another; one without numbers becomes the other's equal. Throws

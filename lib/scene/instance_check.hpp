@@ -1,4 +1,4 @@
-// Which meshes may stand in a second place.
+// Check of the meshes that stand in a second place.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Which sides of triangles a lens bends.
+// Sides of triangles that a lens bends.
 #pragma once
 
 #include <array>

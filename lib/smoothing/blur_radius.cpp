@@ -1,4 +1,4 @@
-// How far a smoothing reaches, and how its reach follows sigma.
+// Reach of a smoothing, and its derivative by sigma.
 #include "dpr/smoothing.hpp"
 #include "smoothing/priors.hpp"
 

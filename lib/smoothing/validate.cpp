@@ -1,4 +1,4 @@
-// Which smoothings there are estimators for, and in what range their numbers must be.
+// Smoothings that there are estimators for, and the ranges of their numbers.
 #include <cmath>
 #include <string>
 
@@ -46,7 +46,7 @@ void validate_sampled_prior(Prior prior, Draws draws, const std::string& stage) 
   }
 }
 
-/// Which baselines, draws and numbers of samples make an unbiased estimator.
+/// Baselines, draws and numbers of samples that make an unbiased estimator.
 void validate_sampling(const Smoothing& s) {
   const bool paired = s.draws == Draws::antithetic;
   if (paired && s.samples % 2 != 0) {

@@ -20,7 +20,7 @@ struct Candidate {
   void restart() { damping = 0, is_still = false; }
 };
 
-/// How many times as often as asked the candidates are turned while the best one still falls.
+/// Factor on the number of steps while the best candidate still falls.
 inline constexpr unsigned k_patience = 4;
 
 /// The step -(H + damping diag(H))^-1 g; false where H is not positive definite even so.

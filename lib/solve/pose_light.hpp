@@ -80,7 +80,7 @@ class LightFit {
 /// The same of residuals' sizes, which come out in another order; 0 of none.
 float robust_deviation(std::span<float> sizes);
 
-/// How corners have their normals where the mesh gives none: the mean over those faces at their vertex that
+/// Normals of corners where the mesh gives none: the mean over those faces at their vertex that
 /// no sharp edge parts from theirs, or over all.
 enum class CornerNormals { parted, smooth };
 

@@ -13,7 +13,7 @@
 namespace dpr {
 namespace {
 
-// How many hypotheses are turned at the coarsest level and at each one after it; the last number holds for
+// Numbers of hypotheses that are turned at the coarsest level and at each one after it; the last holds for
 // all further. A robust loss says little of a pose until details show: more must stay.
 using Beam = std::array<std::size_t, 4>;
 constexpr Beam k_beam{96, 24, 12, 8}, k_robust_beam{192, 96, 32, 8};

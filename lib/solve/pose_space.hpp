@@ -31,7 +31,7 @@ class PoseSpace {
 
   std::size_t size() const { return size_; }
   Hypothesis moved(const Hypothesis& from, const Step& step) const;
-  /// How far each parameter goes to move the object's rim by a fraction `ndc` of the image.
+  /// Change of each parameter that moves the object's rim by a fraction `ndc` of the image.
   Step step_lengths(double ndc) const;
   /// The greatest of the steps' lengths over those that move the rim by 1 NDC.
   double length(const Step& step) const;

@@ -17,7 +17,7 @@ double pixel_scale(const ShapeOptions& options, unsigned level);
 struct ShapeLevel {
   ShapeLevel(const ShapeViews& all, const ShapeOptions& options, unsigned level);
 
-  /// Which views an iteration looks at: the first and how many.
+  /// Views that an iteration looks at: the first and their number.
   std::pair<std::size_t, std::size_t> batch(unsigned iteration) const;
 
   int width, height;
