@@ -133,7 +133,7 @@ DPR_API BufferView frame_history_view(Renderer& renderer);
 /// Enqueues the backward pass of the last frame as it is, emptied or not, for gradients that stay on the
 /// device: what GradientRequest asks for, to single precision, not checked for being finite. Neither waits
 /// nor reads, but for the first after a change of the views, lights, smoothing or request by the host.
-/// @param grad_images  d loss / d image, [view][height][width] of four floats; packed and at offset 0 it is
+/// `grad_images`: d loss / d image, [view][height][width] of four floats; packed and at offset 0 it is
 /// not copied, except with noise on the pixel wider than eight samples
 DPR_API void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events = {});
 
@@ -183,7 +183,7 @@ DPR_API FrameHistory frame_history(AttributeImages& images);
 /// The images, float4 [group][view][height][width]: RGB, and A. Valid until the next forward pass.
 DPR_API BufferView image_view(const AttributeImages& images);
 DPR_API void copy_images(AttributeImages& images, const BufferSpan& to, const Events& events = {});
-/// @param grad_images  d loss / d image, [group][view][height][width] of four floats
+/// `grad_images`: d loss / d image, [group][view][height][width] of four floats
 DPR_API void backward_on_device(AttributeImages& images, const BufferSpan& grad_images,
                                 const Events& events = {});
 /// Those of AttributeImages::backward(), by the names of gradient_view(renderer): "meshes[0].positions",
