@@ -50,7 +50,7 @@ DPR_ALWAYS_INLINE void gather_run(const BarrierPixel q, uint length, const Fragm
   *out = run;
 }
 
-/// What the pixel's fragments leave of the light behind them, too.
+/// Gathers the pixel's slots and the product of 1 - p, which its fragments leave of the light behind them.
 DPR_ALWAYS_INLINE void gather_pixel(const AggregateParams p, uint pixel, uint length,
                                     global const ViewParams* views, global const uint* starts,
                                     const Fragments f, global Slot* slots, Slots* run, float* transparency) {

@@ -29,7 +29,7 @@ typedef struct {
   FaceOf face;
 } Layers;
 
-/// What a pixel's fragments have in common.
+/// State shared by a pixel's fragments.
 typedef struct {
   SampledRun run;
   float nearest;      // view depth of the nearest fragment
@@ -103,7 +103,7 @@ DPR_ALWAYS_INLINE realn draw_depth(const AggregateParams p, const Pixel q, const
   return draw_noise(p.sampling, DPR_DEPTH_PRIOR, name, block);
 }
 
-/// What is seen in a block's samples, at the beta `largest`: -INFINITY for the background.
+/// Winner of each of a block's samples, at the beta `largest`: -INFINITY for the background.
 typedef struct {
   intn winner;
   realn largest;
@@ -114,7 +114,7 @@ static inline intn could_win(const Lead lead, const Coordinates c) {
   return c.beta + highest_noise(DPR_DEPTH_PRIOR) >= lead.largest;
 }
 
-/// What a block drew for the first fragments, kept for the backward pass: depths only where a sample covers.
+/// Noise of a block's first fragments, kept for the backward pass: depths only where a sample covers.
 typedef struct {
   realn distance[DPR_NOISE_CACHE], depth[DPR_NOISE_CACHE];
 } NoiseCache;
@@ -172,13 +172,13 @@ kernel void aggregate_joint_sampled_forward(
   image[pixel] = sum / (float)p.sampling.samples;
 }
 
-/// Where a pixel's fragments collect: wins, and the sums of add_scores for distance and depth.
+/// Sums of a pixel's fragments: wins, and the sums of add_scores for distance and depth.
 /// float[fragment]
 typedef struct {
   global float *wins, *by_distance, *distance_scores, *by_depth, *depth_scores;
 } FragmentSums;
 
-/// What a pixel collects besides.
+/// Other sums of a pixel.
 typedef struct {
   float y;
   ScaleSums sigma, gamma;

@@ -10,7 +10,7 @@
 // over all d of them has the constant d: the change of variables has the determinant gamma^-d.
 #include "sampled_pixel.h"
 
-/// What a pixel's slots have in common. A slot is a place in the pixel's run, or -1 for the background.
+/// State shared by a pixel's slots. A slot is a place in the pixel's run, or -1 for the background.
 typedef struct {
   SampledRun run;
   BarrierPixel barrier;
@@ -52,7 +52,7 @@ typedef struct {
   realn largest;
 } Lead;
 
-/// Whether a slot could win in any sample of the block. It could not where its largest noise were too little.
+/// True if a slot could win in any sample of the block. It could not where its largest noise were too little.
 static inline int could_win(const Lead lead, float beta) {
   return beta > DPR_LOG_ZERO && any_lane(beta + highest_noise(DPR_PRIOR) >= lead.largest);
 }

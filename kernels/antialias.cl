@@ -21,7 +21,7 @@ kernel void antialias_keep(const FrameParams p, global const uint* restrict tile
   for (uint row = rows.first; row < rows.last; ++row) copy_row(row_of(p, rows, row), from, kept);
 }
 
-/// What a sample's parts at a step take: the difference of the colours with the sample's own continued all
+/// Colours that a sample's parts at a step weigh: the difference of both with the sample's own continued all
 /// the way, and the sum of their changes.
 typedef struct {
   float4 difference, changes;
@@ -36,7 +36,7 @@ static inline Taken taken_at(const FrameParams p, const Steps steps, Sample s, i
   return t;
 }
 
-/// What contours add to a sample. One step after the other: unrolled, the colours around all four would be in
+/// Colour that contours add to a sample. One step after the other: unrolled, all four colours would be in
 /// registers at once.
 static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
                               global const float4* restrict raster) {
@@ -73,8 +73,8 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
   }
 }
 
-/// What the end of a step gives the step's cut. Where the parts are scaled by their `total`, so is what one
-/// of them changes.
+/// Gradient of a step's cut from the sample at the step's end. Where the parts are scaled by their `total`,
+/// so is the change by one of them.
 static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step, float total,
                                   global const float4* restrict raster, float4 grad) {
   const Taken taken = taken_at(p, steps, s, step, raster);
@@ -88,8 +88,8 @@ static inline Parts share_taken(const FrameParams p, const Steps steps, Sample s
   return parts_taken(cut_at(p, steps, s, step), turn_of(step)) / total;
 }
 
-/// What a sample is to the samples at a step from it, itself among them, if that is crossed; and to those
-/// at the next step, behind whose first it lies.
+/// Gradient that a sample receives from the samples at a crossed step from it, itself among them, and from
+/// those at the next step, behind whose first it lies.
 static inline float4 gradient_through(const FrameParams p, const Steps steps, Sample s, int step, float total,
                                       global const float4* restrict grad) {
   const int back = DPR_OPPOSITE(step);

@@ -5,10 +5,10 @@
 // to a sample, the less the sample's own colour counts, and the more what continues to it from those behind.
 #include "touched.h"
 
-/// How near a contour at a step is: 1 on the sample, 0 on the step's other end.
+/// Nearness of a contour at a step: 1 on the sample, 0 on the step's other end.
 static inline float nearness(Cut cut, float turn) { return clamp(0.5f + turn * cut.x, 0.0f, 1.0f); }
 
-/// How much of a sample's colour is replaced with what continues from behind. The third power leaves the
+/// Part of a sample's colour that the colour from behind replaces. The third power leaves the
 /// image most of what is seen, and still bounds the gradients of colours that grow with the root of the
 /// distance to a silhouette.
 static inline float share_faded(Cut cut, float turn) {
@@ -23,7 +23,7 @@ static inline Cut share_faded_gradient(Cut cut, float turn) {
                weight_of_slope_gradient(cut.y) * near2 * near);
 }
 
-/// What fades a sample: at most one step of either axis, since a colour continues from the other side.
+/// Steps that fade a sample: at most one of either axis, since a colour continues from the other side.
 typedef struct {
   int2 step;     // by axis; -1: none
   float2 share;  // 0 where nothing does; together at most 1
@@ -33,7 +33,7 @@ typedef struct {
 /// The same as it is kept: the share by each axis, negative for the step to the left or up.
 typedef float2 Shares;
 
-/// Of the steps of an axis, the one whose contour fades a sample; -1 if there is none.
+/// Step of an axis whose contour fades a sample; -1 if there is none.
 static inline int step_that_fades(const FrameParams p, const Steps steps, Sample s, int axis) {
   const uint ahead = at_step(p, steps, s, axis), back = at_step(p, steps, s, DPR_OPPOSITE(axis));
   if (is_contour(ahead) && back == DPR_NO_CROSSING)
@@ -110,7 +110,7 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
   }
 }
 
-/// What the gradient of a faded sample is to its cut at a step.
+/// Gradient of a faded sample with respect to its cut at a step.
 static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
                                   global const float4* restrict raster, global const float4* restrict grad) {
   const Fading f = fading_of(p, steps, s);
@@ -120,7 +120,7 @@ static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample
          share_faded_gradient(cut_at(p, steps, s, step), turn_of(step));
 }
 
-/// What a sample is to those that it continues to along a step: the next, and the one after that.
+/// Gradient that a sample receives from the next two samples along a step, which extrapolate from it.
 static inline float4 gradient_ahead(const FrameParams p, const Steps steps, Sample s, int step,
                                     global const float2* restrict shares,
                                     global const float4* restrict grad) {

@@ -33,7 +33,7 @@ kernel void attribute_weigh_backward(const uint groups, const uint pixels,
   grad_rendered[groups * pixels + i] = (float4)(grad_weight, 0.0f, 0.0f, 0.0f);
 }
 
-/// What faces show beyond a target: sum_j w_j (a_j - target) = RGB - A target. One work-item per pixel.
+/// Attributes minus a target: sum_j w_j (a_j - target) = RGB - A target. One work-item per pixel.
 /// in   pixels    of all views
 /// in   images    float4[pixel]  RGB, and A, the sum of the weights
 /// in   target    float4[pixel]
@@ -59,7 +59,7 @@ kernel void attribute_residual_backward(const uint pixels, global const float4* 
   grad_images[i] = (float4)(grad, -dot(grad, target[i].xyz));
 }
 
-/// What vertices show of where they are. One work-item per (view, vertex).
+/// Attributes of vertices: depths or positions. One work-item per (view, vertex).
 /// in   shows_depth  1: view depth, in all three channels; 0: the world position
 /// in   shown_views  those behind these show 1
 /// in   world        float4[view][vertex]
@@ -101,7 +101,7 @@ static inline float3 corner_at(global const float4* world, uint4 face, uint corn
   return world[corner == 0 ? face.x : corner == 1 ? face.y : face.z].xyz;
 }
 
-/// What faces show of how they lie: their normals, of length 1. One work-item per (view, face).
+/// Attributes of faces: their normals, of length 1. One work-item per (view, face).
 /// in   shown_views  those behind these show 1
 /// in   faces        uint4[face]  vertex indices
 /// in   world        float4[view][vertex]

@@ -6,7 +6,7 @@
 #include "group.h"
 #include "tiles.h"
 
-/// Where the pairs of tiles and triangles are listed.
+/// Lists of the pairs of tiles and triangles.
 typedef struct {
   global uint *face, *tile, *self;
 } Places;

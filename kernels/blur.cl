@@ -41,7 +41,7 @@ typedef float4 pixels_n;
 #define join_lines(lines, k) ((lines)[0][k])
 #endif
 
-/// Where a work-item's outputs are.
+/// Place of a work-item's outputs.
 typedef struct {
   uint image;     /* along columns */
   size_t in, out; /* first pixel of the column's or row's input; first output pixel */
@@ -110,7 +110,7 @@ static inline int2 samples_across(const BlurPass p, int2 inputs) {
   return (int2)(inputs.x * p.across_step + p.across_first, (inputs.y - 1) * p.across_step + p.across_end);
 }
 
-/// Whether a rectangle of samples lies outside of the extents. One row of tiles more is asked on each side.
+/// True if a rectangle of samples lies outside of the extents. One row of tiles more is asked on each side.
 static inline int is_outside(const BlurPass p, global const uint2* restrict extents, uint image, int2 rows,
                              int2 columns) {
   const int first = max(rows.x / DPR_TILE - 1, 0),
@@ -122,13 +122,13 @@ static inline int is_outside(const BlurPass p, global const uint2* restrict exte
   return 1;
 }
 
-/// Whether all that a block of outputs has taps for is there: else its sum is not that of all weights.
+/// True if all that a block of outputs has taps for is there: else its sum is not that of all weights.
 static inline int has_all_taps(const BlurPass p, int at, int block) {
   const int last = at * p.out_step + p.offset;
   return last - p.taps + 1 >= 0 && (last + (block - 1) * p.out_step) / p.in_step < (int)p.in_length;
 }
 
-/// Whether all inputs of a block along columns show the background.
+/// True if all inputs of a block along columns show the background.
 static inline int is_outside_columns(const BlurPass p, const BlurPlace place,
                                      global const uint2* restrict extents) {
   if (p.tile_rows == 0 || !has_all_taps(p, place.at, place.steps)) return 0;
@@ -230,7 +230,7 @@ static inline void row_sums(const BlurPass p, const BlurPlace place, global cons
   }
 }
 
-/// Of at most `most` pixels, a constant; by channels.
+/// Sum over at most `most` pixels, a constant, of products by channel.
 static inline float4 product_of_pixels(const float4* a, global const float4* restrict b, int count,
                                        int most) {
   float4 sum = 0.0f;
@@ -359,7 +359,7 @@ kernel void blur_rows_strided(const BlurPass p, global const uint2* restrict ext
   }
 }
 
-/// What a pass adds to the derivative by the scale: its output, with the weights' derivative, times the
+/// A pass's share of the derivative by the scale: its output, with the weights' derivative, times the
 /// gradient of the output. NDRange as blur_columns.
 /// in   extents  as blur_columns: outside the weights' derivative sums to 0
 /// in   weights  float[tap]  derivative, between zeros

@@ -104,7 +104,7 @@ kernel void blur_sampled_backward(const ShiftParams p, global const uint2* restr
   const uint2 at = (uint2)(i % stride, i / stride % rows) - origin;
   float4 sum = 0.0f;
   for (uint m = 0; m < p.sampling.samples; ++m) {
-    // Of a sample before the frame the difference wraps around, and is beyond it.
+    // The difference of a sample before the frame wraps around, and so lies beyond the frame.
     const uint2 pixel = (at - shifts[view * p.sampling.samples + m]) / p.supersampling;
     if (pixel.x < p.width && pixel.y < p.height)
       sum += grad_image[(view * p.height + pixel.y) * p.width + pixel.x];
@@ -112,7 +112,7 @@ kernel void blur_sampled_backward(const ShiftParams p, global const uint2* restr
   grad_raster[i] = sum / (float)(p.sampling.samples * p.supersampling * p.supersampling);
 }
 
-/// What a pixel adds to the derivative by the scale. One work-item per pixel. Deterministic. Inputs as
+/// A pixel's share of the derivative by the scale. One work-item per pixel. Deterministic. Inputs as
 /// blur_sampled_draw leaves them, blur_sampled_forward and blur_sampled_backward have them, and
 /// in   shift_scores  float[view][sample]
 /// in   raster, grad_image

@@ -223,7 +223,7 @@ typedef struct {
   float of[4][3];
 } OutlineWeights;
 
-/// Of corner `k` of the outline: a corner that is kept, or a cut.
+/// Weight of a face's corner in corner `k` of the outline, which is a kept corner or a cut.
 static inline float weight_of(const ClippedFace c, uint k, uint corner) {
   const uint kept = c.corners - 2;
   if (k < kept) return corner == (c.first + k) % 3 ? 1.0f : 0.0f;
@@ -304,7 +304,7 @@ kernel void clip_fragments(const FrameParams p, const uint last_pair,
   }
 }
 
-/// What the fragments of a clipped face add up to: gradients of the outline's corners, and of the cuts' parts
+/// Sums over the fragments of a clipped face: gradients of the outline's corners, and of the cuts' parts
 /// by the barycentrics.
 typedef struct {
   float3 corner[4];
@@ -368,7 +368,7 @@ static inline void add_outline_distances(const FrameParams p, const ClippedTrian
   }
 }
 
-/// What a cut's part changes by barycentrics with these gradients.
+/// Derivative with respect to a cut's part, from the gradients of barycentrics.
 static inline realn between_corners(const ClippedFace c, uint cut, realn grad_bary1, realn grad_bary2) {
   const uint lost = lost_corner(c, cut), kept = kept_corner(c, cut);
   const realn zero = 0.0f;
@@ -388,7 +388,7 @@ static inline void add_outline_barycentrics(const FrameParams p, const ClippedFa
   const BarycentricScale scale = barycentric_scale(triangle, p.perspective_correct);
   const uint k = is_second ? 2 : 1;
   const int are_cuts = is_second == t.has_second;  // both; else corner k + 1 is the first cut
-  // Of corners k and k + 1, relative to corner 0.
+  // Weights of corners k and k + 1, relative to corner 0.
   const float2 weight1 = (float2)(weight_of(c, k, 1), weight_of(c, k + 1, 1)) - weight_of(c, 0, 1);
   const float2 weight2 = (float2)(weight_of(c, k, 2), weight_of(c, k + 1, 2)) - weight_of(c, 0, 2);
   for (uint i = run.first; i < run.last; i += DPR_WIDTH) {

@@ -22,7 +22,7 @@ static inline uint lost_corner(const ClippedFace c, uint cut) {
   return (c.first + (c.corners == 4 ? 2 : 1 + cut)) % 3;
 }
 
-/// Which of its corners a clipped face loses.
+/// Corner that a clipped face loses.
 static inline int is_lost(const ClippedFace c, uint corner) {
   const uint place = (corner + 3 - c.first) % 3;
   return c.corners == 4 ? place == 2 : place > 0;
@@ -51,7 +51,7 @@ static inline float2 cut_ndc(const FrameParams p, float3 kept, float3 lost, floa
   return (kept.xy + part * (lost.xy - kept.xy)) / cut_divisor(p, znear);
 }
 
-/// What a cut's gradient, of x and y in NDC and of the part, adds to those of its corners' homogeneous
+/// Passes a cut's gradient, of x and y in NDC and of the part, to those of its corners' homogeneous
 /// coordinates: 1 - part of it to that which is kept, part of it to the other. For the depths,
 /// d part / d z_kept = (1 - part) / (z_kept - z_lost) and d part / d z_lost = part / (z_kept - z_lost).
 static inline float3 cut_gradient(const FrameParams p, global const ViewParams* view, const ClippedFace c,

@@ -6,7 +6,7 @@
 #include "clip.h"
 #include "geometry.h"
 
-/// What an edge is in a view. What a contour occludes lies behind it; a crease has surface on both sides.
+/// Role of an edge in a view. A contour occludes the surface behind it; a crease has surface on both sides.
 #define DPR_NO_CONTOUR 0
 #define DPR_OCCLUDES 1
 #define DPR_CREASE 2
@@ -66,12 +66,12 @@ static inline float3 corner_across(uint4 face, uint4 edge, global const float4* 
   return !is_same(y, first) && !is_same(y, second) ? y.xyz : ndc[face.z].xyz;
 }
 
-/// Which corner of a face a vertex is; 3 where it is none.
+/// Number of the face's corner that a vertex is; 3 where it is none.
 static inline uint corner_of_vertex(uint4 face, uint vertex) {
   return face.x == vertex ? 0 : face.y == vertex ? 1 : face.z == vertex ? 2 : 3;
 }
 
-/// What the edges of a view are read from.
+/// Inputs from which the edges of a view are read.
 typedef struct {
   global const uint2* edges;
   global const uint4* faces;
@@ -182,12 +182,12 @@ static inline TileSamples tile_samples(const FrameParams p, uint tile) {
   return s;
 }
 
-/// Whether a contour lies in one of the tiles [first, last] of a row; `tile_starts` are runs of pairs.
+/// True if a contour lies in one of the tiles [first, last] of a row; `tile_starts` are runs of pairs.
 static inline int have_contours(global const uint* tile_starts, uint first, uint last) {
   return tile_starts[last + 1] > tile_starts[first];
 }
 
-/// Whether a contour may cross a step of a tile's cells: it lies there, or in the tiles to the left and
+/// True if a contour may cross a step of a tile's cells: it lies there, or in the tiles to the left and
 /// above, whose steps reach into it.
 static inline int may_be_crossed(const FrameParams p, uint tile, global const uint* tile_starts) {
   const uint in_view = tile % (p.tiles_x * p.tiles_y), left = in_view % p.tiles_x > 0 ? 1 : 0;
@@ -209,7 +209,7 @@ static inline NearTiles near_tiles(const FrameParams p, uint tile, uint reach) {
   return tiles;
 }
 
-/// Whether a contour lies at most `reach` tiles away from a tile.
+/// True if a contour lies at most `reach` tiles away from a tile.
 static inline int is_near_contour(const FrameParams p, uint tile, uint reach,
                                   global const uint* tile_starts) {
   const NearTiles tiles = near_tiles(p, tile, reach);

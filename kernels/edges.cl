@@ -58,7 +58,7 @@ kernel void edges_list(const FrameParams p, const uint4 sizes, global const Open
   if (e.has_area) next[i] = atomic_xchg(heads + copy * sizes.z + bucket_of(e, sizes.z), own);
 }
 
-/// Whether the texture jumps between two open edges in one place.
+/// True if the texture jumps between two open edges in one place.
 static inline int texture_jumps(const OpenEdge own, const OpenEdge other, int same_direction) {
   if (own.texture != other.texture) return 1;
   if (own.texture == DPR_NO_TEXTURE) return 0;

@@ -67,7 +67,7 @@ static inline float side_error(const FrameParams p, const Triangle t) {
   return 0x1p-21f * (along_x * reach_y + along_y * reach_x) + DPR_EDGE_FLOOR;
 }
 
-/// Where along the edge its closest point lies, in [0, 1].
+/// Position of the edge's closest point along the edge, in [0, 1].
 static inline realn closest_on_edge(const Edge e) {
   return clamp((e.dx * e.ex + e.dy * e.ey) * e.inverse_length2, 0.0f, 1.0f);
 }
@@ -91,7 +91,7 @@ static inline realn triangle_distance2(const View3 v) {
   return lesser(lesser(edge_distance2(v.edge[0]), edge_distance2(v.edge[1])), edge_distance2(v.edge[2]));
 }
 
-/// Whether the triangle is nearer than the root of `limit`: a corner, or an edge that the sample is beside.
+/// True if the triangle is nearer than the root of `limit`: a corner, or an edge that the sample is beside.
 static inline intn is_within(const View3 v, float limit) {
   realn nearest = INFINITY;
 #pragma unroll
@@ -109,11 +109,11 @@ static inline float doubled_area(const Triangle t) {
   return (t.x1 - t.x0) * (t.y2 - t.y0) - (t.y1 - t.y0) * (t.x2 - t.x0);
 }
 
-/// Whether rounding has left nothing of the area. A sliver covers the samples that it owns, so that its
+/// True if rounding has left nothing of the area. A sliver covers the samples that it owns, so that its
 /// neighbours' meet; it is not blurred, and its barycentrics, all weight at vertex 0, have no gradient.
 static inline int is_sliver(const Triangle t) { return !(fabs(doubled_area(t)) > DPR_SLIVER_AREA); }
 
-/// What turns a triangle's edge functions into barycentrics: 1 / doubled area, signed, and 1 / depth of each
+/// Factors from a triangle's edge functions to barycentrics: 1 / doubled area, signed, and 1 / depth of each
 /// vertex if perspective correct. Common factors drop out later: they keep the numbers in range, whatever the
 /// unit of length and however thin the triangle. All zero for a sliver.
 typedef struct {

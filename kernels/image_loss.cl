@@ -22,10 +22,10 @@ static inline LossPixel make_pixel(float4 image, float4 target, float inverse_sc
   return p;
 }
 
-/// Whether a loss is one of the `used`; their sums lie one behind the other, in the order of the losses.
+/// True if a loss is one of the `used`; their sums lie one behind the other, in the order of the losses.
 #define DPR_IS_USED(used, name) (((used) >> name##_number & 1u) != 0)
 
-/// What every pixel adds to the sums of its view. One work-item per run of pixels.
+/// Sums of a view over the pixels. One work-item per run of pixels.
 /// in   pixels         of all views
 /// in   used           bit k: loss k counts
 /// in   inverse_scale_squared  of the robust loss
@@ -50,7 +50,7 @@ kernel void image_loss_forward(const uint pixels, const uint used, const float i
   }
 }
 
-/// What the gradients of a view's pixels have in common.
+/// Values shared by the gradients of a view's pixels.
 typedef struct {
   global const float *sums, *weights;
   uint views;

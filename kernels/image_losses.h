@@ -25,7 +25,7 @@ namespace dpr::shared {
 #endif
 
 #ifdef __OPENCL_C_VERSION__
-/// What losses see of a pixel.
+/// A pixel's inputs to losses.
 typedef struct {
   float4 image, target;  // RGBA
   float inverse_scale_squared;

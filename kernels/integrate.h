@@ -22,7 +22,7 @@ static inline float3 slot_color(const Slot s, const Fragments f, float3 backgrou
   return s.fragment == DPR_BACKGROUND_SLOT ? background : fragment_color(f, s.fragment);
 }
 
-/// Where the gradients of slots add up: float[fragment], and the background's.
+/// Sums of the slots' gradients: float[fragment], and the background's.
 typedef struct {
   global float *weight;     // w_k, or w_k / p_k in the joint composition
   global float *beta;       // dL/dbeta_k

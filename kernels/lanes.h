@@ -11,7 +11,7 @@
 #define DPR_WIDTH DPR_LANES /* the width of this file's vectors */
 #endif
 
-/// For what a call would cost more: of noise, inlined, the key's part in the generator's rounds is computed
+/// Inlines functions whose call would cost more: the key's part in the rounds of inlined noise is computed
 /// once for a whole launch on a CPU; and a structure that is handed over lies in memory.
 #define DPR_ALWAYS_INLINE static inline __attribute__((always_inline))
 
@@ -40,7 +40,7 @@ typedef uint uintn;
 #define DPR_LANE_INDEX 0
 static inline float sum_lanes(float v) { return v; }
 static inline float4 sum_lanes_of_4(float a, float b, float c, float d) { return (float4)(a, b, c, d); }
-/// Whether a comparison holds in any lane. By halves: PoCL's any() asks lane by lane.
+/// True if a comparison holds in any lane. By halves: PoCL's any() asks lane by lane.
 static inline int any_lane(int condition) { return condition; }
 #else
 typedef DPR_CONCAT(float, DPR_WIDTH) realn;

@@ -30,7 +30,7 @@ static inline float radial_factor(global const ViewParams* view, float radius2) 
   return 1.0f + radius2 * (view->radial[0] + radius2 * (view->radial[1] + radius2 * view->radial[2]));
 }
 
-/// Where the lens shows a tangent. Not contracted, so that faces that share a cut agree on it.
+/// Tangent as the lens shows it. Not contracted, so that faces that share a cut agree on it.
 static inline float2 bend_tangent(global const ViewParams* view, float2 tangent) {
 #pragma OPENCL FP_CONTRACT OFF
   const HeldTangent held = hold_tangent(view, tangent);

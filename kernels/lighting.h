@@ -15,7 +15,7 @@
 #define DPR_LIGHTS 0
 #endif
 
-/// Where the highlight's base is below this its logarithm stays finite.
+/// Least base of the highlight, which keeps the logarithm finite.
 #define DPR_LEAST_BASE 1e-30f
 
 /// One light at a point: everything that value and gradient share.
@@ -60,7 +60,7 @@ static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, glo
   return t;
 }
 
-/// What comes through the light's cone.
+/// Part of `v` that comes through the light's cone.
 static inline realn through_cone(const LightTerm t, realn v) {
   return (DPR_LIGHTS & DPR_LIGHTS_CONES) ? v * t.cone : v;
 }

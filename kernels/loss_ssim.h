@@ -9,7 +9,7 @@ enum { ssim_sums = 1, ssim_reads_alpha = 0 };
 /// Pixels from a window's middle to its border.
 #define DPR_SSIM_RADIUS 5
 
-/// Of a window: the moments, and the derivatives by those of the image.
+/// Numbers of a window: the moments, and the derivatives by those of the image.
 #define DPR_SSIM_MOMENTS 5
 #define DPR_SSIM_GRADIENTS 3
 

@@ -5,7 +5,7 @@
 /// Normals shorter than this have no direction, squared object units.
 #define DPR_MIN_HINGE_NORMAL 1e-20f
 
-/// What every vertex adds. One work-item per vertex of the mesh.
+/// Terms of every vertex. One work-item per vertex of the mesh.
 /// in   ring_starts  uint[vertex + 1]  runs of `ring`
 /// in   ring         uint[...]         the other vertices of a vertex' faces, each once
 /// in   positions    float4[...]       object space; the mesh's from p.first_vertex on
@@ -33,7 +33,7 @@ kernel void mesh_loss_vertices(const MeshLossParams p, global const uint* restri
   channels[p.vertices + v] = edges;
 }
 
-/// What every hinge adds: two faces with corners `a` and `b` across from their common edge from e0 to e1.
+/// Terms of every hinge: two faces with corners `a` and `b` across from their common edge from e0 to e1.
 /// Their normals are formed along the edge, so the faces' own orientation has no part in it. One work-item
 /// per hinge.
 /// in   hinges     uint4[hinge]      a, b, e0, e1

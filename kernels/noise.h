@@ -39,7 +39,7 @@
 #endif
 static inline int is_kept(int slot) { return DPR_LANES != 1 && slot < DPR_NOISE_CACHE; }
 
-/// Which decision the noise is for: the last word of the counter, beside the view.
+/// Decisions that noise is for: the last word of the counter, beside the view.
 #define DPR_STAGE_OCCUPANCY 0u
 #define DPR_STAGE_AGGREGATE 1u
 
@@ -63,7 +63,7 @@ static inline NoiseName name_noise(uint view, uint pixel, uint face, uint stage)
 /// Number of each lane's sample.
 static inline uintn sample_index(uint block) { return DPR_WIDTH * block + convert_uintn(DPR_LANE_INDEX); }
 
-/// Which lanes hold a sample: the last block may be a part of one.
+/// Lanes that hold a sample: the last block may be a part of one.
 static inline intn sample_counts(const Sampling s, uint block) {
   return sample_index(block) < (uintn)(s.samples);
 }
@@ -145,7 +145,7 @@ static inline realn add_group(const Sampling s, realn y) {
   return mad(s.leave_out, s.draws == DPR_ANTITHETIC ? y + partner : y, y);
 }
 
-/// What a scale, sigma or gamma, collects over variables and samples: sums of (y + G / (M - g)) (nu'(Z)
+/// Sums for a scale, sigma or gamma, over variables and samples: of (y + G / (M - g)) (nu'(Z)
 /// Z - 1) and of nu'(Z) Z - 1.
 typedef struct {
   realn by_score, scores;

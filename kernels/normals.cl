@@ -6,7 +6,7 @@
 /// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
 #define DPR_MIN_NORMAL 1e-20f
 
-/// Of length one, or zero where there is no direction; w = 1 / length, or zero.
+/// Vector of length one, or zero where there is no direction; w = 1 / length, or zero.
 static inline float4 unit_normal(float3 sum) {
   const float size = length(sum);
   const int has_direction = size > DPR_MIN_NORMAL && size < INFINITY;
@@ -102,7 +102,7 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
     const uint previous = corner == 0 ? face.z : corner == 1 ? face.x : face.y;
     // cross(b - a, c - a) . g has the gradient cross(b - c, g) for a, and so on around the face.
     const float3 g = sums[face.x].xyz + sums[face.y].xyz + sums[face.z].xyz;
-    // Where nothing is seen of the face it may lie anywhere, at infinity too.
+    // An unseen face may lie anywhere, at infinity too.
     if (any(g != 0.0f)) sum += cross(positions[next].xyz - positions[previous].xyz, g);
   }
   grad_world[i] += (float4)(sum, 0.0f);

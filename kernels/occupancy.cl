@@ -7,7 +7,7 @@
 #define DPR_OCCUPANCY_WIDTH DPR_FIXED_WIDTH
 #endif
 
-/// What a fragment's distance becomes: p, ln p, d ln p / ds, and x with d / dsigma = -x d / ds.
+/// Occupancy of a fragment: p, ln p, d ln p / ds, and x with d / dsigma = -x d / ds.
 typedef struct {
   realn p, log_p, slope, ratio;
 } Perturbed;
@@ -21,7 +21,7 @@ static inline intn is_inside(realn distance) { return as_intn(distance) >= 0; }
 
 #if DPR_OCCUPANCY_WIDTH == DPR_VARIABLE_WIDTH
 
-/// How far occupancies stay from 0 and 1, where the chain through ln p and the colour behind an opaque
+/// Least distance of occupancies from 0 and 1, where the chain through ln p and the colour behind an opaque
 /// triangle would be lost.
 #define DPR_RIGID_MARGIN 1e-6f
 

@@ -107,7 +107,7 @@ kernel void occupancy_sampled_backward(
   for (uint i = first; i < last; ++i) {
     const float x = distance[i] / p.sigma;
     grad_distance[i] = 0.0f;
-    // Where every sample agrees with the rigid solution, there is nothing beside the baseline.
+    // Samples that all agree with the rigid solution leave nothing beside the baseline.
     const int agrees =
         always_covers(x) || (!signbit(x) && occupancy[i] == 1.0f && p.sampling.baseline > 0.0f);
     if (occupancy[i] <= 0.0f || agrees) continue;

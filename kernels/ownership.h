@@ -1,4 +1,4 @@
-// Which side of an edge a point lies on, without a rounding error, and which triangle owns a sample.
+// Side of an edge on which a point lies, without a rounding error, and the triangle that owns a sample.
 // Triangles that share an edge own every sample there exactly once: the sign is that of the exact edge
 // function of the rounded coordinates, and a sample on the edge itself belongs to the triangle whose left or
 // upper edge it is. That is the sample moved to the right by less than any number, and down by much less, so
@@ -21,7 +21,7 @@
 #define DPR_EDGE_ERROR 1.8e-7f
 #define DPR_EDGE_FLOOR 1e-30f
 
-/// What rounding moves a projected coordinate by at most, in pixels of images up to 16384 wide or high.
+/// Most that rounding moves a projected coordinate, in pixels of images up to 16384 wide or high.
 #define DPR_BOUNDS_SLACK 1e-2f
 
 /// The largest coordinate is scaled to about 2^60: the products' sum stays below 2^128, and the products of
@@ -83,7 +83,7 @@ static inline int side_of_line(float2 a, float2 b, float2 p) {
   return exact_side(a, b, p);
 }
 
-/// Whether a sample belongs to the triangle, so far as the edge a -> b says.
+/// True if a sample belongs to the triangle, so far as the edge a -> b says.
 static inline int is_owned_at(float2 a, float2 b, float2 p, float orientation) {
   int side = side_of_line(a, b, p);
   if (side == 0) side = b.y < a.y || (b.y == a.y && b.x < a.x) ? 1 : -1;

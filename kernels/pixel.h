@@ -55,7 +55,7 @@ static inline float alpha_sensitivity(const Fragments f, uint fragment, float tr
   return f.occupancy[fragment] * transparency / fragment_transparency(f, fragment);
 }
 
-/// What the slots of a pixel have in common in the barrier composition.
+/// State shared by the slots of a pixel in the barrier composition.
 typedef struct {
   uint first, last;   // the pixel's run of the fragment lists
   float nearest;      // view depth of the nearest fragment
@@ -65,7 +65,7 @@ typedef struct {
   float transparency;  // prod (1 - p)
 } BarrierPixel;
 
-/// Of a pixel with `length` fragments. Nothing is returned: oclgrind cannot read what a structure is returned
+/// Loads a pixel's run of `length`. Nothing is returned: oclgrind cannot read what a structure is returned
 /// by where a call is always inlined.
 DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uint length,
                                         global const ViewParams* views, global const uint* starts,
@@ -117,7 +117,7 @@ static inline void swap_slots(global Slot* a, global Slot* b) {
   vstore4(moved, 0, (global uint*)b);
 }
 
-/// What a pixel adds to the gradients of gamma, alpha and the background colour, which had that weight in it.
+/// A pixel's share of the gradients of gamma, alpha and the background colour, which had that weight in it.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,
                                   float background_weight, float4 grad, global float* channels) {
   channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = background_weight * grad.x;

@@ -4,7 +4,7 @@
 
 #include "lanes.h"
 
-/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+/// Bounds of what is drawn: the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
 #define DPR_LOWEST_cauchy (-5.35e6f)
 #define DPR_HIGHEST_cauchy 5.35e6f
 
@@ -38,7 +38,7 @@ static inline realn cauchy_score(realn z) { return 2.0f * z / mad(z, z, 1.0f); }
 #define DPR_BARRIER_REACH INFINITY
 /// Slots within this distance of a cluster's head share its nodes.
 #define DPR_HEAD_WIDTH 1.0f
-/// How far the outermost nodes lie: the mass beyond is 1 / (pi 1e6) a slot.
+/// Distance of the outermost nodes: the mass beyond is 1 / (pi 1e6) a slot.
 #define DPR_TAIL_REACH 1e6f
 /// Joint composition: slots further apart than the sum are taken one after the other, wrong by 1 / (pi 1e6).
 #define DPR_JOINT_BELOW 5e5f

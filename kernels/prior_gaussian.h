@@ -4,7 +4,7 @@
 
 #include "lanes.h"
 
-/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+/// Bounds of what is drawn: the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
 #define DPR_LOWEST_gaussian (-5.3f)
 #define DPR_HIGHEST_gaussian 5.3f
 
@@ -56,7 +56,7 @@ static inline realn gaussian_score(realn z) { return z; }
 #define DPR_BARRIER_WINDOWS ((float2)(1.2f, 3.0f))
 /// Up to so many slots have closed forms (triple.h).
 #define DPR_TRIPLE 3
-/// How far below the largest a slot still counts. Further down its weight is Phi(-8.6 / sqrt 2) = 6e-10 at
+/// Reach below the largest slot that counts. Further down its weight is Phi(-8.6 / sqrt 2) = 6e-10 at
 /// most, its gradient by beta 3e-9: below the integrals' errors.
 #define DPR_BARRIER_REACH 8.6f
 /// Joint composition: how far a slot's density reaches below and above its beta (mass left out: 8e-7 each),
@@ -96,7 +96,7 @@ static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
   *cdf = choose(x < 0.0f, tail, 1.0f - tail);
 }
 
-/// Where ln of the product of the F of slots within either window is -DPR_BARRIER_LOG_FLOOR, or a little
+/// Points where ln of the product of slots' F within either window is -DPR_BARRIER_LOG_FLOOR, or a little
 /// lower: -ln F(x) >= 0.3 max(1.5 - x, 0)^2, and a sum of these is a parabola below the window.
 static inline float2 prior_lower_ends(float2 windows, float2 count, float2 sum, float2 squares) {
   const float2 deficit = max(sum * sum - count * (squares - DPR_BARRIER_LOG_FLOOR / 0.3f), 0.0f);

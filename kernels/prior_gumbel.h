@@ -5,7 +5,7 @@
 
 #include "lanes.h"
 
-/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+/// Bounds of what is drawn: the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
 #define DPR_LOWEST_gumbel (-2.82f)
 #define DPR_HIGHEST_gumbel 16.7f
 
@@ -36,7 +36,7 @@ static inline void prior_cdf_density(realn x, realn* cdf, realn* density) {
 
 static inline void occupancy_log(realn x, realn* log_p, realn* hazard) {
   const realn u = exp_n(min(x, DPR_GUMBEL_FLOOR));
-  // For small u: ln(1 - exp(-u)) = ln u - u / 2 + u^2 / 24 - ..., without the cancellation.
+  // The series ln(1 - exp(-u)) = ln u - u / 2 + u^2 / 24 - ... avoids the cancellation for small u.
   const intn small = u < 0.05f;
   const realn series = mad(u, mad(u, 1.0f / 24.0f, -0.5f), 0.0f);
   const realn survival = exp_n(-u);

@@ -4,7 +4,7 @@
 
 #include "lanes.h"
 
-/// What is drawn lies between these, the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
+/// Bounds of what is drawn: the quantiles of DPR_LOWEST_UNIFORM and DPR_HIGHEST_UNIFORM.
 #define DPR_LOWEST_logistic (-16.7f)
 #define DPR_HIGHEST_logistic 16.7f
 

@@ -8,7 +8,7 @@
 #if DPR_CONCAT(DPR_UNIFORM_IS_, DPR_PRIOR)
 
 #define DPR_RULE DPR_RULE_PIECEWISE
-/// Where the density ends.
+/// End of the density.
 #define DPR_HALF_WIDTH 0.5f
 #define DPR_BARRIER_REACH 1.0f
 #define DPR_JOINT_BELOW 0.5f

@@ -28,7 +28,7 @@
 #define DPR_PRIOR gaussian
 #endif
 
-/// How a prior's integrals over the line are evaluated (quadrature.h).
+/// Rules by which a prior's integrals over the line are evaluated (quadrature.h).
 #define DPR_RULE_SMOOTH 0    /* light tails: equally spaced nodes around the slots */
 #define DPR_RULE_TAILS 1     /* heavy tails: nodes that thin out, around every cluster of slots */
 #define DPR_RULE_PIECEWISE 2 /* polynomials between kinks: Gauss-Legendre in each piece */
@@ -39,7 +39,7 @@
 #include "prior_logistic.h"
 #include "prior_uniform.h"
 
-/// What uniform_from_bits gives lies between these.
+/// Bounds of uniform_from_bits.
 #define DPR_LOWEST_UNIFORM 0x1p-24f
 #define DPR_HIGHEST_UNIFORM (1.0f - 0x1p-24f)
 
@@ -49,7 +49,7 @@ static inline realn uniform_from_bits(uintn bits) {
   return as_realn(bits >> 9 | 0x3f800000u) - (1.0f - DPR_LOWEST_UNIFORM);
 }
 
-/// Of a prior by its name.
+/// Functions of a prior by its name.
 #define noise_quantile(prior, u) DPR_CONCAT(prior, _quantile)(u)
 #define noise_score(prior, z) DPR_CONCAT(prior, _score)(z)
 #define lowest_noise(prior) DPR_CONCAT(DPR_LOWEST_, prior)

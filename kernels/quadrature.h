@@ -1,4 +1,4 @@
-// Where the aggregation integrals are evaluated: stretches of the line of integration, each with its nodes. A
+// Nodes of the aggregation integrals: stretches of the line of integration, each with its nodes. A
 // prior names the rule (priors.h):
 //
 //   smooth     Smooth integrands that decay at both ends: an equally spaced rule converges exponentially
@@ -34,7 +34,7 @@ typedef struct {
   int is_upper;  // tails: this is the cluster's upper half
 } Stretch;
 
-/// What the lower end of the barrier's integral depends on, where its rule needs one: how many slots lie no
+/// Inputs of the lower end of the barrier's integral, where its rule needs one: how many slots lie no
 /// further below the largest than a narrow window reaches, and a wide one, the sums of their betas, and of
 /// the squares.
 typedef struct {
@@ -56,7 +56,7 @@ static inline void add_nearby(float beta, Nearby* n) {
   n->squares += counted * counted;
 }
 
-/// Where the product of the F of all slots falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower: of the
+/// Point where the product of all slots' F falls below exp(-DPR_BARRIER_LOG_FLOOR), or a little lower: of the
 /// bounds by either window the tighter one.
 static inline float lower_end(const Nearby n) {
   const float2 ends = prior_lower_ends(DPR_BARRIER_WINDOWS, n.count, n.sum, n.squares);
@@ -225,7 +225,7 @@ static inline void stretch_nodes(const Stretch s, uint block, realn* t, realn* w
   *weight *= radius;
 }
 
-/// Where the integrand begins. In the barrier composition the product vanishes below the largest slot's
+/// Begin of the integrand. In the barrier composition the product vanishes below the largest slot's
 /// density.
 static inline float lowest_kink(const Slots run) {
 #ifdef DPR_JOINT

@@ -28,7 +28,7 @@ static uint owned_of(uint bits, const FrameParams p, const Triangle t, uint firs
   return owned;
 }
 
-/// Which pixels of a tile (view * tiles + tile) a triangle's blurred area covers: those it owns, and those
+/// Pixels of a tile (view * tiles + tile) that a triangle's blurred area covers: those it owns, and those
 /// closer than the blur distance. Bit 8 * row + column.
 static inline uint2 cover_tile(const FrameParams p, const Triangle t, uint view_tile) {
   const uint tile = view_tile % (p.tiles_x * p.tiles_y);
@@ -55,7 +55,7 @@ static inline uint2 cover_tile(const FrameParams p, const Triangle t, uint view_
   return (uint2)((uint)mask, (uint)(mask >> 32));
 }
 
-/// Whether a triangle owns a vector of samples: by the edge functions where their sign is certain, by
+/// True if a triangle owns a vector of samples: by the edge functions where their sign is certain, by
 /// owns_sample() where it is not.
 static inline intn is_inside(const FrameParams p, const Triangle t, const View3 v, float error,
                              uintn packed) {

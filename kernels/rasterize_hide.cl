@@ -1,11 +1,11 @@
-// What nothing is seen of, because something opaque lies in front of it, further away than the noise of
-// depths reaches: taken out of the coverage before there are fragments of it. For triangles that cover what
+// Takes samples out of the coverage that lie behind something opaque, further away than the noise of depths
+// reaches, before there are fragments of them. For triangles that cover what
 // they own and nothing else: all of them are opaque. A tile is a work-item's on CPUs, a work-group's on
 // GPUs.
 #include "group.h"
 #include "rasterize.h"
 
-/// Of a depth: rounding puts fragments that much beside the range of their triangle's corners.
+/// Error of a depth: rounding puts fragments that much beside the range of their triangle's corners.
 #define DPR_DEPTH_ROUNDING 1e-6f
 
 /// The depth behind which nothing is seen of what a triangle covers.
@@ -14,7 +14,7 @@ static inline float hides_from(global const Triangle* t, float reach) {
 }
 static inline float nearest_depth(global const Triangle* t) { return fmin(fmin(t->z0, t->z1), t->z2); }
 
-/// What the pairs of a tile are read and written by.
+/// Buffers of the pairs of a tile.
 typedef struct {
   global const Triangle* triangles;
   global const uint *face, *places;

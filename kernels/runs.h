@@ -8,7 +8,7 @@
 
 #include "shared_types.h"
 
-/// Whether a run [x, y) has sums of chunks.
+/// True if a run [x, y) has sums of chunks.
 static inline int has_chunks(uint2 run) { return run.y - run.x > DPR_RUN_CHUNK; }
 
 static inline uint slot_of_chunk(uint2 run, uint begin) {

@@ -1,4 +1,4 @@
-// What the sampled compositions share: a pixel's run of fragments, the noise of each, and what a block of
+// Code shared by the sampled compositions: a pixel's run of fragments, the noise of each, and what a block of
 // samples sees.
 #ifndef DPR_SAMPLED_PIXEL_H
 #define DPR_SAMPLED_PIXEL_H
@@ -9,7 +9,7 @@
 /// The face index that names the background's noise.
 #define DPR_BACKGROUND_FACE 0xffffffffu
 
-/// Which face's noise a fragment takes: uint[fragment], uint[pair].
+/// Faces whose noise fragments take: uint[fragment], uint[pair].
 typedef struct {
   global const uint *fragment_pair, *pair_face;
 } FaceOf;
@@ -55,7 +55,7 @@ static inline float4 winner_color(const AggregateParams p, const SampledRun run,
   return (float4)(fragment_color(f, fragment_at(run, f, winner)), 1.0f);
 }
 
-/// Whether a lane of a block holds a sample: the last block may be a part of one.
+/// True if a lane of a block holds a sample: the last block may be a part of one.
 static inline int lane_counts(const AggregateParams p, uint block, uint lane) {
   return DPR_WIDTH * block + lane < p.sampling.samples;
 }

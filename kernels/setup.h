@@ -7,7 +7,7 @@
 /// Corners further away than this, NDC, have squared distances that single precision does not hold.
 #define DPR_MAX_NDC 1e18f
 
-/// How a face of that orientation looks.
+/// Facing of a face with that orientation.
 static inline uint facing_of(int orientation) {
   return orientation > 0 ? DPR_FACE_FRONT : orientation < 0 ? DPR_FACE_BACK : DPR_FACE_DROPPED;
 }
@@ -26,8 +26,8 @@ static inline PixelBounds bounds_of(const FrameParams p, float2 lowest, float2 h
   return bounds;
 }
 
-/// Whether [low, high], pixels, comes within a pixel of the image along one axis; and both. Written so that a
-/// NaN does not.
+/// True if [low, high], pixels, comes within a pixel of the image along one axis; along both. Written so that
+/// a NaN does not.
 static inline int meets_axis(float low, float high, uint size) { return high > -1.0f && low < (float)size; }
 static inline int meets_image(const FrameParams p, const PixelBounds b) {
   return meets_axis(b.left, b.right, p.width) && meets_axis(b.top, b.bottom, p.height);

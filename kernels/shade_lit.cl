@@ -194,7 +194,7 @@ static inline void add_corners(Vec3n grad[3], Vec3n g, realn c1, realn c2) {
   grad[2] = mad3n(g, c2, grad[2]);
 }
 
-/// What moving weight from corner 0 to corner k does to an interpolated quantity with gradient g.
+/// Derivative by weight moved from corner 0 to corner k, of an interpolated quantity with gradient g.
 static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
   return dot3n(sub3n(corner[k], corner[0]), g);
 }
@@ -268,7 +268,7 @@ static inline void store_material(const MaterialGradients g, uint pair, global f
   vstore4((float4)(sum_vec3n(g.coefficient).xyz, sum_lanes(g.shininess)), pair, grad_materials);
 }
 
-/// Where the light was evaluated at the corners: all lanes hold the same, and lane sums have been taken
+/// Backward pass of light evaluated at the corners: all lanes hold the same, and lane sums have been taken
 /// before.
 static inline void corners_backward(const Surface s, const LightingParams lp,
                                     global const Light* restrict lights, const MaterialGradients of,

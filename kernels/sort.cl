@@ -198,7 +198,7 @@ kernel void sort_few(const uint last_key, global const uint* restrict count, glo
 
 #endif
 
-/// Where each key's run begins in the sorted list: lower bound by bisection. One work-item per key, and one
+/// Finds the begin of each key's run in the sorted list, by bisection. One work-item per key, and one
 /// more.
 /// in   keys         how many there are, from 0 on
 /// in   count        uint[1]         the number of elements

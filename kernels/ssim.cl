@@ -21,13 +21,13 @@ constant float ssim_weights[DPR_SSIM_TAPS] = {1.02838008e-3f, 7.59875810e-3f, 3.
 #define DPR_SSIM_C1 1e-4f /* K1 = 0.01 */
 #define DPR_SSIM_C2 9e-4f /* K2 = 0.03 */
 
-/// Where a pixel lies in its image.
+/// Position of a pixel in its image.
 static inline uint2 place_of(uint pixel, uint width, uint height) {
   const uint in_view = pixel % (width * height);
   return (uint2)(in_view % width, in_view / width);
 }
 
-/// Whether a window about that column or row is whole.
+/// True if a window about that column or row is whole.
 static inline int has_window(uint at, uint length) {
   return at >= DPR_SSIM_RADIUS && at + DPR_SSIM_RADIUS < length;
 }

@@ -10,7 +10,7 @@
 
 #include "crossing.h"
 
-/// Of a step that a contour passes without counting there: a flat one, which counts by columns, or one that
+/// Mark of a step that a contour passes without counting: a flat one, which counts by columns, or one that
 /// only one of the samples shows.
 #define DPR_PASSED (DPR_NO_CROSSING - 1)
 
@@ -36,7 +36,7 @@ static inline int is_on_raster(const FrameParams p, Sample s) {
   return s.at.x >= 0 && s.at.y >= 0 && s.at.x < (int)p.width && s.at.y < (int)p.height;
 }
 
-/// What crosses the steps: planes [2][view][height][width], to the right and down.
+/// Contours that cross the steps: planes [2][view][height][width], to the right and down.
 typedef struct {
   global const uint* winner;
   global const float2* cut;
@@ -59,7 +59,7 @@ static inline Sample sample_at(const FrameParams p, uint index) {
   return s;
 }
 
-/// What is at a step: a contour, DPR_PASSED, or DPR_NO_CROSSING, where it leaves the raster too.
+/// Entry of a step: a contour, DPR_PASSED, or DPR_NO_CROSSING, also for a step that leaves the raster.
 static inline uint at_step(const FrameParams p, const Steps steps, Sample s, int step) {
   return is_on_raster(p, sample_beside(p, s, step)) ? steps.winner[place_of(p, steps, s, step)]
                                                     : DPR_NO_CROSSING;
@@ -67,10 +67,10 @@ static inline uint at_step(const FrameParams p, const Steps steps, Sample s, int
 
 static inline int is_contour(uint at_step) { return at_step < DPR_PASSED; }
 
-/// Which end of a step a sample is: -1 its first, 1 its second.
+/// End of a step that a sample is: -1 its first, 1 its second.
 static inline float turn_of(int step) { return step < 2 ? -1.0f : 1.0f; }
 
-/// What a sample takes of the colours at a step: x of the difference to the sample at its other end, and y of
+/// Parts that a sample takes of the colours at a step: x of the difference to the other end's sample, y of
 /// the changes of both colours towards it, of which the sample's own counts x - y.
 typedef float2 Parts;
 
@@ -104,7 +104,7 @@ static inline float total_taken(const FrameParams p, const Steps steps, Sample s
   return fmax(sum, 1.0f);
 }
 
-/// Whether a sample's colour is known to continue towards a step: nothing lies between it and the sample
+/// True if a sample's colour is known to continue towards a step: nothing lies between it and the sample
 /// behind it.
 static inline int continues(const FrameParams p, const Steps steps, Sample s, int step) {
   const Sample behind = sample_beside(p, s, DPR_OPPOSITE(step));

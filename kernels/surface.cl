@@ -1,5 +1,5 @@
 // Base colours of the fragments of textured scenes: the corners' colours, interpolated, times the texture.
-// Where no mesh has a texture, shading interpolates the colours itself.
+// Shading interpolates the colours itself where no mesh has a texture.
 #include "texture.h"
 
 static inline SurfaceScene make_scene(global const uint4* face_colors, global const float4* colors,
@@ -84,8 +84,8 @@ static inline DetailGradient detail_backward(const TexturedFace* f, const Detail
   return g;
 }
 
-/// Of a triangle on the screen q_k is divided by the depth z_k: what the gradients of q_k along x and y are
-/// to those of depths. A clipped face has q_k of its homogeneous corners.
+/// Gradients of depths from those of q_k along x and y: on the screen q_k is divided by the depth z_k. A
+/// clipped face has q_k of its homogeneous corners, without depths.
 static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float3 grad_y) {
   if (f->is_clipped) return 0.0f;
   return -(grad_x * f->steps.q_x + grad_y * f->steps.q_y) / f->steps.depth;
@@ -233,7 +233,7 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
   for (int k = 0; k < 3; ++k) vstore3(vload3((size_t)k, grad) + corner[k], (size_t)k, grad);
 }
 
-/// What every fragment asks of the texels: a cell, which is a texel and its neighbours to the right and
+/// Lists each fragment's texels: a cell, which is a texel and its neighbours to the right and
 /// below, and the parts of these. Sorted by cell, fragments are added up without atomics. One work-item per
 /// pair, up to `last_pair`. Inputs as surface_backward, and
 /// in   no_cell     what stands for the cell of a fragment without texture; no texel has that number

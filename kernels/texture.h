@@ -20,7 +20,7 @@ typedef struct {
   global const ClippedFace* clipped;  // [view][face]; read where p.clips is set
 } SurfaceScene;
 
-/// What levels of detail are made of. Barycentric c_k changes by z (q_k - c_k Q) from sample to sample along
+/// Inputs of the level of detail. Barycentric c_k changes by z (q_k - c_k Q) from sample to sample along
 /// an axis of the image, where q_k = g_k / z_k, Q = sum q_k, z = sum c_k z_k, z_k is a corner's depth, or 1
 /// without perspective, and g_k is the step of the barycentric on the screen. NDC.
 typedef struct {
@@ -52,7 +52,7 @@ static inline float3 cofactor(const ClippedFace c, int k) {
 }
 static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xyw, cofactor(c, 0)); }
 
-/// Of a face that is not clipped, and of one that is: in perspective always, as without it the plane has no
+/// Steps of a whole face, and of a clipped one: in perspective always, as without it the plane has no
 /// steps where it passes the camera.
 static inline Steps triangle_steps(const FrameParams p, const Triangle t) {
   const float3 depth = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
@@ -94,7 +94,7 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   return f;
 }
 
-/// Where a fragment looks into two neighbouring levels of its texture, or twice into its only one. Vectors
+/// Place of a fragment in two neighbouring levels of its texture, or twice in its only one. Vectors
 /// hold column and row of the larger level, then of the smaller one: along each axis the two texels whose
 /// mixture is seen, `low` and the one after it (the first after the last), the part of the latter, and how
 /// fast a place moves from the one to the other.
@@ -139,7 +139,7 @@ static inline Footprint find_footprint(const Texture t, uint level, float2 at) {
 /// The mixtures of four texels, each named by the first of them.
 static inline uint2 footprint_cells(const Footprint f) { return f.first + f.low.yw * f.width + f.low.xz; }
 
-/// What is seen, and its derivatives by the place and by the level of detail.
+/// Colour of a texture, and its derivatives by the place and by the level of detail.
 typedef struct {
   float4 color, by_x, by_y, by_detail;
 } Sample;
@@ -159,7 +159,7 @@ static inline Sample sample_level(uint first, uint width, uint2 low, uint2 high,
   return s;
 }
 
-/// How many texels lie between neighbouring samples of the image, as a level of the pyramid: the logarithm to
+/// Texels between neighbouring samples of the image, as a level of the pyramid: the logarithm to
 /// base 2 of the longer of the place's steps along the image's axes.
 typedef struct {
   float level, part;  // the larger of two levels, and the part of the smaller; 0 where there is one alone
@@ -169,7 +169,7 @@ typedef struct {
   float depth;
 } Detail;
 
-/// How the place changes from sample to sample along an axis, over z, at `way` from corner 0: sum q_k
+/// Change of the place from sample to sample along an axis, over z, at `way` from corner 0: sum q_k
 /// place_k, less Q times its mean by the c_k.
 static inline float2 place_step(const TexturedFace* f, float3 q, float2 way) {
   return q.y * f->place1 + q.z * f->place2 - (q.x + q.y + q.z) * way;

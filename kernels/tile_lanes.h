@@ -20,7 +20,7 @@ static inline uint2 pair_group(uint2 pairs) {
   return (uint2)(first, min(first + size, pairs.y));
 }
 
-/// Which lanes of the vector at `first` lie before `last`.
+/// Lanes of the vector at `first` that lie before `last`.
 static inline intn lanes_before(uint last, uint first) {
   return DPR_LANE_INDEX < (intn)((int)(last - first));
 }

@@ -13,8 +13,8 @@ static inline uint lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 #define DPR_BIN_SLACK 1e-5f
 #define DPR_BIN_RELATIVE_SLACK 2e-6f
 
-/// Where the bounds of a triangle without blur hold no more samples of a tile, whether it owns one of them is
-/// found out at once: that takes less than a pair that covers nothing.
+/// Most samples of a tile, within the bounds of a triangle without blur, whose ownership is found out at
+/// once: that takes less than a pair that covers nothing.
 #define DPR_FEW_SAMPLES 2
 
 /// The samples [x, y] along one axis within [low, high], in samples; x > y, and so for their tiles, if there
@@ -70,7 +70,7 @@ static inline int owns_any(const FrameParams p, const Triangle t, uint2 columns,
   return 0;
 }
 
-/// Whether a tile that the triangle's bounds meet is listed for it.
+/// True if a tile that the triangle's bounds meet is listed for it.
 static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, uint tile_y) {
   const uint2 columns = samples_of_tile(columns_of(t), tile_x), rows = samples_of_tile(rows_of(t), tile_y);
   const uint samples = (columns.y - columns.x + 1) * (rows.y - rows.x + 1);
@@ -80,14 +80,14 @@ static inline int is_listed(const FrameParams p, const Triangle t, uint tile_x, 
   return is_only || tile_overlaps(p, t, tile_x, tile_y);
 }
 
-/// How many tiles a triangle's bounds hold in rows [x, y] of tiles, and in all.
+/// Number of tiles that a triangle's bounds hold in rows [x, y] of tiles, and in all.
 static inline uint tiles_of_rows(const Triangle t, uint2 rows) {
   const uint2 columns = columns_of(t) / DPR_TILE;
   return (columns.y + 1 - columns.x) * (rows.y + 1 - rows.x);
 }
 static inline uint tiles_of_bounds(const Triangle t) { return tiles_of_rows(t, rows_of(t) / DPR_TILE); }
 
-/// How many tiles of rows [x, y] are listed for a triangle.
+/// Number of tiles of rows [x, y] that are listed for a triangle.
 static inline uint count_tiles(const FrameParams p, const Triangle t, uint2 rows) {
   const uint2 columns = columns_of(t) / DPR_TILE;
   uint count = 0;
@@ -97,7 +97,7 @@ static inline uint count_tiles(const FrameParams p, const Triangle t, uint2 rows
   return count;
 }
 
-/// Whether a work-group of a GPU shares a triangle's tiles, by rows: the others would wait for the one
+/// Tiles from which on a work-group of a GPU shares a triangle, by rows: the others would wait for the one
 /// work-item that has it.
 #define DPR_SHARED_TILES 64
 static inline int is_shared(const Triangle t) {

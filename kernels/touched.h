@@ -1,4 +1,4 @@
-// Which samples contours reach: few of those near them do.
+// Samples that contours touch: few of those near contours.
 #ifndef DPR_TOUCHED_H
 #define DPR_TOUCHED_H
 
@@ -33,7 +33,7 @@ static inline void copy_row(TileRow r, global const float4* restrict from, globa
   for (uint k = 0; k < r.count; ++k) to[r.first + k] = from[r.first + k];
 }
 
-/// Whether anything is at a step from a sample, or at the next `reach` - 1 in the same direction.
+/// True if anything is at a step from a sample, or at the next `reach` - 1 in the same direction.
 static inline int is_touched(const FrameParams p, const Steps steps, Sample s, int reach) {
   uint all = DPR_NO_CROSSING;
 #pragma unroll
@@ -45,7 +45,7 @@ static inline int is_touched(const FrameParams p, const Steps steps, Sample s, i
   return all != DPR_NO_CROSSING;
 }
 
-/// Where is_touched() holds in a row of a tile: a bit a sample. Most of the samples near a contour are not.
+/// is_touched() of a row of a tile: a bit a sample. Most of the samples near a contour are not.
 static inline uint touched_in_row(const FrameParams p, const Steps steps, TileRow r, int reach) {
   const int is_inner = r.at.x >= 3 && r.at.x + DPR_TILE + 1 < p.width && r.at.y >= 3 && r.at.y + 2 < p.height;
   uint bits = 0;

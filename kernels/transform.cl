@@ -35,7 +35,7 @@ kernel void transform_forward(const FrameParams p, global const ViewParams* rest
   ndc[i] = (float4)(xy.x, xy.y, depth, 0.0f);
 }
 
-/// What a vertex adds to the gradients of its poses and its camera, channel by channel, DPR_POSE_CHANNELS.
+/// A vertex's share of the gradients of its poses and its camera, channel by channel, DPR_POSE_CHANNELS.
 #define DPR_CHANNEL_VECTORS 2 /* of 8 */
 typedef struct {
   float3 world;  // d loss / d world position

@@ -38,7 +38,7 @@ static inline TileContour load_contour(const FrameParams p, const AntialiasParam
   return c;
 }
 
-/// What its ends add to a crossing: nothing where they have no corners that count.
+/// Area that an edge's ends add to a crossing: none where they have no corners that count.
 static inline CornerArea corner_of(const FrameParams p, const TileContour c, const RasterEdge e,
                                    const Crossing x, int is_second) {
   const CornerArea none = {0.0f, 0.0f, 0.0f, 0.0f};
@@ -46,7 +46,7 @@ static inline CornerArea corner_of(const FrameParams p, const TileContour c, con
   return c.flags & flag ? corner_area(p, e, x, is_second ? e.b : e.a) : none;
 }
 
-/// What a crossing cuts.
+/// Cut of a crossing.
 static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterEdge e, const Crossing x) {
   float area = x.t - 0.5f;
   // One end after the other, so that one is in the registers at a time.
@@ -55,7 +55,7 @@ static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterE
   return (Cut)(area, fmin(e.slope * e.slope, DPR_SLOPE2_THAT_COUNTS));
 }
 
-/// Whether the first sample of a step is on the contour's inner side.
+/// True if the first sample of a step is on the contour's inner side.
 static inline int first_is_inner(const TileContour c, const RasterEdge e) {
   return (c.inner > 0) == e.ascends;
 }
@@ -79,7 +79,7 @@ static inline float plane_depth(const FrameParams p, const TileContour c, float3
   return inverse > 0.0f ? 1.0f / inverse : otherwise;
 }
 
-/// Whether something hides a crease from one of the step's samples: what lies nearer there than the face on
+/// True if something hides a crease from one of the step's samples: what lies nearer there than the face on
 /// its side.
 static inline int hides_crease(const FrameParams p, const TileContour c, global const uint4* restrict faces,
                                global const float4* restrict ndc, int own, float2 sample, float front,
@@ -97,7 +97,7 @@ static inline float depth_at_crossing(float front, float beyond, float distance)
   return continued > front && continued < INFINITY ? continued : front;
 }
 
-/// What the crossings of a tile are found by.
+/// Inputs of the search for a tile's crossings.
 typedef struct {
   global const uint4* faces;
   global const float4* ndc;

@@ -70,7 +70,7 @@ class DPR_API AttributeImages {
   void forward(const Renderer& renderer);
 
   std::size_t channels() const;
-  /// How many images a view has: one for every three channels.
+  /// Number of a view's images: one for every three channels.
   std::size_t groups() const;
   /// The image of a view: RGB, and A, as above, of the channels from 3 * group on. Blocks.
   Image image(std::size_t view = 0, std::size_t group = 0) const;

@@ -71,7 +71,7 @@ typedef struct dpr_device_info {
   int is_default;                /* not 0: what "" takes, if it can be used */
 } dpr_device_info;
 
-/* How many devices there are; none is no error. */
+/* Number of devices; none is no error. */
 DPR_API dpr_status dpr_device_count(size_t* count);
 /* Fills a struct that holds its size. Texts are valid until the thread's next call of this. */
 DPR_API dpr_status dpr_device_describe(size_t index, dpr_device_info* info);
@@ -291,7 +291,7 @@ DPR_API void dpr_renderer_destroy(dpr_renderer* renderer);
 
 /* ---- Losses ---- */
 
-/* How much each loss counts: means over pixels and colour channels, 1 - IoU of the alpha channels, robust
+/* Weight of each loss: means over pixels and colour channels, 1 - IoU of the alpha channels, robust
  * (mse in which pixels of quite another colour hardly count), and 1 - the mean structural similarity, of
  * images of at least 11x11 pixels. dpr/image_loss.hpp has the formulas. */
 typedef struct dpr_loss_weights {
@@ -376,7 +376,7 @@ DPR_API dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* g
 DPR_API dpr_status dpr_gradient_count(const dpr_gradient* gradient, size_t* count);
 /* Valid as long as the handle. */
 DPR_API dpr_status dpr_gradient_name(const dpr_gradient* gradient, size_t index, const char** name);
-/* How many numbers an array has. */
+/* Number of an array's values. */
 DPR_API dpr_status dpr_gradient_size(const dpr_gradient* gradient, const char* name, size_t* count);
 /* Copies an array, [vertex][3] and so on, `count` numbers. */
 DPR_API dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, double* values,

@@ -44,7 +44,7 @@
 extern "C" {
 #endif
 
-/* Of whole numbers either. */
+/* Type of an array's elements; of whole numbers either. */
 typedef enum dpr_element { DPR_FLOAT32 = 0, DPR_INT32 = 1, DPR_INT64 = 2 } dpr_element;
 
 /* Packed and row-major. */
@@ -79,7 +79,7 @@ typedef struct dpr_frame_options {
 /* "preset, sigma, ...": the keys of "smoothing" in the scene format; "znear", "zfar" and "cull"; "shading"
  * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp". */
 DPR_API const char* dpr_frame_settings(void);
-/* Whether size and settings can be rendered with. Opens no device. */
+/* Refuses size and settings that cannot be rendered with. Opens no device. */
 DPR_API dpr_status dpr_frame_check(const dpr_frame_options* options);
 /* Renders, and seldom waits for the device. The frame holds buffers there, which the backward pass reads,
  * until it is destroyed; then they are kept for later calls with the same faces and size. */
@@ -104,7 +104,7 @@ DPR_API dpr_status dpr_frames_release(void);
 typedef struct dpr_cut dpr_cut;
 DPR_API dpr_status dpr_cut_create(const dpr_frame_options* options, const dpr_array* arrays, size_t count,
                                   float tolerance, dpr_cut** cut);
-/* How many pieces and vertices there are now. */
+/* Numbers of pieces and vertices after the cut. */
 DPR_API dpr_status dpr_cut_size(const dpr_cut* cut, size_t* faces, size_t* vertices);
 /* Fills the arrays that are named: DPR_INT64 "faces" [face, 3], "face_of" [face], the face that each is a
  * piece of, and "vertices_of" [vertex, 3], old vertices that each is a sum of, by DPR_FLOAT32

@@ -40,7 +40,7 @@ typedef struct dpr_events {
 #define DPR_EVENTS_INIT \
   { sizeof(dpr_events), NULL, 0, NULL }
 
-/* How much room frames have; with noise on the pixel, contours need some too. */
+/* Room of frames; with noise on the pixel, contours need some too. */
 typedef struct dpr_frame_room {
   size_t size;
   size_t pairs, fragments, contours;

@@ -28,7 +28,7 @@ DPR_API std::string_view to_string(LossKind);
 DPR_API std::vector<std::string_view> loss_names();
 DPR_API LossKind parse_loss(std::string_view word, std::string_view where);
 
-/// How much each loss counts in the total, eq. (74).
+/// Weight of each loss in the total, eq. (74).
 struct DPR_API LossWeights {
   float mse = 0, l1 = 0, silhouette = 0, robust = 0, ssim = 0;
   float robust_scale = 0.1F;  ///< at least 1e-6, a colour difference
@@ -54,7 +54,7 @@ struct LossOptions {
   /// One value a target, or empty for all: where it is 0 a target has no silhouette, and its view no
   /// silhouette loss.
   std::span<const unsigned char> has_alpha = {};
-  /// How much every pixel counts, in the first channel, at least 0: one image a target, of its size, or none.
+  /// Weight of every pixel, in the first channel, at least 0: one image a target, of its size, or none.
   /// Means are over the weights, which are not all 0 in any. A window of ssim counts as the pixel at its
   /// middle does.
   std::span<const Image> masks = {};

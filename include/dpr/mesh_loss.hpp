@@ -12,7 +12,7 @@ namespace dpr {
 
 class Renderer;
 
-/// How much each term counts. Any soup of triangles will do: a vertex' one-ring is every other vertex of its
+/// Weight of each term. Any soup of triangles will do: a vertex' one-ring is every other vertex of its
 /// faces, a hinge every two faces that share an edge, whatever their orientation; where an edge has three
 /// faces it has three hinges. Distances are in object space.
 struct MeshLossWeights {

@@ -60,7 +60,7 @@ class DPR_API MultiDeviceRenderer {
   void set_materials(std::size_t mesh, std::span<const Material> materials);
   void set_lights(const std::optional<Lights>& lights);
 
-  /// How many views a device renders together; 0, as at the beginning: a twelfth of them. Small chunks keep
+  /// Views that a device renders together; 0, as at the beginning: a twelfth of them. Small chunks keep
   /// all devices busy to the end, large ones keep a large device busy. Sums over views round as the chunks
   /// are cut.
   void set_chunk(std::size_t views);
@@ -95,7 +95,7 @@ class DPR_API MultiDeviceRenderer {
   /// InvalidArgument if they are none, or not among the views.
   Evaluation evaluate(std::size_t first, std::size_t count);
 
-  /// How many views each device has rendered since the beginning.
+  /// Number of views that each device has rendered since the beginning.
   std::vector<std::size_t> views_rendered() const;
   /// A sentence for every device that was lost since this was last called.
   std::vector<std::string> take_notes();

@@ -72,7 +72,7 @@ struct LeastSquares {
 struct Descent {
   unsigned iterations = 200;
   OptimizerOptions optimizer;
-  /// How the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has
+  /// Way the scene's smoothing shrinks: from coarse to fine in fixed steps, or as the paper's schedule has
   /// it.
   std::variant<AnnealSchedule, AdaptiveSchedule> schedule;
   LossWeights loss = LossWeights::only(LossKind::mse);

@@ -1,4 +1,4 @@
-// How far Monte Carlo is off: standard errors of images and gradients, and how many samples a wanted one
+// Error of Monte Carlo: standard errors of images and gradients, and how many samples a wanted one
 // takes.
 #pragma once
 

@@ -25,11 +25,11 @@ struct Instance {
   std::optional<std::size_t> instance_of = std::nullopt;
 };
 
-/// Which faces are left out: none; those that wind clockwise in the image, as the outside of a mesh does seen
+/// Faces that are left out: none; those that wind clockwise in the image, as the outside of a mesh does seen
 /// from within; or the others. A mirroring transform turns the winding.
 enum class Cull { none, back, front };
 
-/// Which gradients the backward pass computes. Nothing is computed that is not asked for.
+/// Gradients that the backward pass computes. Nothing is computed that is not asked for.
 struct GradientRequest {
   bool positions = true;    ///< vertex positions, object space
   bool colors = true;       ///< vertex or face colours

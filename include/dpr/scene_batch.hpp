@@ -38,7 +38,7 @@ class DPR_API SceneBatch {
   /// and keeps the scenes there were; where a device fails there are none.
   void set_scenes(std::span<const Scene> scenes);
 
-  /// How many scenes, and how many images of all of them.
+  /// Number of scenes, and of the images of all of them.
   std::size_t scenes() const;
   std::size_t views() const;
   /// A scene's own renderer, for its setters, of views, positions, lights and so on, and for losses of its

@@ -52,11 +52,11 @@ struct ShapeViews {
 /// size.
 DPR_API ShapeViews read_views(const std::filesystem::path& file);
 
-/// How the mesh moves. large_steps: in the variables u = (I + lambda L) v, L the Laplacian of the mesh's
+/// Motion of the mesh. large_steps: in the variables u = (I + lambda L) v, L the Laplacian of the mesh's
 /// edges, by Adam with one step size for all (Nicolet, Jacobson & Jakob 2021). direct: Adam on the positions.
 enum class ShapeSteps { large_steps, direct };
 
-/// How the smoothing shrinks in a level, from `blur` to `blur_end`. annealed: geometrically. adaptive: while
+/// Way the smoothing shrinks in a level, from `blur` to `blur_end`. annealed: geometrically. adaptive: while
 /// less of it means less loss, by the sign of the derivative that AdaptiveSmoothing watches, which doubles
 /// samples too; it need not come to the end.
 enum class ShapeSchedule { annealed, adaptive };
@@ -65,7 +65,7 @@ struct ShapeOptions {
   unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
   unsigned iterations = 400;  ///< > 0: of a level
   unsigned batch = 8;         ///< > 0: views that an iteration renders, in turn
-  /// How many of them a device renders together, as MultiDeviceRenderer::set_chunk(). 0: all on one device, a
+  /// Number that a device renders together, as MultiDeviceRenderer::set_chunk(). 0: all on one device, a
   /// twelfth on several.
   unsigned chunk = 0;
   float edge_pixels = 2.0F;  ///< > 0: length of edges to which a level begins to remesh, in its pixels
@@ -133,7 +133,7 @@ class DPR_API ShapeSolver {
 
   /// The mesh that solve() begins with: the initial one with vertex colours, or the icosphere.
   const Mesh& start() const { return start_; }
-  /// How often the callback is called at most.
+  /// Most calls of the callback.
   unsigned most_iterations() const;
 
   /// From the start, or from the checkpoint if there is one in the file; leaves checkpoints there, the last

@@ -14,7 +14,7 @@ namespace dpr {
 /// Distribution of the noise. What the library knows of each is a row of lib/smoothing/priors.cpp.
 enum class Prior { gaussian, cauchy, logistic, gumbel, uniform };
 
-/// How occupancy and depth combine. barrier: the paper's b = zeta + (gamma / alpha) ln p, eq. (7), (10).
+/// Combination of occupancy and depth. barrier: the paper's b = zeta + (gamma / alpha) ln p, eq. (7), (10).
 /// joint: the expectation of the rigid image when distances and depths are both perturbed; alpha has no part
 /// in it.
 enum class Composition { barrier, joint };
@@ -37,7 +37,7 @@ enum class Estimator { exact, monte_carlo };
 /// solution, eq. (14). leave_one_out: the mean of the other samples.
 enum class VarianceReduction { none, rigid, leave_one_out };
 
-/// How the samples' noise is drawn. The values are shared with the kernels (kernels/shared_types.h).
+/// Way the samples' noise is drawn. The values are shared with the kernels (kernels/shared_types.h).
 /// antithetic: in pairs, z and -z. stratified: a Latin hypercube, each variable once in each of `samples`
 /// strata of equal probability.
 enum class Draws { independent, antithetic, stratified };

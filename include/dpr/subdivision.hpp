@@ -36,7 +36,7 @@ struct DPR_API Combinations {
                                std::size_t channels) const;
 };
 
-/// How the faces of a mesh were cut. All empty where none was.
+/// Cuts of a mesh's faces. All empty where none was cut.
 struct MeshSubdivision {
   std::size_t old_positions = 0, old_faces = 0;  ///< of the mesh that was cut
   std::vector<std::uint32_t> face_of;            ///< [new face] the old face that it is a piece of, ascending

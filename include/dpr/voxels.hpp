@@ -16,7 +16,7 @@ struct Bounds {
   vec3 low{-1.0F}, high{1.0F};
 };
 
-/// Which points a surface encloses. nonzero: its winding number is not 0, so that overlapping parts are one
+/// Points that a surface encloses. nonzero: its winding number is not 0, so that overlapping parts are one
 /// solid and inverted ones count; for consistently oriented faces. even_odd: a ray to it crosses the surface
 /// an odd number of times; for faces of any orientation.
 enum class FillRule { nonzero, even_odd };
@@ -31,7 +31,7 @@ struct DPR_API VoxelGrid {
     return (std::size_t{z} * resolution + y) * resolution + x;
   }
   bool occupied(unsigned x, unsigned y, unsigned z) const { return cells[index(x, y, z)] != 0; }
-  /// How many cells are occupied.
+  /// Number of occupied cells.
   std::size_t count() const;
 };
 

@@ -59,7 +59,7 @@ std::vector<glm::vec3> repeated(std::span<const glm::vec3> vectors, bool is_own,
 
 bool is_number(std::string_view name) { return name == "sigma" || name == "gamma" || name == "alpha"; }
 
-/// What the renderer computes for the gradients of these arrays.
+/// Gradients that the renderer computes for these arrays.
 GradientRequest request_of(std::span<const std::string> names, bool with_affine_views) {
   GradientRequest request{};
   request.positions = request.colors = request.transform = request.camera = request.lights =
@@ -79,7 +79,7 @@ GradientRequest request_of(std::span<const std::string> names, bool with_affine_
   return request;
 }
 
-/// Of an attribute's images, which depend on nothing else.
+/// Gradients of an attribute's images, which depend on nothing else.
 GradientRequest request_of_attribute(std::span<const std::string> names, Attribute attribute) {
   GradientRequest request = request_of(names, false);
   request.texcoords = request.texcoords && attribute == Attribute::texcoords;

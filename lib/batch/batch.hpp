@@ -14,14 +14,14 @@
 
 namespace dpr::batch {
 
-/// How arrays are rendered.
+/// Options of rendering arrays.
 struct BatchOptions {
   const RenderSettings& settings;
-  /// Whether there are lights where no array gives any.
+  /// True if there are lights where no array gives any.
   bool is_lit = false;
-  /// Of a larger batch, the views that come before these: sampled noise is that of the larger batch.
+  /// Views of a larger batch that come before these: sampled noise is that of the larger batch.
   std::size_t first_view = 0;
-  /// Of the arrays whose gradients backward() may be asked for.
+  /// Names of the arrays whose gradients backward() may be asked for.
   std::vector<std::string> gradients = {};
 };
 
@@ -36,7 +36,7 @@ class Batch {
   void read(NamedArrays outputs);
   /// The gradients of sum <grads, outputs>, by names of outputs and of arrays, into `gradients`.
   void backward(NamedArrays grads, NamedArrays gradients);
-  /// Whether no triangle of any view was rendered.
+  /// True if no triangle of any view was rendered.
   bool is_empty();
 
  private:
@@ -54,7 +54,7 @@ class Batch {
   std::vector<glm::vec3> vertices_;  ///< [view][vertex], where the gradients of views need them
 };
 
-/// What subdivide_for_lens() finds for one mesh.
+/// Result of subdivide_for_lens() for one mesh.
 struct CutFaces {
   Faces faces;                            ///< the pieces
   std::vector<std::uint32_t> face_of;     ///< [piece] the face that each is a piece of
@@ -62,7 +62,7 @@ struct CutFaces {
   std::vector<glm::vec3> vertex_weights;  ///< [new vertex]
 };
 
-/// Of the arrays vertices [V, 3], faces, views and intrinsics. Throws the library's errors.
+/// Takes the arrays vertices [V, 3], faces, views and intrinsics. Throws the library's errors.
 CutFaces cut_for_lens(NamedArrays arrays, const RenderSettings& settings, float tolerance);
 
 }  // namespace dpr::batch

@@ -21,7 +21,7 @@ std::vector<std::string_view> light_names() {
   return names;
 }
 
-/// How many numbers a light of a kind has.
+/// Number of a light's values, by kind.
 template <typename Kind>
 std::size_t count_numbers(Kind) {
   std::size_t count = 0;
@@ -32,7 +32,7 @@ std::size_t count_numbers(Kind) {
   return count;
 }
 
-/// Of all but textures, which are counted.
+/// True for the name of an array; textures are counted.
 bool is_name(const std::string& name, std::size_t textures) {
   static constexpr std::array<std::string_view, 11> k_names{
       "vertices",   "faces",     "colors",         "face_colors",   "views",         "intrinsics",

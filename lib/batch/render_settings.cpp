@@ -65,7 +65,7 @@ std::vector<Mode> modes_of(const OptionValue& value, const std::array<std::strin
   throw InvalidArgument("setting (batch)", "\"" + name + "\"", one_of(setting_names()));
 }
 
-/// What is not set stands far enough from what is.
+/// Checks the planes that are set; one that is not is put far enough from the other.
 void validate_clipping(const std::optional<float>& znear, const std::optional<float>& zfar) {
   Camera camera;
   camera.znear = znear.value_or(zfar ? *zfar / 2 : 1);

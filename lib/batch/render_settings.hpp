@@ -1,4 +1,4 @@
-// What a batch is rendered with beside its arrays, set by name.
+// Settings of a batch beside its arrays, set by name.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ class RenderSettings {
   int height() const { return height_; }
   const Smoothing& smoothing() const { return smoothing_; }
   Cull cull() const { return cull_; }
-  /// How lights shade, without their numbers.
+  /// Shading of the lights, without their numbers.
   const Lights& lights() const { return lights_; }
   /// One of each texture, or of all; none: those of a Texture.
   const std::vector<Wrap>& wraps() const { return wraps_; }

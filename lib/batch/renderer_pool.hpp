@@ -38,7 +38,7 @@ struct Surface {
   bool operator==(const Surface&) const = default;
 };
 
-/// What a renderer keeps on the device from one batch to the next.
+/// Contents of the device that a renderer keeps from one batch to the next.
 struct Topology {
   std::shared_ptr<const Faces> faces;
   std::size_t vertices = 0;

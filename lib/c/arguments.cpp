@@ -1,4 +1,4 @@
-// What the functions of the C interface check of their arguments alike.
+// Checks of arguments that the functions of the C interface share.
 #include "base/checks.hpp"
 #include "c/handles.hpp"
 

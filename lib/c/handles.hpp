@@ -1,4 +1,4 @@
-// What the handles of the C interface hold, and how its functions end: no exception leaves them.
+// Contents of the C interface's handles, and the frame of its functions: no exception leaves them.
 #pragma once
 
 #include <cfenv>
@@ -109,7 +109,7 @@ void require_handle(const void* handle, const char* kind, const char* argument);
 /// The same, and forgets it.
 void forget_handle(const void* handle, const char* kind);
 
-/// What a pointer points to. Throws for NULL, and for what is no handle where one is wanted.
+/// Object at a pointer. Throws for NULL, and where a handle is wanted for what is none.
 template <class Type>
 Type& deref(Type* pointer, const char* argument) {
   if (!pointer) throw InvalidArgument(argument, "NULL", "a pointer");
@@ -194,7 +194,7 @@ Camera to_camera(const dpr_camera* camera, const char* argument);
 glm::vec3 to_vector(const float* values);
 /// NULL: none.
 std::optional<Lights> to_lights(const dpr_lights* given);
-/// What a renderer takes of a scene now.
+/// The scene as a renderer takes it now.
 Scene resolved(const dpr_scene& scene);
 /// A mesh without its transform.
 Mesh to_mesh(const dpr_mesh& given);
@@ -213,11 +213,11 @@ void require_count(std::size_t count, std::size_t expected, const char* argument
 void require_views(std::size_t views);
 void require_size(int width, int height, const char* argument);
 
-/// Of RGBA images.
+/// Number of floats of RGBA images.
 std::size_t image_floats(std::size_t views, int width, int height);
 /// Floats as pixels, of which there is a whole number.
 std::span<const glm::vec4> to_pixels(const float* values, std::size_t count, const char* argument);
-/// Where a caller wants `expected` floats of pixels.
+/// A caller's `expected` floats as pixels.
 std::span<glm::vec4> to_pixels(float* values, std::size_t count, std::size_t expected);
 
 }  // namespace dpr::c

@@ -29,7 +29,7 @@ std::vector<Image> to_images(const float* values, const Targets& like) {
   return images;
 }
 
-/// Of one channel.
+/// Masks of one channel.
 std::vector<Image> to_masks(const float* values, const Targets& like) {
   std::vector<Image> masks;
   if (values) masks.assign(like.views, Image(like.width, like.height));
@@ -39,7 +39,7 @@ std::vector<Image> to_masks(const float* values, const Targets& like) {
   return masks;
 }
 
-/// What a program's version of the struct has. The first was padded to where robust begins.
+/// Weights in a program's version of the struct. The first version was padded to where robust begins.
 LossWeights to_weights(const dpr_loss_weights* given) {
   const auto weights = versioned<dpr_loss_weights>(given, DPR_LOSS_WEIGHTS_INIT, "weights");
   LossWeights converted{.mse = weights.mse, .l1 = weights.l1, .silhouette = weights.silhouette};
@@ -50,7 +50,7 @@ LossWeights to_weights(const dpr_loss_weights* given) {
   return converted;
 }
 
-/// What is compared beside colours; `images` holds it.
+/// Attributes that are compared beside colours; `images` holds them.
 std::vector<AttributeTarget> to_attributes(const dpr_loss_options& options, const Targets& like,
                                            std::vector<std::vector<Image>>& images) {
   constexpr std::size_t k_most = 16;

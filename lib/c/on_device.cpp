@@ -1,4 +1,4 @@
-// What stays on the device, in the C interface.
+// Buffers that stay on the device, in the C interface.
 #include "c/buffers.hpp"
 
 using dpr::c::deref;

@@ -106,7 +106,7 @@ Texture to_texture(const dpr_texture& given, const std::string& argument) {
   return texture;
 }
 
-/// What the mesh has of textures; validate() checks how its parts fit.
+/// Copies the mesh's textures; validate() checks how their parts fit.
 void copy_textures(const dpr_mesh& given, Mesh& mesh) {
   if (given.texcoords) {
     require_count(given.texcoord_count, "mesh.texcoord_count");

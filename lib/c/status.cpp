@@ -1,4 +1,4 @@
-// How calls of the C interface fail, what they said, and which handles there are.
+// Failures of the C interface's calls, their messages, and the list of its handles.
 #include <mutex>
 #include <new>
 #include <string_view>

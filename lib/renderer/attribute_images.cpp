@@ -55,7 +55,7 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   return scene;
 }
 
-/// Which vertex of the scene each shown one is; `first` is the number of a mesh's first.
+/// Vertices of the scene that are shown, in order; `first` is the number of a mesh's first.
 std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain, const Geometry& geometry,
                                     std::size_t MeshRange::*first) {
   std::vector<cl_uint> vertices;
@@ -74,7 +74,7 @@ std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain, 
   return vertices;
 }
 
-/// What the renderer's backward pass has to find.
+/// Gradients that the renderer's backward pass has to find.
 GradientRequest request_of(const GradientRequest& wanted, std::optional<Attribute> attribute) {
   GradientRequest request = no_gradients();
   request.positions = wanted.positions;

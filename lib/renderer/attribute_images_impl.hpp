@@ -1,4 +1,4 @@
-// What AttributeImages hold: a renderer of their own, whose colours are the attribute.
+// State of AttributeImages: a renderer of their own, whose colours are the attribute.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace dpr {
 
-/// Where the numbers of an attribute stand.
+/// Elements that an attribute has numbers for.
 enum class AttributeDomain { vertices, faces, corners };
 
 struct AttributeImages::Impl {
@@ -23,7 +23,7 @@ struct AttributeImages::Impl {
 
   Impl(const Device& device, std::optional<Attribute> attribute, std::size_t channels);
 
-  /// Of three channels.
+  /// Number of groups of three channels.
   std::size_t groups() const { return (channels + 2) / 3; }
   /// Alpha is the sum of the weights but in the barrier composition. There one more group shows it.
   static bool shows_weights(const Smoothing& s) { return s.composition == Composition::barrier; }

@@ -1,4 +1,4 @@
-// Which faces nothing can see, because they are the far side of a solid.
+// Faces that nothing can see, because they are the far side of a solid.
 #pragma once
 
 #include <span>
@@ -13,7 +13,7 @@ namespace dpr {
 class BackFaces {
  public:
   BackFaces() = default;
-  /// Of the scene's meshes.
+  /// `solids` are those of the scene's meshes.
   explicit BackFaces(std::vector<Solid> solids);
 
   /// The mesh's positions are others than before.

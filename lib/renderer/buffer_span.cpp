@@ -24,7 +24,7 @@ void require_usable(const Device::Impl& device, const cl::Memory& memory, Access
     throw InvalidArgument(name, "a buffer that kernels may only read", "one that they may write");
 }
 
-/// Of a whole number of floats, which can be counted.
+/// Throws unless the bytes are a whole number of floats, which can be counted.
 void require_floats(std::size_t bytes, const std::string& name) {
   constexpr std::size_t k_most = std::size_t{1} << 34U;
   if (bytes % sizeof(float) == 0 && bytes < k_most) return;

@@ -1,4 +1,4 @@
-// What is checked of a caller's OpenCL objects when they are passed.
+// Checks of a caller's OpenCL objects when they are passed.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@ namespace dpr {
 
 enum class Access { read, write };
 
-/// Where kernels find `count` vectors, each of so many rows of floats. Throws InvalidArgument, which calls
-/// the buffer `name`, unless they may and all are there.
+/// Place at which kernels find `count` vectors, each of so many rows of floats. Throws InvalidArgument, which
+/// calls the buffer `name`, unless kernels may read or write there and all vectors are there.
 struct VectorShape {
   std::size_t count, components, rows = 1;
 };

@@ -1,4 +1,4 @@
-// How near and how far the boxes around meshes lie from cameras: what is known of a mesh before its vertices
+// Depths of the boxes around meshes before cameras: the bounds that are known of a mesh before its vertices
 // are projected.
 #pragma once
 
@@ -20,7 +20,7 @@ struct DepthRange {
 };
 DepthRange depth_range(const BoxCorners& box, const Camera& camera, const glm::mat4& model);
 
-/// Whether no rounding of single precision takes anything of the box to the near plane.
+/// True if no rounding of single precision takes anything of the box to the near plane.
 bool is_beyond_near_plane(const DepthRange& range, const Camera& camera);
 
 }  // namespace dpr

@@ -1,4 +1,4 @@
-// What single precision holds: the scales of a frame before it is rendered, its gradients after.
+// Checks of single precision's range: the scales of a frame before it is rendered, its gradients after.
 #pragma once
 
 #include "dpr/renderer.hpp"

@@ -25,7 +25,7 @@ Range sums_of(const SumList& list, std::size_t channel, const GradientRow& row, 
   return row.of == GradientOf::mesh_in_view ? Range(of_view + index.item, 1) : Range(of_view, meshes);
 }
 
-/// What a gradient of unit sums in a channel says: numbers that sum over meshes do so with one factor.
+/// Adds the terms that a gradient of unit sums in a channel has: numbers that sum over meshes have one factor.
 void add_terms(SceneGradient& of_units, const SumList& list, std::size_t channel, const GradientSums& all,
                std::size_t meshes, Terms& terms) {
   std::size_t number = 0;

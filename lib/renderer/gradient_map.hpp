@@ -37,7 +37,7 @@ struct GradientSums {
   }
 };
 
-/// Whether an array is made of such sums, and not one of vertices, colours or texels.
+/// True if an array is made of such sums, and not one of vertices, colours or texels.
 inline bool is_summed(const GradientRow& row) {
   return row.of != GradientOf::mesh && row.of != GradientOf::all_views;
 }

@@ -1,4 +1,4 @@
-// Whether a frame may have faces that cross the near plane: frames that have none are spared the clipping.
+// Test of whether a frame may have faces that cross the near plane; others are spared the clipping.
 #pragma once
 
 #include <optional>
@@ -27,7 +27,7 @@ class NearPlane {
   bool knows(std::size_t mesh) const noexcept { return is_known_[mesh]; }
   bool knows_views() const noexcept { return are_views_known_; }
   std::span<const BoxCorners> boxes_of_views() const noexcept { return boxes_of_views_; }
-  /// What set_boxes_of_views() takes: of views with shapes of their own, [view][position]. O(positions).
+  /// Boxes for set_boxes_of_views(), of views with shapes of their own, [view][position]. O(positions).
   static std::vector<BoxCorners> boxes_of(std::span<const glm::vec3> positions, const Geometry& geometry);
   /// [view][mesh]; empty: the views share the scene's meshes.
   void set_boxes_of_views(std::vector<BoxCorners>&& boxes) noexcept {

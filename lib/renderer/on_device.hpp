@@ -1,4 +1,4 @@
-// What the functions of dpr/opencl_handles.hpp have in common.
+// Code shared by the functions of dpr/opencl_handles.hpp.
 #pragma once
 
 #include <optional>

@@ -18,14 +18,14 @@ struct Raster {
   int margin = 0;         ///< samples around the frame
 };
 
-/// What is left to the blur of the scale of the pixel's noise, in pixels of a frame whose shorter side is
-/// that long; and its derivative by sigma.
+/// Scale of the pixel's noise that is left to the blur, in pixels of a frame whose shorter side is that
+/// long; and its derivative by sigma.
 struct PixelScale {
   double value, by_sigma;
 };
 PixelScale pixel_scale(const Smoothing& smoothing, int short_side);
 
-/// How far behind the nearest surface, in normalised depth, the noise of the depths lets another be seen.
+/// Distance behind the nearest surface, in normalised depth, up to which depth noise lets another be seen.
 float depth_reach(const Smoothing& smoothing);
 
 class PixelNoise {
@@ -50,8 +50,8 @@ class PixelNoise {
   /// gradient is found by the raster itself.
   void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                 const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole);
-  /// Whether backward() lacks the raster, whose place a gradient has taken: other samples have been smoothed
-  /// since, and the blur no longer holds what it kept of it.
+  /// True if backward() lacks the raster, whose place a gradient has taken: other samples have been smoothed
+  /// since, and the blur no longer holds what it kept of the raster.
   bool lacks_raster(bool by_scale) const { return by_scale && raster_is_gradient_ && !blur_holds_image_; }
 
   /// Samples other than those of forward() the same way, to [view][height][width].
@@ -61,7 +61,7 @@ class PixelNoise {
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
   Buffer<cl_float4> image;  ///< [view][height][width] RGBA
-  /// Of the samples of `raster`, after backward().
+  /// Gradient of the samples of `raster`, after backward().
   const Buffer<cl_float4>& grad_raster(const Buffer<cl_float4>& raster) const {
     return raster_is_gradient_ ? raster : grad_raster_;
   }

@@ -102,7 +102,7 @@ void Renderer::Impl::find_edges() {
   has_moved = false;
 }
 
-/// Of views with shapes of their own none are known to be hidden.
+/// Hides no faces of views with shapes of their own, of which none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
   const bool may_hide =
@@ -150,7 +150,7 @@ Blur::Size Renderer::Impl::image_size() const {
   return {views.size(), static_cast<std::size_t>(scene.width), static_cast<std::size_t>(scene.height)};
 }
 
-/// Of noise on the pixel. Within the capacity for what is expected, or blocks to count.
+/// Finds the contours of noise on the pixel, within the capacity for what is expected, or blocks to count.
 void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
   if (!pixel_noise) return;
   Contour& contour = pixel_noise->contour;
@@ -295,7 +295,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (geometry_colors) {
       gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                       grad_colors);
-      // Where vertices may lie behind the camera their depth goes the way of homogeneous coordinates.
+      // The depth of vertices that may lie behind the camera goes the way of homogeneous coordinates.
       geometry_colors->backward(frame, *geometry, transform, grad_colors,
                                 frame.clips != 0 ? clip.grad : grad_vertices, grad_lit);
     }

@@ -1,4 +1,4 @@
-// What comes into the renderer from buffers, by copies on the device.
+// Inputs of the renderer from buffers, by copies on the device.
 #include <optional>
 #include <utility>
 

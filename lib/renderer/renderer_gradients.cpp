@@ -184,7 +184,7 @@ void add_pose_gradients(std::span<const float> sums, const Scene& scene, std::sp
   }
 }
 
-/// What turning the normals adds to the gradients of rotations, from sums by [3][view][mesh].
+/// Adds the normals' turning to the gradients of rotations, from sums by [3][view][mesh].
 void add_normal_gradients(std::span<const float> sums, SceneGradient& gradient) {
   const std::size_t meshes = gradient.meshes.size(), segments = gradient.views.size() * meshes;
   for (std::size_t i = 0; i < segments; ++i) {

@@ -1,4 +1,4 @@
-// What a Renderer holds: the scene, its geometry on the device, and the stages with their buffers.
+// State of a Renderer: the scene, its geometry on the device, and the stages with their buffers.
 #pragma once
 
 #include <cstdint>
@@ -60,8 +60,8 @@ struct SmoothingSetting {
 /// Adds a gradient of the positions ([vertex], object space) to the one that is there.
 using AddToGradient = std::function<void(const Buffer<cl_float4>& positions, Buffer<cl_float4>& grad)>;
 
-/// Where the counts of a frame go whose sizes are not measured first: to the host, which will want them soon;
-/// or nowhere, until it asks.
+/// Destination of the counts of a frame whose sizes are not measured first: the host, which will want them
+/// soon; or none, until it asks.
 enum class FrameSizes { read, kept };
 
 class RowReads;
@@ -74,7 +74,7 @@ inline constexpr std::size_t k_rows_of_piece = std::size_t{1} << 17;
 struct Renderer::Impl : OnDevice, ViewSet {
   explicit Impl(Device device);
 
-  /// What the setters are given is checked already.
+  /// The setters' arguments are checked already.
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views, std::size_t first_view);
   /// All that depends on each other in one step: none need suit what was there of the others.
@@ -100,7 +100,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
   void take_view_matrices(const FloatVectors& from);
-  /// For images of the scene's size, and so many views.
+  /// Prepares a smoothing for images of the scene's size, and so many views.
   SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {
     return prepare(smoothing, scene, views.size());
@@ -124,7 +124,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void render_aov();
   /// The device alone knows where the mesh's vertices are.
   void forget_positions(std::size_t mesh) noexcept;
-  /// Of all meshes; without any where one has none.
+  /// Texture coordinates of all meshes' corners; none where a mesh has none.
   std::shared_ptr<CornerTexcoords> corner_texcoords_in_force();
 
   /// Throws InvalidArgument unless there is an image to work with; `caller` says who wants it. An image is
@@ -133,7 +133,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void require_scene(const char* caller) const;
   void require_rendered(const char* caller) const;
   void require_forward(const char* caller);
-  /// Of the last frame: [view][height][width] RGBA.
+  /// Image of the last frame: [view][height][width] RGBA.
   const Buffer<cl_float4>& image() const { return pixel_noise ? pixel_noise->image : aggregate.image; }
   /// Held in buffers.
   std::size_t bytes() const;
@@ -248,7 +248,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   };
   Segment all_pixels_, all_views_;
 
-  // Where the next setter prepares what it sets.
+  // Buffers in which the next setter prepares its values.
   ViewSet spare_views_;
   Buffer<cl_float4> spare_values_, spare_view_positions_, spare_view_colors_;
 };

@@ -47,7 +47,7 @@ shared::ViewParams view_params(const Camera& camera, int width, int height) {
   return v;
 }
 
-/// Whether distances have no noise.
+/// True if distances have no noise.
 bool is_sharp(const Smoothing& smoothing) {
   return smoothing.noise == Noise::pixel || smoothing.occupancy_width == OccupancyWidth::zero;
 }
@@ -75,7 +75,7 @@ void set_raster(shared::FrameParams& p, const Scene& scene, const Raster& raster
   p.pixel_size = 2.0F / static_cast<float>(std::min(scene.width, scene.height) * raster.supersampling);
 }
 
-/// Of faces that are left out; 0: none are. Front faces wind counter-clockwise.
+/// Orientation of culled faces; 0: no culling. Front faces wind counter-clockwise.
 float culled_orientation(Cull cull) noexcept {
   if (cull == Cull::none) return 0;
   return cull == Cull::front ? 1.0F : -1.0F;
@@ -129,7 +129,7 @@ void check_raster(const Scene& scene, std::size_t views, const Raster& raster) {
                             " in all views");
 }
 
-/// What the stages before the blur do with noise of the pixel: nothing to distances.
+/// Smoothing of the stages before the blur with noise of the pixel: distances have no noise.
 Smoothing without_distance_noise(Smoothing smoothing) {
   smoothing.occupancy_width = OccupancyWidth::zero;
   smoothing.occupancy_prior = Prior::gaussian;  // has no part in it
@@ -347,8 +347,8 @@ void Renderer::Impl::set_materials(std::size_t mesh, std::span<const Material> m
   rendered = false;
 }
 
-/// Where the copy of a buffer is prepared that takes its place: in what nothing reads between a backward pass
-/// and the next, if that is as long.
+/// Buffer in which the copy that takes a buffer's place is prepared: one that nothing reads between a
+/// backward pass and the next, if that is as long.
 Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
   Buffer<cl_float4>& spare = buffer.size() == vertices ? grad_vertices : spare_values_;

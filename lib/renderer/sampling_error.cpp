@@ -34,7 +34,7 @@ class Spread {
   double count_ = 0;
 };
 
-/// What the replicates of a renderer leave behind.
+/// Sums over the replicates of a renderer.
 class Replicates {
  public:
   explicit Replicates(Renderer::Impl& renderer) : m_(renderer) {}

@@ -1,4 +1,4 @@
-// What a SceneBatch holds: a renderer for each scene, and the images of all in one buffer.
+// State of a SceneBatch: a renderer for each scene, and the images of all in one buffer.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct SceneBatch::Impl : OnDevice {
                                       std::span<const AddToGradient> add_to_positions = {});
   /// Throws InvalidArgument unless all images are of one size and can be counted.
   void require_one_size() const;
-  /// Of all scenes' images.
+  /// Number of all scenes' images.
   std::size_t views() const;
   std::size_t pixels_per_view() const;
 

@@ -1,4 +1,4 @@
-// What the setters of a renderer refuse, of one device or of several.
+// Checks of the setters' arguments, of renderers on one device or several.
 #pragma once
 
 #include <cstddef>
@@ -57,10 +57,10 @@ BlurKernel pixel_blur(const Smoothing& smoothing, const Scene& of);
 /// The shifts by which it is sampled.
 ShiftTable pixel_shifts(const Smoothing& smoothing, const Scene& of);
 
-/// What the scene's own smoothing needs around its frame. Throws as blur_kernel().
+/// Raster that the scene's own smoothing needs around its frame. Throws as blur_kernel().
 Raster raster_of(const Scene& scene);
 
-/// How many views of the scene a frame may have, so that what is counted of them can be counted: pixels, the
+/// Most views of the scene that a frame may have, so that all counts over them fit their types: pixels, the
 /// raster's samples, vertices and faces.
 std::size_t most_views(const Scene& scene, const Raster& raster = {});
 

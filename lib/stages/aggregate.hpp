@@ -82,12 +82,12 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   void backward(const AggregateInputs& in, const glm::vec3& background,
                 const BufferRef<cl_float4>& grad_image);
 
-  /// Of `channels`: the joint composition has none of alpha.
+  /// Number of `channels`: the joint composition has none of alpha.
   std::size_t channel_count() const {
     return now_.smoothing.composition == Composition::joint ? DPR_CHANNEL_ALPHA : DPR_PIXEL_CHANNELS;
   }
 
-  /// Of the buffers below and the slots.
+  /// Bytes a fragment of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
 
   Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
@@ -95,7 +95,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   ColorPlanes grad_color;                        ///< [fragment]
   Buffer<float> channels;                        ///< [channel_count()][view][height][width]
 
-  /// Whether distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
+  /// True if distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
   /// written, but these are.
   bool perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
   Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
@@ -104,7 +104,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   std::size_t bytes() const;
 
  private:
-  /// Of a run of pixels.
+  /// Aggregates a run of pixels.
   void forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels);
   void backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
                 const BufferRef<cl_float4>& grad_image);

@@ -1,4 +1,4 @@
-// What surfaces show in place of their colours: of where they are, or rows of numbers.
+// Attributes that surfaces show in place of their colours: their geometry, or rows of numbers.
 #pragma once
 
 #include "device/kernel.hpp"
@@ -12,7 +12,7 @@ namespace dpr {
 /// Colours that follow from the geometry of a frame: depths or positions of vertices, normals of faces.
 class GeometryColors {
  public:
-  /// Of depth, position or normal.
+  /// `attribute` is depth, position or normal.
   GeometryColors(Device::Impl& device, Attribute attribute);
 
   /// Fills [view][color], after the frame's transform.
@@ -41,7 +41,7 @@ class GeometryColors {
       normals_backward_;
 };
 
-/// Which row each of what is shown has, and who shows each row, in order.
+/// Row that each vertex, face or corner shows, and those that show each row, in order.
 struct RowMap {
   RowMap() = default;
   RowMap(Device::Impl& device, std::span<const cl_uint> row_of_shown, std::size_t rows);

@@ -17,11 +17,11 @@ class Auxiliary {
   void forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                Aggregate& aggregate);
 
-  /// What noise on the pixel can blend and blur: depth and normal, and 1 and the effective number of faces,
-  /// all times the sample's alpha.
+  /// Outputs that noise on the pixel can blend and blur: depth and normal, 1 and the effective number of
+  /// faces, all times the sample's alpha.
   void weigh(const shared::FrameParams& p, const Aggregate& aggregate);
 
-  /// Of the images: pixels along their sides, samples along a pixel's, and around the image.
+  /// Size of the images: pixels along their sides, samples along a pixel's, and around the image.
   struct Raster {
     std::size_t width, height, supersampling, margin;
   };

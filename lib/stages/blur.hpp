@@ -29,8 +29,8 @@ class Blur {
   void set_kernel(BlurKernel kernel) { set(prepare(std::move(kernel))); }
   const BlurKernel& kernel() const { return now_.kernel; }
 
-  /// What of the rasters that follow is covered, and so need not be all alike: the tiles that have pairs.
-  /// Elsewhere nothing is summed up. Until then all of a raster may differ.
+  /// Finds the covered part of the rasters that follow, which need not be all alike: the tiles that have
+  /// pairs. Elsewhere nothing is summed up. Until then all of a raster may differ.
   void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
@@ -41,9 +41,9 @@ class Blur {
   void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                       const BufferRef<cl_float4>& grad_image);
 
-  /// Whether backward_scale() reads the raster itself, not what forward() has kept of it.
+  /// True if backward_scale() reads the raster itself, not what forward() has kept of it.
   bool scale_reads_raster() const { return !is_coarse(); }
-  /// Whether backward() loads whole vectors where the image ends: memory behind it must be there.
+  /// True if backward() loads whole vectors where the image ends: memory behind it must be there.
   bool loads_behind_images() const { return is_coarse(); }
 
   Buffer<float> grad_scale;  ///< [view], by the scale in pixels
@@ -57,7 +57,7 @@ class Blur {
     std::size_t pixels, samples, in, out;
   };
   Axis axis(std::size_t pixels) const;
-  /// Of the coarse grid: those whose splines reach into it.
+  /// Number of the coarse grid's nodes before the frame whose splines reach into the frame.
   std::size_t nodes_before_frame() const;
   bool is_coarse() const { return now_.kernel.decimation > 1; }
 
@@ -72,10 +72,10 @@ class Blur {
   /// The samples that an element along one axis is made of: from i * step + first up to i * step + end.
   struct Footprint {
     int step = 1, first = 0, end = 1;
-    /// Of the outputs of a pass whose inputs have this one.
+    /// Footprint of the outputs of a pass whose inputs have this one.
     Footprint through(const Pass& pass) const;
   };
-  /// Of what the convolution reads.
+  /// Footprint of the convolution's inputs.
   Footprint input_footprint(const Axis& axis) const;
   /// The pass, which passes over what lies outside of the extents. `along` and `across` are of its inputs.
   Pass within_extents(Pass pass, const Footprint& along, const Footprint& across,

@@ -13,7 +13,7 @@ std::uint32_t texture_of(const Mesh& mesh, std::uint32_t face) {
   return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
 }
 
-/// Whether two coordinates are one place of a texture.
+/// True if two coordinates are one place of a texture.
 bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
   const float period = period_of(wrap);
   if (period == 0) return a == b;
@@ -21,14 +21,14 @@ bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
   return periods == glm::round(periods);
 }
 
-/// Which corner of a face a vertex is.
+/// Number of a vertex among a face's corners.
 int corner_of(const Mesh& mesh, std::uint32_t face, std::uint32_t vertex) {
   int corner = 0;
   while (corner < 2 && mesh.faces[face][corner] != vertex) ++corner;
   return corner;
 }
 
-/// Whether the texture jumps at the edge between two faces.
+/// True if the texture jumps at the edge between two faces.
 bool is_seam(const Mesh& mesh, const WeldedEdge& edge) {
   if (mesh.textures.empty()) return false;
   const std::uint32_t own = edge.face, other = *edge.other, texture = texture_of(mesh, own);
@@ -42,7 +42,7 @@ bool is_seam(const Mesh& mesh, const WeldedEdge& edge) {
   });
 }
 
-/// Whether what the mesh says of how it is lit jumps at the edge between two faces: their materials, or the
+/// True if what the mesh says of how it is lit jumps at the edge between two faces: their materials, or the
 /// normals that it gives.
 bool light_may_jump(const Mesh& mesh, const WeldedEdge& edge) {
   const std::uint32_t own = edge.face, other = *edge.other;

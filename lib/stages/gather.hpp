@@ -25,7 +25,7 @@ class Gather {
   std::size_t bytes() const { return chunks_.capacity_bytes(); }
 
  private:
-  /// Of faces that may have more pairs than one work-item is to add.
+  /// Sums chunks of faces that may have more pairs than one work-item is to add.
   void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels,
                   const Buffer<float>& partial);
 

@@ -18,8 +18,8 @@ struct Incidence {
   Buffer<cl_uint> corners;  ///< [face * 3]
 };
 
-/// Where a mesh lies in the joined buffers. An instance has vertices, and as many given normals, of its own;
-/// the rest is where its mesh has it.
+/// Ranges of a mesh in the joined buffers. An instance has vertices, and as many given normals, of its own;
+/// the rest is its mesh's.
 struct MeshRange {
   std::size_t first_vertex = 0, vertices = 0;
   std::size_t first_position = 0, first_color = 0, colors = 0;
@@ -42,7 +42,7 @@ struct Textures {
   Incidence texcoord_corners;
 
   bool empty() const { return list.empty(); }
-  /// Whether some have smaller levels.
+  /// True if some have smaller levels.
   bool has_pyramids() const {
     return std::ranges::any_of(list, [](const shared::Texture& t) { return t.levels > 1; });
   }
@@ -90,7 +90,7 @@ struct Geometry {
   GivenNormals given_normals;
   SurfaceMaterials materials;
 
-  /// Where corners look for their normals, those of vertices among them.
+  /// Indices of the corners' normals, those of vertices among them.
   const Buffer<cl_uint4>& face_normals() const {
     return given_normals.empty() ? face_vertices : given_normals.face_normals;
   }
@@ -98,7 +98,7 @@ struct Geometry {
     return given_normals.empty() ? vertex_corners : given_normals.corners;
   }
   std::size_t normals() const { return vertices + given_normals.count; }
-  /// What the kernels read with the frame's strides.
+  /// Positions that the kernels read with the frame's strides.
   const Buffer<cl_float4>& positions_of(const shared::FrameParams& p) const {
     return p.position_stride != 0 ? view_positions : positions;
   }
@@ -125,16 +125,16 @@ struct Geometry {
   Incidence color_corners_;
 };
 
-/// Whether a mesh of the scene has textures.
+/// True if a mesh of the scene has textures.
 bool is_textured(const Scene& scene);
 
 /// Among the mesh's materials; 0 where it has none.
 std::size_t material_of(const Mesh& mesh, std::size_t face);
 
-/// Whether a mesh of the scene gives normals.
+/// True if a mesh of the scene gives normals.
 bool gives_normals(const Scene& scene);
 
-/// Whether a mesh of the scene has materials of its own.
+/// True if a mesh of the scene has materials of its own.
 bool has_materials(const Scene& scene);
 
 /// A vector of three in the first components; w = 0.

@@ -67,10 +67,10 @@ class Occupancy : public SmoothedStage<OccupancyKernels> {
 /// The build option that chooses a prior.
 std::string prior_option(Prior prior);
 
-/// Whether it is the sampled joint composition.
+/// True for the sampled joint composition.
 bool samples_jointly(const Smoothing& smoothing);
 
-/// How the Monte Carlo estimators of either stage sample.
+/// Sampling of the Monte Carlo estimators of either stage.
 shared::Sampling sampling_params(const Smoothing& smoothing);
 
 }  // namespace dpr

@@ -140,8 +140,8 @@ std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, s
   const auto may_join = [&](std::size_t first, std::size_t next) {
     return is_row(first) ? is_row(next) : row_of(first) == row_of(next);
   };
-  // Of equal size rather than as large as may be; and none larger than the first, so that buffers do not
-  // grow.
+  // The bands have equal size rather than the largest; none is larger than the first, so that buffers do
+  // not grow.
   const std::size_t total = cuts.back().fragment, least_bands = bytes_of(total) / budget + 1;
   std::size_t most = least_bands == 1 ? total : std::max(total / least_bands, largest);
   std::vector<Band> bands;

@@ -12,7 +12,7 @@
 
 namespace dpr {
 
-/// How many pairs and fragments a frame holds, or its buffers can hold; and, with noise on the pixel, pairs
+/// Pairs and fragments that a frame holds, or its buffers can hold; and, with noise on the pixel, pairs
 /// of tiles and contours.
 struct FrameCounts {
   std::size_t pairs = 0, fragments = 0, contours = 0;
@@ -28,8 +28,8 @@ struct ContourCount {
   const Buffer<cl_uint>& starts;
 };
 
-/// What no fragments are made of, where all triangles are opaque: what lies further than `reach`, normalised
-/// depth, behind another.
+/// Samples without fragments, where all triangles are opaque: those that lie further than `reach`,
+/// normalised depth, behind another.
 struct Hiding {
   float reach;
   const Buffer<shared::ViewParams>& cameras;
@@ -71,7 +71,7 @@ class Rasterize {
   void forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
                       const Buffer<shared::Triangle>& triangles, Bin& bin,
                       const std::optional<ContourCount>& contours, bool reads);
-  /// What forward_within() found. Blocks until the device has counted and, where it did not read, rendered.
+  /// Counts of forward_within(). Blocks until the device has counted and, where it did not read, rendered.
   FrameCounts read_counts();
   /// [1] of the frames that forward_within() did not read: the most pairs, fragments and contours' pairs, and
   /// how many were emptied. All 0 at first, and after forget_history().
@@ -80,7 +80,7 @@ class Rasterize {
   /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
   /// the band whose fragments these are.
   Band settle(const shared::FrameParams& p, const FrameCounts& counts);
-  /// Of a frame that cover() counted.
+  /// Counts of a frame that cover() counted.
   FrameCounts counted() const;
   /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
   /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
@@ -96,14 +96,14 @@ class Rasterize {
                 const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                 const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
 
-  /// What the stages behind this one work on: the band, or everything where none was cut.
+  /// Pairs that the stages behind this one work on: the band's, or all where none was cut.
   Range pairs(const Bin& bin) const { return band ? band->pairs : Range(bin.pairs); }
   std::vector<Range> pixels(const shared::FrameParams& p) const;
   Range tiles(const shared::FrameParams& p) const;
 
   PairGroups pair_groups(const Bin& bin) const { return PairGroups(device_, pairs(bin)); }
 
-  /// Of what later stages hold of every fragment.
+  /// Length of the buffers that later stages hold of every fragment.
   Length fragment_length() const { return length(fragments); }
 
   static constexpr std::size_t k_fragment_bytes =
@@ -126,7 +126,7 @@ class Rasterize {
   std::size_t bytes() const;
 
  private:
-  /// What comes before a tile.
+  /// Pairs and fragments before a tile.
   struct TileStart {
     std::size_t tile, pair, fragment;
   };

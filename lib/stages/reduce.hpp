@@ -8,7 +8,7 @@
 
 namespace dpr {
 
-/// What to sum: values[channel][starts[s * stride] .. starts[(s + 1) * stride]) for every channel and segment
+/// Values to sum: values[channel][starts[s * stride] .. starts[(s + 1) * stride]) for every channel and segment
 /// s, of `count` values a channel. The sums are [channel][segment]. How they are rounded depends on
 /// `expected`, roughly how many values of a channel there are.
 struct Summation {

@@ -15,7 +15,7 @@
 
 namespace dpr {
 
-/// What the kernels of lit scenes are built for.
+/// Options that the kernels of lit scenes are built with.
 struct ShadingModel {
   Shading shading = Shading::phong;
   cl_uint lights = 0;        ///< bits of DPR_LIGHTS
@@ -94,7 +94,7 @@ class Shade {
   std::size_t lights() const { return now_.params.lights; }
   /// Launches that find the lights' gradients: without lights one still finds the environment's.
   std::size_t light_launches() const { return std::max<std::size_t>(lights(), 1); }
-  /// Of `light_channels`.
+  /// Number of `light_channels`.
   std::size_t light_channel_count() const;
 
   void forward(const ShadeInputs& in);
@@ -105,7 +105,7 @@ class Shade {
   void backward(const ShadeInputs& in, const ColorPlanes& grad);
   /// The base colours' gradients after backward(), of a textured scene.
   const ColorPlanes& grad_base(const ColorPlanes& grad) const { return lit() ? grad_base_ : grad; }
-  /// What shading adds to d loss / d world position, by way of positions and normals: [view][vertex]. Only if
+  /// Adds the gradient by way of positions and normals to d loss / d world position: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
   /// The gradients of normals that meshes give, and what those add to the models' rotations. After
@@ -115,7 +115,7 @@ class Shade {
   void backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light);
 
   static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
-  /// Of a textured scene's base colours, their gradients, and what the surface holds.
+  /// Bytes a fragment of a textured scene's base colours, their gradients, and the surface's buffers.
   static constexpr std::size_t k_textured_fragment_bytes = 6 * sizeof(float) + Surface::k_fragment_bytes;
 
   std::optional<Surface> surface;        ///< of textured scenes: made for the first of them

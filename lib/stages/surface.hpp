@@ -40,10 +40,10 @@ class Surface {
   /// Adds what goes by way of the levels of detail, as backward() found it, to the gradients of the corners
   /// on the screen, [pair][9] as Rasterize has them, and of clipped faces as Clip has them.
   void backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corners, Buffer<float>& grad_clip);
-  /// What the band's fragments ask of the texels, by fragment and level: for the stage that gathers it.
+  /// Lists the texels that the band's fragments see, by fragment and level, for the stage that gathers.
   void list(const SurfaceInputs& in, const ColorPlanes& grad_base);
 
-  /// Of those below, of two levels, and of what sorting needs beside.
+  /// Bytes a fragment of the buffers below, of two levels, and of those that sorting needs.
   static constexpr std::size_t k_fragment_bytes =
       2 * (4 * sizeof(cl_uint) + sizeof(cl_float2) + sizeof(cl_float4));
 
