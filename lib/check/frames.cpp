@@ -14,7 +14,7 @@
 namespace dpr::check {
 namespace {
 
-// Bounds: some eight times what the runtimes for CPUs leave that were tried (bench/results/README.md), since OpenCL
+// Bounds: some eight times what the runtimes for CPUs leave that were tried (bench/results/notes.md), since OpenCL
 // allows devices several roundings in a division, a root or an exponential. Within those of the tests.
 constexpr double k_ndc = 1e-6, k_distance = 5e-7, k_depth = 1.1e-6, k_barycentric = 4e-6;
 constexpr double k_occupancy = 1e-5, k_color = 1e-5, k_image = 2e-5, k_gradient = 5e-4;

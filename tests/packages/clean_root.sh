@@ -5,7 +5,7 @@
 #       demo   ./cmake/demo.sh            check    dpr devices --check, after demo
 #       unit   the tests labelled unit    kernels  every kernel with every set of options
 #       test   ./cmake/test.sh
-#       Without STEP: demo check kernels unit. The last line is a row of the table in bench/results/README.md.
+#       Without STEP: demo check kernels unit. The last line is a row of the table in bench/results/notes.md.
 #   tests/packages/clean_root.sh SUITE --packages FOLDER      the .deb files that cpack --preset packages wrote
 #
 # The root is kept, with ccache's files, in ${DPR_ROOTS:-~/.cache/dpr/roots}/SUITE;

@@ -14,7 +14,7 @@ using dpr::test::reduced;
 
 namespace {
 
-/// Beside the probability of 1e-9 that is left out, aggregation is as exact as kernels/README.md says, on one
+/// Beside the probability of 1e-9 that is left out, aggregation is as exact as bench/results/notes.md says, on one
 /// side and on the other: twice that, for sums over pixels whose errors have either sign.
 constexpr float k_image_error = 5e-6F;
 constexpr double k_gradient_error = 1e-4;
