@@ -12,6 +12,7 @@
 #include "device/kernel.hpp"
 #include "dpr/error.hpp"
 #include "environment.hpp"
+#include "kernels/scan.hpp"
 #include "results_file.hpp"
 
 namespace dpr::cli {
@@ -30,14 +31,14 @@ double median(std::vector<double> values) {
 /// Microseconds from the launch of a small kernel to the end of the host's wait for it.
 double launch_microseconds(const Device& device) {
   constexpr int k_launches = 200;
-  Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum(device.impl(), "scan.cl", "scan_sum");
+  Launcher<kernel::scan_sum> launch(device.impl());
   const std::vector<cl_uint> one{1};
   const Buffer<cl_uint> value(device.impl(), std::span<const cl_uint>(one));
   Buffer<cl_uint> result(device.impl(), 1);
   std::vector<double> times;
   for (int i = 0; i < k_launches; ++i) {
     const Clock::time_point start = Clock::now();
-    sum.in_groups(1, 1U, value, result);
+    launch.in_groups(1, kernel::scan_sum{.count = 1U, .values = value, .sums = result});
     check_cl(device.impl().queue.finish(), "clFinish");
     times.push_back(seconds_since(start) * 1e6);
   }

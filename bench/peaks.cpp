@@ -7,6 +7,7 @@
 
 #include "device/kernel.hpp"
 #include "device/kernel_sources.hpp"
+#include "kernels/peak.hpp"
 
 namespace dpr::bench {
 namespace {
@@ -33,12 +34,15 @@ cl::Program build(Device::Impl& device) {
 }
 
 /// Seconds of one launch, from before it is enqueued until it has finished.
-double time_launch(Device::Impl& device, const cl::Kernel& kernel, std::size_t items) {
+template <class K>
+double time_launch(Device::Impl& device, const cl::Program& program, std::size_t items, const K& arguments) {
+  cl::Kernel kernel(program, K::k_source.name);
+  detail::set_arguments(kernel, K::k_source.name, arguments.arguments());
   check_cl(device.queue.finish(), "clFinish");
   const auto start = std::chrono::steady_clock::now();
   check_cl(device.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(items),
                                              cl::NDRange(device.local_size())),
-           "kernel " + kernel.getInfo<CL_KERNEL_FUNCTION_NAME>());
+           std::string("kernel ") + K::k_source.name);
   check_cl(device.queue.finish(), "clFinish");
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -48,12 +52,9 @@ double measure_flops(Device::Impl& device, const cl::Program& program) {
   const std::size_t per_unit = device.local_size() * (device.info.type == "cpu" ? 4 : 32);
   const std::size_t items = per_unit * device.info.compute_units;
   Buffer<float> result(device, items);
-  cl::Kernel kernel(program, "peak_fma");
-  kernel.setArg(1, 0.999F);
-  kernel.setArg(2, result.cl_buffer());
   const auto time = [&](cl_uint rounds) {
-    kernel.setArg(0, rounds);
-    return time_launch(device, kernel, items);
+    return time_launch(device, program, items,
+                       kernel::peak_fma{.rounds = rounds, .factor = 0.999F, .result = result});
   };
   cl_uint rounds = 256;
   time(rounds);  // compiles
@@ -72,14 +73,11 @@ double measure_bandwidth(Device::Impl& device, const cl::Program& program) {
   Buffer<float> a(device, floats), b(device, floats), c(device, floats);
   b.fill(1.0F);
   c.fill(2.0F);
-  cl::Kernel kernel(program, "peak_triad");
-  kernel.setArg(0, 3.0F);
-  kernel.setArg(1, b.cl_buffer());
-  kernel.setArg(2, c.cl_buffer());
-  kernel.setArg(3, a.cl_buffer());
-  time_launch(device, kernel, items);
+  const kernel::peak_triad triad{.scale = 3.0F, .b = b, .c = c, .a = a};
+  time_launch(device, program, items, triad);
   double best = INFINITY;
-  for (int run = 0; run < k_stream_runs; ++run) best = std::min(best, time_launch(device, kernel, items));
+  for (int run = 0; run < k_stream_runs; ++run)
+    best = std::min(best, time_launch(device, program, items, triad));
   return 3.0 * sizeof(float) * device.info.lanes * static_cast<double>(items) / best;
 }
 

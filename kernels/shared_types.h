@@ -7,15 +7,9 @@
 #ifndef __OPENCL_C_VERSION__
 #include <CL/cl_platform.h>
 
-#include <string_view>
-
 namespace dpr::shared {
 using uint = cl_uint;
 using float4 = cl_float4;
-/// What the kernel's argument info calls the struct.
-#define DPR_SHARED_NAME(name) static constexpr std::string_view k_cl_name = #name;
-#else
-#define DPR_SHARED_NAME(name)
 #endif
 
 /// Tiles are 8x8 pixels: a tile's coverage by a triangle is one 64-bit mask.
@@ -174,7 +168,6 @@ using float4 = cl_float4;
 
 /// Sizes and settings of a frame that the geometry stages need.
 typedef struct FrameParams {
-  DPR_SHARED_NAME(FrameParams)
   uint views, meshes, vertices, faces;
   uint position_stride;  /* from one view's positions to the next where views have shapes, else 0 */
   uint color_stride;     /* the same for colours */
@@ -196,7 +189,6 @@ typedef struct FrameParams {
 /// Where a mesh stands: itself, or an instance of it. Each has vertices and given normals of its own in the
 /// frame; the positions and values of an instance's are its mesh's.
 typedef struct MeshPlace {
-  DPR_SHARED_NAME(MeshPlace)
   uint vertex_shift; /* the number of a vertex less that of its position */
   uint normal_shift; /* the number of a given normal less that of its value */
   uint is_instance;
@@ -205,7 +197,6 @@ typedef struct MeshPlace {
 
 /// A camera, ready for the kernels.
 typedef struct ViewParams {
-  DPR_SHARED_NAME(ViewParams)
   float4 row[3];     /* world to camera, affine */
   float4 projection; /* NDC = (x, y) * projection.xy / depth + projection.zw; orthographic: depth is 1 */
   float4 eye;        /* camera centre, world; w = 1, or 0: the direction to a camera infinitely far away */
@@ -220,7 +211,6 @@ typedef struct ViewParams {
 
 /// A triangle of a view after projection, if it is not dropped.
 typedef struct Triangle {
-  DPR_SHARED_NAME(Triangle)
   float x0, y0, x1, y1, x2, y2;   /* NDC */
   float z0, z1, z2;               /* view depth, positive in front */
   float orientation;              /* +1 counter-clockwise, -1 clockwise */
@@ -232,7 +222,6 @@ typedef struct Triangle {
 /// lies between the face's corners first + 1 and first + 2, the second between first and first + 2; of three
 /// between first and first + 1, and first and first + 2 (all modulo 3).
 typedef struct ClippedFace {
-  DPR_SHARED_NAME(ClippedFace)
   float4 corner[3];  /* of the face, by a perfect lens: x, y in NDC times w, depth, w: depth, or 1 */
   float4 cut[2];     /* x, y in NDC; depth, which is znear; the part of the way to the corner that is lost */
   float orientation; /* +1 counter-clockwise, -1 clockwise */
@@ -243,7 +232,6 @@ typedef struct ClippedFace {
 
 /// The light that all shading models share.
 typedef struct LightingParams {
-  DPR_SHARED_NAME(LightingParams)
   float4 ambient;
   uint lights;
   float shininess;
@@ -253,7 +241,6 @@ typedef struct LightingParams {
 
 /// A light of any kind.
 typedef struct Light {
-  DPR_SHARED_NAME(Light)
   float4 position; /* world; w = 1, or 0: the direction to a light infinitely far away */
   float4 diffuse, specular;
   float4 axis; /* of the cone, unit, away from the light; w = 1 / length of the axis given */
@@ -267,7 +254,6 @@ typedef struct Light {
 
 /// A texture, and where its texels lie among those of all.
 typedef struct Texture {
-  DPR_SHARED_NAME(Texture)
   uint first;         /* texel of its largest level; the smaller ones follow */
   uint width, height; /* of that level */
   uint levels;        /* 1 unless the filter is trilinear */
@@ -286,7 +272,6 @@ typedef struct Sampling {
 
 /// The perturbation of distances.
 typedef struct OccupancyParams {
-  DPR_SHARED_NAME(OccupancyParams)
   float sigma;
   Sampling sampling;
   uint width;      /* pixels, to name a pixel's noise */
@@ -296,7 +281,6 @@ typedef struct OccupancyParams {
 
 /// The perturbation of depths, and what a pixel's colour is made of.
 typedef struct AggregateParams {
-  DPR_SHARED_NAME(AggregateParams)
   float4 background;
   float sigma, gamma, alpha, background_depth;
   Sampling sampling;
@@ -311,7 +295,6 @@ typedef struct AggregateParams {
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward
 /// pass.
 typedef struct Slot {
-  DPR_SHARED_NAME(Slot)
   float beta;      /* relative to the largest of its pixel (barrier) or its cluster's nearest (joint) */
   float occupancy; /* joint; barrier: of a pixel's first where its integral begins, of up to DPR_TRIPLE in
                       closed form their weights */
@@ -321,7 +304,6 @@ typedef struct Slot {
 
 /// An edge whose face is alone with its vertices: what has to be known of two before they are joined.
 typedef struct OpenEdge {
-  DPR_SHARED_NAME(OpenEdge)
   uint side;        /* 3 * face + the corner at which it begins */
   uint texture;     /* of the mesh's, or DPR_NO_TEXTURE */
   uint material;    /* of the mesh's */
@@ -331,7 +313,6 @@ typedef struct OpenEdge {
 
 /// What contours are looked for.
 typedef struct ContourParams {
-  DPR_SHARED_NAME(ContourParams)
   uint edges;      /* of a view: those of the scene, then, where faces are clipped, the cut of every face */
   uint mesh_edges; /* of the scene */
   uint shading;    /* DPR_UNLIT, DPR_FLAT, ...: whose creases count */
@@ -340,7 +321,6 @@ typedef struct ContourParams {
 
 /// What crossings are looked for.
 typedef struct AntialiasParams {
-  DPR_SHARED_NAME(AntialiasParams)
   uint edges, mesh_edges; /* as in ContourParams */
   float depth_reach;      /* normalised depth: surfaces that much behind the nearest may still be seen */
   uint unused0;
@@ -348,7 +328,6 @@ typedef struct AntialiasParams {
 
 /// A crossing of a step that another contour has won. Planes of steps as antialias_cross.cl has them.
 typedef struct SecondCrossing {
-  DPR_SHARED_NAME(SecondCrossing)
   uint step, contour;
   uint reference;    /* the nearest step that the contour has won: it shows the jump across it */
   float cut, slope2; /* of the contour: Cut of crossing.h */
@@ -357,7 +336,6 @@ typedef struct SecondCrossing {
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its
 /// sizes.
 typedef struct MeshLossParams {
-  DPR_SHARED_NAME(MeshLossParams)
   float laplacian, edge_length, normal_consistency, flatness;
   float edge_target; /* object space */
   uint first_vertex; /* of the mesh, in the joined buffers */
@@ -367,7 +345,6 @@ typedef struct MeshLossParams {
 /// A pass of the blur: out[a] = sum over b of weights[a * out_step - b * in_step + offset] * in[b], for taps
 /// that there are. With the steps exchanged and symmetric weights it is its own transpose.
 typedef struct BlurPass {
-  DPR_SHARED_NAME(BlurPass)
   uint lines;                 /* along rows: rows of all images; along columns: images */
   uint width;                 /* along columns: pixels of a row */
   uint out_length, in_length; /* pixels along the pass */
@@ -380,7 +357,6 @@ typedef struct BlurPass {
 
 /// The blur by samples of the noise.
 typedef struct ShiftParams {
-  DPR_SHARED_NAME(ShiftParams)
   Sampling sampling;
   uint views, first_view;     /* first of the batch that names the noise */
   uint width, height;         /* pixels of an image */
@@ -390,7 +366,6 @@ typedef struct ShiftParams {
 } ShiftParams;
 
 #ifndef __OPENCL_C_VERSION__
-#undef DPR_SHARED_NAME
 }  // namespace dpr::shared
 #endif
 

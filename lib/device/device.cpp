@@ -16,6 +16,7 @@
 #include "device/trial.hpp"
 #include "dpr/multi_device.hpp"
 #include "dpr/opencl_handles.hpp"
+#include "kernels/scan.hpp"
 
 namespace dpr {
 namespace {
@@ -245,10 +246,11 @@ Device open_found(const FoundDevice& found) {
 /// Builds and runs a small kernel. Throws DeviceError or BuildError where that fails, or gives what is wrong.
 void try_out(const Device& device) {
   constexpr std::array<cl_uint, 4> k_values{1, 20, 300, 4000};
-  Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum(device.impl(), "scan.cl", "scan_sum");
+  Launcher<kernel::scan_sum> launch(device.impl());
   const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values));
   Buffer<cl_uint> sums(device.impl(), 1);
-  sum.in_groups(1, static_cast<cl_uint>(k_values.size()), values, sums);
+  launch.in_groups(
+      1, kernel::scan_sum{.count = static_cast<cl_uint>(k_values.size()), .values = values, .sums = sums});
   if (sums.download()[0] != 4321)
     throw DeviceError(CL_INVALID_KERNEL, "a first kernel, which gives a wrong sum");
 }

@@ -1,13 +1,13 @@
-// Typed kernel launches: a wrong number, order or type of arguments does not compile; a signature that
-// differs from the kernel's source fails by name when the kernel is made, before its first launch. Groups are
-// no larger than the device allows for the kernel.
+// Typed kernel launches. The build makes a struct of every kernel's arguments (cmake/EmbedKernels.cmake). A
+// launch with an argument left out, or of another name, order or type, does not compile. Groups are no larger
+// than the device allows for the kernel.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
+#include <span>
 #include <string>
-#include <string_view>
-#include <type_traits>
 
 #include "device/buffer.hpp"
 #include "device/profile.hpp"
@@ -15,82 +15,51 @@
 
 namespace dpr {
 
-/// Argument kinds of a kernel signature: `const global T*`, `global T*`; anything else is passed by value.
-template <class T>
-struct In {};
-template <class T>
-struct Out {};
-
-/// The OpenCL C name of a type that host and kernels share.
-template <class T>
-inline constexpr std::string_view k_cl_type_name = T::k_cl_name;
-template <>
-inline constexpr std::string_view k_cl_type_name<float> = "float";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_uint> = "uint";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_uchar> = "uchar";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_ulong> = "ulong";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_float2> = "float2";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_uint2> = "uint2";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_float4> = "float4";
-template <>
-inline constexpr std::string_view k_cl_type_name<cl_uint4> = "uint4";
-
-/// An argument's type, as a kernel's source has it.
-struct ArgumentType {
-  std::string name;
-  bool is_pointer, is_const;
-};
-
-namespace detail {
-
-template <class T>
+/// The bytes that clSetKernelArg takes.
 struct Argument {
-  using Value = T;
-  static ArgumentType type() { return {std::string(k_cl_type_name<T>), false, false}; }
-  static int set(cl::Kernel& kernel, unsigned index, const T& value) {
-    return kernel.setArg(index, sizeof(T), &value);
-  }
+  std::size_t size;
+  const void* bytes;
+};
+
+/// Members of the structs that the build makes of the kernels (cmake/EmbedKernels.cmake), for `const T`,
+/// `const global T*` and `global T*`. None has a default, and each takes its own type alone.
+template <class T>
+class Value {
+ public:
+  template <std::same_as<T> U>
+  Value(const U& value) : value_(value) {}
+  operator Argument() const { return {sizeof(value_), &value_}; }
+
+ private:
+  T value_;
 };
 
 template <class T>
-struct BufferArgument {
-  using Value = BufferRef<T>;
-  static int set(cl::Kernel& kernel, unsigned index, const BufferRef<T>& buffer) {
-    const cl_mem handle = buffer.handle();
-    return kernel.setArg(index, sizeof(handle), &handle);
-  }
+class Input {
+ public:
+  Input(const Buffer<T>& buffer) : handle_(buffer.cl_buffer()()) {}
+  Input(const BufferRef<T>& buffer) : handle_(buffer.handle()) {}
+  operator Argument() const { return {sizeof(handle_), &handle_}; }
+
+ private:
+  cl_mem handle_;
 };
 
 template <class T>
-struct Argument<In<T>> : BufferArgument<T> {
-  static ArgumentType type() { return {std::string(k_cl_type_name<T>) + "*", true, true}; }
+class Output {
+ public:
+  Output(Buffer<T>& buffer) : handle_(buffer.cl_buffer()()) {}
+  Output(const BufferRef<T>& buffer) : handle_(buffer.handle()) {}
+  operator Argument() const { return {sizeof(handle_), &handle_}; }
+
+ private:
+  cl_mem handle_;
 };
 
-template <class T>
-struct Argument<Out<T>> : BufferArgument<T> {
-  static ArgumentType type() { return {std::string(k_cl_type_name<T>) + "*", true, false}; }
+/// Where a kernel stands, e.g. "scan.cl" and "scan_sum".
+struct KernelSource {
+  const char *file, *name;
 };
-
-/// A kernel of a program, and its work-groups.
-struct BuiltKernel {
-  cl::Kernel kernel;
-  std::size_t group = 0;  ///< work-items that its source asks for; 0: any number
-  std::size_t local = 0;  ///< work-items of the groups that it is launched in
-};
-
-/// Builds a kernel; one that asks for larger groups than the device runs it in is built for smaller ones.
-/// Throws BuildError, DeviceError, and std::logic_error naming kernel and argument where the source differs
-/// from the signature.
-BuiltKernel build_kernel(Device::Impl& device, std::string_view file, const std::string& name,
-                         const std::string& options, std::span<const ArgumentType> signature);
-
-}  // namespace detail
 
 /// The options every kernel of a device is built with.
 std::string build_options(const Device::Impl& device, const std::string& more = "");
@@ -104,53 +73,64 @@ struct Range {
   std::size_t first = 0, count = 0;
 };
 
-/// One kernel of one program. `Args` are In<T>, Out<T> or value types, in the order of the source.
-template <class... Args>
-class Kernel {
+namespace detail {
+
+/// A kernel of a program, and its work-groups.
+struct BuiltKernel {
+  KernelSource source;
+  cl::Kernel kernel;
+  std::size_t group = 0;  ///< work-items that its source asks for; 0: any number
+  std::size_t local = 0;  ///< work-items of the groups that it is launched in
+};
+
+/// Builds a kernel; one that asks for larger groups than the device runs it in is built for smaller ones.
+/// Throws BuildError and DeviceError.
+BuiltKernel build_kernel(Device::Impl& device, const KernelSource& source, const std::string& options);
+
+/// Throws DeviceError.
+void set_arguments(cl::Kernel& kernel, const char* name, std::span<const Argument> arguments);
+
+/// Rounds the range up to whole groups. Throws DeviceError.
+void enqueue(Device::Impl& device, BuiltKernel& kernel, const Range& range,
+             std::span<const Argument> arguments);
+
+}  // namespace detail
+
+template <class K, class... Ks>
+concept OneOf = (std::same_as<K, Ks> || ...);
+
+/// Kernels of a device, each by the struct of its arguments: `launch(range, kernel::scan_sum{.count = ...})`.
+template <class... Ks>
+class Launcher {
  public:
-  Kernel(Device::Impl& device, std::string_view file, const char* name, const std::string& options = "")
-      : device_(&device), file_(file), name_(name) {
-    const std::array<ArgumentType, sizeof...(Args)> signature{detail::Argument<Args>::type()...};
-    built_ = detail::build_kernel(device, file, name_, options, signature);
-  }
+  /// Builds them, in their order. Throws BuildError and DeviceError.
+  explicit Launcher(Device::Impl& device, const std::string& options = "")
+      : device_(&device), built_{{detail::build_kernel(device, Ks::k_source, options)...}} {}
 
   /// Enqueues a range of work-items, rounded up to whole work-groups: kernels guard their range. Nothing for
   /// an empty one.
-  void operator()(const Range& range, const typename detail::Argument<Args>::Value&... args) {
-    const std::size_t local = built_.local;
-    enqueue({range.first, (range.count + local - 1) / local * local}, args...);
+  template <OneOf<Ks...> K>
+  void operator()(const Range& range, const K& arguments) {
+    detail::enqueue(*device_, built_[k_index<K>], range, arguments.arguments());
   }
 
   /// Launches a kernel that is written twice: a work-group of a GPU does the work of one work-item of a CPU.
-  void in_groups(std::size_t count, const typename detail::Argument<Args>::Value&... args) {
-    (*this)(built_.group > 0 ? count * built_.group : count, args...);
+  template <OneOf<Ks...> K>
+  void in_groups(std::size_t count, const K& arguments) {
+    const std::size_t group = built_[k_index<K>].group;
+    (*this)(group > 0 ? count * group : count, arguments);
   }
 
  private:
-  /// Whole groups.
-  void enqueue(const Range& range, const typename detail::Argument<Args>::Value&... args) {
-    if (range.count == 0) return;
-    if (device_->before_work) device_->before_work(name_);
-    unsigned index = 0;
-    (check_argument(detail::Argument<Args>::set(built_.kernel, index++, args)), ...);
-    cl::Event finished;
-    const int error = device_->queue.enqueueNDRangeKernel(
-        built_.kernel, cl::NDRange(range.first), cl::NDRange(range.count), cl::NDRange(built_.local), nullptr,
-        device_->profile != nullptr ? &finished : nullptr);
-    if (error != CL_SUCCESS) {
-      throw DeviceError(error, "kernel " + name_ + ", " + std::to_string(range.count) +
-                                   " work-items in groups of " + std::to_string(built_.local));
-    }
-    if (device_->profile != nullptr) device_->profile->record(file_, name_, finished);
-  }
-
-  void check_argument(int error) const {
-    if (error != CL_SUCCESS) throw DeviceError(error, "clSetKernelArg " + name_);
-  }
+  template <class K>
+  static constexpr std::size_t k_index = [] {
+    std::size_t before = 0;
+    static_cast<void>(((std::same_as<K, Ks> || (++before, false)) || ...));
+    return before;
+  }();
 
   Device::Impl* device_;
-  std::string file_, name_;
-  detail::BuiltKernel built_;
+  std::array<detail::BuiltKernel, sizeof...(Ks)> built_;
 };
 
 }  // namespace dpr

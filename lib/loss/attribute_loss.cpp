@@ -45,8 +45,7 @@ void check_attribute_target(const AttributeTarget& target, std::span<const Image
 AttributeLoss::AttributeLoss(const Device& device, const AttributeTarget& target, unsigned levels)
     : images_(device, target.attribute),
       loss_(loss_of_differences(device, target, levels)),
-      forward_(device.impl(), "attribute.cl", "attribute_residual_forward"),
-      backward_(device.impl(), "attribute.cl", "attribute_residual_backward") {
+      launch_(device.impl()) {
   std::vector<cl_float4> pixels;
   for (const Image& image : target.targets) {
     for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, 0}});
@@ -59,7 +58,10 @@ AttributeLoss::AttributeLoss(const Device& device, const AttributeTarget& target
 std::span<const double> AttributeLoss::evaluate(const Renderer& renderer) {
   images_.forward(renderer);
   const std::size_t pixels = target_.size();
-  forward_(pixels, static_cast<cl_uint>(pixels), images_.impl().images(), target_, residual_);
+  launch_(pixels, kernel::attribute_residual_forward{.pixels = static_cast<cl_uint>(pixels),
+                                                     .images = images_.impl().images(),
+                                                     .target = target_,
+                                                     .residual = residual_});
   loss_.impl().evaluate(residual_);
   return loss_.per_view();
 }
@@ -68,7 +70,10 @@ void AttributeLoss::set_views_of_mean(std::size_t count) { loss_.impl().set_view
 
 SceneGradient AttributeLoss::backward() {
   const std::size_t pixels = target_.size();
-  backward_(pixels, static_cast<cl_uint>(pixels), target_, loss_.impl().grad_image(), grad_images_);
+  launch_(pixels, kernel::attribute_residual_backward{.pixels = static_cast<cl_uint>(pixels),
+                                                      .target = target_,
+                                                      .grad_residual = loss_.impl().grad_image(),
+                                                      .grad_images = grad_images_});
   return images_.impl().backward(grad_images_);
 }
 

@@ -1,8 +1,8 @@
 // The loss of what surfaces show in place of their colours.
 #pragma once
 
-#include "device/kernel.hpp"
 #include "dpr/image_loss.hpp"
+#include "kernels/attribute.hpp"
 
 namespace dpr {
 
@@ -21,7 +21,7 @@ class AttributeLoss {
   AttributeImages images_;
   ImageLoss loss_;                                     // of the differences: its targets are 0
   Buffer<cl_float4> target_, residual_, grad_images_;  // [view][height][width]
-  Kernel<cl_uint, In<cl_float4>, In<cl_float4>, Out<cl_float4>> forward_, backward_;
+  Launcher<kernel::attribute_residual_forward, kernel::attribute_residual_backward> launch_;
 };
 
 /// Throws InvalidArgument unless the target can stand beside those of the images, one a view.

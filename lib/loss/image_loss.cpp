@@ -174,10 +174,7 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
       views_of_mean(targets.size()),
       per_view(targets.size()),
       inverse_scale_squared(1 / (options.weights.robust_scale * options.weights.robust_scale)),
-      forward(device.impl(), "image_loss.cl", "image_loss_forward"),
-      backward(device.impl(), "image_loss.cl", "image_loss_backward"),
-      shrink(device.impl(), "image_loss.cl", "image_loss_shrink"),
-      shrink_backward(device.impl(), "image_loss.cl", "image_loss_shrink_backward"),
+      launch(device.impl()),
       reduce(device.impl()) {
   for (std::size_t view = 0; view < views; ++view) {
     const bool shows_alpha = options.has_alpha.empty() || options.has_alpha[view] != 0;
@@ -313,8 +310,11 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
     const std::size_t pixels = level.pixels_per_view() * views;
     if (l > 0) {
       const Level& before = levels[l - 1];
-      shrink(pixels, static_cast<cl_uint>(before.width), static_cast<cl_uint>(before.height),
-             static_cast<cl_uint>(pixels), l == 1 ? full : before.image, level.image);
+      launch(pixels, kernel::image_loss_shrink{.width = static_cast<cl_uint>(before.width),
+                                               .height = static_cast<cl_uint>(before.height),
+                                               .pixels = static_cast<cl_uint>(pixels),
+                                               .large = l == 1 ? full : before.image,
+                                               .small = level.image});
     }
     if (used == 0) {  // attributes alone
       level.grad_image.fill(cl_float4{});
@@ -322,21 +322,38 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
     }
     const Buffer<cl_float4>& image = l == 0 ? full : level.image;
     const std::size_t run = pixel_run(device.impl()), runs = (pixels + run - 1) / run;
-    forward(runs, static_cast<cl_uint>(pixels), used, inverse_scale_squared, image, level.target, level.mask,
-            level.per_pixel);
+    launch(runs, kernel::image_loss_forward{.pixels = static_cast<cl_uint>(pixels),
+                                            .used = used,
+                                            .inverse_scale_squared = inverse_scale_squared,
+                                            .image = image,
+                                            .target = level.target,
+                                            .mask = level.mask,
+                                            .channels = level.per_pixel});
     if (ssim)
       ssim->forward(windowed(level, image), sums_before(shared::ssim_number) * pixels, level.per_pixel);
     reduce({pixels, sums_before(k_losses.size()), views, 1, level.view_starts, level.per_pixel}, level.sums);
-    backward(runs, static_cast<cl_uint>(views), static_cast<cl_uint>(level.pixels_per_view()),
-             static_cast<cl_uint>(views_of_mean * levels.size()), used, inverse_scale_squared, image,
-             level.target, level.mask, level.sums, device_weights, level.device_channels, level.grad_image);
+    launch(runs, kernel::image_loss_backward{.views = static_cast<cl_uint>(views),
+                                             .pixels_per_view = static_cast<cl_uint>(level.pixels_per_view()),
+                                             .images = static_cast<cl_uint>(views_of_mean * levels.size()),
+                                             .used = used,
+                                             .inverse_scale_squared = inverse_scale_squared,
+                                             .image = image,
+                                             .target = level.target,
+                                             .mask = level.mask,
+                                             .sums = level.sums,
+                                             .weights = device_weights,
+                                             .channels = level.device_channels,
+                                             .grad_image = level.grad_image});
     if (ssim) ssim->backward(windowed(level, image), ssim_weights, level.grad_image);
   }
   for (std::size_t l = levels.size() - 1; l > 0; --l) {
     Level& large = levels[l - 1];
     const std::size_t pixels = large.pixels_per_view() * views;
-    shrink_backward(pixels, static_cast<cl_uint>(large.width), static_cast<cl_uint>(large.height),
-                    static_cast<cl_uint>(pixels), levels[l].grad_image, large.grad_image);
+    launch(pixels, kernel::image_loss_shrink_backward{.width = static_cast<cl_uint>(large.width),
+                                                      .height = static_cast<cl_uint>(large.height),
+                                                      .pixels = static_cast<cl_uint>(pixels),
+                                                      .grad_small = levels[l].grad_image,
+                                                      .grad_large = large.grad_image});
   }
   std::ranges::fill(per_view, 0.0);
   for (const Level& level : levels) add_values(level);

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "device/kernel.hpp"
 #include "dpr/image_loss.hpp"
 #include "image_losses.h"
+#include "kernels/image_loss.hpp"
 #include "loss/attribute_loss.hpp"
 #include "loss/ssim.hpp"
 #include "renderer/frame.hpp"
@@ -97,11 +97,9 @@ struct ImageLoss::Impl {
   float inverse_scale_squared;
   std::uint64_t frame_number = 0;  // of the render that grad_image belongs to; 0: none
 
-  Kernel<cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, Out<float>> forward;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_float, In<cl_float4>, In<cl_float4>, In<float>, In<float>,
-         In<float>, In<float>, Out<cl_float4>>
-      backward;
-  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> shrink, shrink_backward;
+  Launcher<kernel::image_loss_forward, kernel::image_loss_backward, kernel::image_loss_shrink,
+           kernel::image_loss_shrink_backward>
+      launch;
   Reduce reduce;
   Buffer<float> device_weights;  // `view_weights`
   std::optional<Ssim> ssim;      // where it counts

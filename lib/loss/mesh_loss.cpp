@@ -29,12 +29,7 @@ void check_mesh_loss(const MeshLossWeights& weights, const Mesh& mesh) {
 }
 
 MeshLoss::Impl::Impl(const Device& device_, const MeshLossWeights& weights_, const Mesh& mesh)
-    : device(device_),
-      weights(weights_),
-      vertex_terms(device.impl(), "mesh_loss.cl", "mesh_loss_vertices"),
-      hinge_terms(device.impl(), "mesh_loss.cl", "mesh_loss_hinges"),
-      gather(device.impl(), "mesh_loss.cl", "mesh_loss_gather"),
-      reduce(device.impl()) {
+    : device(device_), weights(weights_), launch(device.impl()), reduce(device.impl()) {
   const Adjacency adjacency = make_adjacency(mesh);
   const std::size_t vertices = mesh.positions.size(), hinge_count = adjacency.hinges.size();
   edges = adjacency.edges();
@@ -76,8 +71,15 @@ MeshLoss::Impl::Impl(const Device& device_, const MeshLossWeights& weights_, con
 
 double MeshLoss::Impl::evaluate(const Buffer<cl_float4>& at, std::size_t first_vertex) {
   params.first_vertex = static_cast<cl_uint>(first_vertex);
-  vertex_terms(params.vertices, params, ring_starts, ring, at, laplacians, vertex_channels);
-  hinge_terms(params.hinges, params, hinges, at, hinge_channels, partial);
+  launch(params.vertices, kernel::mesh_loss_vertices{.p = params,
+                                                     .ring_starts = ring_starts,
+                                                     .ring = ring,
+                                                     .positions = at,
+                                                     .laplacians = laplacians,
+                                                     .channels = vertex_channels});
+  launch(params.hinges,
+         kernel::mesh_loss_hinges{
+             .p = params, .hinges = hinges, .positions = at, .channels = hinge_channels, .partial = partial});
   const std::size_t hinge_sums = params.hinges > 0 ? DPR_MESH_LOSS_CHANNELS : 0;
   const auto sums =
       reduce.read({{params.vertices, DPR_MESH_LOSS_CHANNELS, 1, 1, all_vertices, vertex_channels},
@@ -95,8 +97,15 @@ double MeshLoss::Impl::evaluate(const Buffer<cl_float4>& at, std::size_t first_v
 }
 
 void MeshLoss::Impl::add_gradient(const Buffer<cl_float4>& at, Buffer<cl_float4>& grad) {
-  gather(params.vertices, params, ring_starts, ring, at, laplacians, hinge_starts, hinge_places, partial,
-         grad);
+  launch(params.vertices, kernel::mesh_loss_gather{.p = params,
+                                                   .ring_starts = ring_starts,
+                                                   .ring = ring,
+                                                   .positions = at,
+                                                   .laplacians = laplacians,
+                                                   .hinge_starts = hinge_starts,
+                                                   .hinge_places = hinge_places,
+                                                   .partial = partial,
+                                                   .grad = grad});
 }
 
 MeshLoss::MeshLoss(const Device& device, const MeshLossWeights& weights, const Mesh& mesh) {

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "device/kernel.hpp"
 #include "dpr/mesh_loss.hpp"
+#include "kernels/mesh_loss.hpp"
 #include "stages/reduce.hpp"
 
 namespace dpr {
@@ -28,12 +28,7 @@ struct MeshLoss::Impl {
   shared::MeshLossParams params{};
   std::uint64_t frame_number = 0;  // of the render that the last evaluate() belongs to; 0: none
 
-  Kernel<shared::MeshLossParams, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<float>>
-      vertex_terms;
-  Kernel<shared::MeshLossParams, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_float4>> hinge_terms;
-  Kernel<shared::MeshLossParams, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, Out<cl_float4>>
-      gather;
+  Launcher<kernel::mesh_loss_vertices, kernel::mesh_loss_hinges, kernel::mesh_loss_gather> launch;
   Reduce reduce;
   Buffer<cl_uint> ring_starts, ring;           // [vertex + 1], [...]
   Buffer<cl_uint4> hinges;                     // [hinge] across, across, ends of the edge

@@ -36,27 +36,41 @@ std::vector<float> ssim_windows(std::span<const Image> masks) {
   return windows;
 }
 
-Ssim::Ssim(Device::Impl& device)
-    : device_(device),
-      rows_(device, "ssim.cl", "ssim_rows"),
-      columns_(device, "ssim.cl", "ssim_columns"),
-      columns_backward_(device, "ssim.cl", "ssim_columns_backward"),
-      rows_backward_(device, "ssim.cl", "ssim_rows_backward") {}
-
 void Ssim::forward(const Images& in, std::size_t first, Buffer<float>& similarity) {
   const std::size_t pixels = in.views * in.width * in.height;
   of_rows_.resize(device_, DPR_SSIM_MOMENTS * pixels);
   grad_moments_.resize(device_, DPR_SSIM_GRADIENTS * pixels);
-  rows_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), in.image, in.target, of_rows_);
-  columns_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), to_uint(first), of_rows_,
-           in.windows, similarity, grad_moments_);
+  launch_(pixels, kernel::ssim_rows{.width = to_uint(in.width),
+                                    .height = to_uint(in.height),
+                                    .pixels = to_uint(pixels),
+                                    .image = in.image,
+                                    .target = in.target,
+                                    .rows = of_rows_});
+  launch_(pixels, kernel::ssim_columns{.width = to_uint(in.width),
+                                       .height = to_uint(in.height),
+                                       .pixels = to_uint(pixels),
+                                       .first = to_uint(first),
+                                       .rows = of_rows_,
+                                       .window = in.windows,
+                                       .similarity = similarity,
+                                       .grad_moments = grad_moments_});
 }
 
 void Ssim::backward(const Images& in, const Buffer<float>& weights, Buffer<cl_float4>& grad_image) {
   const std::size_t pixels = in.views * in.width * in.height;
-  columns_backward_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), grad_moments_, of_rows_);
-  rows_backward_(pixels, to_uint(in.width), to_uint(in.height), to_uint(pixels), weights, in.image, in.target,
-                 of_rows_, grad_image);
+  launch_(pixels, kernel::ssim_columns_backward{.width = to_uint(in.width),
+                                                .height = to_uint(in.height),
+                                                .pixels = to_uint(pixels),
+                                                .grad_moments = grad_moments_,
+                                                .grad_rows = of_rows_});
+  launch_(pixels, kernel::ssim_rows_backward{.width = to_uint(in.width),
+                                             .height = to_uint(in.height),
+                                             .pixels = to_uint(pixels),
+                                             .weights = weights,
+                                             .image = in.image,
+                                             .target = in.target,
+                                             .grad_rows = of_rows_,
+                                             .grad_image = grad_image});
 }
 
 }  // namespace dpr

@@ -1,8 +1,8 @@
 // Structural similarity of images and targets on the device.
 #pragma once
 
-#include "device/kernel.hpp"
 #include "dpr/image.hpp"
+#include "kernels/ssim.hpp"
 
 namespace dpr {
 
@@ -22,7 +22,7 @@ class Ssim {
     const Buffer<float>& windows;
   };
 
-  explicit Ssim(Device::Impl& device);
+  explicit Ssim(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// Writes each window's share of its view's similarity, by pixel, from `similarity[first]` on.
   void forward(const Images& in, std::size_t first, Buffer<float>& similarity);
@@ -32,11 +32,8 @@ class Ssim {
 
  private:
   Device::Impl& device_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, In<cl_float4>, Out<cl_float4>> rows_;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_float4>, In<float>, Out<float>, Out<cl_float4>> columns_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> columns_backward_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>>
-      rows_backward_;
+  Launcher<kernel::ssim_rows, kernel::ssim_columns, kernel::ssim_columns_backward, kernel::ssim_rows_backward>
+      launch_;
   Buffer<cl_float4> of_rows_, grad_moments_;  // [DPR_SSIM_MOMENTS or DPR_SSIM_GRADIENTS][view][pixel]
 };
 

@@ -93,8 +93,7 @@ AttributeImages::Impl::Impl(const Device& device, std::optional<Attribute> attri
       channels(channels_),
       renderer(device),
       rows_(device.impl()),
-      weigh_(device.impl(), "attribute.cl", "attribute_weigh_forward"),
-      weigh_backward_(device.impl(), "attribute.cl", "attribute_weigh_backward") {
+      launch_(device.impl()) {
   if (!has_rows()) renderer.impl().geometry_colors.emplace(device.impl(), *attribute);
 }
 
@@ -241,7 +240,10 @@ void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
   if (shows_weights()) {
     const std::size_t pixels = r.image().size() / passes(), count = groups() * pixels;
     weighed_.resize(r.device.impl(), count);
-    weigh_(count, to_uint(groups()), to_uint(pixels), r.image(), weighed_);
+    launch_(count, kernel::attribute_weigh_forward{.groups = to_uint(groups()),
+                                                   .pixels = to_uint(pixels),
+                                                   .rendered = r.image(),
+                                                   .images = weighed_});
   }
   views = source.views.size();
 }
@@ -251,7 +253,10 @@ BufferRef<cl_float4> AttributeImages::Impl::grad_of_rendered(const BufferRef<cl_
   Renderer::Impl& r = renderer.impl();
   const std::size_t pixels = r.image().size() / passes();
   grad_rendered_.resize(r.device.impl(), r.image().size());
-  weigh_backward_(pixels, to_uint(groups()), to_uint(pixels), grad_images, grad_rendered_);
+  launch_(pixels, kernel::attribute_weigh_backward{.groups = to_uint(groups()),
+                                                   .pixels = to_uint(pixels),
+                                                   .grad_images = grad_images,
+                                                   .grad_rendered = grad_rendered_});
   return grad_rendered_;
 }
 

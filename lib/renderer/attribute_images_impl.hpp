@@ -74,7 +74,7 @@ struct AttributeImages::Impl {
   SceneGradient empty_gradient() const;
 
   ShownRows rows_;
-  Kernel<cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>> weigh_, weigh_backward_;
+  Launcher<kernel::attribute_weigh_forward, kernel::attribute_weigh_backward> launch_;
   Buffer<cl_float4> weighed_, grad_rendered_;
   GradientRequest wanted_;          // of the source's scene
   std::vector<SourceMesh> meshes_;  // of the source

@@ -173,7 +173,7 @@ void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes size
   bin.forward(frame, setup, expected.pairs);
   std::optional<ContourCount> contours;
   if (pixel_noise) {
-    const Contour& contour = pixel_noise->contour;
+    Contour& contour = pixel_noise->contour;
     contours.emplace(contour.pair_starts.size() - 1, contour.pair_starts);
   }
   rasterize.forward_within(expected, frame, setup.triangles, bin, contours, sizes == FrameSizes::read);

@@ -3,10 +3,6 @@
 namespace dpr {
 namespace {
 
-const char* file_of(Composition composition) {
-  return composition == Composition::joint ? "aggregate_joint.cl" : "aggregate.cl";
-}
-
 /// The build options that choose the priors: the sampled joint composition draws from both.
 std::string prior_options(const Smoothing& smoothing) {
   if (!samples_jointly(smoothing)) return prior_option(smoothing.depth_prior);
@@ -16,28 +12,16 @@ std::string prior_options(const Smoothing& smoothing) {
 
 }  // namespace
 
-AggregateKernels::Exact::Exact(Device::Impl& device, Composition composition, const std::string& options)
-    : forward(device, file_of(composition),
-              composition == Composition::joint ? "aggregate_joint_forward" : "aggregate_forward", options),
-      backward(device, file_of(composition),
-               composition == Composition::joint ? "aggregate_joint_backward" : "aggregate_backward",
-               options) {}
-
-AggregateKernels::Sampled::Sampled(Device::Impl& device, const std::string& options)
-    : forward(device, "aggregate_sampled.cl", "aggregate_sampled_forward", options),
-      backward(device, "aggregate_sampled.cl", "aggregate_sampled_backward", options) {}
-
-AggregateKernels::JointSampled::JointSampled(Device::Impl& device, const std::string& options)
-    : forward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_forward", options),
-      backward(device, "aggregate_joint_sampled.cl", "aggregate_joint_sampled_backward", options) {}
-
 Aggregate::Setting Aggregate::prepare(const Smoothing& smoothing) const {
   const std::string options = prior_options(smoothing);
   const std::string wanted = std::string(to_string(smoothing.composition)) +
                              std::string(to_string(smoothing.aggregation_estimator)) + options;
   return SmoothedStage::prepare(smoothing, wanted, [&](AggregateKernels& kernels) {
-    if (smoothing.aggregation_estimator == Estimator::exact) {
-      kernels.exact.emplace(device_, smoothing.composition, options);
+    const bool is_exact = smoothing.aggregation_estimator == Estimator::exact;
+    if (is_exact && smoothing.composition == Composition::barrier) {
+      kernels.barrier.emplace(device_, options);
+    } else if (is_exact) {
+      kernels.joint.emplace(device_, options);
     } else if (samples_jointly(smoothing)) {
       kernels.joint_sampled.emplace(device_, options);
     } else {
@@ -65,8 +49,8 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
   shared::AggregateParams a = params(in.p, background);
   image.resize(device_, a.pixels);
-  if (now_.kernels->exact) {
-    const bool has_background_slots = now_.smoothing.composition == Composition::barrier;
+  if (now_.kernels->barrier || now_.kernels->joint) {
+    const bool has_background_slots = now_.kernels->barrier.has_value();
     slots_.resize(device_, in.rasterize.fragments + (has_background_slots ? a.pixels : 0));
     slot_counts_.resize(device_, a.pixels);
   }
@@ -76,21 +60,59 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
   }
 }
 
+template <class Arguments>
+Arguments Aggregate::exact_forward(const AggregateInputs& in, const shared::AggregateParams& a) {
+  const Rasterize& r = in.rasterize;
+  return {.p = a,
+          .views = in.views.cameras,
+          .starts = r.pixel_starts,
+          .list = r.list,
+          .depth = r.depth,
+          .log_occupancy = in.occupancy.log_occupancy,
+          .occupancy = in.occupancy.occupancy,
+          .red = in.shade.color.red,
+          .green = in.shade.color.green,
+          .blue = in.shade.color.blue,
+          .slots = slots_,
+          .slot_counts = slot_counts_,
+          .image = image};
+}
+
 void Aggregate::forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels) {
   const Rasterize& r = in.rasterize;
-  if (now_.kernels->exact) {
-    now_.kernels->exact->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                 in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
-                                 in.shade.color.green, in.shade.color.blue, slots_, slot_counts_, image);
+  if (now_.kernels->barrier) {
+    (*now_.kernels->barrier)(pixels, exact_forward<kernel::aggregate_forward>(in, a));
+  } else if (now_.kernels->joint) {
+    (*now_.kernels->joint)(pixels, exact_forward<kernel::aggregate_joint_forward>(in, a));
   } else if (now_.kernels->joint_sampled) {
-    now_.kernels->joint_sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance,
-                                         r.depth, in.shade.color.red, in.shade.color.green,
-                                         in.shade.color.blue, r.fragment_pair, in.bin.pair_face, image);
+    (*now_.kernels->joint_sampled)(pixels,
+                                   kernel::aggregate_joint_sampled_forward{.p = a,
+                                                                           .views = in.views.cameras,
+                                                                           .starts = r.pixel_starts,
+                                                                           .list = r.list,
+                                                                           .distance = r.distance,
+                                                                           .depth = r.depth,
+                                                                           .red = in.shade.color.red,
+                                                                           .green = in.shade.color.green,
+                                                                           .blue = in.shade.color.blue,
+                                                                           .fragment_pair = r.fragment_pair,
+                                                                           .pair_face = in.bin.pair_face,
+                                                                           .image = image});
   } else {
-    now_.kernels->sampled->forward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                   in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
-                                   in.shade.color.green, in.shade.color.blue, r.fragment_pair,
-                                   in.bin.pair_face, image);
+    (*now_.kernels->sampled)(pixels,
+                             kernel::aggregate_sampled_forward{.p = a,
+                                                               .views = in.views.cameras,
+                                                               .starts = r.pixel_starts,
+                                                               .list = r.list,
+                                                               .depth = r.depth,
+                                                               .log_occupancy = in.occupancy.log_occupancy,
+                                                               .occupancy = in.occupancy.occupancy,
+                                                               .red = in.shade.color.red,
+                                                               .green = in.shade.color.green,
+                                                               .blue = in.shade.color.blue,
+                                                               .fragment_pair = r.fragment_pair,
+                                                               .pair_face = in.bin.pair_face,
+                                                               .image = image});
   }
 }
 
@@ -112,26 +134,80 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
   }
 }
 
+template <class Arguments>
+Arguments Aggregate::exact_backward(const AggregateInputs& in, const shared::AggregateParams& a,
+                                    const BufferRef<cl_float4>& grad_image) {
+  const Rasterize& r = in.rasterize;
+  return {.p = a,
+          .views = in.views.cameras,
+          .starts = r.pixel_starts,
+          .list = r.list,
+          .depth = r.depth,
+          .log_occupancy = in.occupancy.log_occupancy,
+          .occupancy = in.occupancy.occupancy,
+          .red = in.shade.color.red,
+          .green = in.shade.color.green,
+          .blue = in.shade.color.blue,
+          .slots = slots_,
+          .slot_counts = slot_counts_,
+          .grad_image = grad_image,
+          .grad_depth = grad_depth,
+          .grad_log_occupancy = grad_log_occupancy,
+          .grad_red = grad_color.red,
+          .grad_green = grad_color.green,
+          .grad_blue = grad_color.blue,
+          .channels = channels};
+}
+
 void Aggregate::backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
                          const BufferRef<cl_float4>& grad_image) {
   const Rasterize& r = in.rasterize;
-  if (now_.kernels->exact) {
-    now_.kernels->exact->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                  in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
-                                  in.shade.color.green, in.shade.color.blue, slots_, slot_counts_, grad_image,
-                                  grad_depth, grad_log_occupancy, grad_color.red, grad_color.green,
-                                  grad_color.blue, channels);
+  if (now_.kernels->barrier) {
+    (*now_.kernels->barrier)(pixels, exact_backward<kernel::aggregate_backward>(in, a, grad_image));
+  } else if (now_.kernels->joint) {
+    (*now_.kernels->joint)(pixels, exact_backward<kernel::aggregate_joint_backward>(in, a, grad_image));
   } else if (now_.kernels->joint_sampled) {
-    now_.kernels->joint_sampled->backward(
-        pixels, a, in.views.cameras, r.pixel_starts, r.list, r.distance, r.depth, in.shade.color.red,
-        in.shade.color.green, in.shade.color.blue, r.fragment_pair, in.bin.pair_face, grad_image,
-        grad_distance, grad_depth, grad_color.red, grad_color.green, grad_color.blue, grad_sigma, channels);
+    (*now_.kernels->joint_sampled)(pixels,
+                                   kernel::aggregate_joint_sampled_backward{.p = a,
+                                                                            .views = in.views.cameras,
+                                                                            .starts = r.pixel_starts,
+                                                                            .list = r.list,
+                                                                            .distance = r.distance,
+                                                                            .depth = r.depth,
+                                                                            .red = in.shade.color.red,
+                                                                            .green = in.shade.color.green,
+                                                                            .blue = in.shade.color.blue,
+                                                                            .fragment_pair = r.fragment_pair,
+                                                                            .pair_face = in.bin.pair_face,
+                                                                            .grad_image = grad_image,
+                                                                            .grad_distance = grad_distance,
+                                                                            .grad_depth = grad_depth,
+                                                                            .grad_red = grad_color.red,
+                                                                            .grad_green = grad_color.green,
+                                                                            .grad_blue = grad_color.blue,
+                                                                            .grad_sigma = grad_sigma,
+                                                                            .channels = channels});
   } else {
-    now_.kernels->sampled->backward(pixels, a, in.views.cameras, r.pixel_starts, r.list, r.depth,
-                                    in.occupancy.log_occupancy, in.occupancy.occupancy, in.shade.color.red,
-                                    in.shade.color.green, in.shade.color.blue, r.fragment_pair,
-                                    in.bin.pair_face, grad_image, grad_depth, grad_log_occupancy,
-                                    grad_color.red, grad_color.green, grad_color.blue, channels);
+    (*now_.kernels->sampled)(pixels,
+                             kernel::aggregate_sampled_backward{.p = a,
+                                                                .views = in.views.cameras,
+                                                                .starts = r.pixel_starts,
+                                                                .list = r.list,
+                                                                .depth = r.depth,
+                                                                .log_occupancy = in.occupancy.log_occupancy,
+                                                                .occupancy = in.occupancy.occupancy,
+                                                                .red = in.shade.color.red,
+                                                                .green = in.shade.color.green,
+                                                                .blue = in.shade.color.blue,
+                                                                .fragment_pair = r.fragment_pair,
+                                                                .pair_face = in.bin.pair_face,
+                                                                .grad_image = grad_image,
+                                                                .grad_depth = grad_depth,
+                                                                .grad_log_occupancy = grad_log_occupancy,
+                                                                .grad_red = grad_color.red,
+                                                                .grad_green = grad_color.green,
+                                                                .grad_blue = grad_color.blue,
+                                                                .channels = channels});
   }
 }
 

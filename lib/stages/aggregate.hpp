@@ -4,8 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
+#include "kernels/aggregate.hpp"
+#include "kernels/aggregate_joint.hpp"
+#include "kernels/aggregate_joint_sampled.hpp"
+#include "kernels/aggregate_sampled.hpp"
 #include "stages/occupancy.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/shade.hpp"
@@ -26,45 +29,14 @@ struct AggregateInputs {
 
 /// Kernels of one composition, estimator and prior; `built` names them.
 struct AggregateKernels {
-  using ForwardKernel =
-      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-             In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, Out<cl_uint>, Out<cl_float4>>;
-  using BackwardKernel =
-      Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-             In<float>, In<float>, In<float>, In<float>, Out<shared::Slot>, In<cl_uint>, In<cl_float4>,
-             Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>;
-  /// Exact kernels of either composition. The forward pass leaves the pixels' slots for the backward pass.
-  struct Exact {
-    Exact(Device::Impl& device, Composition composition, const std::string& options);
-    ForwardKernel forward;
-    BackwardKernel backward;
-  };
-  struct Sampled {
-    Sampled(Device::Impl& device, const std::string& options);
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
-        forward;
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>,
-           Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
-        backward;
-  };
-  /// Perturbs distances too, and so takes the place of the occupancy stage.
-  struct JointSampled {
-    JointSampled(Device::Impl& device, const std::string& options);
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, Out<cl_float4>>
-        forward;
-    Kernel<shared::AggregateParams, In<shared::ViewParams>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-           In<float>, In<float>, In<float>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<float>, Out<float>,
-           Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
-        backward;
-  };
-
   std::string built;
-  std::optional<Exact> exact;
-  std::optional<Sampled> sampled;
-  std::optional<JointSampled> joint_sampled;
+  /// Exact. The forward pass leaves the pixels' slots for the backward pass.
+  std::optional<Launcher<kernel::aggregate_forward, kernel::aggregate_backward>> barrier;
+  std::optional<Launcher<kernel::aggregate_joint_forward, kernel::aggregate_joint_backward>> joint;
+  std::optional<Launcher<kernel::aggregate_sampled_forward, kernel::aggregate_sampled_backward>> sampled;
+  /// Perturbs distances too, and so takes the place of the occupancy stage.
+  std::optional<Launcher<kernel::aggregate_joint_sampled_forward, kernel::aggregate_joint_sampled_backward>>
+      joint_sampled;
 };
 
 class Aggregate : public SmoothedStage<AggregateKernels> {
@@ -109,6 +81,12 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   void backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
                 const BufferRef<cl_float4>& grad_image);
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
+  /// Arguments of the exact kernels of either composition.
+  template <class Arguments>
+  Arguments exact_forward(const AggregateInputs& in, const shared::AggregateParams& a);
+  template <class Arguments>
+  Arguments exact_backward(const AggregateInputs& in, const shared::AggregateParams& a,
+                           const BufferRef<cl_float4>& grad_image);
 
   Buffer<shared::Slot> slots_;   // [fragment], and in the barrier composition [pixel] more
   Buffer<cl_uint> slot_counts_;  // [pixel]

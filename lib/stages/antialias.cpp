@@ -22,26 +22,18 @@ shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
 
 }  // namespace
 
-Antialias::Antialias(Device::Impl& device)
-    : device_(device),
-      front_(device, "antialias_cross.cl", "antialias_front"),
-      cross_(device, "antialias_cross.cl", "antialias_cross"),
-      second_find_(device, "antialias_second.cl", "antialias_second_find"),
-      fade_(device, "antialias_fade.cl", "antialias_fade"),
-      keep_(device, "antialias.cl", "antialias_keep"),
-      forward_(device, "antialias.cl", "antialias_forward"),
-      backward_(device, "antialias.cl", "antialias_backward"),
-      second_forward_(device, "antialias_second.cl", "antialias_second_forward"),
-      second_backward_(device, "antialias_second.cl", "antialias_second_backward"),
-      fade_backward_(device, "antialias_fade.cl", "antialias_fade_backward"),
-      cross_backward_(device, "antialias_cross.cl", "antialias_cross_backward") {}
-
 void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour) {
   front.resize(device_, samples_of(p));
   const Range tiles = rasterize.tiles(p);
   const std::size_t rows = row_items(device_);
-  front_(Range{tiles.first * rows, tiles.count * rows}, p, to_uint(tiles.last()), contour.tile_starts,
-         rasterize.pixel_starts, rasterize.list, rasterize.depth, front);
+  launch_(Range{tiles.first * rows, tiles.count * rows},
+          kernel::antialias_front{.p = p,
+                                  .last_tile = to_uint(tiles.last()),
+                                  .tile_starts = contour.tile_starts,
+                                  .starts = rasterize.pixel_starts,
+                                  .list = rasterize.list,
+                                  .depth = rasterize.depth,
+                                  .front = front});
 }
 
 void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
@@ -51,12 +43,35 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
   crowded_.resize(device_, k_tile_words * tiles);
   second_counts.resize(device_, tiles);
   seconds.resize(device_, DPR_SECOND_CROSSINGS * tiles);
-  cross_(tiles, in.p, params(in, depth_reach), in.views.cameras, in.edges.edges, in.geometry.face_vertices,
-         in.facing, in.transform.ndc, in.clipped, contour.tile_starts, contour.pair_contour, front, winner,
-         cut, crowded_);
-  second_find_(tiles, in.p, params(in, depth_reach), in.views.cameras, in.edges.edges,
-               in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.tile_starts,
-               contour.pair_contour, front, winner, crowded_, second_counts, seconds);
+  launch_(tiles, kernel::antialias_cross{.p = in.p,
+                                         .a = params(in, depth_reach),
+                                         .views = in.views.cameras,
+                                         .edges = in.edges.edges,
+                                         .faces = in.geometry.face_vertices,
+                                         .facing = in.facing,
+                                         .ndc = in.transform.ndc,
+                                         .clipped = in.clipped,
+                                         .tile_starts = contour.tile_starts,
+                                         .pair_contour = contour.pair_contour,
+                                         .front = front,
+                                         .winner = winner,
+                                         .cut = cut,
+                                         .crowded = crowded_});
+  launch_(tiles, kernel::antialias_second_find{.p = in.p,
+                                               .a = params(in, depth_reach),
+                                               .views = in.views.cameras,
+                                               .edges = in.edges.edges,
+                                               .faces = in.geometry.face_vertices,
+                                               .facing = in.facing,
+                                               .ndc = in.transform.ndc,
+                                               .clipped = in.clipped,
+                                               .tile_starts = contour.tile_starts,
+                                               .pair_contour = contour.pair_contour,
+                                               .front = front,
+                                               .winner = winner,
+                                               .crowded = crowded_,
+                                               .counts = second_counts,
+                                               .seconds = seconds});
 }
 
 void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
@@ -65,10 +80,28 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
   kept.samples.resize(device_, samples_of(p));
   kept.faded.resize(device_, samples_of(p));
   kept.shares.resize(device_, samples_of(p));
-  fade_(rows, p, contour.tile_starts, winner, cut, samples, kept.samples, kept.faded, kept.shares);
-  forward_(rows, p, contour.tile_starts, winner, cut, kept.faded, samples);
-  second_forward_(tiles_of(p), p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
-                  samples);
+  launch_(rows, kernel::antialias_fade{.p = p,
+                                       .tile_starts = contour.tile_starts,
+                                       .winner = winner,
+                                       .cut = cut,
+                                       .raster = samples,
+                                       .kept = kept.samples,
+                                       .faded_raster = kept.faded,
+                                       .shares = kept.shares});
+  launch_(rows, kernel::antialias_forward{.p = p,
+                                          .tile_starts = contour.tile_starts,
+                                          .winner = winner,
+                                          .cut = cut,
+                                          .raster = kept.faded,
+                                          .blended = samples});
+  launch_(tiles_of(p), kernel::antialias_second_forward{.p = p,
+                                                        .tile_starts = contour.tile_starts,
+                                                        .counts = second_counts,
+                                                        .seconds = seconds,
+                                                        .winner = winner,
+                                                        .cut = cut,
+                                                        .raster = kept.faded,
+                                                        .blended = samples});
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
@@ -78,16 +111,54 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
   grad_seconds_.resize(device_, seconds.size());
   kept_grad_.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
-  keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
-  backward_(rows, in.p, contour.tile_starts, winner, cut, kept.faded, kept_grad_, grad_cut_, grad);
-  second_backward_(tiles_of(in.p), in.p, contour.tile_starts, second_counts, seconds, winner, cut, kept.faded,
-                   kept_grad_, grad_cut_, grad, grad_seconds_);
-  keep_(rows, in.p, contour.tile_starts, grad, kept_grad_);
-  fade_backward_(rows, in.p, contour.tile_starts, winner, cut, kept.samples, kept.shares, kept_grad_,
-                 grad_cut_, grad);
-  cross_backward_(contour.pairs, in.p, params(in, 0.0F), contour.pair_count, in.edges.edges,
-                  in.geometry.face_vertices, in.facing, in.transform.ndc, in.clipped, contour.pair_contour,
-                  contour.pair_tile, winner, grad_cut_, second_counts, seconds, grad_seconds_, grad_ends);
+  launch_(rows, kernel::antialias_keep{
+                    .p = in.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad_});
+  launch_(rows, kernel::antialias_backward{.p = in.p,
+                                           .tile_starts = contour.tile_starts,
+                                           .winner = winner,
+                                           .cut = cut,
+                                           .raster = kept.faded,
+                                           .grad_blended = kept_grad_,
+                                           .grad_cut = grad_cut_,
+                                           .grad_raster = grad});
+  launch_(tiles_of(in.p), kernel::antialias_second_backward{.p = in.p,
+                                                            .tile_starts = contour.tile_starts,
+                                                            .counts = second_counts,
+                                                            .seconds = seconds,
+                                                            .winner = winner,
+                                                            .cut = cut,
+                                                            .raster = kept.faded,
+                                                            .grad_blended = kept_grad_,
+                                                            .grad_cut = grad_cut_,
+                                                            .grad_raster = grad,
+                                                            .grad_seconds = grad_seconds_});
+  launch_(rows, kernel::antialias_keep{
+                    .p = in.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad_});
+  launch_(rows, kernel::antialias_fade_backward{.p = in.p,
+                                                .tile_starts = contour.tile_starts,
+                                                .winner = winner,
+                                                .cut = cut,
+                                                .raster = kept.samples,
+                                                .shares = kept.shares,
+                                                .grad_faded = kept_grad_,
+                                                .grad_cut = grad_cut_,
+                                                .grad_raster = grad});
+  launch_(contour.pairs, kernel::antialias_cross_backward{.p = in.p,
+                                                          .a = params(in, 0.0F),
+                                                          .pairs = contour.pair_count,
+                                                          .edges = in.edges.edges,
+                                                          .faces = in.geometry.face_vertices,
+                                                          .facing = in.facing,
+                                                          .ndc = in.transform.ndc,
+                                                          .clipped = in.clipped,
+                                                          .pair_contour = contour.pair_contour,
+                                                          .pair_tile = contour.pair_tile,
+                                                          .winner = winner,
+                                                          .grad_cut = grad_cut_,
+                                                          .second_counts = second_counts,
+                                                          .seconds = seconds,
+                                                          .grad_seconds = grad_seconds_,
+                                                          .grad_ends = grad_ends});
 }
 
 std::size_t Antialias::bytes() const {

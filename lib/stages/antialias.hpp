@@ -1,7 +1,10 @@
 // Samples blended across the contours between them, and what that gives back to contours and samples.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/antialias.hpp"
+#include "kernels/antialias_cross.hpp"
+#include "kernels/antialias_fade.hpp"
+#include "kernels/antialias_second.hpp"
 #include "stages/contour.hpp"
 #include "stages/rasterize.hpp"
 
@@ -20,7 +23,7 @@ struct KeptSamples {
 
 class Antialias {
  public:
-  explicit Antialias(Device::Impl& device);
+  explicit Antialias(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// The front-most depths of the samples near contours of the rasterizer's band.
   void find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour);
@@ -48,37 +51,11 @@ class Antialias {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> front_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
-         In<cl_uchar>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
-         Out<cl_uint>, Out<cl_float2>, Out<cl_uint>>
-      cross_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
-         In<cl_uchar>, In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<float>,
-         In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<shared::SecondCrossing>>
-      second_find_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>,
-         Out<cl_float4>, Out<cl_float2>>
-      fade_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_float4>, Out<cl_float4>> keep_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>>
-      forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float4>,
-         Out<cl_float2>, Out<cl_float4>>
-      backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
-         In<cl_float2>, In<cl_float4>, Out<cl_float4>>
-      second_forward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<shared::SecondCrossing>, In<cl_uint>,
-         In<cl_float2>, In<cl_float4>, In<cl_float4>, Out<cl_float2>, Out<cl_float4>, Out<cl_float2>>
-      second_backward_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, In<cl_float2>,
-         In<cl_float4>, Out<cl_float2>, Out<cl_float4>>
-      fade_backward_;
-  Kernel<shared::FrameParams, shared::AntialiasParams, In<cl_uint>, In<cl_uint2>, In<cl_uint4>, In<cl_uchar>,
-         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float2>,
-         In<cl_uint>, In<shared::SecondCrossing>, In<cl_float2>, Out<cl_float4>>
-      cross_backward_;
+  Launcher<kernel::antialias_front, kernel::antialias_cross, kernel::antialias_second_find,
+           kernel::antialias_fade, kernel::antialias_keep, kernel::antialias_forward,
+           kernel::antialias_backward, kernel::antialias_second_forward, kernel::antialias_second_backward,
+           kernel::antialias_fade_backward, kernel::antialias_cross_backward>
+      launch_;
   Buffer<cl_uint> crowded_;         // [tile] of four words
   Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
   Buffer<cl_float2> grad_seconds_;  // [tile][DPR_SECOND_CROSSINGS]

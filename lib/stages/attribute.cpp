@@ -6,21 +6,25 @@
 namespace dpr {
 
 GeometryColors::GeometryColors(Device::Impl& device, Attribute attribute)
-    : attribute_(attribute),
-      device_(device),
-      vertices_(device, "attribute.cl", "attribute_vertices_forward"),
-      vertices_backward_(device, "attribute.cl", "attribute_vertices_backward"),
-      normals_(device, "attribute.cl", "attribute_normals_forward"),
-      normals_backward_(device, "attribute.cl", "attribute_normals_backward") {}
+    : attribute_(attribute), device_(device), launch_(device) {}
 
 void GeometryColors::forward(const shared::FrameParams& p, const Geometry& geometry,
                              const Transform& transform, Buffer<cl_float4>& colors) {
   const std::size_t count = std::size_t{p.views} * (is_of_faces() ? p.faces : p.vertices);
   colors.resize(device_, count);
   if (is_of_faces()) {
-    normals_(count, p, to_uint(shown_views), geometry.face_vertices, transform.world, colors);
+    launch_(count, kernel::attribute_normals_forward{.p = p,
+                                                     .shown_views = to_uint(shown_views),
+                                                     .faces = geometry.face_vertices,
+                                                     .world = transform.world,
+                                                     .colors = colors});
   } else {
-    vertices_(count, p, shows_depth(), to_uint(shown_views), transform.world, transform.ndc, colors);
+    launch_(count, kernel::attribute_vertices_forward{.p = p,
+                                                      .shows_depth = shows_depth(),
+                                                      .shown_views = to_uint(shown_views),
+                                                      .world = transform.world,
+                                                      .ndc = transform.ndc,
+                                                      .colors = colors});
   }
 }
 
@@ -30,10 +34,21 @@ void GeometryColors::backward(const shared::FrameParams& p, const Geometry& geom
   const std::size_t count = std::size_t{p.views} * p.vertices;
   grad_world.resize(device_, count);
   if (is_of_faces()) {
-    normals_backward_(count, p, to_uint(shown_views), geometry.face_vertices, geometry.vertex_corners.starts,
-                      geometry.vertex_corners.corners, transform.world, grad_colors, grad_world);
+    launch_(count, kernel::attribute_normals_backward{.p = p,
+                                                      .shown_views = to_uint(shown_views),
+                                                      .faces = geometry.face_vertices,
+                                                      .corner_starts = geometry.vertex_corners.starts,
+                                                      .corners = geometry.vertex_corners.corners,
+                                                      .world = transform.world,
+                                                      .grad_colors = grad_colors,
+                                                      .grad_world = grad_world});
   } else {
-    vertices_backward_(count, p, shows_depth(), to_uint(shown_views), grad_colors, grad_depth, grad_world);
+    launch_(count, kernel::attribute_vertices_backward{.p = p,
+                                                       .shows_depth = shows_depth(),
+                                                       .shown_views = to_uint(shown_views),
+                                                       .grad_colors = grad_colors,
+                                                       .grad_depth = grad_depth,
+                                                       .grad_world = grad_world});
   }
 }
 
@@ -49,13 +64,6 @@ RowMap::RowMap(Device::Impl& device, std::span<const cl_uint> row_of_shown, std:
   shown_by.upload(device, in_order);
 }
 
-ShownRows::ShownRows(Device::Impl& device)
-    : device_(device),
-      rows_(device, "attribute.cl", "attribute_rows_forward"),
-      rows_backward_(device, "attribute.cl", "attribute_rows_backward"),
-      positions_(device, "attribute.cl", "attribute_positions_forward"),
-      positions_backward_(device, "attribute.cl", "attribute_positions_backward") {}
-
 namespace {
 
 cl_uint4 sizes_of(std::size_t x, std::size_t y, std::size_t z, std::size_t w) {
@@ -68,28 +76,42 @@ void ShownRows::forward(const RowMap& map, std::size_t channels, const Buffer<fl
                         std::size_t passes, std::size_t views, Buffer<cl_float4>& colors) {
   const std::size_t count = passes * views * map.shown;
   colors.resize(device_, count);
-  rows_(count, sizes_of(passes, views, map.shown, channels), map.row_of, values, colors);
+  launch_(count, kernel::attribute_rows_forward{.size = sizes_of(passes, views, map.shown, channels),
+                                                .row_of = map.row_of,
+                                                .values = values,
+                                                .colors = colors});
 }
 
 void ShownRows::backward(const RowMap& map, std::size_t channels, std::size_t views,
                          const Buffer<cl_float4>& grad_colors, Buffer<float>& grad) {
   grad.resize(device_, map.rows * channels);
-  rows_backward_(map.rows * channels, sizes_of(map.rows, views, map.shown, channels), map.starts,
-                 map.shown_by, BufferRef<float>(grad_colors.cl_buffer()()), grad);
+  launch_(map.rows * channels,
+          kernel::attribute_rows_backward{.size = sizes_of(map.rows, views, map.shown, channels),
+                                          .starts = map.starts,
+                                          .shown_by = map.shown_by,
+                                          .grad_colors = BufferRef<float>(grad_colors.cl_buffer()()),
+                                          .grad = grad});
 }
 
 void ShownRows::move(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& positions,
                      std::size_t copies, Buffer<cl_float4>& moved) {
   moved.resize(device_, copies * map.shown);
-  positions_(copies * map.shown, sizes_of(copies, sources, map.shown, map.rows), map.row_of, positions,
-             moved);
+  launch_(copies * map.shown,
+          kernel::attribute_positions_forward{.size = sizes_of(copies, sources, map.shown, map.rows),
+                                              .vertex_of = map.row_of,
+                                              .positions = positions,
+                                              .moved = moved});
 }
 
 void ShownRows::move_backward(const RowMap& map, std::size_t sources, const Buffer<cl_float4>& grad_moved,
                               std::size_t copies, Buffer<cl_float4>& grad) {
   grad.resize(device_, sources * map.rows);
-  positions_backward_(sources * map.rows, sizes_of(copies, sources, map.shown, map.rows), map.starts,
-                      map.shown_by, grad_moved, grad);
+  launch_(sources * map.rows,
+          kernel::attribute_positions_backward{.size = sizes_of(copies, sources, map.shown, map.rows),
+                                               .starts = map.starts,
+                                               .shown_by = map.shown_by,
+                                               .grad_moved = grad_moved,
+                                               .grad = grad});
 }
 
 CornerTexcoords::CornerTexcoords(Device::Impl& device, const Scene& scene) {

@@ -1,8 +1,8 @@
 // Attributes that surfaces show in place of their colours: their geometry, or rows of numbers.
 #pragma once
 
-#include "device/kernel.hpp"
 #include "dpr/attribute_images.hpp"
+#include "kernels/attribute.hpp"
 #include "stages/exchange.hpp"
 #include "stages/geometry.hpp"
 #include "stages/transform.hpp"
@@ -32,13 +32,9 @@ class GeometryColors {
 
   Attribute attribute_;
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_float4>, In<cl_float4>, Out<cl_float4>> vertices_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
-      vertices_backward_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint4>, In<cl_float4>, Out<cl_float4>> normals_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
-         Out<cl_float4>>
-      normals_backward_;
+  Launcher<kernel::attribute_vertices_forward, kernel::attribute_vertices_backward,
+           kernel::attribute_normals_forward, kernel::attribute_normals_backward>
+      launch_;
 };
 
 /// Row that each vertex, face or corner shows, and those that show each row, in order.
@@ -58,7 +54,7 @@ struct RowMap {
 /// Rows of the caller's or the scene's, and positions, at what is shown.
 class ShownRows {
  public:
-  explicit ShownRows(Device::Impl& device);
+  explicit ShownRows(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// From values[row][channel] to colors[pass][view][shown], three channels a pass; passes behind them
   /// show 1.
@@ -77,10 +73,9 @@ class ShownRows {
 
  private:
   Device::Impl& device_;
-  Kernel<cl_uint4, In<cl_uint>, In<float>, Out<cl_float4>> rows_;
-  Kernel<cl_uint4, In<cl_uint>, In<cl_uint>, In<float>, Out<float>> rows_backward_;
-  Kernel<cl_uint4, In<cl_uint>, In<cl_float4>, Out<cl_float4>> positions_;
-  Kernel<cl_uint4, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>> positions_backward_;
+  Launcher<kernel::attribute_rows_forward, kernel::attribute_rows_backward,
+           kernel::attribute_positions_forward, kernel::attribute_positions_backward>
+      launch_;
 };
 
 /// The texture coordinates of a scene's meshes, one after the other, whether they have textures or not.

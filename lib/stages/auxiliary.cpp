@@ -2,12 +2,6 @@
 
 namespace dpr {
 
-Auxiliary::Auxiliary(Device::Impl& device)
-    : device_(device),
-      forward_(device, "auxiliary.cl", "auxiliary_forward"),
-      weigh_(device, "auxiliary.cl", "auxiliary_weigh"),
-      finish_(device, "auxiliary.cl", "auxiliary_finish") {}
-
 void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, const Transform& transform,
                         Aggregate& aggregate) {
   const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
@@ -19,9 +13,21 @@ void Auxiliary::forward(const AggregateInputs& in, const Geometry& geometry, con
   face_id.resize(device_, pixels);
   const Rasterize& r = in.rasterize;
   for (const Range& run : r.pixels(in.p)) {
-    forward_(run, in.p, run.last(), r.pixel_starts, r.list, aggregate.grad_color.red, aggregate.channels,
-             r.depth, r.bary1, r.bary2, r.fragment_pair, in.bin.pair_face, geometry.face_vertices,
-             transform.world, outputs, face_id);
+    launch_(run, kernel::auxiliary_forward{.p = in.p,
+                                           .last_pixel = run.last(),
+                                           .starts = r.pixel_starts,
+                                           .list = r.list,
+                                           .weight = aggregate.grad_color.red,
+                                           .channels = aggregate.channels,
+                                           .depth = r.depth,
+                                           .bary1 = r.bary1,
+                                           .bary2 = r.bary2,
+                                           .fragment_pair = r.fragment_pair,
+                                           .pair_face = in.bin.pair_face,
+                                           .faces = geometry.face_vertices,
+                                           .world = transform.world,
+                                           .outputs = outputs,
+                                           .face_id = face_id});
   }
 }
 
@@ -29,7 +35,11 @@ void Auxiliary::weigh(const shared::FrameParams& p, const Aggregate& aggregate) 
   const std::size_t pixels = std::size_t{p.views} * p.width * p.height;
   surface.resize(device_, pixels);
   coverage.resize(device_, pixels);
-  weigh_(pixels, p, outputs, aggregate.channels, surface, coverage);
+  launch_(pixels, kernel::auxiliary_weigh{.p = p,
+                                          .outputs = outputs,
+                                          .channels = aggregate.channels,
+                                          .surface = surface,
+                                          .coverage = coverage});
 }
 
 void Auxiliary::finish(const shared::FrameParams& p, const Raster& raster,
@@ -42,9 +52,20 @@ void Auxiliary::finish(const shared::FrameParams& p, const Raster& raster,
   faces.resize(device_, count);
   const cl_uint4 image{
       {to_uint(raster.width), to_uint(raster.height), to_uint(raster.supersampling), to_uint(raster.margin)}};
-  finish_(count, p, image, blurred_surface.size() > 0 ? 1 : 0, texcoords.empty() ? 0 : 1, outputs, face_id,
-          blurred_surface, blurred_coverage, texcoords.map.row_of,
-          BufferRef<cl_float2>(texcoords.values.cl_buffer()()), normals, places, uvs, faces);
+  launch_(count, kernel::auxiliary_finish{.p = p,
+                                          .image = image,
+                                          .blurred = cl_uint{blurred_surface.size() > 0},
+                                          .has_uv = cl_uint{!texcoords.empty()},
+                                          .outputs = outputs,
+                                          .face_id = face_id,
+                                          .surface = blurred_surface,
+                                          .coverage = blurred_coverage,
+                                          .texcoord_of = texcoords.map.row_of,
+                                          .texcoords = BufferRef<cl_float2>(texcoords.values.cl_buffer()()),
+                                          .normals = normals,
+                                          .places = places,
+                                          .uvs = uvs,
+                                          .faces = faces});
 }
 
 }  // namespace dpr

@@ -1,7 +1,7 @@
 // Auxiliary outputs of every pixel from the weights of its fragments.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/auxiliary.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/attribute.hpp"
 #include "stages/geometry.hpp"
@@ -10,7 +10,7 @@ namespace dpr {
 
 class Auxiliary {
  public:
-  explicit Auxiliary(Device::Impl& device);
+  explicit Auxiliary(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// Runs the aggregation backward pass for a gradient of 1 in red, which leaves the weight of every fragment
   /// in the gradient of its red: `aggregate` is left with that.
@@ -48,14 +48,7 @@ class Auxiliary {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
-         In<float>, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, Out<float>, Out<cl_uint>>
-      forward_;
-  Kernel<shared::FrameParams, In<float>, In<float>, Out<cl_float4>, Out<cl_float4>> weigh_;
-  Kernel<shared::FrameParams, cl_uint4, cl_uint, cl_uint, In<float>, In<cl_uint>, In<cl_float4>,
-         In<cl_float4>, In<cl_uint>, In<cl_float2>, Out<cl_float4>, Out<cl_float4>, Out<cl_float2>,
-         Out<cl_uint>>
-      finish_;
+  Launcher<kernel::auxiliary_forward, kernel::auxiliary_weigh, kernel::auxiliary_finish> launch_;
   Buffer<cl_float4> grad_red_;  // [view][height][width] 1 in red
 };
 

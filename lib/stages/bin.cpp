@@ -2,13 +2,6 @@
 
 namespace dpr {
 
-Bin::Bin(Device::Impl& device)
-    : device_(device),
-      fill_(device, "bin.cl", "bin_fill"),
-      link_(device, "bin.cl", "bin_link"),
-      scan_(device),
-      sort_(device) {}
-
 void Bin::start() { scan_(pair_starts.size() - 1, pair_starts); }
 
 void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
@@ -35,10 +28,21 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
-  fill_(pair_starts.size() - 1, p, n, setup.triangles, pair_starts, pair_count, place_face, pair_tile,
-        places);
+  launch_(pair_starts.size() - 1, kernel::bin_fill{.p = p,
+                                                   .capacity = n,
+                                                   .triangles = setup.triangles,
+                                                   .offsets = pair_starts,
+                                                   .pairs = pair_count,
+                                                   .place_face = place_face,
+                                                   .place_tile = pair_tile,
+                                                   .places = places});
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
-  link_(pairs, n, pair_count, places, place_face, pair_face, face_pairs);
+  launch_(pairs, kernel::bin_link{.capacity = n,
+                                  .pairs = pair_count,
+                                  .places = places,
+                                  .place_owner = place_face,
+                                  .pair_owner = pair_face,
+                                  .owner_pairs = face_pairs});
 }
 
 std::size_t Bin::bytes() const {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "device/kernel.hpp"
+#include "kernels/bin.hpp"
 #include "stages/scan.hpp"
 #include "stages/setup.hpp"
 #include "stages/sort.hpp"
@@ -16,7 +16,7 @@ inline constexpr std::size_t k_most_pairs = std::numeric_limits<cl_uint>::max() 
 
 class Bin {
  public:
-  explicit Bin(Device::Impl& device);
+  explicit Bin(Device::Impl& device) : device_(device), launch_(device), scan_(device), sort_(device) {}
 
   /// Makes runs of the setup's counts, which `pair_starts` holds. Before forward(), which empties them where
   /// the pairs do not fit.
@@ -44,10 +44,7 @@ class Bin {
   void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>,
-         Out<cl_uint>, Out<cl_uint>>
-      fill_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
+  Launcher<kernel::bin_fill, kernel::bin_link> launch_;
   Scan scan_;
   Sort sort_;
 };

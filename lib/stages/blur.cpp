@@ -48,15 +48,7 @@ shared::BlurPass transposed(shared::BlurPass pass) {
 
 }  // namespace
 
-Blur::Blur(Device::Impl& device)
-    : device_(device),
-      find_extents_(device, "blur.cl", "blur_extents"),
-      columns_(device, "blur.cl", "blur_columns"),
-      rows_(device, "blur.cl", "blur_rows"),
-      rows_strided_(device, "blur.cl", "blur_rows_strided"),
-      columns_scale_(device, "blur.cl", "blur_columns_scale"),
-      rows_scale_(device, "blur.cl", "blur_rows_scale"),
-      reduce_(device) {
+Blur::Blur(Device::Impl& device) : device_(device), launch_(device), reduce_(device) {
   extents_.resize(device_, 1);  // kernels have the argument where nothing is known, too
 }
 
@@ -121,7 +113,7 @@ std::size_t Blur::row_items(const Pass& pass) const {
 void Blur::find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts) {
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   extents_.resize(device_, rows);
-  find_extents_(rows, p, tile_starts, extents_);
+  launch_(rows, kernel::blur_extents{.p = p, .tile_starts = tile_starts, .extents = extents_});
   tile_rows_ = p.tiles_y;
 }
 
@@ -153,7 +145,8 @@ void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer
   pass.lines = static_cast<cl_uint>(views);
   pass.width = static_cast<cl_uint>(width);
   out.resize(device_, views * pass.out_length * width);
-  columns_(views * column_items(pass, width), pass, extents_, weights, in, out);
+  launch_(views * column_items(pass, width),
+          kernel::blur_columns{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
 }
 
 void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
@@ -161,10 +154,13 @@ void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, cons
   pass.lines = static_cast<cl_uint>(lines);
   out.resize(device_, lines * pass.out_length);
   if (pass.in_step == 1 && pass.out_step == 1) {
-    rows_(lines * row_items(pass), pass, extents_, weights, in, out);
+    launch_(lines * row_items(pass),
+            kernel::blur_rows{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
   } else {
     const std::size_t blocks = groups(pass.out_length, block_of(device_));
-    rows_strided_(groups(lines, pixels_of_vector(device_)) * blocks, pass, extents_, weights, in, out);
+    launch_(
+        groups(lines, pixels_of_vector(device_)) * blocks,
+        kernel::blur_rows_strided{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
   }
 }
 
@@ -226,11 +222,22 @@ void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
   along_columns.lines = static_cast<cl_uint>(size.views);
   along_columns.width = static_cast<cl_uint>(x.in);
   along_rows.lines = static_cast<cl_uint>(size.views * y.out);
-  columns_scale_(size.views * of_columns, along_columns, static_cast<cl_uint>(stride), 0, extents_,
-                 now_.weights_by_scale, is_coarse() ? in_ : raster, grad_between_, products_);
-  rows_scale_(size.views * of_rows, along_rows, static_cast<cl_uint>(stride),
-              static_cast<cl_uint>(of_columns), static_cast<cl_uint>(y.out), now_.weights_by_scale, between_,
-              is_coarse() ? grad_out_ : grad_image, products_);
+  launch_(size.views * of_columns, kernel::blur_columns_scale{.p = along_columns,
+                                                              .stride = static_cast<cl_uint>(stride),
+                                                              .first = 0U,
+                                                              .extents = extents_,
+                                                              .weights = now_.weights_by_scale,
+                                                              .in = is_coarse() ? in_ : raster,
+                                                              .grad = grad_between_,
+                                                              .products = products_});
+  launch_(size.views * of_rows, kernel::blur_rows_scale{.p = along_rows,
+                                                        .stride = static_cast<cl_uint>(stride),
+                                                        .first = static_cast<cl_uint>(of_columns),
+                                                        .rows = static_cast<cl_uint>(y.out),
+                                                        .weights = now_.weights_by_scale,
+                                                        .in = between_,
+                                                        .grad = is_coarse() ? grad_out_ : grad_image,
+                                                        .products = products_});
   upload_starts(size.views, stride);
   reduce_({size.views * stride, 1, size.views, 1, starts_, products_}, grad_scale);
 }

@@ -2,7 +2,7 @@
 // scale.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/blur.hpp"
 #include "smoothing/blur_kernel.hpp"
 #include "stages/reduce.hpp"
 
@@ -87,11 +87,9 @@ class Blur {
 
   Device::Impl& device_;
   Setting now_;
-  Kernel<shared::FrameParams, In<cl_uint>, Out<cl_uint2>> find_extents_;
-  Kernel<Pass, In<cl_uint2>, In<float>, In<cl_float4>, Out<cl_float4>> columns_, rows_, rows_strided_;
-  Kernel<Pass, cl_uint, cl_uint, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>>
-      columns_scale_;
-  Kernel<Pass, cl_uint, cl_uint, cl_uint, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> rows_scale_;
+  Launcher<kernel::blur_extents, kernel::blur_columns, kernel::blur_rows, kernel::blur_rows_strided,
+           kernel::blur_columns_scale, kernel::blur_rows_scale>
+      launch_;
   Reduce reduce_;
   /// Input of the convolution, after its columns, after its rows; the first and the last of a coarse grid
   /// only.

@@ -12,12 +12,7 @@ std::size_t block_samples(const Device::Impl& device) { return device.info.lanes
 
 BlurSampled::BlurSampled(Device::Impl& device, const Smoothing& smoothing, const ShiftTable& table,
                          const BlurKernel& kernel)
-    : device_(device),
-      draw_(device, "blur_sampled.cl", "blur_sampled_draw"),
-      forward_(device, "blur_sampled.cl", "blur_sampled_forward"),
-      backward_(device, "blur_sampled.cl", "blur_sampled_backward"),
-      scale_(device, "blur_sampled.cl", "blur_sampled_scale"),
-      reduce_(device) {
+    : device_(device), launch_(device), reduce_(device) {
   params_.sampling = sampling_params(smoothing);
   params_.supersampling = static_cast<cl_uint>(kernel.supersampling);
   params_.margin = static_cast<cl_uint>(kernel.margin);
@@ -45,12 +40,17 @@ void BlurSampled::draw(const Blur::Size& size, cl_uint first_view) {
   shifts_.resize(device_, size.views * samples);
   shift_scores_.resize(device_, size.views * samples);
   const std::size_t blocks = (samples + block_samples(device_) - 1) / block_samples(device_);
-  draw_(size.views * blocks, params_, cumulative_, scores_, shifts_, shift_scores_);
+  launch_(size.views * blocks, kernel::blur_sampled_draw{.p = params_,
+                                                         .cumulative = cumulative_,
+                                                         .scores = scores_,
+                                                         .shifts = shifts_,
+                                                         .shift_scores = shift_scores_});
 }
 
 void BlurSampled::forward(const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
   image.resize(device_, pixels());
-  forward_(pixels(), params_, shifts_, raster, image);
+  launch_(pixels(),
+          kernel::blur_sampled_forward{.p = params_, .shifts = shifts_, .raster = raster, .image = image});
 }
 
 void BlurSampled::backward(const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster) {
@@ -58,12 +58,19 @@ void BlurSampled::backward(const BufferRef<cl_float4>& grad_image, Buffer<cl_flo
   const std::size_t samples =
       params_.views * (params_.height * per_pixel + around) * (params_.width * per_pixel + around);
   grad_raster.resize(device_, samples);
-  backward_(samples, params_, shifts_, grad_image, grad_raster);
+  launch_(samples,
+          kernel::blur_sampled_backward{
+              .p = params_, .shifts = shifts_, .grad_image = grad_image, .grad_raster = grad_raster});
 }
 
 void BlurSampled::backward_scale(const Buffer<cl_float4>& raster, const BufferRef<cl_float4>& grad_image) {
   products_.resize(device_, pixels());
-  scale_(pixels(), params_, shifts_, shift_scores_, raster, grad_image, products_);
+  launch_(pixels(), kernel::blur_sampled_scale{.p = params_,
+                                               .shifts = shifts_,
+                                               .shift_scores = shift_scores_,
+                                               .raster = raster,
+                                               .grad_image = grad_image,
+                                               .products = products_});
   reduce_({pixels(), 1, params_.views, 1, starts_, products_}, grad_scale);
 }
 

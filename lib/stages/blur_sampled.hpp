@@ -1,8 +1,8 @@
 // The blur of the rigid image by samples of the noise of the pixel's position: the mean of shifted frames.
 #pragma once
 
-#include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
+#include "kernels/blur_sampled.hpp"
 #include "smoothing/blur_kernel.hpp"
 #include "stages/blur.hpp"
 #include "stages/reduce.hpp"
@@ -34,9 +34,9 @@ class BlurSampled {
 
   Device::Impl& device_;
   shared::ShiftParams params_{};
-  Kernel<shared::ShiftParams, In<float>, In<float>, Out<cl_uint2>, Out<float>> draw_;
-  Kernel<shared::ShiftParams, In<cl_uint2>, In<cl_float4>, Out<cl_float4>> forward_, backward_;
-  Kernel<shared::ShiftParams, In<cl_uint2>, In<float>, In<cl_float4>, In<cl_float4>, Out<float>> scale_;
+  Launcher<kernel::blur_sampled_draw, kernel::blur_sampled_forward, kernel::blur_sampled_backward,
+           kernel::blur_sampled_scale>
+      launch_;
   Reduce reduce_;
   Buffer<float> cumulative_, scores_;
   Buffer<cl_uint2> shifts_;     ///< [view][sample]

@@ -4,34 +4,51 @@
 
 namespace dpr {
 
-Clip::Kernels::Kernels(Device::Impl& device)
-    : forward(device, "clip.cl", "clip_forward"),
-      cover(device, "clip.cl", "clip_cover"),
-      fragments(device, "clip.cl", "clip_fragments"),
-      backward(device, "clip.cl", "clip_backward") {}
-
 void Clip::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                    const Transform& transform, Setup& setup, Buffer<cl_uint>& counts) {
-  if (!kernels_) kernels_.emplace(device_);
+  if (!launch_) launch_.emplace(device_);
   views_ = &views;
   const std::size_t count = std::size_t{p.views} * p.faces;
   faces.resize(device_, count);
-  kernels_->forward(count, p, views.cameras, geometry.face_vertices, transform.world, transform.ndc, faces,
-                    setup.facing, setup.kept, counts, setup.triangles);
+  (*launch_)(count, kernel::clip_forward{.p = p,
+                                         .views = views.cameras,
+                                         .faces = geometry.face_vertices,
+                                         .world = transform.world,
+                                         .ndc = transform.ndc,
+                                         .clipped = faces,
+                                         .facing = setup.facing,
+                                         .kept = setup.kept,
+                                         .counts = counts,
+                                         .triangles = setup.triangles});
 }
 
 void Clip::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                  Buffer<cl_uint2>& masks, Buffer<cl_uint>& counts) {
-  kernels_->cover(bin.pairs, p, static_cast<cl_uint>(bin.pairs), bin.pair_count, faces, triangles,
-                  bin.pair_face, bin.pair_tile, masks, counts);
+  (*launch_)(bin.pairs, kernel::clip_cover{.p = p,
+                                           .capacity = static_cast<cl_uint>(bin.pairs),
+                                           .pairs = bin.pair_count,
+                                           .clipped = faces,
+                                           .triangles = triangles,
+                                           .pair_face = bin.pair_face,
+                                           .pair_tile = bin.pair_tile,
+                                           .masks = masks,
+                                           .counts = counts});
 }
 
 void Clip::fragments(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                      Rasterize& rasterize) {
   const Range pairs = rasterize.pairs(bin);
-  kernels_->fragments(pairs, p, pairs.last(), faces, triangles, bin.pair_face, rasterize.fragment_starts,
-                      rasterize.fragment_pixel, rasterize.distance, rasterize.depth, rasterize.bary1,
-                      rasterize.bary2);
+  (*launch_)(pairs, kernel::clip_fragments{.p = p,
+                                           .last_pair = pairs.last(),
+                                           .clipped = faces,
+                                           .triangles = triangles,
+                                           .pair_face = bin.pair_face,
+                                           .fragment_starts = rasterize.fragment_starts,
+                                           .pixels = rasterize.fragment_pixel,
+                                           .distance = rasterize.distance,
+                                           .depth = rasterize.depth,
+                                           .bary1 = rasterize.bary1,
+                                           .bary2 = rasterize.bary2});
 }
 
 void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
@@ -39,9 +56,21 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                     const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range pairs = rasterize.pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
-  kernels_->backward(pairs, p, pairs.last(), views_->cameras, faces, triangles, bin.pair_face,
-                     rasterize.fragment_starts, rasterize.fragment_pixel, rasterize.distance, grad_distance,
-                     grad_depth, grad_bary1, grad_bary2, rasterize.grad_corners, grad_corners);
+  (*launch_)(pairs, kernel::clip_backward{.p = p,
+                                          .last_pair = pairs.last(),
+                                          .views = views_->cameras,
+                                          .clipped = faces,
+                                          .triangles = triangles,
+                                          .pair_face = bin.pair_face,
+                                          .fragment_starts = rasterize.fragment_starts,
+                                          .pixels = rasterize.fragment_pixel,
+                                          .distance = rasterize.distance,
+                                          .grad_distance = grad_distance,
+                                          .grad_depth = grad_depth,
+                                          .grad_bary1 = grad_bary1,
+                                          .grad_bary2 = grad_bary2,
+                                          .grad_corners = rasterize.grad_corners,
+                                          .grad_clip = grad_corners});
 }
 
 }  // namespace dpr

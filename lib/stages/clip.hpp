@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "device/kernel.hpp"
+#include "kernels/clip.hpp"
 #include "stages/bin.hpp"
 #include "stages/geometry.hpp"
 #include "stages/setup.hpp"
@@ -43,25 +43,10 @@ class Clip {
   }
 
  private:
-  struct Kernels {
-    explicit Kernels(Device::Impl& device);
-    Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
-           Out<shared::ClippedFace>, Out<cl_uchar>, Out<cl_uchar>, Out<cl_uint>, Out<shared::Triangle>>
-        forward;
-    Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::ClippedFace>, In<shared::Triangle>,
-           In<cl_uint>, In<cl_uint>, Out<cl_uint2>, Out<cl_uint>>
-        cover;
-    Kernel<shared::FrameParams, cl_uint, In<shared::ClippedFace>, In<shared::Triangle>, In<cl_uint>,
-           In<cl_uint>, In<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
-        fragments;
-    Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<shared::ClippedFace>,
-           In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>,
-           In<float>, In<float>, Out<float>, Out<float>>
-        backward;
-  };
-
   Device::Impl& device_;
-  std::optional<Kernels> kernels_;      // made for the first frame that may have such faces
+  std::optional<
+      Launcher<kernel::clip_forward, kernel::clip_cover, kernel::clip_fragments, kernel::clip_backward>>
+      launch_;                          // made for the first frame that may have such faces
   const DeviceViews* views_ = nullptr;  // of the frame
 };
 

@@ -4,16 +4,6 @@
 
 namespace dpr {
 
-Contour::Contour(Device::Impl& device)
-    : device_(device),
-      count_(device, "contour.cl", "contour_count"),
-      fill_(device, "contour.cl", "contour_fill"),
-      link_(device, "bin.cl", "bin_link"),
-      gather_(device, "contour.cl", "contour_gather"),
-      gather_cuts_(device, "contour.cl", "contour_gather_cuts"),
-      scan_(device),
-      sort_(device) {}
-
 std::size_t edges_of_view(const ContourInputs& in) {
   return in.edges.count + (in.p.clips != 0 ? in.p.faces : 0);
 }
@@ -60,9 +50,17 @@ void Contour::count(const ContourInputs& in) {
                           "fewer, so that they can be counted");
   }
   pair_starts.resize(device_, view_edges(in) + 1);
-  count_(view_edges(in), in.p, params(in), in.edges.edges, in.facing, in.transform.ndc, in.transform.world,
-         in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
-         pair_starts);
+  launch_(view_edges(in), kernel::contour_count{.p = in.p,
+                                                .c = params(in),
+                                                .edges = in.edges.edges,
+                                                .facing = in.facing,
+                                                .ndc = in.transform.ndc,
+                                                .world = in.transform.world,
+                                                .faces = in.geometry.face_vertices,
+                                                .clipped = in.clipped,
+                                                .face_colors = in.geometry.face_colors(),
+                                                .colors = in.geometry.colors_of(in.p),
+                                                .counts = pair_starts});
   scan_(view_edges(in), pair_starts);
 }
 
@@ -73,25 +71,69 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
     buffer->resize(device_, Length::at_most(pairs));
   const Incidence& corners = in.geometry.vertex_corners;
   // Without edges one work-item still writes the count.
-  fill_(std::max<std::size_t>(view_edges(in), 1), in.p, params(in), to_uint(capacity), in.edges.edges,
-        in.edges.face_edges, corners.starts, corners.corners, in.facing, in.transform.ndc, in.transform.world,
-        in.geometry.face_vertices, in.clipped, in.geometry.face_colors(), in.geometry.colors_of(in.p),
-        pair_starts, pair_count, place_contour_, pair_tile, places_);
+  launch_(std::max<std::size_t>(view_edges(in), 1),
+          kernel::contour_fill{.p = in.p,
+                               .c = params(in),
+                               .capacity = to_uint(capacity),
+                               .edges = in.edges.edges,
+                               .face_edges = in.edges.face_edges,
+                               .corner_starts = corners.starts,
+                               .corners = corners.corners,
+                               .facing = in.facing,
+                               .ndc = in.transform.ndc,
+                               .world = in.transform.world,
+                               .faces = in.geometry.face_vertices,
+                               .clipped = in.clipped,
+                               .face_colors = in.geometry.face_colors(),
+                               .colors = in.geometry.colors_of(in.p),
+                               .offsets = pair_starts,
+                               .pairs = pair_count,
+                               .place_contour = place_contour_,
+                               .place_tile = pair_tile,
+                               .places = places_});
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
-  link_(pairs, to_uint(capacity), pair_count, places_, place_contour_, pair_contour, edge_pairs_);
+  launch_(pairs, kernel::bin_link{.capacity = to_uint(capacity),
+                                  .pairs = pair_count,
+                                  .places = places_,
+                                  .place_owner = place_contour_,
+                                  .pair_owner = pair_contour,
+                                  .owner_pairs = edge_pairs_});
 }
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
                      Buffer<cl_float4>& grad_clip) {
   const Incidence& corners = in.geometry.vertex_corners;
-  gather_(2 * pairs, in.p, params(in), pair_count, pair_contour, pair_starts, edge_pairs_, in.edges.edges,
-          in.geometry.face_vertices, in.edges.face_edges, corners.starts, corners.corners, grad_ends,
-          grad_ndc);
+  launch_(2 * pairs, kernel::contour_gather{.p = in.p,
+                                            .c = params(in),
+                                            .pairs = pair_count,
+                                            .pair_contour = pair_contour,
+                                            .pair_starts = pair_starts,
+                                            .edge_pairs = edge_pairs_,
+                                            .edges = in.edges.edges,
+                                            .faces = in.geometry.face_vertices,
+                                            .face_edges = in.edges.face_edges,
+                                            .corner_starts = corners.starts,
+                                            .corners = corners.corners,
+                                            .grad_ends = grad_ends,
+                                            .grad_ndc = grad_ndc});
   if (in.p.clips == 0) return;
-  gather_cuts_(std::size_t{in.p.views} * in.p.vertices, in.p, params(in), in.views.cameras, in.edges.edges,
-               in.geometry.face_vertices, in.transform.ndc, in.clipped, pair_starts, edge_pairs_,
-               in.edges.face_edges, corners.starts, corners.corners, grad_ends, grad_ndc, grad_clip);
+  launch_(std::size_t{in.p.views} * in.p.vertices,
+          kernel::contour_gather_cuts{.p = in.p,
+                                      .c = params(in),
+                                      .views = in.views.cameras,
+                                      .edges = in.edges.edges,
+                                      .faces = in.geometry.face_vertices,
+                                      .ndc = in.transform.ndc,
+                                      .clipped = in.clipped,
+                                      .pair_starts = pair_starts,
+                                      .edge_pairs = edge_pairs_,
+                                      .face_edges = in.edges.face_edges,
+                                      .corner_starts = corners.starts,
+                                      .corners = corners.corners,
+                                      .grad_ends = grad_ends,
+                                      .grad_ndc = grad_ndc,
+                                      .grad_clip = grad_clip});
 }
 
 std::size_t Contour::bytes() const {

@@ -3,8 +3,9 @@
 
 #include <optional>
 
-#include "device/kernel.hpp"
 #include "dpr/light.hpp"
+#include "kernels/bin.hpp"
+#include "kernels/contour.hpp"
 #include "stages/edges.hpp"
 #include "stages/geometry.hpp"
 #include "stages/scan.hpp"
@@ -30,7 +31,7 @@ std::size_t edges_of_view(const ContourInputs& in);
 
 class Contour {
  public:
-  explicit Contour(Device::Impl& device);
+  explicit Contour(Device::Impl& device) : device_(device), launch_(device), scan_(device), sort_(device) {}
 
   /// Blocks to read the number of pairs.
   void forward(const ContourInputs& in);
@@ -59,21 +60,9 @@ class Contour {
   void list(const ContourInputs& in, std::size_t capacity);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint2>, In<cl_uchar>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint4>, In<shared::ClippedFace>, In<cl_uint4>, In<cl_float4>, Out<cl_uint>>
-      count_;
-  Kernel<shared::FrameParams, shared::ContourParams, cl_uint, In<cl_uint2>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_uchar>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<shared::ClippedFace>,
-         In<cl_uint4>, In<cl_float4>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>>
-      fill_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>> link_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint2>, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
-      gather_;
-  Kernel<shared::FrameParams, shared::ContourParams, In<shared::ViewParams>, In<cl_uint2>, In<cl_uint4>,
-         In<cl_float4>, In<shared::ClippedFace>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>,
-         In<cl_uint>, In<cl_float4>, Out<cl_float4>, Out<cl_float4>>
-      gather_cuts_;
+  Launcher<kernel::contour_count, kernel::contour_fill, kernel::bin_link, kernel::contour_gather,
+           kernel::contour_gather_cuts>
+      launch_;
   Scan scan_;
   Sort sort_;
   Buffer<cl_uint> edge_pairs_;              // the pairs of every edge

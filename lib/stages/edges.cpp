@@ -105,8 +105,7 @@ std::size_t number_of(const WeldedEdge& edge, std::span<const cl_uint> numbers) 
 
 }  // namespace
 
-Edges::Edges(Device::Impl& device, const Scene& scene)
-    : device_(device), list_(device, "edges.cl", "edges_list"), join_(device, "edges.cl", "edges_join") {
+Edges::Edges(Device::Impl& device, const Scene& scene) : device_(device), launch_(device) {
   constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
   std::vector<cl_uint2> rows;
   std::vector<cl_uint> all_numbers;
@@ -150,10 +149,25 @@ void Edges::join(const shared::FrameParams& p, const Geometry& geometry) {
   next_.resize(device_, copies * open);
   heads_.fill(DPR_NO_OPEN_EDGE);
   const cl_uint4 sizes{{to_uint(copies), to_uint(open), to_uint(buckets), 0}};
-  list_(copies * open, p, sizes, open_, geometry.face_vertices, geometry.places, geometry.positions_of(p),
-        heads_, next_);
-  join_(copies * open, p, sizes, to_uint(count), open_, geometry.face_vertices, geometry.places,
-        geometry.positions_of(p), heads_, next_, face_edges, edges);
+  launch_(copies * open, kernel::edges_list{.p = p,
+                                            .sizes = sizes,
+                                            .open = open_,
+                                            .faces = geometry.face_vertices,
+                                            .places = geometry.places,
+                                            .positions = geometry.positions_of(p),
+                                            .heads = heads_,
+                                            .next = next_});
+  launch_(copies * open, kernel::edges_join{.p = p,
+                                            .sizes = sizes,
+                                            .mesh_edges = to_uint(count),
+                                            .open = open_,
+                                            .faces = geometry.face_vertices,
+                                            .places = geometry.places,
+                                            .positions = geometry.positions_of(p),
+                                            .heads = heads_,
+                                            .next = next_,
+                                            .face_edges = face_edges,
+                                            .edges = edges});
 }
 
 std::size_t Edges::bytes() const {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "device/kernel.hpp"
+#include "kernels/edges.hpp"
 #include "mesh/solid.hpp"
 #include "stages/geometry.hpp"
 
@@ -29,12 +29,7 @@ class Edges {
   void add(const Mesh& mesh, std::size_t first_face);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint4, In<shared::OpenEdge>, In<cl_uint4>, In<shared::MeshPlace>,
-         In<cl_float4>, Out<cl_uint>, Out<cl_uint>>
-      list_;
-  Kernel<shared::FrameParams, cl_uint4, cl_uint, In<shared::OpenEdge>, In<cl_uint4>, In<shared::MeshPlace>,
-         In<cl_float4>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint2>>
-      join_;
+  Launcher<kernel::edges_list, kernel::edges_join> launch_;
   Buffer<shared::OpenEdge> open_;  // [open edge]
   Buffer<cl_uint> heads_, next_;
 };

@@ -27,7 +27,11 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<float>& 
 
 void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                             Buffer<shared::ViewParams>& cameras) {
-  cameras_(count, to_uint(count), layout(from), orthographic ? 1 : 0, BufferRef<float>(from.buffer), cameras);
+  launch_(count, kernel::exchange_cameras{.count = to_uint(count),
+                                          .from = layout(from),
+                                          .orthographic = cl_uint{orthographic},
+                                          .source = BufferRef<float>(from.buffer),
+                                          .views = cameras});
 }
 
 void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
@@ -35,13 +39,22 @@ void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVect
 }
 
 void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
-  vectors_(count, to_uint(count), layout(from), layout(to), clean ? 1 : 0, BufferRef<cl_uint>(from.buffer),
-           BufferRef<cl_uint>(to.buffer));
+  launch_(count, kernel::exchange_vectors{.vectors = to_uint(count),
+                                          .from = layout(from),
+                                          .to = layout(to),
+                                          .clean = cl_uint{clean},
+                                          .source = BufferRef<cl_uint>(from.buffer),
+                                          .target = BufferRef<cl_uint>(to.buffer)});
 }
 
 void Exchange::map(const SparseMap& map, const Buffer<float>& sums, Buffer<float>& numbers) {
   numbers.resize(device_, map.numbers);
-  map_(map.numbers, to_uint(map.numbers), map.starts, map.terms, map.factors, sums, numbers);
+  launch_(map.numbers, kernel::exchange_map{.numbers = to_uint(map.numbers),
+                                            .starts = map.starts,
+                                            .terms = map.terms,
+                                            .factors = map.factors,
+                                            .sums = sums,
+                                            .values = numbers});
 }
 
 }  // namespace dpr

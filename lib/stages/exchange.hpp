@@ -1,7 +1,7 @@
 // Vectors to and from buffers of the caller's, and numbers of a gradient from the sums of its channels.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/exchange.hpp"
 
 namespace dpr {
 
@@ -25,11 +25,7 @@ struct SparseMap {
 
 class Exchange {
  public:
-  explicit Exchange(Device::Impl& device)
-      : device_(device),
-        vectors_(device, "exchange.cl", "exchange_vectors"),
-        cameras_(device, "exchange.cl", "exchange_cameras"),
-        map_(device, "exchange.cl", "exchange_map") {}
+  explicit Exchange(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// From the caller's `count` vectors to elements of `to` from `first` on, 0 behind their components.
   /// Numbers that are not finite become 0: kernels index by what they compute of them.
@@ -47,9 +43,7 @@ class Exchange {
   void copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean);
 
   Device::Impl& device_;
-  Kernel<cl_uint, cl_uint4, cl_uint4, cl_uint, In<cl_uint>, Out<cl_uint>> vectors_;
-  Kernel<cl_uint, cl_uint4, cl_uint, In<float>, Out<shared::ViewParams>> cameras_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<float>> map_;
+  Launcher<kernel::exchange_vectors, kernel::exchange_cameras, kernel::exchange_map> launch_;
 };
 
 /// Elements of a buffer from `first` on, `components` of each.

@@ -1,7 +1,7 @@
 // Gradients of pairs' corners, gathered at vertices and colours.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/gather.hpp"
 #include "stages/bin.hpp"
 #include "stages/geometry.hpp"
 
@@ -9,7 +9,7 @@ namespace dpr {
 
 class Gather {
  public:
-  explicit Gather(Device::Impl& device);
+  explicit Gather(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// grad[view][target] from partial[pair][9].
   void per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
@@ -30,12 +30,7 @@ class Gather {
                   const Buffer<float>& partial);
 
   Device::Impl& device_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>>
-      chunk_sums_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
-         In<float>, Out<cl_float4>>
-      corners_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, Out<float>> faces_;
+  Launcher<kernel::gather_chunks, kernel::gather_corners, kernel::gather_faces> launch_;
   Buffer<float> chunks_;  // [slot][channel]
 };
 

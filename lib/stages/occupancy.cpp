@@ -23,14 +23,6 @@ shared::Sampling sampling_params(const Smoothing& smoothing) {
   return s;
 }
 
-OccupancyKernels::Exact::Exact(Device::Impl& device, const std::string& options)
-    : forward(device, "occupancy.cl", "occupancy_forward", options),
-      backward(device, "occupancy.cl", "occupancy_backward", options) {}
-
-OccupancyKernels::Sampled::Sampled(Device::Impl& device, const std::string& options)
-    : forward(device, "occupancy_sampled.cl", "occupancy_sampled_forward", options),
-      backward(device, "occupancy_sampled.cl", "occupancy_sampled_backward", options) {}
-
 Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
   if (samples_jointly(smoothing)) return {smoothing, now_.kernels};
   const std::string options = prior_option(smoothing.occupancy_prior) + " -DDPR_OCCUPANCY_WIDTH=" +
@@ -65,11 +57,23 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
   const Range pairs = rasterize.pairs(bin);
   if (now_.kernels->exact) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    now_.kernels->exact->forward((rasterize.fragments + width - 1) / width, params(p), pairs.last(),
-                                 rasterize.fragment_starts, rasterize.distance, log_occupancy, occupancy);
+    (*now_.kernels->exact)((rasterize.fragments + width - 1) / width,
+                           kernel::occupancy_forward{.p = params(p),
+                                                     .last_pair = pairs.last(),
+                                                     .fragment_starts = rasterize.fragment_starts,
+                                                     .distance = rasterize.distance,
+                                                     .log_occupancy = log_occupancy,
+                                                     .occupancy = occupancy});
   } else {
-    now_.kernels->sampled->forward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
-                                   rasterize.fragment_pixel, rasterize.distance, log_occupancy, occupancy);
+    (*now_.kernels->sampled)(pairs,
+                             kernel::occupancy_sampled_forward{.p = params(p),
+                                                               .pairs = pairs.last(),
+                                                               .pair_face = bin.pair_face,
+                                                               .fragment_starts = rasterize.fragment_starts,
+                                                               .pixels = rasterize.fragment_pixel,
+                                                               .distance = rasterize.distance,
+                                                               .log_occupancy = log_occupancy,
+                                                               .occupancy = occupancy});
   }
 }
 
@@ -80,12 +84,26 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
   grad_sigma.resize(device_, bin.pairs);
   if (now_.kernels->exact) {
     const PairGroups groups = rasterize.pair_groups(bin);
-    now_.kernels->exact->backward(groups.count, params(p), groups.pairs, rasterize.fragment_starts,
-                                  rasterize.distance, grad_log_occupancy, grad_distance, grad_sigma);
+    (*now_.kernels->exact)(groups.count,
+                           kernel::occupancy_backward{.p = params(p),
+                                                      .pairs = groups.pairs,
+                                                      .fragment_starts = rasterize.fragment_starts,
+                                                      .distance = rasterize.distance,
+                                                      .grad_log_occupancy = grad_log_occupancy,
+                                                      .grad_distance = grad_distance,
+                                                      .grad_sigma = grad_sigma});
   } else {
-    now_.kernels->sampled->backward(pairs, params(p), pairs.last(), bin.pair_face, rasterize.fragment_starts,
-                                    rasterize.fragment_pixel, rasterize.distance, occupancy,
-                                    grad_log_occupancy, grad_distance, grad_sigma);
+    (*now_.kernels->sampled)(pairs,
+                             kernel::occupancy_sampled_backward{.p = params(p),
+                                                                .pairs = pairs.last(),
+                                                                .pair_face = bin.pair_face,
+                                                                .fragment_starts = rasterize.fragment_starts,
+                                                                .pixels = rasterize.fragment_pixel,
+                                                                .distance = rasterize.distance,
+                                                                .occupancy = occupancy,
+                                                                .grad_log_occupancy = grad_log_occupancy,
+                                                                .grad_distance = grad_distance,
+                                                                .grad_sigma = grad_sigma});
   }
 }
 

@@ -5,8 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "device/kernel.hpp"
 #include "dpr/smoothing.hpp"
+#include "kernels/occupancy.hpp"
+#include "kernels/occupancy_sampled.hpp"
 #include "stages/bin.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/smoothed_stage.hpp"
@@ -15,26 +16,9 @@ namespace dpr {
 
 /// Kernels of one estimator and prior; `built` names them.
 struct OccupancyKernels {
-  /// Kernels of the exact and of the sampled estimator, for one prior.
-  struct Exact {
-    Exact(Device::Impl& device, const std::string& options);
-    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<float>, Out<float>, Out<float>> forward;
-    Kernel<shared::OccupancyParams, cl_uint2, In<cl_uint>, In<float>, In<float>, Out<float>, Out<float>>
-        backward;
-  };
-  struct Sampled {
-    Sampled(Device::Impl& device, const std::string& options);
-    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, Out<float>,
-           Out<float>>
-        forward;
-    Kernel<shared::OccupancyParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>, In<float>,
-           In<float>, Out<float>, Out<float>>
-        backward;
-  };
-
   std::string built;
-  std::optional<Exact> exact;
-  std::optional<Sampled> sampled;
+  std::optional<Launcher<kernel::occupancy_forward, kernel::occupancy_backward>> exact;
+  std::optional<Launcher<kernel::occupancy_sampled_forward, kernel::occupancy_sampled_backward>> sampled;
 };
 
 class Occupancy : public SmoothedStage<OccupancyKernels> {

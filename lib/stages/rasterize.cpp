@@ -4,20 +4,6 @@
 
 namespace dpr {
 
-Rasterize::Rasterize(Device::Impl& device)
-    : device_(device),
-      cover_(device, "rasterize.cl", "rasterize_cover"),
-      hide_(device, "rasterize_hide.cl", "rasterize_hide"),
-      count_(device, "rasterize.cl", "rasterize_count"),
-      rows_(device, "rasterize.cl", "rasterize_rows"),
-      fit_(device, "rasterize.cl", "rasterize_fit"),
-      note_(device, "rasterize.cl", "rasterize_note"),
-      rebase_(device, "rasterize.cl", "rasterize_rebase"),
-      list_(device, "rasterize.cl", "rasterize_list"),
-      forward_(device, "rasterize.cl", "rasterize_forward"),
-      backward_(device, "rasterize.cl", "rasterize_backward"),
-      scan_(device) {}
-
 namespace {
 
 /// Work-items of the listing kernels for a tile: as rasterize.cl shares it out.
@@ -46,7 +32,7 @@ PixelBlock pixel_block(const shared::FrameParams& p, const Range& tiles) {
 }
 
 /// The first of the starts of any list is 0.
-ContourCount no_contours(const Bin& bin) { return {0, bin.pair_starts}; }
+ContourCount no_contours(Bin& bin) { return {0, bin.pair_starts}; }
 
 template <class Start>
 Band make_band(const shared::FrameParams& p, const Start& first, const Start& last) {
@@ -64,32 +50,53 @@ PairGroups::PairGroups(const Device::Impl& device, const Range& of)
   count = (of.count + size - 1) / size;
 }
 
-void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
                       const ContourCount& contours) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
   const std::size_t pixels = pixels_of(p);
   masks.resize(device_, length(pairs));
   fragment_starts.resize(device_, length(std::size_t{pairs} + 1));
-  cover_(pairs, p, pairs, bin.pair_count, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts);
+  launch_(pairs, kernel::rasterize_cover{.p = p,
+                                         .capacity = pairs,
+                                         .pairs = bin.pair_count,
+                                         .triangles = triangles,
+                                         .pair_face = bin.pair_face,
+                                         .pair_tile = bin.pair_tile,
+                                         .masks = masks,
+                                         .counts = fragment_starts});
   if (clip != nullptr) clip->cover(p, triangles, bin, masks, fragment_starts);
   if (hiding) {
-    hide_.in_groups(tiles_of(p), p, hiding->reach, hiding->cameras, bin.tile_starts, triangles, bin.pair_face,
-                    bin.places, masks, fragment_starts, bin.face_pairs);
+    launch_.in_groups(tiles_of(p), kernel::rasterize_hide{.p = p,
+                                                          .reach = hiding->reach,
+                                                          .views = hiding->cameras,
+                                                          .tile_starts = bin.tile_starts,
+                                                          .triangles = triangles,
+                                                          .pair_face = bin.pair_face,
+                                                          .places = bin.places,
+                                                          .masks = masks,
+                                                          .counts = fragment_starts,
+                                                          .face_pairs = bin.face_pairs});
   }
   scan_(pairs, fragment_starts);
   pixel_starts.resize(device_, pixels + 1);
-  count_(tiles_of(p) * shares_of_tile(device_), p, bin.tile_starts, masks, pixel_starts);
+  launch_(tiles_of(p) * shares_of_tile(device_),
+          kernel::rasterize_count{
+              .p = p, .tile_starts = bin.tile_starts, .masks = masks, .counts = pixel_starts});
   scan_(pixels, pixel_starts);
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
-  rows_(rows + 1, p, to_uint(contours.last), bin.tile_starts, bin.pair_starts, fragment_starts,
-        contours.starts, device_rows_);
+  launch_(rows + 1, kernel::rasterize_rows{.p = p,
+                                           .last_contour = to_uint(contours.last),
+                                           .tile_starts = bin.tile_starts,
+                                           .pair_starts = bin.pair_starts,
+                                           .fragment_starts = fragment_starts,
+                                           .contour_starts = contours.starts,
+                                           .rows = device_rows_});
   in_bands_ = false;
 }
 
-void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                      const Bin& bin) {
+void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
   counted_ = true;
   count(p, triangles, bin, no_contours(bin));
   row_starts_.clear();
@@ -173,9 +180,13 @@ void Rasterize::rebase(const Band& next) {
   const auto rebase = [&](const PixelBlock& runs, const Buffer<cl_uint>& frame_starts,
                           Buffer<cl_uint>& starts) {
     starts.resize(device_, frame_starts.size());
-    rebase_(runs.rows * (runs.columns + 1), static_cast<cl_uint>(runs.first),
-            static_cast<cl_uint>(runs.columns), static_cast<cl_uint>(runs.rows),
-            static_cast<cl_uint>(runs.stride), frame_starts, starts);
+    launch_(runs.rows * (runs.columns + 1),
+            kernel::rasterize_rebase{.first = static_cast<cl_uint>(runs.first),
+                                     .columns = static_cast<cl_uint>(runs.columns),
+                                     .rows = static_cast<cl_uint>(runs.rows),
+                                     .stride = static_cast<cl_uint>(runs.stride),
+                                     .starts = frame_starts,
+                                     .band_starts = starts});
   };
   rebase({next.pairs.first, next.pairs.count}, frame_fragment_starts_, fragment_starts);
   rebase(next.pixels, frame_pixel_starts_, pixel_starts);
@@ -192,15 +203,31 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
     buffer->resize(device_, fragment_length());
   const std::size_t shares = shares_of_tile(device_);
   const Range listing(next.tiles.first * shares, next.tiles.count * shares);
-  list_(listing, p, listing.last(), bin.tile_starts, masks, fragment_starts, pixel_starts, list);
+  launch_(listing, kernel::rasterize_list{.p = p,
+                                          .last_share = listing.last(),
+                                          .tile_starts = bin.tile_starts,
+                                          .masks = masks,
+                                          .fragment_starts = fragment_starts,
+                                          .pixel_starts = pixel_starts,
+                                          .lists = list});
   const PairGroups groups(device_, next.pairs);
-  forward_(groups.count, p, groups.pairs, triangles, bin.pair_face, bin.pair_tile, masks, fragment_starts,
-           fragment_pair, fragment_pixel, distance, depth, bary1, bary2);
+  launch_(groups.count, kernel::rasterize_forward{.p = p,
+                                                  .pairs = groups.pairs,
+                                                  .triangles = triangles,
+                                                  .pair_face = bin.pair_face,
+                                                  .pair_tile = bin.pair_tile,
+                                                  .masks = masks,
+                                                  .fragment_starts = fragment_starts,
+                                                  .fragment_pair = fragment_pair,
+                                                  .pixels = fragment_pixel,
+                                                  .distance = distance,
+                                                  .depth = depth,
+                                                  .bary1 = bary1,
+                                                  .bary2 = bary2});
   if (clip != nullptr) clip->fragments(p, triangles, bin, *this);
 }
 
-void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                        const Bin& bin) {
+void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
   cover(p, triangles, bin);
   forward(p, triangles, bin, whole_frame(p, counted()));
 }
@@ -218,10 +245,20 @@ void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameP
   if (reads) {
     last_row_.start(device_rows_, last_row);
   } else {
-    note_(1, limits, to_uint(last_row), device_rows_, history());
+    launch_(
+        1,
+        kernel::rasterize_note{
+            .capacity = limits, .last_row = to_uint(last_row), .rows = device_rows_, .history = history()});
   }
-  fit_(device_.local_size() * device_.info.compute_units, limits, sizes, device_rows_, masks, fragment_starts,
-       pixel_starts, bin.pair_starts, contour_count.starts);
+  launch_(device_.local_size() * device_.info.compute_units,
+          kernel::rasterize_fit{.capacity = limits,
+                                .sizes = sizes,
+                                .rows = device_rows_,
+                                .masks = masks,
+                                .fragment_starts = fragment_starts,
+                                .pixel_starts = pixel_starts,
+                                .pair_starts = bin.pair_starts,
+                                .contour_starts = contour_count.starts});
   frame_fragments = capacity.fragments;
   forward(p, triangles, bin, whole_frame(p, capacity));
 }
@@ -233,7 +270,7 @@ FrameCounts Rasterize::read_counts() {
   return {last.s[2], last.s[1], last.s[3]};
 }
 
-const Buffer<cl_uint4>& Rasterize::history() {
+Buffer<cl_uint4>& Rasterize::history() {
   if (history_.size() == 0) {
     Buffer<cl_uint4> zero(device_, 1);
     zero.fill(cl_uint4{});
@@ -260,8 +297,18 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range range = pairs(bin);
   grad_corners.resize(device_, Length::varying(std::size_t{9} * bin.pairs));
-  backward_(range, p, range.last(), triangles, bin.pair_face, fragment_starts, fragment_pixel, distance,
-            grad_distance, grad_depth, grad_bary1, grad_bary2, grad_corners);
+  launch_(range, kernel::rasterize_backward{.p = p,
+                                            .last_pair = range.last(),
+                                            .triangles = triangles,
+                                            .pair_face = bin.pair_face,
+                                            .fragment_starts = fragment_starts,
+                                            .pixels = fragment_pixel,
+                                            .distance = distance,
+                                            .grad_distance = grad_distance,
+                                            .grad_depth = grad_depth,
+                                            .grad_bary1 = grad_bary1,
+                                            .grad_bary2 = grad_bary2,
+                                            .grad_corners = grad_corners});
   if (clip != nullptr)
     clip->backward(p, triangles, bin, *this, grad_distance, grad_depth, grad_bary1, grad_bary2);
 }

@@ -5,7 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "device/kernel.hpp"
+#include "kernels/rasterize.hpp"
+#include "kernels/rasterize_hide.hpp"
 #include "stages/bin.hpp"
 #include "stages/clip.hpp"
 #include "stages/scan.hpp"
@@ -25,7 +26,7 @@ struct FrameCounts {
 /// Contours' pairs of a frame, as far as they have to fit: starts[last] is how many there are.
 struct ContourCount {
   std::size_t last;
-  const Buffer<cl_uint>& starts;
+  Buffer<cl_uint>& starts;
 };
 
 /// Samples without fragments, where all triangles are opaque: those that lie further than `reach`,
@@ -60,10 +61,10 @@ struct PairGroups {
 
 class Rasterize {
  public:
-  explicit Rasterize(Device::Impl& device);
+  explicit Rasterize(Device::Impl& device) : device_(device), launch_(device), scan_(device) {}
 
   /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
-  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin);
   /// The same and forward() of the whole frame without waiting to learn how many fragments there are. If
   /// anything exceeds the capacity the frame is emptied, with the lists of faces' and contours' pairs;
   /// read_counts() returns the true counts, so that the caller can retry. `reads`: they are on their way to
@@ -75,7 +76,7 @@ class Rasterize {
   FrameCounts read_counts();
   /// [1] of the frames that forward_within() did not read: the most pairs, fragments and contours' pairs, and
   /// how many were emptied. All 0 at first, and after forget_history().
-  const Buffer<cl_uint4>& history();
+  Buffer<cl_uint4>& history();
   void forget_history();
   /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
   /// the band whose fragments these are.
@@ -90,7 +91,7 @@ class Rasterize {
   void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                const Band& band);
   /// All of it: cover() and forward() of the whole frame.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin);
   /// From the gradients of distance, depth and barycentrics to `grad_corners` of the band's pairs.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
@@ -137,32 +138,14 @@ class Rasterize {
   Length length(std::size_t count) const {
     return counted_ ? Length::varying(count) : Length::at_most(count);
   }
-  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+  void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
              const ContourCount& contours);
 
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<shared::Triangle>, In<cl_uint>, In<cl_uint>,
-         Out<cl_uint2>, Out<cl_uint>>
-      cover_;
-  Kernel<shared::FrameParams, float, In<shared::ViewParams>, In<cl_uint>, In<shared::Triangle>, In<cl_uint>,
-         In<cl_uint>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>>
-      hide_;
-  Kernel<shared::FrameParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> count_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint4>>
-      rows_;
-  Kernel<cl_uint4, cl_uint4, In<cl_uint4>, Out<cl_uint2>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>,
-         Out<cl_uint>>
-      fit_;
-  Kernel<cl_uint4, cl_uint, In<cl_uint4>, Out<cl_uint4>> note_;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> rebase_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint2>, In<cl_uint>, In<cl_uint>, Out<cl_uint>>
-      list_;
-  Kernel<shared::FrameParams, cl_uint2, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint2>,
-         In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<float>, Out<float>, Out<float>, Out<float>>
-      forward_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::Triangle>, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>>
-      backward_;
+  Launcher<kernel::rasterize_cover, kernel::rasterize_hide, kernel::rasterize_count, kernel::rasterize_rows,
+           kernel::rasterize_fit, kernel::rasterize_note, kernel::rasterize_rebase, kernel::rasterize_list,
+           kernel::rasterize_forward, kernel::rasterize_backward>
+      launch_;
   Scan scan_;
   Buffer<cl_uint4> device_rows_, history_;
   PendingRead<cl_uint4> last_row_;

@@ -10,25 +10,33 @@ std::size_t slots_of_segments(std::size_t elements_of_segment) {
   return std::clamp(std::bit_floor(elements_of_segment / k_elements_of_slot), k_least, k_most);
 }
 
-Reduce::Reduce(Device::Impl& device)
-    : device_(device),
-      partial_sums_(device, "reduce.cl", "reduce_partial"),
-      final_sums_(device, "reduce.cl", "reduce_final") {}
-
 void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_sum) {
   const std::size_t count = what.channels * what.segments;
   if (count == 0) return;
   if (what.slots != 0) {
-    final_sums_(count, to_uint(count), to_uint(what.slots), to_uint(first_sum), what.values, sums);
+    launch_(count, kernel::reduce_final{.count = to_uint(count),
+                                        .slots = to_uint(what.slots),
+                                        .first = to_uint(first_sum),
+                                        .partial = what.values,
+                                        .sums = sums});
     return;
   }
   const auto slots = static_cast<cl_uint>(slots_of_segments(what.expected / what.segments));
   partial_.resize(device_, 2 * count * slots);
   const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-  partial_sums_(count * slots / width, static_cast<cl_uint>(what.count), static_cast<cl_uint>(what.channels),
-                static_cast<cl_uint>(what.segments), static_cast<cl_uint>(what.stride), slots, what.starts,
-                what.values, partial_);
-  final_sums_(count, static_cast<cl_uint>(count), slots, static_cast<cl_uint>(first_sum), partial_, sums);
+  launch_(count * slots / width, kernel::reduce_partial{.count = static_cast<cl_uint>(what.count),
+                                                        .channels = static_cast<cl_uint>(what.channels),
+                                                        .segments = static_cast<cl_uint>(what.segments),
+                                                        .stride = static_cast<cl_uint>(what.stride),
+                                                        .slots = slots,
+                                                        .starts = what.starts,
+                                                        .values = what.values,
+                                                        .partial = partial_});
+  launch_(count, kernel::reduce_final{.count = static_cast<cl_uint>(count),
+                                      .slots = slots,
+                                      .first = static_cast<cl_uint>(first_sum),
+                                      .partial = partial_,
+                                      .sums = sums});
 }
 
 void Reduce::operator()(const Summation& what, Buffer<float>& sums) {

@@ -4,7 +4,7 @@
 #include <initializer_list>
 #include <vector>
 
-#include "device/kernel.hpp"
+#include "kernels/reduce.hpp"
 
 namespace dpr {
 
@@ -24,7 +24,7 @@ std::size_t slots_of_segments(std::size_t elements_of_segment);
 
 class Reduce {
  public:
-  explicit Reduce(Device::Impl& device);
+  explicit Reduce(Device::Impl& device) : device_(device), launch_(device) {}
 
   void operator()(const Summation& what, Buffer<float>& sums);
   /// Writes them from `first_sum` on. Nothing is done where there are no channels.
@@ -36,8 +36,7 @@ class Reduce {
 
  private:
   Device::Impl& device_;
-  Kernel<cl_uint, cl_uint, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<float>, Out<float>> partial_sums_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<float>, Out<float>> final_sums_;
+  Launcher<kernel::reduce_partial, kernel::reduce_final> launch_;
   Buffer<float> partial_, sums_;
 };
 

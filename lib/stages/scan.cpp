@@ -9,8 +9,7 @@ std::size_t scanned_at_once(const Device::Impl& device) {
   return device.info.lanes == 1 ? DPR_SCAN_CHUNK : k_by_a_work_item;
 }
 
-Scan::Scan(Device::Impl& device)
-    : device_(device), sum_(device, "scan.cl", "scan_sum"), apply_(device, "scan.cl", "scan_apply") {
+Scan::Scan(Device::Impl& device) : device_(device), launch_(device) {
   const cl_uint zero = 0;
   zero_.upload(device, std::span(&zero, 1));
   bases_.resize(4);  // 1024^4 > 2^32 counts
@@ -21,15 +20,17 @@ void Scan::operator()(std::size_t count, Buffer<cl_uint>& values) { scan_level(c
 void Scan::scan_level(std::size_t count, Buffer<cl_uint>& values, std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
   if (count <= scanned_at_once(device_)) {
-    apply_.in_groups(1, n, n, zero_, values);
+    launch_.in_groups(1, kernel::scan_apply{.count = n, .size = n, .bases = zero_, .values = values});
     return;
   }
   const std::size_t chunks = (count + DPR_SCAN_CHUNK - 1) / DPR_SCAN_CHUNK;
   Buffer<cl_uint>& bases = bases_[level];
   bases.resize(device_, chunks + 1);
-  sum_.in_groups(chunks, n, values, bases);
+  launch_.in_groups(chunks, kernel::scan_sum{.count = n, .values = values, .sums = bases});
   scan_level(chunks, bases, level + 1);
-  apply_.in_groups(chunks, n, DPR_SCAN_CHUNK, bases, values);
+  launch_.in_groups(
+      chunks,
+      kernel::scan_apply{.count = n, .size = cl_uint{DPR_SCAN_CHUNK}, .bases = bases, .values = values});
 }
 
 std::size_t Scan::bytes() const {

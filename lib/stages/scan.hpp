@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "device/kernel.hpp"
+#include "kernels/scan.hpp"
 
 namespace dpr {
 
@@ -25,8 +25,7 @@ class Scan {
   void scan_level(std::size_t count, Buffer<cl_uint>& values, std::size_t level);
 
   Device::Impl& device_;
-  Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> sum_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, Out<cl_uint>> apply_;
+  Launcher<kernel::scan_sum, kernel::scan_apply> launch_;
   Buffer<cl_uint> zero_;
   std::vector<Buffer<cl_uint>> bases_;  // [level][chunk + 1] the scan of the chunks' sums
 };

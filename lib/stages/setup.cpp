@@ -2,8 +2,6 @@
 
 namespace dpr {
 
-Setup::Setup(Device::Impl& device) : device_(device), forward_(device, "setup.cl", "setup_forward") {}
-
 void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                     const Buffer<cl_float4>& ndc, const Buffer<float>& hidden, Buffer<cl_uint>& counts) {
   const std::size_t count = std::size_t{p.views} * p.faces;
@@ -11,7 +9,15 @@ void Setup::forward(const shared::FrameParams& p, const DeviceViews& views, cons
   kept.resize(device_, count);
   counts.resize(device_, count + 1);
   triangles.resize(device_, count);
-  forward_(count, p, views.cameras, geometry.face_vertices, ndc, hidden, facing, kept, counts, triangles);
+  launch_(count, kernel::setup_forward{.p = p,
+                                       .views = views.cameras,
+                                       .faces = geometry.face_vertices,
+                                       .ndc = ndc,
+                                       .hidden = hidden,
+                                       .facing = facing,
+                                       .kept = kept,
+                                       .counts = counts,
+                                       .triangles = triangles});
 }
 
 }  // namespace dpr

@@ -1,7 +1,7 @@
 // Triangles of every view: assembled, culled, bounded, and the tiles of each counted.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/setup.hpp"
 #include "stages/geometry.hpp"
 #include "stages/transform.hpp"
 
@@ -9,7 +9,7 @@ namespace dpr {
 
 class Setup {
  public:
-  explicit Setup(Device::Impl& device);
+  explicit Setup(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// `hidden` is [view][mesh], the orientation of faces that nothing can see; 0: all may be. `counts` gets
   /// how many tiles are listed for each triangle, [view][face], with room for their sum.
@@ -26,9 +26,7 @@ class Setup {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_uint4>, In<cl_float4>, In<float>, Out<cl_uchar>,
-         Out<cl_uchar>, Out<cl_uint>, Out<shared::Triangle>>
-      forward_;
+  Launcher<kernel::setup_forward> launch_;
 };
 
 }  // namespace dpr

@@ -14,20 +14,7 @@ std::string shading_options(const ShadingModel& model) {
 }  // namespace
 
 LitShading::LitShading(Device::Impl& device, const ShadingModel& of)
-    : model(of),
-      normals_forward(device, "normals.cl", "normals_forward"),
-      normals_backward_normalize(device, "normals.cl", "normals_backward_normalize"),
-      normals_backward(device, "normals.cl", "normals_backward"),
-      normals_given_forward(device, "normals.cl", "normals_given_forward"),
-      normals_given_backward(device, "normals.cl", "normals_given_backward"),
-      forward(device, "shade_lit.cl", "shade_lit_forward", shading_options(of)),
-      backward(device, "shade_lit.cl", "shade_lit_backward", shading_options(of)),
-      backward_lights(device, "shade_lit.cl", "shade_lit_backward_lights", shading_options(of)) {}
-
-Shade::Shade(Device::Impl& device)
-    : device_(device),
-      forward_(device, "shade.cl", "shade_forward"),
-      backward_(device, "shade.cl", "shade_backward") {}
+    : model(of), normals(device), shade(device, shading_options(of)) {}
 
 void Shade::make_surface() {
   if (!surface) surface.emplace(device_);
@@ -65,9 +52,17 @@ void Shade::forward(const ShadeInputs& in) {
     light(in);
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
-    forward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
-             in.geometry.face_colors(), in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
-             color.red, color.green, color.blue);
+    launch_(groups.count, kernel::shade_forward{.p = in.p,
+                                                .pairs = groups.pairs,
+                                                .pair_face = in.bin.pair_face,
+                                                .fragment_starts = in.rasterize.fragment_starts,
+                                                .face_colors = in.geometry.face_colors(),
+                                                .colors = in.geometry.colors_of(in.p),
+                                                .bary1 = in.rasterize.bary1,
+                                                .bary2 = in.rasterize.bary2,
+                                                .red = color.red,
+                                                .green = color.green,
+                                                .blue = color.blue});
   }
 }
 
@@ -75,23 +70,47 @@ void Shade::find_normals(const ShadeInputs& in) {
   const GivenNormals& given = in.geometry.given_normals;
   normals_.resize(device_, std::size_t{in.p.views} * in.p.normals);
   if (is_flat()) return;
-  now_.kernels->normals_forward(std::size_t{in.p.views} * in.p.vertices, in.p, in.geometry.face_vertices,
-                                in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
-                                in.transform.world, normals_);
+  now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
+                        kernel::normals_forward{.p = in.p,
+                                                .faces = in.geometry.face_vertices,
+                                                .corner_starts = in.geometry.vertex_corners.starts,
+                                                .corners = in.geometry.vertex_corners.corners,
+                                                .world = in.transform.world,
+                                                .normals = normals_});
   if (given.empty()) return;
-  now_.kernels->normals_given_forward(in.p.views * given.count, in.p, in.views.models, given.values,
-                                      given.mesh, in.geometry.places, normals_);
+  now_.kernels->normals(in.p.views * given.count, kernel::normals_given_forward{.p = in.p,
+                                                                                .models = in.views.models,
+                                                                                .values = given.values,
+                                                                                .given_mesh = given.mesh,
+                                                                                .places = in.geometry.places,
+                                                                                .normals = normals_});
 }
 
 void Shade::light(const ShadeInputs& in) {
   const Range pairs = in.rasterize.pairs(in.bin);
   find_normals(in);
-  now_.kernels->forward(pairs, in.p, now_.params, pairs.last(), in.views.cameras, now_.lights,
-                        in.geometry.face_vertices, in.geometry.face_colors(), in.geometry.colors_of(in.p),
-                        in.transform.world, in.geometry.face_normals(), normals_,
-                        in.geometry.materials.values, in.bin.pair_face, in.rasterize.fragment_starts,
-                        in.rasterize.bary1, in.rasterize.bary2, base_.red, base_.green, base_.blue, color.red,
-                        color.green, color.blue);
+  now_.kernels->shade(pairs, kernel::shade_lit_forward{.p = in.p,
+                                                       .lp = now_.params,
+                                                       .last_pair = pairs.last(),
+                                                       .views = in.views.cameras,
+                                                       .lights = now_.lights,
+                                                       .faces = in.geometry.face_vertices,
+                                                       .face_colors = in.geometry.face_colors(),
+                                                       .colors = in.geometry.colors_of(in.p),
+                                                       .world = in.transform.world,
+                                                       .face_normals = in.geometry.face_normals(),
+                                                       .normals = normals_,
+                                                       .materials = in.geometry.materials.values,
+                                                       .pair_face = in.bin.pair_face,
+                                                       .fragment_starts = in.rasterize.fragment_starts,
+                                                       .bary1 = in.rasterize.bary1,
+                                                       .bary2 = in.rasterize.bary2,
+                                                       .base_red = base_.red,
+                                                       .base_green = base_.green,
+                                                       .base_blue = base_.blue,
+                                                       .red = color.red,
+                                                       .green = color.green,
+                                                       .blue = color.blue});
 }
 
 void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
@@ -103,9 +122,20 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
     surface->backward(in.surface(), grad_base(grad), lit(), grad_bary1, grad_bary2, grad_corner_colors);
   } else if (!lit()) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
-    backward_(groups.count, in.p, groups.pairs, in.bin.pair_face, in.rasterize.fragment_starts,
-              in.geometry.face_colors(), in.geometry.colors_of(in.p), in.rasterize.bary1, in.rasterize.bary2,
-              grad.red, grad.green, grad.blue, grad_bary1, grad_bary2, grad_corner_colors);
+    launch_(groups.count, kernel::shade_backward{.p = in.p,
+                                                 .pairs = groups.pairs,
+                                                 .pair_face = in.bin.pair_face,
+                                                 .fragment_starts = in.rasterize.fragment_starts,
+                                                 .face_colors = in.geometry.face_colors(),
+                                                 .colors = in.geometry.colors_of(in.p),
+                                                 .bary1 = in.rasterize.bary1,
+                                                 .bary2 = in.rasterize.bary2,
+                                                 .grad_red = grad.red,
+                                                 .grad_green = grad.green,
+                                                 .grad_blue = grad.blue,
+                                                 .grad_bary1 = grad_bary1,
+                                                 .grad_bary2 = grad_bary2,
+                                                 .grad_colors = grad_corner_colors});
   }
 }
 
@@ -116,14 +146,39 @@ void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
   grad_corner_normals_.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
   grad_materials.resize(device_, Length::varying(std::size_t{DPR_MATERIAL_CHANNELS} * in.bin.pairs));
   grad_eye.resize(device_, Length::varying(std::size_t{3} * in.bin.pairs));
-  now_.kernels->backward(pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(),
-                         in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
-                         in.geometry.colors_of(in.p), in.transform.world, in.geometry.face_normals(),
-                         normals_, in.geometry.materials.values, in.bin.pair_face,
-                         in.rasterize.fragment_starts, in.rasterize.bary1, in.rasterize.bary2, base_.red,
-                         base_.green, base_.blue, grad.red, grad.green, grad.blue, grad_bary1, grad_bary2,
-                         grad_base_.red, grad_base_.green, grad_base_.blue, grad_corner_colors,
-                         grad_corner_positions_, grad_corner_normals_, grad_materials, grad_eye);
+  now_.kernels->shade(pairs, kernel::shade_lit_backward{.p = in.p,
+                                                        .lp = now_.params,
+                                                        .pairs = static_cast<cl_uint>(in.bin.pairs),
+                                                        .last_pair = pairs.last(),
+                                                        .views = in.views.cameras,
+                                                        .lights = now_.lights,
+                                                        .faces = in.geometry.face_vertices,
+                                                        .face_colors = in.geometry.face_colors(),
+                                                        .colors = in.geometry.colors_of(in.p),
+                                                        .world = in.transform.world,
+                                                        .face_normals = in.geometry.face_normals(),
+                                                        .normals = normals_,
+                                                        .materials = in.geometry.materials.values,
+                                                        .pair_face = in.bin.pair_face,
+                                                        .fragment_starts = in.rasterize.fragment_starts,
+                                                        .bary1 = in.rasterize.bary1,
+                                                        .bary2 = in.rasterize.bary2,
+                                                        .base_red = base_.red,
+                                                        .base_green = base_.green,
+                                                        .base_blue = base_.blue,
+                                                        .grad_red = grad.red,
+                                                        .grad_green = grad.green,
+                                                        .grad_blue = grad.blue,
+                                                        .grad_bary1 = grad_bary1,
+                                                        .grad_bary2 = grad_bary2,
+                                                        .grad_base_red = grad_base_.red,
+                                                        .grad_base_green = grad_base_.green,
+                                                        .grad_base_blue = grad_base_.blue,
+                                                        .grad_colors = grad_corner_colors,
+                                                        .grad_positions = grad_corner_positions_,
+                                                        .grad_normals = grad_corner_normals_,
+                                                        .grad_materials = grad_materials,
+                                                        .grad_eye = grad_eye});
 }
 
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
@@ -132,11 +187,17 @@ void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_floa
   if (is_flat()) return;
   gather.per_view(in.p, in.p.normals, in.bin, in.geometry.normal_corners(), grad_corner_normals_,
                   grad_normals_);
-  now_.kernels->normals_backward_normalize(std::size_t{in.p.views} * in.p.normals, in.p, normals_,
-                                           grad_normals_);
-  now_.kernels->normals_backward(std::size_t{in.p.views} * in.p.vertices, in.p, in.geometry.face_vertices,
-                                 in.geometry.vertex_corners.starts, in.geometry.vertex_corners.corners,
-                                 in.transform.world, grad_normals_, grad_world);
+  now_.kernels->normals(
+      std::size_t{in.p.views} * in.p.normals,
+      kernel::normals_backward_normalize{.p = in.p, .normals = normals_, .grad_normals = grad_normals_});
+  now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
+                        kernel::normals_backward{.p = in.p,
+                                                 .faces = in.geometry.face_vertices,
+                                                 .corner_starts = in.geometry.vertex_corners.starts,
+                                                 .corners = in.geometry.vertex_corners.corners,
+                                                 .world = in.transform.world,
+                                                 .grad_sums = grad_normals_,
+                                                 .grad_world = grad_world});
 }
 
 void Shade::backward_given_normals(const ShadeInputs& in) {
@@ -149,21 +210,45 @@ void Shade::backward_given_normals(const ShadeInputs& in) {
     normal_channels.fill(0.0F);
     return;
   }
-  now_.kernels->normals_given_backward(given.count, in.p, in.views.models, given.values, given.mesh,
-                                       in.geometry.places, grad_normals_, grad_given_normals,
-                                       normal_channels);
+  now_.kernels->normals(given.count, kernel::normals_given_backward{.p = in.p,
+                                                                    .models = in.views.models,
+                                                                    .values = given.values,
+                                                                    .given_mesh = given.mesh,
+                                                                    .places = in.geometry.places,
+                                                                    .grad_sums = grad_normals_,
+                                                                    .grad_values = grad_given_normals,
+                                                                    .channels = normal_channels});
 }
 
 void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {
   const Range pairs = in.rasterize.pairs(in.bin);
   light_channels.resize(device_, light_channel_count() * in.bin.pairs);
-  now_.kernels->backward_lights(
-      pairs, in.p, now_.params, static_cast<cl_uint>(in.bin.pairs), pairs.last(), static_cast<cl_uint>(light),
-      in.views.cameras, now_.lights, in.geometry.face_vertices, in.geometry.face_colors(),
-      in.geometry.colors_of(in.p), in.transform.world, in.geometry.face_normals(), normals_,
-      in.geometry.materials.values, in.bin.pair_face, in.rasterize.fragment_starts, in.rasterize.bary1,
-      in.rasterize.bary2, base_.red, base_.green, base_.blue, grad.red, grad.green, grad.blue,
-      light_channels);
+  now_.kernels->shade(pairs,
+                      kernel::shade_lit_backward_lights{.p = in.p,
+                                                        .lp = now_.params,
+                                                        .pairs = static_cast<cl_uint>(in.bin.pairs),
+                                                        .last_pair = pairs.last(),
+                                                        .light = static_cast<cl_uint>(light),
+                                                        .views = in.views.cameras,
+                                                        .lights = now_.lights,
+                                                        .faces = in.geometry.face_vertices,
+                                                        .face_colors = in.geometry.face_colors(),
+                                                        .colors = in.geometry.colors_of(in.p),
+                                                        .world = in.transform.world,
+                                                        .face_normals = in.geometry.face_normals(),
+                                                        .normals = normals_,
+                                                        .materials = in.geometry.materials.values,
+                                                        .pair_face = in.bin.pair_face,
+                                                        .fragment_starts = in.rasterize.fragment_starts,
+                                                        .bary1 = in.rasterize.bary1,
+                                                        .bary2 = in.rasterize.bary2,
+                                                        .base_red = base_.red,
+                                                        .base_green = base_.green,
+                                                        .base_blue = base_.blue,
+                                                        .grad_red = grad.red,
+                                                        .grad_green = grad.green,
+                                                        .grad_blue = grad.blue,
+                                                        .channels = light_channels});
 }
 
 std::size_t Shade::bytes() const {

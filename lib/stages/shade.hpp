@@ -5,7 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include "device/kernel.hpp"
+#include "kernels/normals.hpp"
+#include "kernels/shade.hpp"
+#include "kernels/shade_lit.hpp"
 #include "stages/bin.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
@@ -30,34 +32,10 @@ class LitShading {
   LitShading(Device::Impl& device, const ShadingModel& model);
 
   ShadingModel model;
-  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, Out<cl_float4>>
-      normals_forward;
-  Kernel<shared::FrameParams, In<cl_float4>, Out<cl_float4>> normals_backward_normalize;
-  Kernel<shared::FrameParams, In<cl_uint4>, In<cl_uint>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
-         Out<cl_float4>>
-      normals_backward;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>,
-         Out<cl_float4>>
-      normals_given_forward;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>, In<cl_float4>,
-         Out<cl_float4>, Out<float>>
-      normals_given_backward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, In<shared::ViewParams>, In<shared::Light>,
-         In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>,
-         In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
-         Out<float>, Out<float>>
-      forward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, In<shared::ViewParams>,
-         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>, Out<float>, Out<float>, Out<float>>
-      backward;
-  Kernel<shared::FrameParams, shared::LightingParams, cl_uint, cl_uint, cl_uint, In<shared::ViewParams>,
-         In<shared::Light>, In<cl_uint4>, In<cl_uint4>, In<cl_float4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<cl_float4>, In<cl_uint>, In<cl_uint>, In<float>, In<float>, In<float>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>>
-      backward_lights;
+  Launcher<kernel::normals_forward, kernel::normals_backward_normalize, kernel::normals_backward,
+           kernel::normals_given_forward, kernel::normals_given_backward>
+      normals;
+  Launcher<kernel::shade_lit_forward, kernel::shade_lit_backward, kernel::shade_lit_backward_lights> shade;
 };
 
 /// Everything of a frame that shading reads.
@@ -76,7 +54,7 @@ struct ShadeInputs {
 
 class Shade {
  public:
-  explicit Shade(Device::Impl& device);
+  explicit Shade(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// The lights on the device, and the kernels that they need.
   struct Lighting {
@@ -132,12 +110,7 @@ class Shade {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
-         In<float>, Out<float>, Out<float>, Out<float>>
-      forward_;
-  Kernel<shared::FrameParams, cl_uint2, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<float>,
-         In<float>, In<float>, In<float>, In<float>, Out<float>, Out<float>, Out<float>>
-      backward_;
+  Launcher<kernel::shade_forward, kernel::shade_backward> launch_;
   bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
   void find_normals(const ShadeInputs& in);
   void light(const ShadeInputs& in);

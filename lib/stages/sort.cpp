@@ -11,14 +11,6 @@ bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::si
   return capacity <= DPR_SORT_BLOCK && key_count <= k_keys_of_a_group;
 }
 
-Sort::Sort(Device::Impl& device)
-    : device_(device),
-      scan_(device),
-      histogram_(device, "sort.cl", "sort_histogram"),
-      scatter_(device, "sort.cl", "sort_scatter"),
-      ranges_(device, "sort.cl", "sort_ranges"),
-      few_(device, "sort.cl", "sort_few") {}
-
 void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::size_t key_count,
                       Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
   const auto last_key = static_cast<cl_uint>(key_count);
@@ -30,7 +22,13 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     std::swap(values, other_values_);
   };
   if (capacity > 0 && is_sorted_at_once(device_, capacity, key_count)) {
-    few_.in_groups(1, last_key, count, keys, values, other_keys_, other_values_, starts);
+    launch_.in_groups(1, kernel::sort_few{.last_key = last_key,
+                                          .count = count,
+                                          .keys = keys,
+                                          .values = values,
+                                          .sorted_keys = other_keys_,
+                                          .sorted_values = other_values_,
+                                          .starts = starts});
     exchange();
     return;
   }
@@ -39,7 +37,8 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     pass(capacity, shift, count, keys, values);
     exchange();
   }
-  ranges_(key_count + 1, last_key, count, keys, starts);
+  launch_(key_count + 1,
+          kernel::sort_ranges{.keys = last_key, .count = count, .sorted_keys = keys, .starts = starts});
 }
 
 void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count,
@@ -48,9 +47,18 @@ void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& cou
   const auto n = static_cast<cl_uint>(capacity);
   const std::size_t digits = std::size_t{1} << DPR_SORT_BITS(device_.info.lanes);
   offsets_.resize(device_, digits * blocks + 1);
-  histogram_.in_groups(blocks, n, shift, count, keys, offsets_);
+  launch_.in_groups(blocks,
+                    kernel::sort_histogram{
+                        .capacity = n, .shift = shift, .count = count, .keys = keys, .histogram = offsets_});
   scan_(digits * blocks, offsets_);
-  scatter_.in_groups(blocks, n, shift, count, keys, values, offsets_, other_keys_, other_values_);
+  launch_.in_groups(blocks, kernel::sort_scatter{.capacity = n,
+                                                 .shift = shift,
+                                                 .count = count,
+                                                 .keys = keys,
+                                                 .values = values,
+                                                 .offsets = offsets_,
+                                                 .sorted_keys = other_keys_,
+                                                 .sorted_values = other_values_});
 }
 
 std::size_t Sort::bytes() const {

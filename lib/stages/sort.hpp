@@ -1,7 +1,7 @@
 // Stable radix sort of (key, value) on the device.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/sort.hpp"
 #include "stages/scan.hpp"
 
 namespace dpr {
@@ -11,7 +11,7 @@ bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::si
 
 class Sort {
  public:
-  explicit Sort(Device::Impl& device);
+  explicit Sort(Device::Impl& device) : device_(device), scan_(device), launch_(device) {}
 
   /// Sorts the first `count[0]` keys, all below `key_count`, and values with them, in place; `capacity` is
   /// what they are at most. `starts` gets the run of every key: [key_count + 1].
@@ -27,11 +27,7 @@ class Sort {
 
   Device::Impl& device_;
   Scan scan_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> histogram_;
-  Kernel<cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>>
-      scatter_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, Out<cl_uint>> ranges_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint>, Out<cl_uint>, Out<cl_uint>, Out<cl_uint>> few_;
+  Launcher<kernel::sort_histogram, kernel::sort_scatter, kernel::sort_ranges, kernel::sort_few> launch_;
   Buffer<cl_uint> offsets_, other_keys_, other_values_;
 };
 

@@ -14,21 +14,27 @@ std::size_t ColorPlanes::bytes() const {
   return red.capacity_bytes() + green.capacity_bytes() + blue.capacity_bytes();
 }
 
-Surface::Surface(Device::Impl& device)
-    : device_(device),
-      forward_(device, "surface.cl", "surface_forward"),
-      backward_(device, "surface.cl", "surface_backward"),
-      backward_detail_(device, "surface.cl", "surface_detail_backward"),
-      list_(device, "surface.cl", "surface_list") {}
-
 void Surface::forward(const SurfaceInputs& in, ColorPlanes& base) {
   const Textures& t = in.geometry.textures;
   const Range pairs = in.rasterize.pairs(in.bin);
   base.resize(device_, in.rasterize.fragment_length());
-  forward_(pairs, in.p, pairs.last(), in.bin.pair_face, in.rasterize.fragment_starts,
-           in.geometry.face_colors(), in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
-           t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
-           base.red, base.green, base.blue);
+  launch_(pairs, kernel::surface_forward{.p = in.p,
+                                         .last_pair = pairs.last(),
+                                         .pair_face = in.bin.pair_face,
+                                         .fragment_starts = in.rasterize.fragment_starts,
+                                         .face_colors = in.geometry.face_colors(),
+                                         .colors = in.geometry.colors_of(in.p),
+                                         .face_texcoords = t.face_texcoords,
+                                         .texcoords = t.texcoord_values,
+                                         .textures = t.textures,
+                                         .texels = t.texel_values,
+                                         .triangles = in.triangles,
+                                         .clipped = in.clipped,
+                                         .bary1 = in.rasterize.bary1,
+                                         .bary2 = in.rasterize.bary2,
+                                         .red = base.red,
+                                         .green = base.green,
+                                         .blue = base.blue});
 }
 
 void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds,
@@ -38,11 +44,29 @@ void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bo
   const Range pairs = in.rasterize.pairs(in.bin);
   grad_corner_texcoords.resize(device_, std::size_t{9} * in.bin.pairs);
   grad_steps_.resize(device_, std::size_t{9} * in.bin.pairs);
-  backward_(pairs, in.p, pairs.last(), adds ? 1 : 0, in.bin.pair_face, in.rasterize.fragment_starts,
-            in.geometry.face_colors(), in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values,
-            t.textures, t.texel_values, in.triangles, in.clipped, in.rasterize.bary1, in.rasterize.bary2,
-            grad_base.red, grad_base.green, grad_base.blue, grad_bary1, grad_bary2, grad_corner_colors,
-            grad_corner_texcoords, grad_steps_);
+  launch_(pairs, kernel::surface_backward{.p = in.p,
+                                          .last_pair = pairs.last(),
+                                          .adds = cl_uint{adds},
+                                          .pair_face = in.bin.pair_face,
+                                          .fragment_starts = in.rasterize.fragment_starts,
+                                          .face_colors = in.geometry.face_colors(),
+                                          .colors = in.geometry.colors_of(in.p),
+                                          .face_texcoords = t.face_texcoords,
+                                          .texcoords = t.texcoord_values,
+                                          .textures = t.textures,
+                                          .texels = t.texel_values,
+                                          .triangles = in.triangles,
+                                          .clipped = in.clipped,
+                                          .bary1 = in.rasterize.bary1,
+                                          .bary2 = in.rasterize.bary2,
+                                          .grad_red = grad_base.red,
+                                          .grad_green = grad_base.green,
+                                          .grad_blue = grad_base.blue,
+                                          .grad_bary1 = grad_bary1,
+                                          .grad_bary2 = grad_bary2,
+                                          .grad_colors = grad_corner_colors,
+                                          .grad_texcoords = grad_corner_texcoords,
+                                          .grad_steps = grad_steps_});
 }
 
 void Surface::backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corners,
@@ -50,8 +74,16 @@ void Surface::backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corne
   const Textures& t = in.geometry.textures;
   if (!t.has_pyramids()) return;
   const Range pairs = in.rasterize.pairs(in.bin);
-  backward_detail_(pairs, in.p, pairs.last(), in.bin.pair_face, t.face_texcoords, t.textures, in.triangles,
-                   in.clipped, grad_steps_, grad_corners, grad_clip);
+  launch_(pairs, kernel::surface_detail_backward{.p = in.p,
+                                                 .last_pair = pairs.last(),
+                                                 .pair_face = in.bin.pair_face,
+                                                 .face_texcoords = t.face_texcoords,
+                                                 .textures = t.textures,
+                                                 .triangles = in.triangles,
+                                                 .clipped = in.clipped,
+                                                 .grad_steps = grad_steps_,
+                                                 .grad_corners = grad_corners,
+                                                 .grad_clip = grad_clip});
 }
 
 void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
@@ -62,11 +94,29 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
   for (Buffer<cl_uint>* buffer : {&cells, &numbers}) buffer->resize(device_, places);
   parts.resize(device_, places);
   grad_seen.resize(device_, places);
-  list_(pairs, in.p, pairs.last(), static_cast<cl_uint>(t.texels), static_cast<cl_uint>(levels),
-        in.bin.pair_face, in.rasterize.fragment_starts, in.geometry.face_colors(),
-        in.geometry.colors_of(in.p), t.face_texcoords, t.texcoord_values, t.textures, in.triangles,
-        in.clipped, in.rasterize.bary1, in.rasterize.bary2, grad_base.red, grad_base.green, grad_base.blue,
-        place_count, cells, numbers, parts, grad_seen);
+  launch_(pairs, kernel::surface_list{.p = in.p,
+                                      .last_pair = pairs.last(),
+                                      .no_cell = static_cast<cl_uint>(t.texels),
+                                      .levels = static_cast<cl_uint>(levels),
+                                      .pair_face = in.bin.pair_face,
+                                      .fragment_starts = in.rasterize.fragment_starts,
+                                      .face_colors = in.geometry.face_colors(),
+                                      .colors = in.geometry.colors_of(in.p),
+                                      .face_texcoords = t.face_texcoords,
+                                      .texcoords = t.texcoord_values,
+                                      .textures = t.textures,
+                                      .triangles = in.triangles,
+                                      .clipped = in.clipped,
+                                      .bary1 = in.rasterize.bary1,
+                                      .bary2 = in.rasterize.bary2,
+                                      .grad_red = grad_base.red,
+                                      .grad_green = grad_base.green,
+                                      .grad_blue = grad_base.blue,
+                                      .places = place_count,
+                                      .cells = cells,
+                                      .numbers = numbers,
+                                      .parts = parts,
+                                      .grad_seen = grad_seen});
 }
 
 std::size_t Surface::bytes() const {

@@ -1,7 +1,7 @@
 // Base colours of fragments in scenes with textures: the corners' colours times the texture.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/surface.hpp"
 #include "stages/bin.hpp"
 #include "stages/geometry.hpp"
 #include "stages/rasterize.hpp"
@@ -29,7 +29,7 @@ struct SurfaceInputs {
 
 class Surface {
  public:
-  explicit Surface(Device::Impl& device);
+  explicit Surface(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// The base colours of the band's fragments.
   void forward(const SurfaceInputs& in, ColorPlanes& base);
@@ -58,23 +58,9 @@ class Surface {
  private:
   Device::Impl& device_;
   Buffer<float> grad_steps_;  // [pair][9] of the levels of detail: from backward() to backward_detail()
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>, In<cl_uint4>,
-         In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>, In<shared::ClippedFace>,
-         In<float>, In<float>, Out<float>, Out<float>, Out<float>>
-      forward_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>, In<cl_float4>,
-         In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<cl_float4>, In<shared::Triangle>,
-         In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<float>,
-         Out<float>, Out<float>, Out<float>, Out<float>>
-      backward_;
-  Kernel<shared::FrameParams, cl_uint, In<cl_uint>, In<cl_uint4>, In<shared::Texture>, In<shared::Triangle>,
-         In<shared::ClippedFace>, In<float>, Out<float>, Out<float>>
-      backward_detail_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, cl_uint, In<cl_uint>, In<cl_uint>, In<cl_uint4>,
-         In<cl_float4>, In<cl_uint4>, In<cl_float4>, In<shared::Texture>, In<shared::Triangle>,
-         In<shared::ClippedFace>, In<float>, In<float>, In<float>, In<float>, In<float>, Out<cl_uint>,
-         Out<cl_uint>, Out<cl_uint>, Out<cl_float2>, Out<cl_float4>>
-      list_;
+  Launcher<kernel::surface_forward, kernel::surface_backward, kernel::surface_detail_backward,
+           kernel::surface_list>
+      launch_;
 };
 
 }  // namespace dpr

@@ -13,19 +13,14 @@ std::size_t texels_of_level(const shared::Texture& texture, cl_uint level) {
 
 }  // namespace
 
-Texels::Texels(Device::Impl& device)
-    : device_(device),
-      sort_(device),
-      sum_(device, "texels.cl", "texels_sum"),
-      gather_(device, "texels.cl", "texels_gather"),
-      shrink_(device, "texels.cl", "texels_shrink"),
-      shrink_backward_(device, "texels.cl", "texels_shrink_backward") {}
-
 void Texels::build(Textures& textures) {
   for (cl_uint i = 0; i < textures.list.size(); ++i) {
     const shared::Texture& t = textures.list[i];
     for (cl_uint level = 1; level < t.levels; ++level)
-      shrink_(texels_of_level(t, level), i, level, textures.textures, textures.texel_values);
+      launch_(
+          texels_of_level(t, level),
+          kernel::texels_shrink{
+              .number = i, .level = level, .textures = textures.textures, .texels = textures.texel_values});
   }
 }
 
@@ -38,8 +33,12 @@ void Texels::add(const Textures& textures, Surface& surface) {
   const std::size_t places = surface.cells.size();
   if (places == 0) return;
   sort_(places, surface.place_count, textures.texels + 1, surface.cells, surface.numbers, starts_);
-  sum_(textures.texels, static_cast<cl_uint>(textures.texels), starts_, surface.numbers, surface.parts,
-       surface.grad_seen, sums_);
+  launch_(textures.texels, kernel::texels_sum{.cells = static_cast<cl_uint>(textures.texels),
+                                              .starts = starts_,
+                                              .numbers = surface.numbers,
+                                              .parts = surface.parts,
+                                              .grad_seen = surface.grad_seen,
+                                              .sums = sums_});
 }
 
 void Texels::finish(const Textures& textures) {
@@ -48,9 +47,16 @@ void Texels::finish(const Textures& textures) {
   for (cl_uint i = 0; i < textures.list.size(); ++i) {
     const shared::Texture& t = textures.list[i];
     for (cl_uint level = t.levels; level-- > 0;) {
-      gather_(texels_of_level(t, level), cells, i, level, textures.textures, sums_, grad);
+      launch_(texels_of_level(t, level), kernel::texels_gather{.cells = cells,
+                                                               .number = i,
+                                                               .level = level,
+                                                               .textures = textures.textures,
+                                                               .sums = sums_,
+                                                               .grad = grad});
       if (level + 1 < t.levels)
-        shrink_backward_(texels_of_level(t, level), i, level + 1, textures.textures, grad);
+        launch_(texels_of_level(t, level),
+                kernel::texels_shrink_backward{
+                    .number = i, .level = level + 1, .textures = textures.textures, .grad = grad});
     }
   }
 }

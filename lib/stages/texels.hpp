@@ -1,7 +1,7 @@
 // The smaller levels of textures; and gradients of texels, gathered from what fragments see of them.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/texels.hpp"
 #include "stages/geometry.hpp"
 #include "stages/sort.hpp"
 #include "stages/surface.hpp"
@@ -10,7 +10,7 @@ namespace dpr {
 
 class Texels {
  public:
-  explicit Texels(Device::Impl& device);
+  explicit Texels(Device::Impl& device) : device_(device), sort_(device), launch_(device) {}
 
   /// Fills the smaller levels from the largest.
   void build(Textures& textures);
@@ -28,9 +28,8 @@ class Texels {
  private:
   Device::Impl& device_;
   Sort sort_;
-  Kernel<cl_uint, In<cl_uint>, In<cl_uint>, In<cl_float2>, In<cl_float4>, Out<cl_float4>> sum_;
-  Kernel<cl_uint, cl_uint, cl_uint, In<shared::Texture>, In<cl_float4>, Out<cl_float4>> gather_;
-  Kernel<cl_uint, cl_uint, In<shared::Texture>, Out<cl_float4>> shrink_, shrink_backward_;
+  Launcher<kernel::texels_sum, kernel::texels_gather, kernel::texels_shrink, kernel::texels_shrink_backward>
+      launch_;
   Buffer<cl_uint> starts_;  // [texel + 2] runs of fragments by cell; the last cell is that of no texture
   Buffer<cl_float4> sums_;  // [4][texel]
 };

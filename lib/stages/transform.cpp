@@ -4,19 +4,18 @@
 
 namespace dpr {
 
-Transform::Transform(Device::Impl& device)
-    : device_(device),
-      forward_(device, "transform.cl", "transform_forward"),
-      backward_(device, "transform.cl", "transform_backward"),
-      backward_lens_(device, "transform.cl", "transform_backward_lens"),
-      backward_positions_(device, "transform.cl", "transform_backward_positions") {}
-
 void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry) {
   const std::size_t count = std::size_t{p.views} * p.vertices;
   world.resize(device_, count);
   ndc.resize(device_, count);
-  forward_(count, p, views.cameras, views.models, geometry.positions_of(p), geometry.vertex_mesh,
-           geometry.places, world, ndc);
+  launch_(count, kernel::transform_forward{.p = p,
+                                           .views = views.cameras,
+                                           .models = views.models,
+                                           .positions = geometry.positions_of(p),
+                                           .vertex_mesh = geometry.vertex_mesh,
+                                           .places = geometry.places,
+                                           .world = world,
+                                           .ndc = ndc});
 }
 
 void Transform::backward(const shared::FrameParams& p, const DeviceViews& views, bool lit,
@@ -27,11 +26,25 @@ void Transform::backward(const shared::FrameParams& p, const DeviceViews& views,
   partial_sums.resize(device_,
                       (p.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS) * segments * 2 * slots);
   if (p.distorts != 0) {
-    backward_lens_(segments * slots, p, to_uint(slots), views.cameras, views.vertex_starts, world, grad,
-                   partial_sums);
+    launch_(segments * slots, kernel::transform_backward_lens{.p = p,
+                                                              .slots = to_uint(slots),
+                                                              .views = views.cameras,
+                                                              .starts = views.vertex_starts,
+                                                              .world = world,
+                                                              .grad_ndc = grad,
+                                                              .partial = partial_sums});
   }
-  backward_(segments * slots, p, lit ? 1 : 0, to_uint(slots), views.cameras, views.models,
-            views.vertex_starts, world, grad_clip, grad_lit, grad, partial_sums);
+  launch_(segments * slots, kernel::transform_backward{.p = p,
+                                                       .lit = cl_uint{lit},
+                                                       .slots = to_uint(slots),
+                                                       .views = views.cameras,
+                                                       .models = views.models,
+                                                       .starts = views.vertex_starts,
+                                                       .world = world,
+                                                       .grad_clip = grad_clip,
+                                                       .grad_lit = grad_lit,
+                                                       .grad = grad,
+                                                       .partial = partial_sums});
 }
 
 void Transform::backward_positions(const shared::FrameParams& p, const DeviceViews& views,
@@ -39,8 +52,12 @@ void Transform::backward_positions(const shared::FrameParams& p, const DeviceVie
   const std::size_t count = p.position_stride != 0 ? std::size_t{p.views} * p.vertices : p.vertices;
   grad_positions.resize(device_,
                         p.position_stride != 0 ? p.views * geometry.position_count : geometry.position_count);
-  backward_positions_(count, p, views.models, geometry.vertex_mesh, geometry.places, grad_world,
-                      grad_positions);
+  launch_(count, kernel::transform_backward_positions{.p = p,
+                                                      .models = views.models,
+                                                      .vertex_mesh = geometry.vertex_mesh,
+                                                      .places = geometry.places,
+                                                      .grad_world = grad_world,
+                                                      .grad_positions = grad_positions});
 }
 
 }  // namespace dpr

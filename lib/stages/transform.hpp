@@ -1,7 +1,7 @@
 // Vertices to world and NDC, and gradients back to object space and to the poses.
 #pragma once
 
-#include "device/kernel.hpp"
+#include "kernels/transform.hpp"
 #include "stages/geometry.hpp"
 #include "stages/reduce.hpp"
 
@@ -16,7 +16,7 @@ struct DeviceViews {
 
 class Transform {
  public:
-  explicit Transform(Device::Impl& device);
+  explicit Transform(Device::Impl& device) : device_(device), launch_(device) {}
 
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
   /// From the gradients of `ndc` to those of `world`, in place. `grad_clip` is what clipped faces add where
@@ -42,18 +42,9 @@ class Transform {
 
  private:
   Device::Impl& device_;
-  Kernel<shared::FrameParams, In<shared::ViewParams>, In<cl_float4>, In<cl_float4>, In<cl_uint>,
-         In<shared::MeshPlace>, Out<cl_float4>, Out<cl_float4>>
-      forward_;
-  Kernel<shared::FrameParams, cl_uint, cl_uint, In<shared::ViewParams>, In<cl_float4>, In<cl_uint>,
-         In<cl_float4>, In<cl_float4>, In<cl_float4>, Out<cl_float4>, Out<float>>
-      backward_;
-  Kernel<shared::FrameParams, cl_uint, In<shared::ViewParams>, In<cl_uint>, In<cl_float4>, In<cl_float4>,
-         Out<float>>
-      backward_lens_;
-  Kernel<shared::FrameParams, In<cl_float4>, In<cl_uint>, In<shared::MeshPlace>, In<cl_float4>,
-         Out<cl_float4>>
-      backward_positions_;
+  Launcher<kernel::transform_forward, kernel::transform_backward, kernel::transform_backward_lens,
+           kernel::transform_backward_positions>
+      launch_;
 };
 
 }  // namespace dpr

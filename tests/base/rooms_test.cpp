@@ -13,9 +13,10 @@
 namespace {
 
 /// From the ground up.
-const std::vector<std::string> k_floors{"reference", "base",   "image",  "codecs",   "mesh", "smoothing",
-                                        "scene",     "device", "stages", "renderer", "loss", "multi_device",
-                                        "solve",     "c",      "batch",  "check",    "cli",  "learn"};
+const std::vector<std::string> k_floors{"reference", "base",  "image",        "codecs", "mesh",
+                                        "smoothing", "scene", "kernels",      "device", "stages",
+                                        "renderer",  "loss",  "multi_device", "solve",  "c",
+                                        "batch",     "check", "cli",          "learn"};
 
 std::ptrdiff_t floor_of(const std::string& folder) {
   return std::ranges::find(k_floors, folder) - k_floors.begin();

@@ -1,79 +1,41 @@
-// Typed launches: a signature that differs from the kernel's source fails by name when the kernel is made, a
-// program that does not build says everything a bug report needs.
+// Launches, and programs that do not build, which say everything that a bug report needs.
 #include "device/kernel.hpp"
 
 #include <doctest/doctest.h>
 
 #include "dpr/error.hpp"
+#include "kernels/scan.hpp"
 #include "support/messages.hpp"
 #include "support/probe.hpp"
 
 namespace {
 
-using dpr::In;
-using dpr::Kernel;
-using dpr::Out;
 using dpr::test::device_impl;
 
-/// Makes scan_sum, whose source says (const uint, const global uint*, global uint*), with another signature.
-template <class... Args>
-void make_scan_sum() {
-  const Kernel<Args...> kernel(device_impl(), "scan.cl", "scan_sum");
-}
+/// No kernel of its file.
+struct scan_nothing : dpr::kernel::scan_sum {
+  static constexpr dpr::KernelSource k_source{"scan.cl", "scan_nothing"};
+};
 
 }  // namespace
 
 TEST_SUITE("unit") {
-  TEST_CASE("a signature that is the source's is accepted, and launches") {
-    Kernel<cl_uint, In<cl_uint>, Out<cl_uint>> kernel(device_impl(), "scan.cl", "scan_sum");
+  TEST_CASE("a kernel is launched with its arguments, over no items not at all") {
+    dpr::Launcher<dpr::kernel::scan_apply, dpr::kernel::scan_sum> launch(device_impl());
     const std::vector<cl_uint> values{1, 2, 3, 4};
     const dpr::Buffer<cl_uint> in(device_impl(), std::span<const cl_uint>(values));
     dpr::Buffer<cl_uint> out;
     dpr::test::poison(out, 1, 0xdeadbeefU);
-    kernel(0, 4U, in, out);  // no items: nothing is launched
+    const dpr::kernel::scan_sum sum{.count = 4U, .values = in, .sums = out};
+    launch(0, sum);
     CHECK(out.download() == std::vector<cl_uint>{0xdeadbeefU});
-    kernel(1, 4U, in, out);
+    launch(1, sum);
     CHECK(out.download() == std::vector<cl_uint>{10U});
   }
 
-  TEST_CASE("a signature with another number of arguments fails by name") {
-    const auto make = [] { make_scan_sum<cl_uint, In<cl_uint>>(); };
-    DPR_CHECK_MESSAGE_HAS(std::logic_error, make(), "kernel scan_sum has 3 arguments, its signature 2");
-  }
-
-  TEST_CASE("a signature with another element type fails by name and place") {
-    const auto make = [] { make_scan_sum<cl_uint, In<float>, Out<cl_uint>>(); };
-    DPR_CHECK_MESSAGE_HAS(
-        std::logic_error, make(),
-        "kernel scan_sum, argument 1: the source says const uint*, the signature const float*");
-  }
-
-  TEST_CASE("a signature that writes where the source reads, or reads where it writes, fails") {
-    const auto writes = [] { make_scan_sum<cl_uint, Out<cl_uint>, Out<cl_uint>>(); };
-    DPR_CHECK_MESSAGE_HAS(std::logic_error, writes(),
-                          "argument 1: the source says const uint*, the signature uint*");
-    const auto reads = [] { make_scan_sum<cl_uint, In<cl_uint>, In<cl_uint>>(); };
-    DPR_CHECK_MESSAGE_HAS(std::logic_error, reads(),
-                          "argument 2: the source says uint*, the signature const uint*");
-  }
-
-  TEST_CASE("a signature with a value for a buffer, or another struct, fails") {
-    const auto value = [] { make_scan_sum<cl_uint, cl_uint, Out<cl_uint>>(); };
-    DPR_CHECK_MESSAGE_HAS(std::logic_error, value(),
-                          "argument 1: the source says const uint*, the signature uint");
-    const auto other_struct = [] {
-      const Kernel<dpr::shared::ViewParams, In<cl_uint>, In<cl_uint2>, Out<cl_uint>> kernel(
-          device_impl(), "rasterize.cl", "rasterize_count");
-    };
-    DPR_CHECK_MESSAGE_HAS(
-        std::logic_error, other_struct(),
-        "kernel rasterize_count, argument 0: the source says FrameParams, the signature ViewParams");
-  }
-
   TEST_CASE("a kernel that the program does not have fails by name") {
-    const auto make = [] { const Kernel<cl_uint> kernel(device_impl(), "scan.cl", "scan_nothing"); };
     try {
-      make();
+      const dpr::Launcher<scan_nothing> launch(device_impl());
       FAIL("no exception");
     } catch (const dpr::DeviceError& error) {
       CHECK(error.code() == CL_INVALID_KERNEL_NAME);

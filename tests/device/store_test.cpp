@@ -12,8 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "device/kernel.hpp"
 #include "dpr/error.hpp"
+#include "kernels/scan.hpp"
 #include "support/probe.hpp"
 #include "support/temp_dir.hpp"
 #include "support/variable.hpp"
@@ -150,12 +150,11 @@ TEST_SUITE("unit") {
       device.impl().keeps_binaries = true;
       device.impl().before_work = [&](std::string_view work) { builds += work == "scan.cl" ? 1 : 0; };
       // Options of its own, so that it is a program of its own.
-      dpr::Kernel<cl_uint, dpr::In<cl_uint>, dpr::Out<cl_uint>> sum(device.impl(), "scan.cl", "scan_sum",
-                                                                    " -DDPR_SCAN_CHUNK=128");
+      dpr::Launcher<dpr::kernel::scan_sum> launch(device.impl(), " -DDPR_SCAN_CHUNK=128");
       const std::vector<cl_uint> values{1, 2, 3, 4};
       const dpr::Buffer<cl_uint> in(device.impl(), std::span<const cl_uint>(values));
       dpr::Buffer<cl_uint> out(device.impl(), 1);
-      sum.in_groups(1, 4U, in, out);
+      launch.in_groups(1, dpr::kernel::scan_sum{.count = 4U, .values = in, .sums = out});
       return out.download()[0];
     };
     CHECK(sum_of_four() == 10);
