@@ -19,7 +19,7 @@ struct SumList {
   std::size_t count() const { return channels * segments; }
 };
 
-/// What is summed: channels of pixels; sigma; poses, by view and mesh; the eye, by view; lights; the rotations of
+/// Sums: channels of pixels; sigma; poses, by view and mesh; the eye, by view; lights; the rotations of
 /// normals that meshes give, by view and mesh; materials; and the scale of the pixel's noise.
 enum class SumOf { pixels, sigma, poses, eye, lights, normals, materials, scale };
 

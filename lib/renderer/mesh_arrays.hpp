@@ -46,7 +46,7 @@ struct MeshArray {
   /// The joined buffer of all meshes, and the first element of this one.
   Buffer<cl_float4>& (*device)(Geometry& geometry);
   std::size_t (*first)(const Geometry& geometry, const ArrayRef& at);
-  /// Where a backward pass leaves the gradient, element by element as in that buffer.
+  /// Gradient that a backward pass leaves, element by element as in that buffer.
   const Buffer<cl_float4>& (*gradient)(const Renderer::Impl& renderer);
   /// Elements between two views that have arrays of their own, or 0 where they share the mesh's. Null: always.
   cl_uint shared::FrameParams::*stride = nullptr;

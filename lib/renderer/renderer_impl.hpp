@@ -185,7 +185,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   SceneGradient empty_gradient() const;
   /// True if the gradient of the meshes' arrays is asked for, and a mesh has one.
   bool wants(ArrayId id) const;
-  /// Where the last backward pass left a row's gradient: of a mesh's array, of one of its textures, or of all
+  /// Place of a row's gradient after the last backward pass: of a mesh's array, of one of its textures, or of all
   /// views' own shapes. None: not asked for, or not there.
   std::optional<DeviceGradient> mesh_gradient(const GradientRow& row, std::size_t mesh,
                                               std::size_t texture = 0);
