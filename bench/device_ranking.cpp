@@ -38,7 +38,7 @@ double launch_microseconds(const Device& device) {
   std::vector<double> times;
   for (int i = 0; i < k_launches; ++i) {
     const Clock::time_point start = Clock::now();
-    launch.in_groups(1, kernel::scan_sum{.count = 1U, .values = value, .sums = result});
+    launch.in_groups(1, kernel::scan_sum{.count = 1U, .present = value, .values = value, .sums = result});
     check_cl(device.impl().queue.finish(), "clFinish");
     times.push_back(seconds_since(start) * 1e6);
   }

@@ -67,22 +67,18 @@ DPR_SHARING_KERNEL kernel void bin_fill(const FrameParams p, const uint capacity
   list_tiles(p, t, i, rows_of(t) / DPR_TILE, are_all, offsets[i], out);
 }
 
-/// Links pairs, numbered by tile, and the places where owners list theirs: faces, or contours. One work-item
-/// for every pair within the capacity.
+/// Links pairs, numbered by tile, and the places where owners list theirs: faces, or contours. Any number of
+/// work-items.
 /// in   pairs        uint[1]
 /// in   places       uint[pair]      where the pair's owner lists it
 /// in   place_owner  uint[place]     view * faces + face, or the contour
-/// out  pair_owner   uint[capacity]  0 where there is no pair
+/// out  pair_owner   uint[pair]
 /// out  owner_pairs  uint[place]     the pairs of every owner, by tile
-kernel void bin_link(const uint capacity, global const uint* restrict pairs,
-                     global const uint* restrict places, global const uint* restrict place_owner,
-                     global uint* restrict pair_owner, global uint* restrict owner_pairs) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= capacity) return;
-  if (pair >= pairs[0]) {
-    pair_owner[pair] = 0;
-    return;
+kernel void bin_link(global const uint* restrict pairs, global const uint* restrict places,
+                     global const uint* restrict place_owner, global uint* restrict pair_owner,
+                     global uint* restrict owner_pairs) {
+  for (uint pair = (uint)get_global_id(0); pair < pairs[0]; pair += (uint)get_global_size(0)) {
+    pair_owner[pair] = place_owner[places[pair]];
+    owner_pairs[places[pair]] = pair;
   }
-  pair_owner[pair] = place_owner[places[pair]];
-  owner_pairs[places[pair]] = pair;
 }

@@ -264,14 +264,14 @@ static inline void outline_barycentrics(const ViewedClip v, intn in_second, cons
 /// in   pixels   uint[fragment]  x | y << 16
 /// out  distance, depth  float[fragment]  as rasterize_forward; not written for other faces
 /// out  bary1, bary2     float[fragment]  of the whole face
-kernel void clip_fragments(const FrameParams p, const uint last_pair,
+kernel void clip_fragments(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
                            global const ClippedFace* restrict clipped,
                            global const Triangle* restrict triangles, global const uint* restrict pair_face,
                            global const uint* restrict fragment_starts, global const uint* restrict pixels,
                            global float* restrict distance, global float* restrict depth,
                            global float* restrict bary1, global float* restrict bary2) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint face = pair_face[pair], last = fragment_starts[pair + 1];
   if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;
   const ClippedFace c = clipped[face];
@@ -415,8 +415,8 @@ static inline void add_outline_barycentrics(const FrameParams p, const ClippedFa
 /// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward.
 /// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
 /// out     grad_clip     float[pair][9]   of the corners' homogeneous coordinates, by way of the cuts
-kernel void clip_backward(const FrameParams p, const uint last_pair, global const ViewParams* restrict views,
-                          global const ClippedFace* restrict clipped,
+kernel void clip_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
+                          global const ViewParams* restrict views, global const ClippedFace* restrict clipped,
                           global const Triangle* restrict triangles, global const uint* restrict pair_face,
                           global const uint* restrict fragment_starts, global const uint* restrict pixels,
                           global const float* restrict distance, global const float* restrict grad_distance,
@@ -424,7 +424,7 @@ kernel void clip_backward(const FrameParams p, const uint last_pair, global cons
                           global const float* restrict grad_bary2, global float* restrict grad_corners,
                           global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint face = pair_face[pair], last = fragment_starts[pair + 1];
   for (uint k = 0; k < 9; ++k) grad_clip[9 * pair + k] = 0.0f;
   if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;

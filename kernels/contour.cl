@@ -6,12 +6,12 @@
 // Faces are neighbours by the vertices that they share or, at edges where each has vertices of its own, where
 // these coincide (edges.cl): then there are two edges, one on each face's, and one of them stands for both.
 //
-// Edges end at the near plane where faces cross it, and the plane's cut of a face is a boundary: the cuts
-// of all faces are numbered behind the edges of the scene.
+// Where faces cross the near plane, edges end there, and what the plane cuts of a face is a boundary: the
+// cuts of all faces are numbered behind the edges of the scene.
 #include "contour.h"
 #include "face_normal.h"
 
-/// Most that rounding moves a crossing, in samples.
+/// What rounding may move a crossing by, in samples.
 #define DPR_CROSSING_SLACK 0.01f
 
 /// The sine of the angle between faces from which they count as shaded differently.
@@ -26,13 +26,13 @@ typedef struct {
   EdgeScene edges;
 } ContourScene;
 
-/// Number of the face's corner that a vertex is, or coincides with; 3 where none does.
+/// Which corner of the face a vertex is, or coincides with; 3 where none does.
 static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) {
   const float4 v = ndc[vertex];
   return is_same(ndc[face.x], v) ? 0 : is_same(ndc[face.y], v) ? 1 : is_same(ndc[face.z], v) ? 2 : 3;
 }
 
-/// True if the faces' colours differ at an end of the edge.
+/// Whether the faces' colours differ at an end of the edge.
 DPR_ALWAYS_INLINE int color_jumps(const ContourScene s, uint4 edge) {
   const uint own = own_face(edge), other = other_face(edge);
 #pragma unroll 1
@@ -54,7 +54,7 @@ static inline int normals_differ(const ContourScene s, uint4 edge) {
   return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
 }
 
-/// True if an edge on vertices of its own face alone is the one that stands for both: the one whose face is
+/// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is
 /// in front.
 static inline int stands_for_both(uint4 edge, global const uchar* facing) {
   const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
@@ -63,7 +63,7 @@ static inline int stands_for_both(uint4 edge, global const uchar* facing) {
   return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
 }
 
-/// True if an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
+/// Whether an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
 static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
   if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
   const uint2 sides_of = s.edges.edges[edge];
@@ -183,7 +183,7 @@ typedef struct {
   global const uint* offsets;                  // of the view's edges: equal where an edge is no contour
 } Contours;
 
-/// True if an edge that is a contour is that long.
+/// Whether an edge that is a contour is that long.
 static inline int is_long(const FrameParams p, const Contours c, uint edge) {
   if (c.offsets[edge] == c.offsets[edge + 1]) return 1;
   const ViewEdge e = view_edge(c.edges, edge);
@@ -205,7 +205,7 @@ static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
   return DPR_NO_MESH_EDGE;
 }
 
-/// True if all contours that end in a vertex are that long.
+/// Whether all contours that end in a vertex are that long.
 static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
   const uint last = 2 * c.corner_starts[vertex + 1];
   for (uint k = 2 * c.corner_starts[vertex]; k < last; ++k) {
@@ -215,7 +215,7 @@ static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
   return 1;
 }
 
-/// True if all contours that end in the end of an edge are that long: those of its vertex; or, on the near
+/// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
 /// plane, the edge that is cut there, and the cuts of its faces.
 static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
   const uint mesh_edges = c.edges.mesh_edges, cut = end == 0 ? e.cut[0] : e.cut[1];
@@ -280,7 +280,7 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
 }
 
 /// Adds the gradients of contours' ends to those of the vertices: each vertex the contours at its corners in
-/// order, each contour its pairs. One work-item per end of a pair: vertices are many, and few have a contour.
+/// order, each contour its pairs. Any number of work-items, by end of a pair: vertices are many, and few have a contour.
 /// That of the first pair of the first contour of a vertex sums for the vertex. Deterministic.
 /// in      pairs         uint[1]                how many there are
 /// in      pair_contour  uint[pair]             see DPR_CONTOUR_FLAGS
@@ -299,26 +299,27 @@ kernel void contour_gather(const FrameParams p, const ContourParams c, global co
                            global const uint4* restrict faces, global const uint* restrict face_edges,
                            global const uint* restrict corner_starts, global const uint* restrict corners,
                            global const float4* restrict grad_ends, global float4* restrict grad_ndc) {
-  const uint i = (uint)get_global_id(0), pair = i / 2;
-  if (pair >= pairs[0]) return;
-  const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / c.edges;
-  const uint own = contour - view * c.edges;
-  if (own >= c.mesh_edges || edge_pairs[pair_starts[contour]] != pair) return;
-  const uint4 record = record_of(edges_of_shape(p, view, c.mesh_edges, edges)[own], faces);
-  const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
-  global const uint* starts = pair_starts + view * c.edges;
-  uint first = DPR_NO_MESH_EDGE;
-  float2 sum = 0.0f;
-  for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
-    const uint edge = edge_at(face_edges, corners[k / 2], k % 2);
-    if (edge == DPR_NO_MESH_EDGE || starts[edge] == starts[edge + 1]) continue;
-    first = min(first, edge);
-    for (uint place = starts[edge]; place < starts[edge + 1]; ++place) {
-      const float4 grad = grad_ends[edge_pairs[place]];
-      sum += k % 2 ? grad.zw : grad.xy;
+  for (uint i = (uint)get_global_id(0); i < 2 * pairs[0]; i += (uint)get_global_size(0)) {
+    const uint pair = i / 2;
+    const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / c.edges;
+    const uint own = contour - view * c.edges;
+    if (own >= c.mesh_edges || edge_pairs[pair_starts[contour]] != pair) continue;
+    const uint4 record = record_of(edges_of_shape(p, view, c.mesh_edges, edges)[own], faces);
+    const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
+    global const uint* starts = pair_starts + view * c.edges;
+    uint first = DPR_NO_MESH_EDGE;
+    float2 sum = 0.0f;
+    for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
+      const uint edge = edge_at(face_edges, corners[k / 2], k % 2);
+      if (edge == DPR_NO_MESH_EDGE || starts[edge] == starts[edge + 1]) continue;
+      first = min(first, edge);
+      for (uint place = starts[edge]; place < starts[edge + 1]; ++place) {
+        const float4 grad = grad_ends[edge_pairs[place]];
+        sum += k % 2 ? grad.zw : grad.xy;
+      }
     }
+    if (first == own) grad_ndc[view * p.vertices + vertex] += (float4)(sum, 0.0f, 0.0f);
   }
-  if (first == own) grad_ndc[view * p.vertices + vertex] += (float4)(sum, 0.0f, 0.0f);
 }
 
 /// The gradients of a contour's ends, summed over its pairs.
@@ -330,7 +331,7 @@ static inline float4 sum_of_pairs(uint contour, global const uint* pair_starts, 
   return sum;
 }
 
-/// Gradient that a contour's end on a cut gives to one of the corners beside the cut.
+/// What the end of a contour that is a cut gives to one of the corners that it lies between.
 static inline float3 share_of_cut(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                   uint cut, int to_lost, float2 grad) {
   const float part = clipped_cut(c, cut).w;

@@ -69,7 +69,7 @@ static inline Perturbed perturb(realn distance, float sigma) {
 
 #endif
 
-/// One work-item for every vector of fragments within the capacity of the buffers. Deterministic.
+/// Any number of work-items, by vector of fragments. Deterministic.
 /// in   fragment_starts  uint[pair + 1]   up to `last_pair`: its last is the number of fragments
 /// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
 /// out  log_occupancy    float[fragment]  ln p, DPR_LOG_ZERO for p = 0
@@ -78,25 +78,26 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
                               global const uint* restrict fragment_starts,
                               global const float* restrict distance, global float* restrict log_occupancy,
                               global float* restrict occupancy) {
-  const uint i = (uint)get_global_id(0) * DPR_WIDTH;
-  if (i >= fragment_starts[last_pair]) return;
-  const Perturbed v = perturb(load_n(i, distance), p.sigma);
-  store_n(greater(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
-  store_n(v.p, i, occupancy);
+  const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
+  for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
+    const Perturbed v = perturb(load_n(i, distance), p.sigma);
+    store_n(greater(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
+    store_n(v.p, i, occupancy);
+  }
 }
 
 /// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per
-/// group of `pairs`.
+/// group of pairs in `range`.
 /// in   fragment_starts, distance  as occupancy_forward
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
-kernel void occupancy_backward(const OccupancyParams p, const uint2 pairs,
+kernel void occupancy_backward(const OccupancyParams p, const uint2 range, global const uint* restrict pairs,
                                global const uint* restrict fragment_starts,
                                global const float* restrict distance,
                                global const float* restrict grad_log_occupancy,
                                global float* restrict grad_distance, global float* restrict grad_sigma) {
-  const uint2 group = pair_group(pairs);
+  const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
   for (uint pair = group.x; pair < group.y; ++pair) {

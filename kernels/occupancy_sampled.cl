@@ -39,22 +39,20 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 #endif
 }
 
-/// One work-item per pair of `pairs`. Deterministic.
+/// One work-item per pair, up to `last_pair`. Deterministic.
 /// in   pair_face        uint[pair]       view * faces + face
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixels           uint[fragment]   x | y << 16
 /// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
 /// out  log_occupancy    float[fragment]  ln of the mean, DPR_LOG_ZERO where no sample covers
 /// out  occupancy        float[fragment]  the mean
-kernel void occupancy_sampled_forward(const OccupancyParams p, const uint pairs,
-                                      global const uint* restrict pair_face,
-                                      global const uint* restrict fragment_starts,
-                                      global const uint* restrict pixels,
-                                      global const float* restrict distance,
-                                      global float* restrict log_occupancy,
-                                      global float* restrict occupancy) {
+kernel void occupancy_sampled_forward(
+    const OccupancyParams p, const uint last_pair, global const uint* restrict pairs,
+    global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+    global const uint* restrict pixels, global const float* restrict distance,
+    global float* restrict log_occupancy, global float* restrict occupancy) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   for (uint i = first; i < last; ++i) {
@@ -88,19 +86,19 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
                   scale_estimate(p.sampling, sigma, y_sum));
 }
 
-/// One work-item per pair of `pairs`. Deterministic. Inputs, and the occupancy, as in
+/// One work-item per pair, up to `last_pair`. Deterministic. Inputs, and the occupancy, as in
 /// occupancy_sampled_forward.
 /// in   grad_log_occupancy  float[fragment]
 /// out  grad_distance       float[fragment]
 /// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
 kernel void occupancy_sampled_backward(
-    const OccupancyParams p, const uint pairs, global const uint* restrict pair_face,
-    global const uint* restrict fragment_starts, global const uint* restrict pixels,
-    global const float* restrict distance, global const float* restrict occupancy,
-    global const float* restrict grad_log_occupancy, global float* restrict grad_distance,
-    global float* restrict grad_sigma) {
+    const OccupancyParams p, const uint last_pair, global const uint* restrict pairs,
+    global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+    global const uint* restrict pixels, global const float* restrict distance,
+    global const float* restrict occupancy, global const float* restrict grad_log_occupancy,
+    global float* restrict grad_distance, global float* restrict grad_sigma) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   float total = 0.0f;

@@ -11,7 +11,7 @@
 #define DPR_TILE_SHARE (DPR_TILE * DPR_TILE)
 #endif
 
-/// State of a work-item of the listing kernels.
+/// What a work-item of the listing kernels has.
 typedef struct {
   uint tile;               // of all views
   uint first;              // of its pixels, as the masks count them: 8 * row + column
@@ -40,27 +40,22 @@ static inline uint pixel_of(const FrameParams p, const TileShare s, uint bit) {
 static inline uint lowest_bit_of(ulong mask) { return 63 - (uint)clz(mask & -mask); }
 
 /// Which pixels of its tile a triangle's blurred area covers: those it owns, and those closer than the blur
-/// distance. One work-item for every pair within the capacity; where there is no pair, nothing is covered.
+/// distance. Any number of work-items.
 /// in   pairs   uint[1]      how many there are
 /// in   triangles  Triangle[view][face]
 /// in   pair_face  uint[pair]  view * faces + face
 /// in   pair_tile  uint[pair]  view * tiles + tile
-/// out  masks   uint2[capacity]  bit 8 * row + column
-/// out  counts  uint[capacity]   covered pixels
-kernel void rasterize_cover(const FrameParams p, const uint capacity, global const uint* restrict pairs,
+/// out  masks   uint2[pair]  bit 8 * row + column
+/// out  counts  uint[pair]   covered pixels
+kernel void rasterize_cover(const FrameParams p, global const uint* restrict pairs,
                             global const Triangle* restrict triangles, global const uint* restrict pair_face,
                             global const uint* restrict pair_tile, global uint2* restrict masks,
                             global uint* restrict counts) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= capacity) return;
-  if (pair >= pairs[0]) {
-    masks[pair] = 0;
-    counts[pair] = 0;
-    return;
+  for (uint pair = (uint)get_global_id(0); pair < pairs[0]; pair += (uint)get_global_size(0)) {
+    const uint2 mask = cover_tile(p, triangles[pair_face[pair]], pair_tile[pair]);
+    masks[pair] = mask;
+    counts[pair] = popcount(mask.x) + popcount(mask.y);
   }
-  const uint2 mask = cover_tile(p, triangles[pair_face[pair]], pair_tile[pair]);
-  masks[pair] = mask;
-  counts[pair] = popcount(mask.x) + popcount(mask.y);
 }
 
 /// Counts the fragments of every pixel. One work-item per share of a tile.
@@ -93,7 +88,7 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   }
 }
 
-/// Finds the first pair of every row of tiles: the host cuts bands there. One work-item per row of all views,
+/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views,
 /// and one more.
 /// in   tile_starts      uint[view * tile + 1]  runs of pairs
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
@@ -112,7 +107,7 @@ kernel void rasterize_rows(const FrameParams p, const uint last_contour,
       (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], contour_starts[last_contour]);
 }
 
-/// True if the totals of a frame, pairs, fragments and contours' pairs, exceed the capacity of its buffers.
+/// Whether the totals of a frame, pairs, fragments and contours' pairs, exceed the capacity of its buffers.
 static inline int exceeds(uint4 last, uint4 capacity) {
   return last.z > capacity.x || last.y > capacity.y || last.w > capacity.z;
 }
@@ -139,12 +134,15 @@ kernel void rasterize_fit(const uint4 capacity, const uint4 sizes, global const 
 /// Keeps what a frame was like for a host that asks later. One work-item.
 /// in   capacity, rows  as rasterize_fit
 /// in   last_row
-/// in out  history  uint4[1]  the most pairs, fragments and contours' pairs so far; w = frames emptied
+/// in out  history  uint4[2]  the most pairs, fragments and contours' pairs so far, and those of this frame;
+///                            w = frames emptied so far
 kernel void rasterize_note(const uint4 capacity, const uint last_row, global const uint4* restrict rows,
                            global uint4* restrict history) {
   if (get_global_id(0) != 0) return;
   const uint4 last = rows[last_row], before = history[0];
-  history[0] = (uint4)(max(before.xyz, last.zyw), before.w + (exceeds(last, capacity) ? 1u : 0u));
+  const uint emptied = before.w + (exceeds(last, capacity) ? 1u : 0u);
+  history[0] = (uint4)(max(before.xyz, last.zyw), emptied);
+  history[1] = (uint4)(last.zyw, emptied);
 }
 
 /// Counts runs from a band's first element. The runs are `columns` from `first` on and as many from every
@@ -203,7 +201,7 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
   return corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per group of `pairs`. Deterministic.
+/// What a fragment is: distance, depth, barycentrics. One work-item per group of pairs in `range`. Deterministic.
 /// in   triangles, pair_face, pair_tile, masks  as rasterize_cover
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// out  fragment_pair  uint[fragment]
@@ -212,14 +210,14 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
 ///                                 triangle owns the sample, at distance 0 too. 0 where p.sharp is set
 /// out  depth     float[fragment]  view depth by the clipped barycentrics
 /// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
-kernel void rasterize_forward(const FrameParams p, const uint2 pairs,
+kernel void rasterize_forward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
                               global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
                               global float* restrict distance, global float* restrict depth,
                               global float* restrict bary1, global float* restrict bary2) {
-  const uint2 group = pair_group(pairs);
+  const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
   for (uint pair = group.x; pair < group.y; ++pair) {
@@ -254,13 +252,13 @@ kernel void rasterize_forward(const FrameParams p, const uint2 pairs,
   }
 }
 
-/// Gradients of the triangle's corners, summed over a pair's fragments. One work-item per pair, up to
-/// `last_pair`.
+/// Gradients of the triangle's corners, summed over a pair's fragments, of pairs up to `last_pair`. Any number
+/// of work-items.
 /// in   triangles, pair_face, fragment_starts, pixels  as rasterize_forward
 /// in   distance       float[fragment]  whose sign says on which side the sample lies
 /// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
-kernel void rasterize_backward(const FrameParams p, const uint last_pair,
+kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
                                global const Triangle* restrict triangles,
                                global const uint* restrict pair_face,
                                global const uint* restrict fragment_starts,
@@ -269,34 +267,36 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair,
                                global const float* restrict grad_depth,
                                global const float* restrict grad_bary1,
                                global const float* restrict grad_bary2, global float* restrict grad_corners) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
-  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
-  if (first == last) {
-    for (int k = 0; k < 9; ++k) grad_corners[9 * pair + k] = 0.0f;
-    return;
-  }
-  CornerGradients g;
-#pragma unroll
-  for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
-  const Triangle t = triangles[pair_face[pair]];
-  const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
-  for (uint i = first; i < last; i += DPR_WIDTH) {
-    const intn in_run = lanes_before(last, i);
-    const uintn packed = load_pixels(in_run, i, pixels);
-    const realn x = pixel_x(p, convert_realn(packed & 0xffffu)), y = pixel_y(p, convert_realn(packed >> 16));
-    const View3 v = view_triangle(t, x, y);
-    if (!p.sharp) {
-      add_distance_gradient(v, DPR_NO_EDGE, as_intn(load_run(in_run, i, distance)) >= 0, p.euclidean,
-                            load_run(in_run, i, grad_distance), &g);
+  const uint end = min(last_pair, pairs[0]);
+  for (uint pair = (uint)get_global_id(0); pair < end; pair += (uint)get_global_size(0)) {
+    const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    if (first == last) {
+      for (int k = 0; k < 9; ++k) grad_corners[9 * pair + k] = 0.0f;
+      continue;
     }
-    add_barycentric_gradient(v, t, scale, load_run(in_run, i, grad_depth), load_run(in_run, i, grad_bary1),
-                             load_run(in_run, i, grad_bary2), &g);
-  }
+    CornerGradients g;
 #pragma unroll
-  for (int k = 0; k < 3; ++k) {
-    grad_corners[9 * pair + 3 * k] = sum_lanes(g.x[k]);
-    grad_corners[9 * pair + 3 * k + 1] = sum_lanes(g.y[k]);
-    grad_corners[9 * pair + 3 * k + 2] = sum_lanes(g.z[k]);
+    for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
+    const Triangle t = triangles[pair_face[pair]];
+    const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
+    for (uint i = first; i < last; i += DPR_WIDTH) {
+      const intn in_run = lanes_before(last, i);
+      const uintn packed = load_pixels(in_run, i, pixels);
+      const realn x = pixel_x(p, convert_realn(packed & 0xffffu)),
+                  y = pixel_y(p, convert_realn(packed >> 16));
+      const View3 v = view_triangle(t, x, y);
+      if (!p.sharp) {
+        add_distance_gradient(v, DPR_NO_EDGE, as_intn(load_run(in_run, i, distance)) >= 0, p.euclidean,
+                              load_run(in_run, i, grad_distance), &g);
+      }
+      add_barycentric_gradient(v, t, scale, load_run(in_run, i, grad_depth), load_run(in_run, i, grad_bary1),
+                               load_run(in_run, i, grad_bary2), &g);
+    }
+#pragma unroll
+    for (int k = 0; k < 3; ++k) {
+      grad_corners[9 * pair + 3 * k] = sum_lanes(g.x[k]);
+      grad_corners[9 * pair + 3 * k + 1] = sum_lanes(g.y[k]);
+      grad_corners[9 * pair + 3 * k + 2] = sum_lanes(g.z[k]);
+    }
   }
 }

@@ -19,20 +19,20 @@ static inline CornerColors load_colors(const FrameParams p, uint view_face,
   return c;
 }
 
-/// One work-item per group of `pairs`. Deterministic.
+/// One work-item per group of pairs in `range`. Deterministic.
 /// in   pair_face        uint[pair]      view * faces + face
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// in   face_colors  uint4[face]         indices into colors, by corner
 /// in   colors       float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
 /// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
-kernel void shade_forward(const FrameParams p, const uint2 pairs, global const uint* restrict pair_face,
-                          global const uint* restrict fragment_starts,
+kernel void shade_forward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
+                          global const uint* restrict pair_face, global const uint* restrict fragment_starts,
                           global const uint4* restrict face_colors, global const float4* restrict colors,
                           global const float* restrict bary1, global const float* restrict bary2,
                           global float* restrict red, global float* restrict green,
                           global float* restrict blue) {
-  const uint2 group = pair_group(pairs);
+  const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
   for (uint pair = group.x; pair < group.y; ++pair) {
@@ -48,19 +48,19 @@ kernel void shade_forward(const FrameParams p, const uint2 pairs, global const u
   }
 }
 
-/// One work-item per group of `pairs`. Deterministic. Inputs as shade_forward, and
+/// One work-item per group of pairs in `range`. Deterministic. Inputs as shade_forward, and
 /// in   grad_red, grad_green, grad_blue  float[fragment]
 /// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
 /// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's
 ///      fragments
-kernel void shade_backward(const FrameParams p, const uint2 pairs, global const uint* restrict pair_face,
-                           global const uint* restrict fragment_starts,
+kernel void shade_backward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
+                           global const uint* restrict pair_face, global const uint* restrict fragment_starts,
                            global const uint4* restrict face_colors, global const float4* restrict colors,
                            global const float* restrict bary1, global const float* restrict bary2,
                            global const float* restrict grad_red, global const float* restrict grad_green,
                            global const float* restrict grad_blue, global float* restrict grad_bary1,
                            global float* restrict grad_bary2, global float* restrict grad_colors) {
-  const uint2 group = pair_group(pairs);
+  const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
   for (uint pair = group.x; pair < group.y; ++pair) {

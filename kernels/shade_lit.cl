@@ -130,10 +130,10 @@ static inline Vec3n load_base(intn in_run, uint first, const RgbPlanes from) {
 ///      then
 /// out  red, green, blue  float[fragment]
 kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, const uint last_pair,
-                              global const ViewParams* restrict views, global const Light* restrict lights,
-                              global const uint4* restrict faces, global const uint4* restrict face_colors,
-                              global const float4* restrict colors, global const float4* restrict world,
-                              global const uint4* restrict face_normals,
+                              global const uint* restrict pair_count, global const ViewParams* restrict views,
+                              global const Light* restrict lights, global const uint4* restrict faces,
+                              global const uint4* restrict face_colors, global const float4* restrict colors,
+                              global const float4* restrict world, global const uint4* restrict face_normals,
                               global const float4* restrict normals, global const float4* restrict materials,
                               global const uint* restrict pair_face,
                               global const uint* restrict fragment_starts, global const float* restrict bary1,
@@ -142,7 +142,7 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, cons
                               global float* restrict red, global float* restrict green,
                               global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pair_count[0])) return;
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
                                  face_normals, normals, materials);
   const RgbPlanes bases = {base_red, base_green, base_blue};
@@ -298,10 +298,11 @@ static inline void corners_backward(const Surface s, const LightingParams lp,
 /// out  grad_materials  float[pair][DPR_MATERIAL_CHANNELS]
 /// out  grad_eye     float[3][pair]    of the camera centre
 kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, const uint pairs,
-                               const uint last_pair, global const ViewParams* restrict views,
-                               global const Light* restrict lights, global const uint4* restrict faces,
-                               global const uint4* restrict face_colors, global const float4* restrict colors,
-                               global const float4* restrict world, global const uint4* restrict face_normals,
+                               const uint last_pair, global const uint* restrict pair_count,
+                               global const ViewParams* restrict views, global const Light* restrict lights,
+                               global const uint4* restrict faces, global const uint4* restrict face_colors,
+                               global const float4* restrict colors, global const float4* restrict world,
+                               global const uint4* restrict face_normals,
                                global const float4* restrict normals, global const float4* restrict materials,
                                global const uint* restrict pair_face,
                                global const uint* restrict fragment_starts,
@@ -316,7 +317,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp, con
                                global float* restrict grad_normals, global float* restrict grad_materials,
                                global float* restrict grad_eye) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pair_count[0])) return;
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
                                  face_normals, normals, materials);
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
@@ -422,19 +423,20 @@ static inline void store_light_sums(const LightSums sums, global const Light* li
 /// to `last_pair`; one launch per light, or for light 0 where there is none. Inputs as shade_lit_backward.
 /// out  channels  float[DPR_ENVIRONMENT_CHANNELS][pair], then float[light][DPR_LIGHT_CHANNELS][pair]
 kernel void shade_lit_backward_lights(
-    const FrameParams p, const LightingParams lp, const uint pairs, const uint last_pair, const uint light,
-    global const ViewParams* restrict views, global const Light* restrict lights,
-    global const uint4* restrict faces, global const uint4* restrict face_colors,
-    global const float4* restrict colors, global const float4* restrict world,
-    global const uint4* restrict face_normals, global const float4* restrict normals,
-    global const float4* restrict materials, global const uint* restrict pair_face,
-    global const uint* restrict fragment_starts, global const float* restrict bary1,
-    global const float* restrict bary2, global const float* restrict base_red,
-    global const float* restrict base_green, global const float* restrict base_blue,
-    global const float* restrict grad_red, global const float* restrict grad_green,
-    global const float* restrict grad_blue, global float* restrict channels) {
+    const FrameParams p, const LightingParams lp, const uint pairs, const uint last_pair,
+    global const uint* restrict pair_count, const uint light, global const ViewParams* restrict views,
+    global const Light* restrict lights, global const uint4* restrict faces,
+    global const uint4* restrict face_colors, global const float4* restrict colors,
+    global const float4* restrict world, global const uint4* restrict face_normals,
+    global const float4* restrict normals, global const float4* restrict materials,
+    global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+    global const float* restrict bary1, global const float* restrict bary2,
+    global const float* restrict base_red, global const float* restrict base_green,
+    global const float* restrict base_blue, global const float* restrict grad_red,
+    global const float* restrict grad_green, global const float* restrict grad_blue,
+    global float* restrict channels) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pair_count[0])) return;
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, face_colors, colors, world,
                                  face_normals, normals, materials);
   LightSums sums = zero_light_sums();

@@ -16,8 +16,7 @@ using float4 = cl_float4;
 #define DPR_TILE 8
 
 /// Work-items of a group that works together (group.h). On devices or for kernels with smaller groups the
-/// host asks for fewer: a power of two, no less than DPR_LEAST_GROUP, which is the number of digits that a
-/// GPU sorts by.
+/// host asks for fewer: a power of two, no less than DPR_LEAST_GROUP.
 #ifndef DPR_GROUP
 #define DPR_GROUP 64
 #endif
@@ -36,8 +35,8 @@ using float4 = cl_float4;
 #define DPR_RUN_CHUNK 512
 #define DPR_RUN_SLOTS(count) (2 * ((count) / DPR_RUN_CHUNK + 1))
 
-/// By which a pass of a sort orders, on devices of so many lanes.
-#define DPR_SORT_BITS(lanes) ((lanes) == 1 ? 4 : 8)
+/// Bits by which a pass of a sort orders, at most.
+#define DPR_SORT_BITS 8
 
 /// Pairs that a work-item handles in order, on devices whose lanes are vector registers (tile_lanes.h).
 #define DPR_PAIR_GROUP 8
@@ -55,7 +54,7 @@ using float4 = cl_float4;
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu
 
-/// Ways to draw noise, in the order of dpr::Draws.
+/// How noise is drawn, in the order of dpr::Draws.
 #define DPR_INDEPENDENT 0
 #define DPR_ANTITHETIC 1
 #define DPR_STRATIFIED 2
@@ -72,7 +71,7 @@ using float4 = cl_float4;
 #define DPR_GOURAUD 3
 #define DPR_BLINN 4
 
-/// Kinds of lights beyond points that kernels are built for: bits of DPR_LIGHTS.
+/// What lights ask of the kernels beyond points: bits of DPR_LIGHTS.
 #define DPR_LIGHTS_DISTANT 1   /* infinitely far away: position.w is 0 */
 #define DPR_LIGHTS_CONES 2     /* within a cone about an axis */
 #define DPR_LIGHTS_HARMONICS 4 /* an environment */
@@ -92,12 +91,12 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_COS_INNER 12
 #define DPR_CHANNEL_COS_OUTER 13
 
-/// Place of a fragment's base colour for the light: its triangle's corners, or planes of fragments.
+/// Where the light finds the base colour of a fragment: in its triangle's corners, or in planes of fragments.
 #define DPR_BASE_OF_CORNERS 0
 #define DPR_BASE_OF_FRAGMENTS 1
 
-/// Values of dpr::Wrap (lib/image/texture_words.hpp has the names) and of dpr::Filter, in their order; and
-/// the texture of a face that has none.
+/// What lies beyond a texture, in the order of dpr::Wrap (lib/image/texture_words.hpp has the names); what
+/// lies between its texels, in that of dpr::Filter; and the texture of a face that has none.
 #define DPR_REPEAT 0
 #define DPR_MIRROR 1
 #define DPR_CLAMP 2
@@ -128,7 +127,7 @@ using float4 = cl_float4;
 #define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
 
-/// Facing of a face: the sense in which its corners wind in NDC. A dropped one is culled, has no area or
+/// How a face looks from a view: which way its corners wind in NDC. Dropped is what is culled, has no area or
 /// reaches nearer than the near plane, if the plane leaves nothing of it.
 #define DPR_FACE_DROPPED 0
 #define DPR_FACE_FRONT 1 /* counter-clockwise */
@@ -162,7 +161,7 @@ using float4 = cl_float4;
 /// Crossings that a tile has room for beside those that won their steps.
 #define DPR_SECOND_CROSSINGS 8
 
-/// Terms of a mesh's own loss by vertex: squared Laplacian, and half the squared excess of edge
+/// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge
 /// lengths; and its hinges: 1 - cos, and that squared.
 #define DPR_MESH_LOSS_CHANNELS 2
 
@@ -186,7 +185,7 @@ typedef struct FrameParams {
   uint normals;      /* of a view: those of the vertices, then those that meshes give */
 } FrameParams;
 
-/// A mesh or an instance of it in the frame. Each has vertices and given normals of its own in the
+/// Where a mesh stands: itself, or an instance of it. Each has vertices and given normals of its own in the
 /// frame; the positions and values of an instance's are its mesh's.
 typedef struct MeshPlace {
   uint vertex_shift; /* the number of a vertex less that of its position */
@@ -217,7 +216,7 @@ typedef struct Triangle {
   uint first_sample, last_sample; /* column | row << 16, inclusive; of the blurred bounding box */
 } Triangle;
 
-/// Rest of a face that crosses the near plane: a triangle or a quadrilateral. Its corners are those
+/// What is left of a face that crosses the near plane: a triangle or a quadrilateral. Its corners are those
 /// of the face that are not nearer than the plane, from `first` on, then the two cuts: of four the first cut
 /// lies between the face's corners first + 1 and first + 2, the second between first and first + 2; of three
 /// between first and first + 1, and first and first + 2 (all modulo 3).
@@ -261,7 +260,7 @@ typedef struct Texture {
   uint unused0, unused1;
 } Texture;
 
-/// Sampling of the Monte Carlo estimators; part of the structs below.
+/// How the Monte Carlo estimators sample; part of the structs below.
 typedef struct Sampling {
   uint samples;
   uint draws;      /* DPR_INDEPENDENT, DPR_ANTITHETIC or DPR_STRATIFIED */
@@ -311,7 +310,7 @@ typedef struct OpenEdge {
   float4 places;    /* of its two ends in the texture, in periods */
 } OpenEdge;
 
-/// Parameters of the search for contours.
+/// What contours are looked for.
 typedef struct ContourParams {
   uint edges;      /* of a view: those of the scene, then, where faces are clipped, the cut of every face */
   uint mesh_edges; /* of the scene */
@@ -319,7 +318,7 @@ typedef struct ContourParams {
   uint unused0;
 } ContourParams;
 
-/// Parameters of the search for crossings.
+/// What crossings are looked for.
 typedef struct AntialiasParams {
   uint edges, mesh_edges; /* as in ContourParams */
   float depth_reach;      /* normalised depth: surfaces that much behind the nearest may still be seen */

@@ -1,24 +1,26 @@
 // A stable radix sort of (key, value) by some bits a pass: pairs leave it ordered by tile and, within a tile,
 // still by face. Nothing depends on the order in which work-items run. The number of elements, `count`, is on
-// the device; the host launches for the capacity of the buffers. A block is a work-item's on CPUs, which
-// count eight bits in their caches, and a work-group's on GPUs, which count four in local memory. Few
-// elements are sorted by one work-item or one group instead, to the same order.
+// the device; the host launches for the capacity of the buffers, and blocks without elements cost next to
+// nothing. A block is a work-item's on CPUs, and a work-group's on GPUs, which sorts it in local memory by
+// four bits at a time. Few elements are sorted by one work-item or one group instead, to the same order.
 #include "group.h"
 
 #ifndef DPR_LANES
 #define DPR_LANES 8
 #endif
 
-#define DPR_SORT_DIGITS (1u << DPR_SORT_BITS(DPR_LANES))
+static inline uint sort_digit(uint key, uint shift, uint bits) { return (key >> shift) & ((1u << bits) - 1); }
 
-static inline uint sort_digit(uint key, uint shift) { return (key >> shift) & (DPR_SORT_DIGITS - 1); }
-
-/// Columns of the histogram.
-static inline uint sort_blocks(uint capacity) {
-  return capacity / DPR_SORT_BLOCK + (capacity % DPR_SORT_BLOCK != 0);
+/// Columns of the histogram: blocks that have elements, and one where there are none.
+static inline uint sort_blocks(uint count) {
+  return max(count / DPR_SORT_BLOCK + (count % DPR_SORT_BLOCK != 0), 1u);
 }
 
 #if DPR_LANES == 1
+
+/// Bits by which a group sorts at a time: a work-item has a count for each of their values.
+#define DPR_SORT_GROUP_BITS 4
+#define DPR_SORT_GROUP_DIGITS (1u << DPR_SORT_GROUP_BITS)
 
 /// Elements of a block that are there.
 static inline uint elements_of(uint block, uint count) {
@@ -26,64 +28,97 @@ static inline uint elements_of(uint block, uint count) {
   return count > first ? min(count - first, (uint)DPR_SORT_BLOCK) : 0;
 }
 
-/// Counts the digits of every block. One work-group per block.
-/// in   capacity   the largest number of elements
-/// in   shift      of the pass' digit: the lowest of its bits
-/// in   count      uint[1]                      the number of elements
+/// What a group sorts a block by: two lists of keys and of where they were, one behind the other; counts.
+typedef struct {
+  local uint *keys, *order;
+  local uint *counts, *sums;
+} GroupSort;
+
+/// Declares a group's local memory. To be used in a kernel.
+#define DPR_GROUP_SORT(name)                                                     \
+  local uint name##_keys[2 * DPR_SORT_BLOCK], name##_order[2 * DPR_SORT_BLOCK];  \
+  local uint name##_counts[DPR_LOCAL_PLACES(DPR_SORT_GROUP_DIGITS * DPR_GROUP)]; \
+  local uint name##_sums[DPR_GROUP];                                             \
+  const GroupSort name = {name##_keys, name##_order, name##_counts, name##_sums}
+
+/// Sorts the first `here` keys of the first list by their bits from `shift` to `end`, with their places in the
+/// block. Returns where the list with the result begins. To be called by all of the group, after the keys are there.
+static inline uint sort_group(const GroupSort s, uint here, uint shift, uint end) {
+  const uint each = DPR_EACH(DPR_SORT_BLOCK), digits = DPR_SORT_GROUP_DIGITS;
+  const uint item = (uint)get_local_id(0), first = item * each, last = min(here, first + each);
+  uint from = 0;
+  for (uint i = item; i < here; i += DPR_GROUP) s.order[i] = i;
+  for (; shift < end; shift += DPR_SORT_GROUP_BITS) {
+    const uint bits = min(end - shift, (uint)DPR_SORT_GROUP_BITS);
+    for (uint d = 0; d < digits; ++d) s.counts[local_place(d * DPR_GROUP + item, digits)] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint i = first; i < last; ++i)
+      ++s.counts[local_place(sort_digit(s.keys[from + i], shift, bits) * DPR_GROUP + item, digits)];
+    barrier(CLK_LOCAL_MEM_FENCE);
+    group_scan_chunk(s.counts, digits, s.sums);
+    for (uint i = first; i < last; ++i) {
+      const uint key = s.keys[from + i];
+      const uint target = s.counts[local_place(sort_digit(key, shift, bits) * DPR_GROUP + item, digits)]++;
+      s.keys[DPR_SORT_BLOCK - from + target] = key;
+      s.order[DPR_SORT_BLOCK - from + target] = s.order[from + i];
+    }
+    from = DPR_SORT_BLOCK - from;
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  return from;
+}
+
+/// Counts the digits of every block. One work-group per block of the capacity.
+/// in   shift, bits  of the pass' digit: the lowest of its bits, and how many
+/// in   count      uint[1]                the number of elements
 /// in   keys       uint[count]
-/// out  histogram  uint[DPR_SORT_DIGITS][block]
-DPR_GROUP_KERNEL kernel void sort_histogram(const uint capacity, const uint shift,
+/// out  histogram  uint[1 << bits][block]  of blocks that have elements, at least one
+/// out  size       uint[1]                its elements
+DPR_GROUP_KERNEL kernel void sort_histogram(const uint shift, const uint bits,
                                             global const uint* restrict count,
-                                            global const uint* restrict keys,
-                                            global uint* restrict histogram) {
-  local uint counts[DPR_SORT_DIGITS * DPR_GROUP];  // [digit][work-item]
+                                            global const uint* restrict keys, global uint* restrict histogram,
+                                            global uint* restrict size) {
+  local uint counts[1u << DPR_SORT_BITS];
   const uint block = (uint)get_group_id(0), item = (uint)get_local_id(0), here = elements_of(block, count[0]);
-  for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[d * DPR_GROUP + item] = 0;
-  for (uint i = item; i < here; i += DPR_GROUP)
-    ++counts[sort_digit(keys[block * DPR_SORT_BLOCK + i], shift) * DPR_GROUP + item];
+  const uint digits = 1u << bits, blocks = sort_blocks(count[0]);
+  for (uint d = item; d < digits; d += DPR_GROUP) counts[d] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (item >= DPR_SORT_DIGITS) return;
-  uint sum = 0;
-  for (uint k = 0; k < DPR_GROUP; ++k) sum += counts[item * DPR_GROUP + (k + item) % DPR_GROUP];
-  histogram[item * sort_blocks(capacity) + block] = sum;
+  for (uint i = item; i < here; i += DPR_GROUP)
+    atomic_inc(&counts[sort_digit(keys[block * DPR_SORT_BLOCK + i], shift, bits)]);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (block >= blocks) return;
+  for (uint d = item; d < digits; d += DPR_GROUP) histogram[d * blocks + block] = counts[d];
+  if (block == 0 && item == 0) size[0] = digits * blocks;
 }
 
 /// Moves every element to its place. One work-group per block: it sorts the block in local memory, so that
 /// neighbours are written by neighbours. Inputs as sort_histogram, and
-/// in   values   uint[count]                   move with their keys
-/// in   offsets  uint[DPR_SORT_DIGITS][block]  exclusive scan of the histogram
+/// in   values   uint[count]              move with their keys
+/// in   offsets  uint[1 << bits][block]   exclusive scan of the histogram
 /// out  sorted_keys, sorted_values  uint[count]
-DPR_GROUP_KERNEL kernel void sort_scatter(const uint capacity, const uint shift,
+DPR_GROUP_KERNEL kernel void sort_scatter(const uint shift, const uint bits,
                                           global const uint* restrict count, global const uint* restrict keys,
                                           global const uint* restrict values,
                                           global const uint* restrict offsets,
                                           global uint* restrict sorted_keys,
                                           global uint* restrict sorted_values) {
-  const uint each = DPR_EACH(DPR_SORT_BLOCK), of_counts = DPR_SORT_DIGITS;
-  local uint block_keys[DPR_LOCAL_PLACES(DPR_SORT_BLOCK)], order[DPR_SORT_BLOCK], group_sums[DPR_GROUP];
-  local uint counts[DPR_LOCAL_PLACES(DPR_SORT_DIGITS * DPR_GROUP)];  // [digit][work-item]
-  local uint targets[DPR_SORT_DIGITS];  // of a digit's first element, less its place in the block
+  DPR_GROUP_SORT(sort);
+  local uint firsts[1u << DPR_SORT_BITS];  // of a digit's elements in the block
   const uint block = (uint)get_group_id(0), item = (uint)get_local_id(0), here = elements_of(block, count[0]);
-  const uint first = block * DPR_SORT_BLOCK, blocks = sort_blocks(capacity);
-  for (uint i = item; i < here; i += DPR_GROUP) block_keys[local_place(i, each)] = keys[first + i];
-  for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[local_place(d * DPR_GROUP + item, of_counts)] = 0;
+  const uint first = block * DPR_SORT_BLOCK, blocks = sort_blocks(count[0]);
+  for (uint i = item; i < here; i += DPR_GROUP) sort.keys[i] = keys[first + i];
   barrier(CLK_LOCAL_MEM_FENCE);
-  const uint last = min(here, (item + 1) * each);
-  for (uint i = item * each; i < last; ++i)
-    ++counts[local_place(sort_digit(block_keys[local_place(i, each)], shift) * DPR_GROUP + item, of_counts)];
-  barrier(CLK_LOCAL_MEM_FENCE);
-  group_scan_chunk(counts, of_counts, group_sums);
-  if (item < DPR_SORT_DIGITS)
-    targets[item] = offsets[item * blocks + block] - counts[local_place(item * DPR_GROUP, of_counts)];
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint i = item * each; i < last; ++i)
-    order[counts[local_place(sort_digit(block_keys[local_place(i, each)], shift) * DPR_GROUP + item,
-                             of_counts)]++] = i;
+  const uint list = sort_group(sort, here, shift, shift + bits);
+  for (uint i = item; i < here; i += DPR_GROUP) {
+    const uint digit = sort_digit(sort.keys[list + i], shift, bits);
+    if (i == 0 || sort_digit(sort.keys[list + i - 1], shift, bits) != digit) firsts[digit] = i;
+  }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint i = item; i < here; i += DPR_GROUP) {
-    const uint key = block_keys[local_place(order[i], each)], target = targets[sort_digit(key, shift)] + i;
+    const uint key = sort.keys[list + i], digit = sort_digit(key, shift, bits);
+    const uint target = offsets[digit * blocks + block] + i - firsts[digit];
     sorted_keys[target] = key;
-    sorted_values[target] = values[first + order[i]];
+    sorted_values[target] = values[first + sort.order[list + i]];
   }
 }
 
@@ -98,42 +133,20 @@ DPR_GROUP_KERNEL kernel void sort_few(const uint last_key, global const uint* re
                                       global const uint* restrict keys, global const uint* restrict values,
                                       global uint* restrict sorted_keys, global uint* restrict sorted_values,
                                       global uint* restrict starts) {
-  const uint each = DPR_EACH(DPR_SORT_BLOCK), of_counts = DPR_SORT_DIGITS;
-  local uint list_keys[2][DPR_SORT_BLOCK], order[2][DPR_SORT_BLOCK], group_sums[DPR_GROUP];
-  local uint counts[DPR_LOCAL_PLACES(DPR_SORT_DIGITS * DPR_GROUP)];  // [digit][work-item]
+  DPR_GROUP_SORT(sort);
   const uint item = (uint)get_local_id(0), here = min(count[0], (uint)DPR_SORT_BLOCK);
-  const uint first = item * each, last = min(here, first + each);
-  uint from = 0;
-  for (uint i = item; i < here; i += DPR_GROUP) {
-    list_keys[from][i] = keys[i];
-    order[from][i] = i;
-  }
+  for (uint i = item; i < here; i += DPR_GROUP) sort.keys[i] = keys[i];
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint shift = 0; shift < 32 && (last_key - 1) >> shift != 0; shift += DPR_SORT_BITS(DPR_LANES)) {
-    for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[local_place(d * DPR_GROUP + item, of_counts)] = 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = first; i < last; ++i)
-      ++counts[local_place(sort_digit(list_keys[from][i], shift) * DPR_GROUP + item, of_counts)];
-    barrier(CLK_LOCAL_MEM_FENCE);
-    group_scan_chunk(counts, of_counts, group_sums);
-    for (uint i = first; i < last; ++i) {
-      const uint key = list_keys[from][i];
-      const uint target = counts[local_place(sort_digit(key, shift) * DPR_GROUP + item, of_counts)]++;
-      list_keys[1 - from][target] = key;
-      order[1 - from][target] = order[from][i];
-    }
-    from = 1 - from;
-    barrier(CLK_LOCAL_MEM_FENCE);
-  }
+  const uint list = sort_group(sort, here, 0, last_key > 1 ? 32 - clz(last_key - 1) : 0);
   for (uint i = item; i < here; i += DPR_GROUP) {
-    sorted_keys[i] = list_keys[from][i];
-    sorted_values[i] = values[order[from][i]];
+    sorted_keys[i] = sort.keys[list + i];
+    sorted_values[i] = values[sort.order[list + i]];
   }
   for (uint key = item; key <= last_key; key += DPR_GROUP) {
     uint low = 0, high = here;
     while (low < high) {
       const uint middle = (low + high) / 2;
-      if (list_keys[from][middle] < key) {
+      if (sort.keys[list + middle] < key) {
         low = middle + 1;
       } else {
         high = middle;
@@ -145,32 +158,34 @@ DPR_GROUP_KERNEL kernel void sort_few(const uint last_key, global const uint* re
 
 #else
 
-/// As above. One work-item per block.
-kernel void sort_histogram(const uint capacity, const uint shift, global const uint* restrict count,
-                           global const uint* restrict keys, global uint* restrict histogram) {
-  const uint block = (uint)get_global_id(0);
-  const uint blocks = sort_blocks(capacity);
+/// As above. One work-item per block of the capacity.
+kernel void sort_histogram(const uint shift, const uint bits, global const uint* restrict count,
+                           global const uint* restrict keys, global uint* restrict histogram,
+                           global uint* restrict size) {
+  const uint block = (uint)get_global_id(0), elements = count[0];
+  const uint digits = 1u << bits, blocks = sort_blocks(elements);
   if (block >= blocks) return;
-  uint counts[DPR_SORT_DIGITS];
-  for (uint d = 0; d < DPR_SORT_DIGITS; ++d) counts[d] = 0;
-  const uint last = min(count[0], (block + 1) * DPR_SORT_BLOCK);
-  for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) ++counts[sort_digit(keys[i], shift)];
-  for (uint d = 0; d < DPR_SORT_DIGITS; ++d) histogram[d * blocks + block] = counts[d];
+  uint counts[1u << DPR_SORT_BITS];
+  for (uint d = 0; d < digits; ++d) counts[d] = 0;
+  const uint last = min(elements, (block + 1) * DPR_SORT_BLOCK);
+  for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) ++counts[sort_digit(keys[i], shift, bits)];
+  for (uint d = 0; d < digits; ++d) histogram[d * blocks + block] = counts[d];
+  if (block == 0) size[0] = digits * blocks;
 }
 
-/// As above. One work-item per block.
-kernel void sort_scatter(const uint capacity, const uint shift, global const uint* restrict count,
+/// As above. One work-item per block of the capacity.
+kernel void sort_scatter(const uint shift, const uint bits, global const uint* restrict count,
                          global const uint* restrict keys, global const uint* restrict values,
                          global const uint* restrict offsets, global uint* restrict sorted_keys,
                          global uint* restrict sorted_values) {
-  const uint block = (uint)get_global_id(0);
-  const uint blocks = sort_blocks(capacity);
+  const uint block = (uint)get_global_id(0), elements = count[0];
+  const uint digits = 1u << bits, blocks = sort_blocks(elements);
   if (block >= blocks) return;
-  uint next[DPR_SORT_DIGITS];
-  for (uint d = 0; d < DPR_SORT_DIGITS; ++d) next[d] = offsets[d * blocks + block];
-  const uint last = min(count[0], (block + 1) * DPR_SORT_BLOCK);
+  uint next[1u << DPR_SORT_BITS];
+  for (uint d = 0; d < digits; ++d) next[d] = offsets[d * blocks + block];
+  const uint last = min(elements, (block + 1) * DPR_SORT_BLOCK);
   for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) {
-    const uint target = next[sort_digit(keys[i], shift)]++;
+    const uint target = next[sort_digit(keys[i], shift, bits)]++;
     sorted_keys[target] = keys[i];
     sorted_values[target] = values[i];
   }

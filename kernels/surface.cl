@@ -30,7 +30,8 @@ static inline SurfaceScene make_scene(global const uint4* face_colors, global co
 /// in   clipped          ClippedFace[view][face]  read where p.clips is set
 /// in   bary1, bary2     float[fragment]  barycentrics of corners 1 and 2
 /// out  red, green, blue  float[fragment]
-kernel void surface_forward(const FrameParams p, const uint last_pair, global const uint* restrict pair_face,
+kernel void surface_forward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
+                            global const uint* restrict pair_face,
                             global const uint* restrict fragment_starts,
                             global const uint4* restrict face_colors, global const float4* restrict colors,
                             global const uint4* restrict face_texcoords,
@@ -40,7 +41,7 @@ kernel void surface_forward(const FrameParams p, const uint last_pair, global co
                             global const float* restrict bary2, global float* restrict red,
                             global float* restrict green, global float* restrict blue) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
   const SurfaceScene scene =
@@ -99,8 +100,8 @@ static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float
 /// out  grad_texcoords  float[pair][9]  u, v of the corners, and 0
 /// out  grad_steps      float[pair][9]  of the levels of detail's q_k along x, along y, and depths; not
 ///                                      written for faces whose texture has one level
-kernel void surface_backward(const FrameParams p, const uint last_pair, const uint adds,
-                             global const uint* restrict pair_face,
+kernel void surface_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
+                             const uint adds, global const uint* restrict pair_face,
                              global const uint* restrict fragment_starts,
                              global const uint4* restrict face_colors, global const float4* restrict colors,
                              global const uint4* restrict face_texcoords,
@@ -113,7 +114,7 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, const ui
                              global float* restrict grad_colors, global float* restrict grad_texcoords,
                              global float* restrict grad_steps) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const SurfaceScene scene =
       make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
@@ -199,7 +200,7 @@ static inline void add_to_clipped_corners(const ClippedFace c, int along_y, floa
 /// in out  grad_corners  float[pair][9]  x, y (NDC) and view depth of the corners
 /// in out  grad_clip     float[pair][9]  of the homogeneous corners of clipped faces, if p.clips is set
 kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
-                                    global const uint* restrict pair_face,
+                                    global const uint* restrict pairs, global const uint* restrict pair_face,
                                     global const uint4* restrict face_texcoords,
                                     global const Texture* restrict textures,
                                     global const Triangle* restrict triangles,
@@ -207,7 +208,7 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
                                     global const float* restrict grad_steps,
                                     global float* restrict grad_corners, global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
+  if (pair >= min(last_pair, pairs[0])) return;
   const uint view_face = pair_face[pair], texture = face_texcoords[view_face % p.faces].w;
   if (texture == DPR_NO_TEXTURE || textures[texture].levels == 1) return;
   const float3 depth = vload3(2, grad_steps + 9 * pair);
@@ -236,15 +237,17 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
 /// Lists each fragment's texels: a cell, which is a texel and its neighbours to the right and
 /// below, and the parts of these. Sorted by cell, fragments are added up without atomics. One work-item per
 /// pair, up to `last_pair`. Inputs as surface_backward, and
+/// in   pair_tile   uint[pair]  view * tiles + tile
 /// in   no_cell     what stands for the cell of a fragment without texture; no texel has that number
 /// in   levels      how many of a pyramid a fragment sees at most, 1 or 2
 /// out  places      uint[1]                   how many there are: fragments times levels
 /// out  cells       uint[fragment][levels]    the first of the cell's texels
 /// out  numbers     uint[fragment][levels]    the place's own: what sorting permutes
 /// out  parts       float2[fragment][levels]  of the neighbours to the right and below
-/// out  grad_seen   float4[fragment][levels]  RGB of what is seen of the level
-kernel void surface_list(const FrameParams p, const uint last_pair, const uint no_cell, const uint levels,
-                         global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+/// out  grad_seen   float4[fragment][levels]  RGB of what is seen of the level; w has the bits of the tile
+kernel void surface_list(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
+                         const uint no_cell, const uint levels, global const uint* restrict pair_face,
+                         global const uint* restrict pair_tile, global const uint* restrict fragment_starts,
                          global const uint4* restrict face_colors, global const float4* restrict colors,
                          global const uint4* restrict face_texcoords, global const float4* restrict texcoords,
                          global const Texture* restrict textures, global const Triangle* restrict triangles,
@@ -255,8 +258,8 @@ kernel void surface_list(const FrameParams p, const uint last_pair, const uint n
                          global uint* restrict numbers, global float2* restrict parts,
                          global float4* restrict grad_seen) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= last_pair) return;
-  if (pair + 1 == last_pair) places[0] = levels * fragment_starts[last_pair];
+  if (get_group_id(0) == 0 && get_local_id(0) == 0) places[0] = levels * fragment_starts[last_pair];
+  if (pair >= min(last_pair, pairs[0])) return;
   const SurfaceScene scene =
       make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
@@ -273,7 +276,8 @@ kernel void surface_list(const FrameParams p, const uint last_pair, const uint n
       numbers[place] = place;
       cells[place] = !is_seen ? no_cell : k == 0 ? cell.x : cell.y;
       parts[place] = k == 0 ? footprint.part.xy : footprint.part.zw;
-      grad_seen[place] = (k == 0 ? 1.0f - detail.part : detail.part) * grad;
+      grad_seen[place] =
+          (float4)((k == 0 ? 1.0f - detail.part : detail.part) * grad.xyz, as_float(pair_tile[pair]));
     }
   }
 }

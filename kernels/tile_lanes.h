@@ -13,11 +13,14 @@
 #include "lanes.h"
 #include "shared_types.h"
 
-/// The pairs [x, y) of a work-item, out of those of the launch; none if x is not less.
-static inline uint2 pair_group(uint2 pairs) {
-  const uint size = DPR_WIDTH == 1 ? 1 : DPR_PAIR_GROUP;
-  const uint first = pairs.x + (uint)get_global_id(0) * size;
-  return (uint2)(first, min(first + size, pairs.y));
+/// The pairs [x, y) of a work-item, out of those in `range` that there are; none if x is not less. Where there
+/// are more than the host has launched for, groups are larger.
+static inline uint2 pair_group(uint2 range, uint pairs) {
+  const uint last = min(range.y, pairs), count = last > range.x ? last - range.x : 0;
+  const uint items = (uint)get_global_size(0), least = DPR_WIDTH == 1 ? 1 : DPR_PAIR_GROUP;
+  const uint size = max(count / items + (count % items != 0), least);
+  const uint first = range.x + (uint)get_global_id(0) * size;
+  return (uint2)(first, min(first + size, last));
 }
 
 /// Lanes of the vector at `first` that lie before `last`.

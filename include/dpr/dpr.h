@@ -31,7 +31,8 @@ typedef enum dpr_status {
   DPR_DEVICE_ERROR = 3,     /* an OpenCL call failed */
   DPR_BUILD_ERROR = 4,      /* a kernel did not compile */
   DPR_OUT_OF_MEMORY = 5,    /* of the host */
-  DPR_INTERNAL_ERROR = 6
+  DPR_INTERNAL_ERROR = 6,
+  DPR_FRAME_EMPTIED = 7 /* the call's work is enqueued, but frames before it on the device were emptied */
 } dpr_status;
 
 /* Message of the thread's last call that failed; "" before. Valid until the thread's next call that fails. */

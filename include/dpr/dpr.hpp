@@ -21,6 +21,7 @@
 #include "dpr/multi_device.hpp"
 #include "dpr/notes.hpp"
 #include "dpr/optimizer.hpp"
+#include "dpr/perturbed_pose.hpp"
 #include "dpr/photographs.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"

@@ -74,7 +74,9 @@ DPR_API dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, cons
                                                     const dpr_events* events);
 /* Frames that need no more than this are whole; until the next scene. Each count is at most 3435973832. */
 DPR_API dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room);
-/* A frame that exceeds its room is emptied. */
+/* A frame that exceeds its room is emptied. The first call that knows of such frames waits for the device to
+ * count its own, which is whole, and returns DPR_FRAME_EMPTIED: images and gradients of the emptied ones show
+ * nothing. */
 DPR_API dpr_status dpr_renderer_forward_on_device(dpr_renderer* renderer, const dpr_events* events);
 /* Frames that were emptied since the last call, and what the largest needed. Waits for the device. */
 DPR_API dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, size_t* emptied,

@@ -95,7 +95,7 @@ DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, co
 /// cameras in lit scenes then.
 DPR_API void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events = {});
 
-/// Room of frames: at most 3435973832 of each, which with the headroom of buffers are fewer than
+/// How much room frames have: at most 3435973832 of each, which with the headroom of buffers are fewer than
 /// 2^32.
 struct FrameRoom {
   std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them
@@ -115,8 +115,14 @@ DPR_API void reserve(Renderer& renderer, const FrameRoom& room);
 ///
 /// The host learns the counts from the first frame of a scene, and of another number of views, unless there
 /// is reserve(); and from whatever needs a whole frame: Renderer::image(), statistics(), frame_history(), ...
-/// That waits for the device, as do a frame in several bands and the first with noise on the pixel.
-DPR_API void forward_on_device(Renderer& renderer, const Events& events = {});
+/// That waits for the device, as do a frame in several bands and the first with noise on the pixel. Every
+/// frame's counts, 16 bytes, also follow it without a wait: the first call after they have arrived makes room
+/// for them. A program that enqueues frames faster than the device renders them has the room of earlier
+/// frames; one that lets the device finish at times loses none to growth of less than a quarter in between.
+///
+/// @return how many frames are known by now to have been emptied that no call has returned yet. Where there
+/// are any, this frame is not one of them: the call waits for the device to count it.
+DPR_API std::size_t forward_on_device(Renderer& renderer, const Events& events = {});
 
 /// Room that frames of forward_on_device() took since the last call.
 struct FrameHistory {
@@ -124,7 +130,8 @@ struct FrameHistory {
   FrameRoom largest;        ///< exceeding or not; fragments of frames whose pairs fitted
 };
 
-/// Waits for the device. Later frames have room for the largest, and a quarter more.
+/// Waits for the device. Later frames have room for the largest, and a quarter more. Emptied frames that it
+/// returns are in no later result of forward_on_device().
 DPR_API FrameHistory frame_history(Renderer& renderer);
 /// The same for kernels: four unsigned numbers, pairs, fragments, contours and frames emptied. Valid as long
 /// as the renderer.
@@ -178,7 +185,8 @@ DPR_API void set_values(AttributeImages& images, const BufferSpan& values, std::
 DPR_API void reserve(AttributeImages& images, const FrameRoom& room);
 /// AttributeImages::forward(), of the renderer's scene as it is now, wherever its parts have come from. The
 /// first, and one after a change of the scene, views, smoothing or request by the host, waits to follow it.
-DPR_API void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events = {});
+DPR_API std::size_t forward_on_device(AttributeImages& images, const Renderer& renderer,
+                                      const Events& events = {});
 DPR_API FrameHistory frame_history(AttributeImages& images);
 /// The images, float4 [group][view][height][width]: RGB, and A. Valid until the next forward pass.
 DPR_API BufferView image_view(const AttributeImages& images);

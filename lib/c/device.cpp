@@ -2,7 +2,9 @@
 #include "c/handles.hpp"
 #include "dpr/opencl_handles.hpp"
 
-using namespace dpr::c;
+using dpr::c::deref;
+using dpr::c::give;
+using dpr::c::guarded;
 
 dpr_status dpr_device_open(const char* selector, dpr_device** device) {
   return guarded([&] {
@@ -33,7 +35,7 @@ dpr_status dpr_device_describe(std::size_t index, dpr_device_info* info) {
     found.compute_units = kept.compute_units;
     found.lanes = kept.lanes;
     found.is_default = kept.is_default ? 1 : 0;
-    fill(info, found, "info");
+    dpr::c::fill(info, found, "info");
   });
 }
 
@@ -51,4 +53,4 @@ dpr_status dpr_device_name(const dpr_device* device, const char** name) {
   return guarded([&] { deref(name, "name") = deref(device, "device").device.info().name.c_str(); });
 }
 
-void dpr_device_destroy(dpr_device* device) { destroy(device); }
+void dpr_device_destroy(dpr_device* device) { dpr::c::destroy(device); }

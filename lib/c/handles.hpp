@@ -87,6 +87,14 @@ class QuietFloats {
   std::fenv_t callers_;
 };
 
+/// Work was enqueued, and earlier frames are known by now to have been emptied.
+struct FramesEmptied : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws FramesEmptied if there are any.
+void require_none_emptied(std::size_t frames);
+
 /// Runs a function's body; what it throws becomes a status.
 template <class Body>
 dpr_status guarded(const Body& body) noexcept {

@@ -59,9 +59,17 @@ void forget_handle(const void* handle, const char* kind) {
   handles().kinds.erase(found(handles(), handle, kind, kind));
 }
 
+void require_none_emptied(std::size_t frames) {
+  if (frames == 0) return;
+  throw FramesEmptied("frames on the device: " + std::to_string(frames) +
+                      " needed more room than they had and were emptied; this one has it");
+}
+
 dpr_status status_of_exception() noexcept {
   try {
     throw;
+  } catch (const FramesEmptied& emptied) {
+    return fail(DPR_FRAME_EMPTIED, emptied.what());
   } catch (const InvalidArgument& error) {
     return fail(DPR_INVALID_ARGUMENT, error.what());
   } catch (const IoError& error) {

@@ -218,6 +218,19 @@ class PendingRead {
     return value_;
   }
 
+  /// Whether take_arrived() may be called. Does not block.
+  bool has_arrived() const {
+    return is_started() && arrived_.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>() <= CL_COMPLETE;
+  }
+
+  /// Does not block. Throws DeviceError for a read that failed, which is then as if it had not been started.
+  T take_arrived() {
+    device_ = nullptr;
+    check_cl(std::min(arrived_.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>(), CL_COMPLETE),
+             "clEnqueueReadBuffer");
+    return value_;
+  }
+
  private:
   Device::Impl* device_ = nullptr;
   cl::Event arrived_;

@@ -246,11 +246,13 @@ Device open_found(const FoundDevice& found) {
 /// Builds and runs a small kernel. Throws DeviceError or BuildError where that fails, or gives what is wrong.
 void try_out(const Device& device) {
   constexpr std::array<cl_uint, 4> k_values{1, 20, 300, 4000};
+  constexpr std::array<cl_uint, 1> k_count{k_values.size()};
   Launcher<kernel::scan_sum> launch(device.impl());
-  const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values));
+  const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values)),
+      count(device.impl(), std::span<const cl_uint>(k_count));
   Buffer<cl_uint> sums(device.impl(), 1);
-  launch.in_groups(
-      1, kernel::scan_sum{.count = static_cast<cl_uint>(k_values.size()), .values = values, .sums = sums});
+  launch.in_groups(1,
+                   kernel::scan_sum{.count = k_count[0], .present = count, .values = values, .sums = sums});
   if (sums.download()[0] != 4321)
     throw DeviceError(CL_INVALID_KERNEL, "a first kernel, which gives a wrong sum");
 }

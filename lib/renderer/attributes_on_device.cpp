@@ -29,11 +29,12 @@ void reserve(AttributeImages& images, const FrameRoom& room) {
   if (m.renderer.impl().geometry) m.renderer.impl().reserve(*m.room);
 }
 
-void forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
+std::size_t forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
   AttributeImages::Impl& m = images.impl();
   require_same_device(m.renderer.device(), renderer.device(), "forward_on_device");
   renderer.impl().require_rendered("forward_on_device");
   enqueue(device_of(images), events, [&] { m.forward(renderer.impl(), FrameSizes::kept); });
+  return m.renderer.impl().take_emptied();
 }
 
 FrameHistory frame_history(AttributeImages& images) {

@@ -24,10 +24,6 @@ std::size_t fragment_bytes(const Geometry& geometry) {
   return k_always + (geometry.textures.empty() ? 0 : Shade::k_textured_fragment_bytes);
 }
 
-FrameCounts larger(const FrameCounts& a, const FrameCounts& b) {
-  return {std::max(a.pairs, b.pairs), std::max(a.fragments, b.fragments), std::max(a.contours, b.contours)};
-}
-
 }  // namespace
 
 std::uint64_t next_frame_number() {
@@ -72,11 +68,14 @@ void Renderer::Impl::forward(FrameSizes sizes) {
   hide_back_faces();
   set_up();
   capacity.reset();
-  capacity = expected_capacity();
+  const FrameNote note = sizes == FrameSizes::kept ? learn() : FrameNote();
+  if (note.emptied == 0) capacity = expected_capacity();
   if (capacity) {
     forward_within(*capacity, sizes);
   } else {
+    const FrameCounts before = last_counts.value_or(FrameCounts());
     forward_measured();
+    if (sizes == FrameSizes::kept) expect(before);
   }
   rendered = true;
   frame_number = next_frame_number();
@@ -132,11 +131,22 @@ void Renderer::Impl::set_up() {
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts && !reserved) return std::nullopt;
   const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
-  const FrameCounts expected{with_headroom(counts.pairs), with_headroom(counts.fragments),
-                             with_headroom(counts.contours)};
+  const FrameCounts expected{std::min(with_headroom(counts.pairs), k_most_pairs),
+                             with_headroom(counts.fragments), with_headroom(counts.contours)};
   if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= device.memory_budget())
     return std::nullopt;
   return expected;
+}
+
+/// What kernels are launched for: not more than the room, and a quarter more than the last frame took that is
+/// known.
+FrameCounts Renderer::Impl::likely_counts(const FrameCounts& room) const {
+  if (!known_counts) return room;
+  const auto likely = [](std::size_t known, std::size_t most) {
+    return std::min(with_headroom(known) + 1, most);
+  };
+  return {likely(known_counts->pairs, room.pairs), likely(known_counts->fragments, room.fragments),
+          likely(known_counts->contours, room.contours)};
 }
 
 ContourInputs Renderer::Impl::contour_inputs() const {
@@ -155,7 +165,7 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
   if (!pixel_noise) return;
   Contour& contour = pixel_noise->contour;
   if (expected) {
-    contour.forward_within(contour_inputs(), expected->contours);
+    contour.forward_within(contour_inputs(), expected->contours, likely_counts(*expected).contours);
   } else {
     contour.forward(contour_inputs());
   }
@@ -169,14 +179,16 @@ void Renderer::Impl::finish_image() {
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {
+  const FrameCounts likely = likely_counts(expected);
   find_contours(expected);
-  bin.forward(frame, setup, expected.pairs);
+  bin.forward(frame, setup, expected.pairs, likely.pairs);
   std::optional<ContourCount> contours;
   if (pixel_noise) {
     Contour& contour = pixel_noise->contour;
     contours.emplace(contour.pair_starts.size() - 1, contour.pair_starts);
   }
-  rasterize.forward_within(expected, frame, setup.triangles, bin, contours, sizes == FrameSizes::read);
+  rasterize.forward_within(expected, likely.fragments, frame, setup.triangles, bin, contours,
+                           sizes == FrameSizes::read);
   bands = {*rasterize.band};
   shade_and_aggregate();
   finish_image();
@@ -193,6 +205,24 @@ void Renderer::Impl::forward_measured() {
   if (bands.size() > 1) return;
   last_counts = rasterize.counted();
   if (pixel_noise) last_counts->contours = pixel_noise->contour.pairs;
+  known_counts = last_counts;
+}
+
+/// What has arrived of earlier frames' counts, without waiting. Those of a scene before count for nothing.
+FrameNote Renderer::Impl::learn() {
+  if (!last_counts) rasterize.disown_notes();
+  const FrameNote note = rasterize.poll_notes();
+  if (reserved && !last_counts) last_counts.emplace();  // from here on notes are this scene's
+  // Buffers are kept while most of their headroom is left.
+  const auto with_least_room = [](std::size_t count) { return count + count * 3 / 16; };
+  const FrameCounts& found = note.counts;
+  const FrameCounts wanted{with_least_room(found.pairs), with_least_room(found.fragments),
+                           with_least_room(found.contours)};
+  const std::optional<FrameCounts> room = expected_capacity();
+  if (!room || !wanted.fit(*room)) expect(found);
+  if (found.pairs > 0) known_counts = found;
+  found_emptied_ += note.emptied;
+  return note;
 }
 
 void Renderer::Impl::reserve(const FrameCounts& counts) {
@@ -214,7 +244,7 @@ void Renderer::Impl::settle() {
     bands = {rasterize.settle(frame, found)};
     shade.settle(found.fragments);
     occupancy.settle(found.fragments);
-    last_counts = found;
+    known_counts = last_counts = found;
     if (pixel_noise) pixel_noise->contour.settle(found.contours);
     return;
   }
@@ -255,7 +285,7 @@ void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images)
   enqueue_backward(grad_images);
   if (!gradient_map) gradient_map = make_gradient_map();
   made_exchange().map(*gradient_map, gradient_sums_, grad_numbers);
-  if (wants(ArrayId::materials)) join_material_gradients();
+  if (wants_materials()) join_material_gradients();
   device_gradient_frame = frame_number;
 }
 

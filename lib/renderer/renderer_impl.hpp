@@ -5,11 +5,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dpr/renderer.hpp"
 #include "renderer/gradient_map.hpp"
-#include "renderer/mesh_arrays.hpp"
 #include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
@@ -67,12 +67,6 @@ enum class FrameSizes { read, kept };
 
 class RowReads;
 
-/// Elements of a buffer.
-struct DeviceGradient {
-  const Buffer<cl_float4>& values;
-  std::size_t first, count;
-};
-
 /// Rows that are on the way between the host's three floats and the device's four at a time: 2 MiB of these.
 inline constexpr std::size_t k_rows_of_piece = std::size_t{1} << 17;
 
@@ -89,10 +83,20 @@ struct Renderer::Impl : OnDevice, ViewSet {
                  const std::optional<Lights>& lights);
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_cull(Cull cull) noexcept;
-  void set(const ArrayRef& at, const ArrayValues& values);
+  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
+  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
+  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
+  void set_normals(std::size_t mesh, std::span<const glm::vec3> normals);
+  void set_materials(std::size_t mesh, std::span<const Material> materials);
   void set_lights(const std::optional<Lights>& lights);
-  /// An array of `count` elements from the device, in place: the host's copy stays what it was.
-  void take(const ArrayRef& at, std::size_t count, const FloatVectors& from);
+  /// The same from the device, in place, for whom the host's copies stay what they were.
+  void take_positions(std::size_t mesh, const FloatVectors& from);
+  void take_colors(std::size_t mesh, const FloatVectors& from);
+  void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
+  void take_texcoords(std::size_t mesh, const FloatVectors& from);
+  void take_normals(std::size_t mesh, const FloatVectors& from);
+  void take_materials(std::size_t mesh, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
@@ -104,7 +108,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   }
   void set(SmoothingSetting&& prepared) noexcept;
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else
-  /// blocks to read the sizes to allocate.
+  /// blocks to read the sizes to allocate, as it does where sizes are kept and an earlier frame turns out to
+  /// have been emptied.
   void forward(FrameSizes sizes = FrameSizes::read);
   SceneGradient backward(const BufferRef<cl_float4>& grad_images, const AddToGradient& add_to_positions = {});
   /// Its two halves: what the device does, and what the host reads of it.
@@ -117,6 +122,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
   void expect(const FrameCounts& counts);
+  /// Frames of kept sizes that forward() has found emptied since the last call.
+  std::size_t take_emptied() { return std::exchange(found_emptied_, 0); }
   /// Fills `aov` for the last frame, if it does not hold that already, emptied or not.
   void render_aov();
   /// The device alone knows where the mesh's vertices are.
@@ -138,10 +145,11 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Scene scene;
   bool has_moved = true;  // vertices have, since the edges were joined; or which of them the frame reads
   bool rendered = false;  // the stages hold the frame of the current scene, or it is on the way
-  std::optional<FrameCounts> capacity;     // of the last frame, until it is known to fit
-  std::optional<FrameCounts> last_counts;  // of a frame like the next one; none: nothing is to be expected
-  std::optional<FrameCounts> reserved;     // by the caller
-  std::uint64_t frame_number = 0;          // which frame that is, among all renderers'
+  std::optional<FrameCounts> capacity;      // of the last frame, until it is known to fit
+  std::optional<FrameCounts> last_counts;   // of a frame like the next one; none: nothing is to be expected
+  std::optional<FrameCounts> reserved;      // by the caller
+  std::optional<FrameCounts> known_counts;  // of the last frame whose counts are known: what to launch for
+  std::uint64_t frame_number = 0;           // which frame that is, among all renderers'
 
   float hidden_reach = 0;  // normalised depth behind a triangle from where on nothing is seen; or infinite
 
@@ -183,19 +191,17 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Exchange& made_exchange();
   /// The gradient of zero sums: all arrays of the last backward pass but those of vertices, colours, texels.
   SceneGradient empty_gradient() const;
-  /// True if the gradient of the meshes' arrays is asked for, and a mesh has one.
-  bool wants(ArrayId id) const;
-  /// Place of a row's gradient after the last backward pass: of a mesh's array, of one of its textures, or of all
-  /// views' own shapes. None: not asked for, or not there.
-  std::optional<DeviceGradient> mesh_gradient(const GradientRow& row, std::size_t mesh,
-                                              std::size_t texture = 0);
+  bool wants_colors() const;
+  bool wants_texcoords() const;
+  bool wants_normals() const;
+  bool wants_materials() const;
 
  private:
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
-  template <class Element>
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const Element> elements);
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> vectors);
   Buffer<cl_float4>& spare_for(const Buffer<cl_float4>& buffer);
 
   ShadeInputs shade_inputs() const {
@@ -210,6 +216,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void hide_back_faces();
   void set_up();
   std::optional<FrameCounts> expected_capacity() const;
+  FrameCounts likely_counts(const FrameCounts& room) const;
+  FrameNote learn();
   void forward_within(const FrameCounts& expected, FrameSizes sizes);
   void forward_measured();
   void settle();
@@ -224,13 +232,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
-  void read_mesh_gradients(SceneGradient& gradient, RowReads& rows);
+  void add_sums(std::span<const Summation> all);
+  void read_mesh_gradients(SceneGradient& gradient, RowReads& rows) const;
   /// Adds what was summed to the gradients of the meshes' arrays.
   SceneGradient finish_summed_gradients(std::span<const float> sums, SceneGradient gradient = {}) const;
   GradientMap make_gradient_map() const;
   /// From sums by channel to `grad_materials`.
   void join_material_gradients();
 
+  std::size_t found_emptied_ = 0;
   Buffer<float> hidden_;  // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;
 

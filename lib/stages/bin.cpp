@@ -1,5 +1,7 @@
 #include "stages/bin.hpp"
 
+#include <algorithm>
+
 namespace dpr {
 
 void Bin::start() { scan_(pair_starts.size() - 1, pair_starts); }
@@ -8,12 +10,13 @@ void Bin::forward(const shared::FrameParams& p, const Setup& setup) {
   const std::size_t faces = pair_starts.size() - 1;
   const std::size_t found =
       read_total(pair_starts, faces, "pairs of tiles and triangles (frame)", k_most_pairs);
-  list(p, setup, found);
+  list(p, setup, found, found);
   settle(found);
 }
 
-void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
-  list(p, setup, capacity);
+void Bin::forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity,
+                  std::size_t likely) {
+  list(p, setup, capacity, likely);
 }
 
 void Bin::settle(std::size_t known_pairs) {
@@ -22,8 +25,9 @@ void Bin::settle(std::size_t known_pairs) {
     buffer->settle(known_pairs);
 }
 
-void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity) {
+void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity, std::size_t likely) {
   pairs = capacity;
+  launched = std::min(capacity, likely);
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
     buffer->resize(device_, Length::at_most(pairs));
@@ -37,12 +41,11 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
                                                    .place_tile = pair_tile,
                                                    .places = places});
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
-  launch_(pairs, kernel::bin_link{.capacity = n,
-                                  .pairs = pair_count,
-                                  .places = places,
-                                  .place_owner = place_face,
-                                  .pair_owner = pair_face,
-                                  .owner_pairs = face_pairs});
+  launch_(launched, kernel::bin_link{.pairs = pair_count,
+                                     .places = places,
+                                     .place_owner = place_face,
+                                     .pair_owner = pair_face,
+                                     .owner_pairs = face_pairs});
 }
 
 std::size_t Bin::bytes() const {

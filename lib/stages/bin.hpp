@@ -24,11 +24,13 @@ class Bin {
   /// Blocks to read the number of pairs.
   void forward(const shared::FrameParams& p, const Setup& setup);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
-  void forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
+  /// Kernels are launched for as many as are likely.
+  void forward(const shared::FrameParams& p, const Setup& setup, std::size_t capacity, std::size_t likely);
   /// Says how many pairs there are, after a forward() that did not wait for it.
   void settle(std::size_t known_pairs);
 
   std::size_t pairs = 0;        ///< or the capacity, until the number is known
+  std::size_t launched = 0;     ///< work-items for all of them, which take several each where there are more
   Buffer<cl_uint> pair_count;   ///< [1] how many there are, 0 where they do not fit
   Buffer<cl_uint> pair_face;    ///< [pair] view * faces + face
   Buffer<cl_uint> pair_tile;    ///< [pair] view * tiles + tile
@@ -41,7 +43,7 @@ class Bin {
   std::size_t bytes() const;
 
  private:
-  void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity);
+  void list(const shared::FrameParams& p, const Setup& setup, std::size_t capacity, std::size_t likely);
 
   Device::Impl& device_;
   Launcher<kernel::bin_fill, kernel::bin_link> launch_;

@@ -40,6 +40,7 @@ void Clip::fragments(const shared::FrameParams& p, const Buffer<shared::Triangle
   const Range pairs = rasterize.pairs(bin);
   (*launch_)(pairs, kernel::clip_fragments{.p = p,
                                            .last_pair = pairs.last(),
+                                           .pairs = bin.pair_count,
                                            .clipped = faces,
                                            .triangles = triangles,
                                            .pair_face = bin.pair_face,
@@ -58,6 +59,7 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
   (*launch_)(pairs, kernel::clip_backward{.p = p,
                                           .last_pair = pairs.last(),
+                                          .pairs = bin.pair_count,
                                           .views = views_->cameras,
                                           .clipped = faces,
                                           .triangles = triangles,

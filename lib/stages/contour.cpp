@@ -1,5 +1,6 @@
 #include "stages/contour.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace dpr {
@@ -27,13 +28,13 @@ constexpr const char* k_pairs = "pairs of tiles and contours (frame)";
 void Contour::forward(const ContourInputs& in) {
   count(in);
   const std::size_t found = read_total(pair_starts, view_edges(in), k_pairs);
-  list(in, found);
+  list(in, found, found);
   settle(found);
 }
 
-void Contour::forward_within(const ContourInputs& in, std::size_t capacity) {
+void Contour::forward_within(const ContourInputs& in, std::size_t capacity, std::size_t likely) {
   count(in);
-  list(in, capacity);
+  list(in, capacity, likely);
 }
 
 std::size_t Contour::read_count() const { return read_total(pair_starts, pair_starts.size() - 1, k_pairs); }
@@ -64,8 +65,9 @@ void Contour::count(const ContourInputs& in) {
   scan_(view_edges(in), pair_starts);
 }
 
-void Contour::list(const ContourInputs& in, std::size_t capacity) {
+void Contour::list(const ContourInputs& in, std::size_t capacity, std::size_t likely) {
   pairs = capacity;
+  launched = std::min(capacity, likely);
   pair_count.resize(device_, 1);
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
     buffer->resize(device_, Length::at_most(pairs));
@@ -93,30 +95,29 @@ void Contour::list(const ContourInputs& in, std::size_t capacity) {
                                .places = places_});
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
-  launch_(pairs, kernel::bin_link{.capacity = to_uint(capacity),
-                                  .pairs = pair_count,
-                                  .places = places_,
-                                  .place_owner = place_contour_,
-                                  .pair_owner = pair_contour,
-                                  .owner_pairs = edge_pairs_});
+  launch_(launched, kernel::bin_link{.pairs = pair_count,
+                                     .places = places_,
+                                     .place_owner = place_contour_,
+                                     .pair_owner = pair_contour,
+                                     .owner_pairs = edge_pairs_});
 }
 
 void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
                      Buffer<cl_float4>& grad_clip) {
   const Incidence& corners = in.geometry.vertex_corners;
-  launch_(2 * pairs, kernel::contour_gather{.p = in.p,
-                                            .c = params(in),
-                                            .pairs = pair_count,
-                                            .pair_contour = pair_contour,
-                                            .pair_starts = pair_starts,
-                                            .edge_pairs = edge_pairs_,
-                                            .edges = in.edges.edges,
-                                            .faces = in.geometry.face_vertices,
-                                            .face_edges = in.edges.face_edges,
-                                            .corner_starts = corners.starts,
-                                            .corners = corners.corners,
-                                            .grad_ends = grad_ends,
-                                            .grad_ndc = grad_ndc});
+  launch_(2 * launched, kernel::contour_gather{.p = in.p,
+                                               .c = params(in),
+                                               .pairs = pair_count,
+                                               .pair_contour = pair_contour,
+                                               .pair_starts = pair_starts,
+                                               .edge_pairs = edge_pairs_,
+                                               .edges = in.edges.edges,
+                                               .faces = in.geometry.face_vertices,
+                                               .face_edges = in.edges.face_edges,
+                                               .corner_starts = corners.starts,
+                                               .corners = corners.corners,
+                                               .grad_ends = grad_ends,
+                                               .grad_ndc = grad_ndc});
   if (in.p.clips == 0) return;
   launch_(std::size_t{in.p.views} * in.p.vertices,
           kernel::contour_gather_cuts{.p = in.p,

@@ -36,7 +36,8 @@ class Contour {
   /// Blocks to read the number of pairs.
   void forward(const ContourInputs& in);
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
-  void forward_within(const ContourInputs& in, std::size_t capacity);
+  /// Kernels are launched for as many as are likely.
+  void forward_within(const ContourInputs& in, std::size_t capacity, std::size_t likely);
   /// How many there are, after forward_within(). Blocks.
   std::size_t read_count() const;
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
@@ -47,6 +48,7 @@ class Contour {
               Buffer<cl_float4>& grad_clip);
 
   std::size_t pairs = 0;         ///< or the capacity, until the number is known
+  std::size_t launched = 0;      ///< work-items for all of them, which take several each where there are more
   Buffer<cl_uint> pair_count;    ///< [1] how many there are, 0 where they do not fit
   Buffer<cl_uint> pair_starts;   ///< [view * edge + 1] runs of the edges' pairs
   Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
@@ -57,7 +59,7 @@ class Contour {
 
  private:
   void count(const ContourInputs& in);
-  void list(const ContourInputs& in, std::size_t capacity);
+  void list(const ContourInputs& in, std::size_t capacity, std::size_t likely);
 
   Device::Impl& device_;
   Launcher<kernel::contour_count, kernel::contour_fill, kernel::bin_link, kernel::contour_gather,

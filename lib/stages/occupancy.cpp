@@ -57,7 +57,7 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
   const Range pairs = rasterize.pairs(bin);
   if (now_.kernels->exact) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    (*now_.kernels->exact)((rasterize.fragments + width - 1) / width,
+    (*now_.kernels->exact)((rasterize.launched_fragments() + width - 1) / width,
                            kernel::occupancy_forward{.p = params(p),
                                                      .last_pair = pairs.last(),
                                                      .fragment_starts = rasterize.fragment_starts,
@@ -67,7 +67,8 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
   } else {
     (*now_.kernels->sampled)(pairs,
                              kernel::occupancy_sampled_forward{.p = params(p),
-                                                               .pairs = pairs.last(),
+                                                               .last_pair = pairs.last(),
+                                                               .pairs = bin.pair_count,
                                                                .pair_face = bin.pair_face,
                                                                .fragment_starts = rasterize.fragment_starts,
                                                                .pixels = rasterize.fragment_pixel,
@@ -86,7 +87,8 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
     const PairGroups groups = rasterize.pair_groups(bin);
     (*now_.kernels->exact)(groups.count,
                            kernel::occupancy_backward{.p = params(p),
-                                                      .pairs = groups.pairs,
+                                                      .range = groups.pairs,
+                                                      .pairs = bin.pair_count,
                                                       .fragment_starts = rasterize.fragment_starts,
                                                       .distance = rasterize.distance,
                                                       .grad_log_occupancy = grad_log_occupancy,
@@ -95,7 +97,8 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
   } else {
     (*now_.kernels->sampled)(pairs,
                              kernel::occupancy_sampled_backward{.p = params(p),
-                                                                .pairs = pairs.last(),
+                                                                .last_pair = pairs.last(),
+                                                                .pairs = bin.pair_count,
                                                                 .pair_face = bin.pair_face,
                                                                 .fragment_starts = rasterize.fragment_starts,
                                                                 .pixels = rasterize.fragment_pixel,

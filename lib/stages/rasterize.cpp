@@ -1,5 +1,6 @@
 #include "stages/rasterize.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace dpr {
@@ -44,10 +45,10 @@ Band make_band(const shared::FrameParams& p, const Start& first, const Start& la
 
 }  // namespace
 
-PairGroups::PairGroups(const Device::Impl& device, const Range& of)
+PairGroups::PairGroups(const Device::Impl& device, const Range& of, std::size_t launched)
     : pairs{{static_cast<cl_uint>(of.first), of.last()}} {
   const std::size_t size = device.info.lanes == 1 ? 1 : DPR_PAIR_GROUP;
-  count = (of.count + size - 1) / size;
+  count = (std::min(of.count, launched) + size - 1) / size;
 }
 
 void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
@@ -56,14 +57,13 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
   const std::size_t pixels = pixels_of(p);
   masks.resize(device_, length(pairs));
   fragment_starts.resize(device_, length(std::size_t{pairs} + 1));
-  launch_(pairs, kernel::rasterize_cover{.p = p,
-                                         .capacity = pairs,
-                                         .pairs = bin.pair_count,
-                                         .triangles = triangles,
-                                         .pair_face = bin.pair_face,
-                                         .pair_tile = bin.pair_tile,
-                                         .masks = masks,
-                                         .counts = fragment_starts});
+  launch_(bin.launched, kernel::rasterize_cover{.p = p,
+                                                .pairs = bin.pair_count,
+                                                .triangles = triangles,
+                                                .pair_face = bin.pair_face,
+                                                .pair_tile = bin.pair_tile,
+                                                .masks = masks,
+                                                .counts = fragment_starts});
   if (clip != nullptr) clip->cover(p, triangles, bin, masks, fragment_starts);
   if (hiding) {
     launch_.in_groups(tiles_of(p), kernel::rasterize_hide{.p = p,
@@ -77,7 +77,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
                                                           .counts = fragment_starts,
                                                           .face_pairs = bin.face_pairs});
   }
-  scan_(pairs, fragment_starts);
+  scan_(pairs, bin.pair_count, fragment_starts);
   pixel_starts.resize(device_, pixels + 1);
   launch_(tiles_of(p) * shares_of_tile(device_),
           kernel::rasterize_count{
@@ -104,7 +104,7 @@ void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangl
     row_starts_.push_back({row_starts_.size() * p.tiles_x, row.s[0], row.s[1]});
   }
   check_total(row_starts_.back().fragment, "fragments (frame)");
-  frame_fragments = row_starts_.back().fragment;
+  frame_fragments = likely_fragments_ = row_starts_.back().fragment;
 }
 
 FrameCounts Rasterize::counted() const { return {row_starts_.back().pair, row_starts_.back().fragment}; }
@@ -210,9 +210,10 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
                                           .fragment_starts = fragment_starts,
                                           .pixel_starts = pixel_starts,
                                           .lists = list});
-  const PairGroups groups(device_, next.pairs);
+  const PairGroups groups(device_, next.pairs, bin.launched);
   launch_(groups.count, kernel::rasterize_forward{.p = p,
-                                                  .pairs = groups.pairs,
+                                                  .range = groups.pairs,
+                                                  .pairs = bin.pair_count,
                                                   .triangles = triangles,
                                                   .pair_face = bin.pair_face,
                                                   .pair_tile = bin.pair_tile,
@@ -232,11 +233,12 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
   forward(p, triangles, bin, whole_frame(p, counted()));
 }
 
-void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
-                               const Buffer<shared::Triangle>& triangles, Bin& bin,
-                               const std::optional<ContourCount>& contours, bool reads) {
+void Rasterize::forward_within(const FrameCounts& capacity, std::size_t likely_fragments,
+                               const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                               Bin& bin, const std::optional<ContourCount>& contours, bool reads) {
   const ContourCount contour_count = contours ? *contours : no_contours(bin);
   counted_ = false;
+  likely_fragments_ = likely_fragments;
   count(p, triangles, bin, contour_count);
   const std::size_t last_row = device_rows_.size() - 1;
   const cl_uint4 limits{{to_uint(bin.pairs), to_uint(capacity.fragments), to_uint(capacity.contours), 0}};
@@ -249,6 +251,8 @@ void Rasterize::forward_within(const FrameCounts& capacity, const shared::FrameP
         1,
         kernel::rasterize_note{
             .capacity = limits, .last_row = to_uint(last_row), .rows = device_rows_, .history = history()});
+    if (notes_under_way_ < notes_.size())
+      notes_[(oldest_note_ + notes_under_way_++) % notes_.size()].start(history_, 1);
   }
   launch_(device_.local_size() * device_.info.compute_units,
           kernel::rasterize_fit{.capacity = limits,
@@ -272,14 +276,38 @@ FrameCounts Rasterize::read_counts() {
 
 Buffer<cl_uint4>& Rasterize::history() {
   if (history_.size() == 0) {
-    Buffer<cl_uint4> zero(device_, 1);
+    Buffer<cl_uint4> zero(device_, 2);
     zero.fill(cl_uint4{});
     history_ = std::move(zero);
   }
   return history_;
 }
 
-void Rasterize::forget_history() { history_.fill(cl_uint4{}); }
+PendingRead<cl_uint4>& Rasterize::next_note() {
+  PendingRead<cl_uint4>& note = notes_[oldest_note_];
+  oldest_note_ = (oldest_note_ + 1) % notes_.size();
+  --notes_under_way_;
+  return note;
+}
+
+void Rasterize::forget_history() {
+  while (notes_under_way_ > 0) next_note().take();
+  noted_emptied_ = 0;
+  disowned_notes_ = 0;
+  history_.fill(cl_uint4{});
+}
+
+FrameNote Rasterize::poll_notes() {
+  FrameNote note;
+  while (notes_under_way_ > 0 && notes_[oldest_note_].has_arrived()) {
+    const bool is_own = disowned_notes_ == 0;
+    if (!is_own) --disowned_notes_;
+    const cl_uint4 found = next_note().take_arrived();
+    note.emptied += found.s[3] - std::exchange(noted_emptied_, found.s[3]);
+    if (is_own) note.counts = larger(note.counts, {found.s[0], found.s[1], found.s[2]});
+  }
+  return note;
+}
 
 Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) {
   band = whole_frame(p, counts);
@@ -297,18 +325,20 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
                          const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range range = pairs(bin);
   grad_corners.resize(device_, Length::varying(std::size_t{9} * bin.pairs));
-  launch_(range, kernel::rasterize_backward{.p = p,
-                                            .last_pair = range.last(),
-                                            .triangles = triangles,
-                                            .pair_face = bin.pair_face,
-                                            .fragment_starts = fragment_starts,
-                                            .pixels = fragment_pixel,
-                                            .distance = distance,
-                                            .grad_distance = grad_distance,
-                                            .grad_depth = grad_depth,
-                                            .grad_bary1 = grad_bary1,
-                                            .grad_bary2 = grad_bary2,
-                                            .grad_corners = grad_corners});
+  const Range launched(range.first, std::min(range.count, bin.launched));
+  launch_(launched, kernel::rasterize_backward{.p = p,
+                                               .last_pair = range.last(),
+                                               .pairs = bin.pair_count,
+                                               .triangles = triangles,
+                                               .pair_face = bin.pair_face,
+                                               .fragment_starts = fragment_starts,
+                                               .pixels = fragment_pixel,
+                                               .distance = distance,
+                                               .grad_distance = grad_distance,
+                                               .grad_depth = grad_depth,
+                                               .grad_bary1 = grad_bary1,
+                                               .grad_bary2 = grad_bary2,
+                                               .grad_corners = grad_corners});
   if (clip != nullptr)
     clip->backward(p, triangles, bin, *this, grad_distance, grad_depth, grad_bary1, grad_bary2);
 }

@@ -2,6 +2,8 @@
 // own.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -21,6 +23,16 @@ struct FrameCounts {
   bool fit(const FrameCounts& capacity) const {
     return pairs <= capacity.pairs && fragments <= capacity.fragments && contours <= capacity.contours;
   }
+};
+
+inline FrameCounts larger(const FrameCounts& a, const FrameCounts& b) {
+  return {std::max(a.pairs, b.pairs), std::max(a.fragments, b.fragments), std::max(a.contours, b.contours)};
+}
+
+/// What the device noted of frames that the host does not wait for.
+struct FrameNote {
+  FrameCounts counts;       ///< the most of any; of fragments only where the pairs fitted
+  std::size_t emptied = 0;  ///< frames up to the last of them that are in no note before
 };
 
 /// Contours' pairs of a frame, as far as they have to fit: starts[last] is how many there are.
@@ -53,7 +65,8 @@ struct Band {
 
 /// The launch of a kernel that handles pairs in groups (kernels/tile_lanes.h).
 struct PairGroups {
-  PairGroups(const Device::Impl& device, const Range& of);
+  /// For as many pairs as Bin::launched says.
+  PairGroups(const Device::Impl& device, const Range& of, std::size_t launched);
 
   cl_uint2 pairs;     ///< the first, and the one behind the last
   std::size_t count;  ///< work-items
@@ -69,15 +82,21 @@ class Rasterize {
   /// anything exceeds the capacity the frame is emptied, with the lists of faces' and contours' pairs;
   /// read_counts() returns the true counts, so that the caller can retry. `reads`: they are on their way to
   /// the host at once; else only history() takes part.
-  void forward_within(const FrameCounts& capacity, const shared::FrameParams& p,
+  /// Kernels are launched for `likely_fragments`.
+  void forward_within(const FrameCounts& capacity, std::size_t likely_fragments, const shared::FrameParams& p,
                       const Buffer<shared::Triangle>& triangles, Bin& bin,
                       const std::optional<ContourCount>& contours, bool reads);
   /// Counts of forward_within(). Blocks until the device has counted and, where it did not read, rendered.
   FrameCounts read_counts();
-  /// [1] of the frames that forward_within() did not read: the most pairs, fragments and contours' pairs, and
-  /// how many were emptied. All 0 at first, and after forget_history().
+  /// [2] of the frames that forward_within() did not read: the most pairs, fragments and contours' pairs of
+  /// any, and those of the last; and, of both, how many frames were emptied. All 0 at first, and after
+  /// forget_history().
   Buffer<cl_uint4>& history();
   void forget_history();
+  /// The history after those frames, as far as it has arrived. Does not block.
+  FrameNote poll_notes();
+  /// The counts of the notes that are on the way are those of another scene.
+  void disown_notes() { disowned_notes_ = notes_under_way_; }
   /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
   /// the band whose fragments these are.
   Band settle(const shared::FrameParams& p, const FrameCounts& counts);
@@ -102,7 +121,10 @@ class Rasterize {
   std::vector<Range> pixels(const shared::FrameParams& p) const;
   Range tiles(const shared::FrameParams& p) const;
 
-  PairGroups pair_groups(const Bin& bin) const { return PairGroups(device_, pairs(bin)); }
+  PairGroups pair_groups(const Bin& bin) const { return PairGroups(device_, pairs(bin), bin.launched); }
+
+  /// Fragments to launch for, by kernels that take more where there are more.
+  std::size_t launched_fragments() const { return std::min(fragments, likely_fragments_); }
 
   /// Length of the buffers that later stages hold of every fragment.
   Length fragment_length() const { return length(fragments); }
@@ -132,6 +154,8 @@ class Rasterize {
     std::size_t tile, pair, fragment;
   };
 
+  /// The oldest of those under way, which it no longer is.
+  PendingRead<cl_uint4>& next_note();
   /// The tiles of a row.
   std::vector<TileStart> tile_starts(const shared::FrameParams& p, const Bin& bin, std::size_t row) const;
   void rebase(const Band& next);
@@ -149,6 +173,10 @@ class Rasterize {
   Scan scan_;
   Buffer<cl_uint4> device_rows_, history_;
   PendingRead<cl_uint4> last_row_;
+  std::array<PendingRead<cl_uint4>, 8> notes_;  // a ring; frames beyond are in the next note
+  std::size_t oldest_note_ = 0, notes_under_way_ = 0, disowned_notes_ = 0;
+  cl_uint noted_emptied_ = 0;  // frames, in the notes so far
+  std::size_t likely_fragments_ = 0;
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
   bool counted_ = true;                // the counts are the frame's, not the capacity
   bool in_bands_ = false;              // the starts above are a band's, those below the frame's

@@ -17,16 +17,22 @@ class Scan {
 
   /// Makes `count` values, of a buffer of one more, the sums of those before each, and the last the sum of
   /// all. Sums saturate at 2^32 - 1.
-  void operator()(std::size_t count, Buffer<cl_uint>& values);
+  void operator()(std::size_t count, Buffer<cl_uint>& values) { scan_level(count, all_, values, 0); }
+  /// The same of the first present[0] values of at most `capacity`: values[present[0]] and values[capacity]
+  /// are the sum of all, those between are left as they are.
+  void operator()(std::size_t capacity, const Buffer<cl_uint>& present, Buffer<cl_uint>& values) {
+    scan_level(capacity, present, values, 0);
+  }
 
   std::size_t bytes() const;
 
  private:
-  void scan_level(std::size_t count, Buffer<cl_uint>& values, std::size_t level);
+  void scan_level(std::size_t count, const Buffer<cl_uint>& present, Buffer<cl_uint>& values,
+                  std::size_t level);
 
   Device::Impl& device_;
   Launcher<kernel::scan_sum, kernel::scan_apply> launch_;
-  Buffer<cl_uint> zero_;
+  Buffer<cl_uint> zero_, all_;          // [1] 0, and the largest number
   std::vector<Buffer<cl_uint>> bases_;  // [level][chunk + 1] the scan of the chunks' sums
 };
 

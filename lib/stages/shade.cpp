@@ -53,7 +53,8 @@ void Shade::forward(const ShadeInputs& in) {
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_forward{.p = in.p,
-                                                .pairs = groups.pairs,
+                                                .range = groups.pairs,
+                                                .pairs = in.bin.pair_count,
                                                 .pair_face = in.bin.pair_face,
                                                 .fragment_starts = in.rasterize.fragment_starts,
                                                 .face_colors = in.geometry.face_colors(),
@@ -92,6 +93,7 @@ void Shade::light(const ShadeInputs& in) {
   now_.kernels->shade(pairs, kernel::shade_lit_forward{.p = in.p,
                                                        .lp = now_.params,
                                                        .last_pair = pairs.last(),
+                                                       .pair_count = in.bin.pair_count,
                                                        .views = in.views.cameras,
                                                        .lights = now_.lights,
                                                        .faces = in.geometry.face_vertices,
@@ -123,7 +125,8 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
   } else if (!lit()) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_backward{.p = in.p,
-                                                 .pairs = groups.pairs,
+                                                 .range = groups.pairs,
+                                                 .pairs = in.bin.pair_count,
                                                  .pair_face = in.bin.pair_face,
                                                  .fragment_starts = in.rasterize.fragment_starts,
                                                  .face_colors = in.geometry.face_colors(),
@@ -150,6 +153,7 @@ void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
                                                         .lp = now_.params,
                                                         .pairs = static_cast<cl_uint>(in.bin.pairs),
                                                         .last_pair = pairs.last(),
+                                                        .pair_count = in.bin.pair_count,
                                                         .views = in.views.cameras,
                                                         .lights = now_.lights,
                                                         .faces = in.geometry.face_vertices,
@@ -228,6 +232,7 @@ void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::
                                                         .lp = now_.params,
                                                         .pairs = static_cast<cl_uint>(in.bin.pairs),
                                                         .last_pair = pairs.last(),
+                                                        .pair_count = in.bin.pair_count,
                                                         .light = static_cast<cl_uint>(light),
                                                         .views = in.views.cameras,
                                                         .lights = now_.lights,

@@ -1,8 +1,23 @@
 #include "stages/sort.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <utility>
 
 namespace dpr {
+
+namespace {
+
+/// Bits of the largest of so many keys.
+unsigned key_bits(std::size_t key_count) {
+  return static_cast<unsigned>(std::bit_width(std::max<std::size_t>(key_count, 1) - 1));
+}
+
+}  // namespace
+
+unsigned sort_passes(std::size_t key_count) {
+  return (key_bits(key_count) + DPR_SORT_BITS - 1) / DPR_SORT_BITS;
+}
 
 bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::size_t key_count) {
   constexpr std::size_t k_of_a_work_item = 16384;  // 20 microseconds; a launch takes 5 to 10
@@ -32,27 +47,31 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     exchange();
     return;
   }
-  for (unsigned shift = 0; capacity > 0 && shift < 32 && (key_count - 1) >> shift != 0;
-       shift += DPR_SORT_BITS(device_.info.lanes)) {
-    pass(capacity, shift, count, keys, values);
+  const unsigned all_bits = key_bits(key_count), passes = capacity > 0 ? sort_passes(key_count) : 0;
+  for (unsigned k = 0, shift = 0; k < passes; ++k) {  // of bits as equal as may be: fewer digits to count
+    const unsigned bits = (all_bits - shift + passes - k - 1) / (passes - k);
+    pass(capacity, shift, bits, count, keys, values);
     exchange();
+    shift += bits;
   }
   launch_(key_count + 1,
           kernel::sort_ranges{.keys = last_key, .count = count, .sorted_keys = keys, .starts = starts});
 }
 
-void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count,
+void Sort::pass(std::size_t capacity, unsigned shift, unsigned bits, const Buffer<cl_uint>& count,
                 const Buffer<cl_uint>& keys, const Buffer<cl_uint>& values) {
   const std::size_t blocks = (capacity + DPR_SORT_BLOCK - 1) / DPR_SORT_BLOCK;
-  const auto n = static_cast<cl_uint>(capacity);
-  const std::size_t digits = std::size_t{1} << DPR_SORT_BITS(device_.info.lanes);
-  offsets_.resize(device_, digits * blocks + 1);
-  launch_.in_groups(blocks,
-                    kernel::sort_histogram{
-                        .capacity = n, .shift = shift, .count = count, .keys = keys, .histogram = offsets_});
-  scan_(digits * blocks, offsets_);
-  launch_.in_groups(blocks, kernel::sort_scatter{.capacity = n,
-                                                 .shift = shift,
+  offsets_.resize(device_, (blocks << DPR_SORT_BITS) + 1);
+  offset_count_.resize(device_, 1);
+  launch_.in_groups(blocks, kernel::sort_histogram{.shift = shift,
+                                                   .bits = bits,
+                                                   .count = count,
+                                                   .keys = keys,
+                                                   .histogram = offsets_,
+                                                   .size = offset_count_});
+  scan_(blocks << bits, offset_count_, offsets_);
+  launch_.in_groups(blocks, kernel::sort_scatter{.shift = shift,
+                                                 .bits = bits,
                                                  .count = count,
                                                  .keys = keys,
                                                  .values = values,
@@ -62,8 +81,8 @@ void Sort::pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& cou
 }
 
 std::size_t Sort::bytes() const {
-  return scan_.bytes() + offsets_.capacity_bytes() + other_keys_.capacity_bytes() +
-         other_values_.capacity_bytes();
+  return scan_.bytes() + offsets_.capacity_bytes() + offset_count_.capacity_bytes() +
+         other_keys_.capacity_bytes() + other_values_.capacity_bytes();
 }
 
 }  // namespace dpr

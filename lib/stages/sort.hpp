@@ -6,6 +6,9 @@
 
 namespace dpr {
 
+/// Passes that a sort of so many keys takes, three launches each: as few as DPR_SORT_BITS allow.
+unsigned sort_passes(std::size_t key_count);
+
 /// Whether one work-item, or on a GPU one group, sorts them sooner than the launches of a sort by many take.
 bool is_sorted_at_once(const Device::Impl& device, std::size_t capacity, std::size_t key_count);
 
@@ -21,14 +24,14 @@ class Sort {
   std::size_t bytes() const;
 
  private:
-  /// A stable pass by DPR_SORT_BITS.
-  void pass(std::size_t capacity, unsigned shift, const Buffer<cl_uint>& count, const Buffer<cl_uint>& keys,
-            const Buffer<cl_uint>& values);
+  /// A stable pass by `bits` from `shift` on.
+  void pass(std::size_t capacity, unsigned shift, unsigned bits, const Buffer<cl_uint>& count,
+            const Buffer<cl_uint>& keys, const Buffer<cl_uint>& values);
 
   Device::Impl& device_;
   Scan scan_;
   Launcher<kernel::sort_histogram, kernel::sort_scatter, kernel::sort_ranges, kernel::sort_few> launch_;
-  Buffer<cl_uint> offsets_, other_keys_, other_values_;
+  Buffer<cl_uint> offsets_, offset_count_, other_keys_, other_values_;
 };
 
 }  // namespace dpr

@@ -20,6 +20,7 @@ void Surface::forward(const SurfaceInputs& in, ColorPlanes& base) {
   base.resize(device_, in.rasterize.fragment_length());
   launch_(pairs, kernel::surface_forward{.p = in.p,
                                          .last_pair = pairs.last(),
+                                         .pairs = in.bin.pair_count,
                                          .pair_face = in.bin.pair_face,
                                          .fragment_starts = in.rasterize.fragment_starts,
                                          .face_colors = in.geometry.face_colors(),
@@ -46,6 +47,7 @@ void Surface::backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bo
   grad_steps_.resize(device_, std::size_t{9} * in.bin.pairs);
   launch_(pairs, kernel::surface_backward{.p = in.p,
                                           .last_pair = pairs.last(),
+                                          .pairs = in.bin.pair_count,
                                           .adds = cl_uint{adds},
                                           .pair_face = in.bin.pair_face,
                                           .fragment_starts = in.rasterize.fragment_starts,
@@ -76,6 +78,7 @@ void Surface::backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corne
   const Range pairs = in.rasterize.pairs(in.bin);
   launch_(pairs, kernel::surface_detail_backward{.p = in.p,
                                                  .last_pair = pairs.last(),
+                                                 .pairs = in.bin.pair_count,
                                                  .pair_face = in.bin.pair_face,
                                                  .face_texcoords = t.face_texcoords,
                                                  .textures = t.textures,
@@ -96,9 +99,11 @@ void Surface::list(const SurfaceInputs& in, const ColorPlanes& grad_base) {
   grad_seen.resize(device_, places);
   launch_(pairs, kernel::surface_list{.p = in.p,
                                       .last_pair = pairs.last(),
+                                      .pairs = in.bin.pair_count,
                                       .no_cell = static_cast<cl_uint>(t.texels),
                                       .levels = static_cast<cl_uint>(levels),
                                       .pair_face = in.bin.pair_face,
+                                      .pair_tile = in.bin.pair_tile,
                                       .fragment_starts = in.rasterize.fragment_starts,
                                       .face_colors = in.geometry.face_colors(),
                                       .colors = in.geometry.colors_of(in.p),

@@ -51,7 +51,7 @@ class Surface {
   Buffer<cl_uint> place_count;          ///< [1] of those below
   Buffer<cl_uint> cells, numbers;  ///< [fragment][level] the first texel that is seen; the place's number
   Buffer<cl_float2> parts;         ///< [fragment][level] of its neighbours
-  Buffer<cl_float4> grad_seen;     ///< [fragment][level] RGB of what is seen of the level
+  Buffer<cl_float4> grad_seen;     ///< [fragment][level] RGB of what is seen of the level; its tile
 
   std::size_t bytes() const;
 

@@ -25,44 +25,38 @@ void Texels::build(Textures& textures) {
 }
 
 void Texels::start(const Textures& textures) {
-  sums_.resize(device_, 4 * textures.texels);
-  sums_.fill(cl_float4{});
+  grad.resize(device_, textures.texels);
+  grad.fill(cl_float4{});
 }
 
 void Texels::add(const Textures& textures, Surface& surface) {
   const std::size_t places = surface.cells.size();
   if (places == 0) return;
   sort_(places, surface.place_count, textures.texels + 1, surface.cells, surface.numbers, starts_);
-  launch_(textures.texels, kernel::texels_sum{.cells = static_cast<cl_uint>(textures.texels),
-                                              .starts = starts_,
-                                              .numbers = surface.numbers,
-                                              .parts = surface.parts,
-                                              .grad_seen = surface.grad_seen,
-                                              .sums = sums_});
-}
-
-void Texels::finish(const Textures& textures) {
-  grad.resize(device_, textures.texels);
-  const auto cells = static_cast<cl_uint>(textures.texels);
   for (cl_uint i = 0; i < textures.list.size(); ++i) {
     const shared::Texture& t = textures.list[i];
-    for (cl_uint level = t.levels; level-- > 0;) {
-      launch_(texels_of_level(t, level), kernel::texels_gather{.cells = cells,
-                                                               .number = i,
-                                                               .level = level,
-                                                               .textures = textures.textures,
-                                                               .sums = sums_,
-                                                               .grad = grad});
-      if (level + 1 < t.levels)
-        launch_(texels_of_level(t, level),
-                kernel::texels_shrink_backward{
-                    .number = i, .level = level + 1, .textures = textures.textures, .grad = grad});
-    }
+    for (cl_uint level = 0; level < t.levels; ++level)
+      launch_(texels_of_level(t, level), kernel::texels_sum{.number = i,
+                                                            .level = level,
+                                                            .textures = textures.textures,
+                                                            .starts = starts_,
+                                                            .numbers = surface.numbers,
+                                                            .parts = surface.parts,
+                                                            .grad_seen = surface.grad_seen,
+                                                            .grad = grad});
   }
 }
 
-std::size_t Texels::bytes() const {
-  return grad.capacity_bytes() + sort_.bytes() + starts_.capacity_bytes() + sums_.capacity_bytes();
+void Texels::finish(const Textures& textures) {
+  for (cl_uint i = 0; i < textures.list.size(); ++i) {
+    const shared::Texture& t = textures.list[i];
+    for (cl_uint level = t.levels; level-- > 1;)
+      launch_(texels_of_level(t, level - 1),
+              kernel::texels_shrink_backward{
+                  .number = i, .level = level, .textures = textures.textures, .grad = grad});
+  }
 }
+
+std::size_t Texels::bytes() const { return grad.capacity_bytes() + sort_.bytes() + starts_.capacity_bytes(); }
 
 }  // namespace dpr

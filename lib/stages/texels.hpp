@@ -18,7 +18,7 @@ class Texels {
   void start(const Textures& textures);
   /// Adds a band's fragments, as Surface::list() left them; their order is lost there.
   void add(const Textures& textures, Surface& surface);
-  /// From the sums over all bands to `grad`.
+  /// Adds the gradients of smaller levels to the largest's, after the last band.
   void finish(const Textures& textures);
 
   Buffer<cl_float4> grad;  ///< [texel]; those of the largest levels are the textures' own
@@ -28,10 +28,8 @@ class Texels {
  private:
   Device::Impl& device_;
   Sort sort_;
-  Launcher<kernel::texels_sum, kernel::texels_gather, kernel::texels_shrink, kernel::texels_shrink_backward>
-      launch_;
+  Launcher<kernel::texels_sum, kernel::texels_shrink, kernel::texels_shrink_backward> launch_;
   Buffer<cl_uint> starts_;  // [texel + 2] runs of fragments by cell; the last cell is that of no texture
-  Buffer<cl_float4> sums_;  // [4][texel]
 };
 
 }  // namespace dpr

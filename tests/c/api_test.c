@@ -491,6 +491,48 @@ static void test_on_device(cl_context context, cl_command_queue queue, dpr_rende
   clReleaseMemObject(gradients);
 }
 
+/* A frame that outgrows its room is told by the next call, whose own frame is whole. */
+static void test_emptied_frames(cl_context context, cl_command_queue queue, const dpr_device* device,
+                                const dpr_scene* scene) {
+  dpr_buffer from = DPR_BUFFER_INIT, to = DPR_BUFFER_INIT;
+  float small[9], emptied[FLOATS], found[FLOATS], whole[FLOATS];
+  dpr_renderer* renderer = NULL;
+  dpr_attribute* depths = NULL;
+  int i;
+  cl_mem vertices = clCreateBuffer(context, CL_MEM_READ_ONLY, sizeof small, NULL, NULL);
+  cl_mem image = clCreateBuffer(context, CL_MEM_READ_WRITE, sizeof found, NULL, NULL);
+  from.buffer = vertices;
+  to.buffer = image;
+  for (i = 0; i < 9; ++i) small[i] = 0.01f * positions[i];
+  clEnqueueWriteBuffer(queue, vertices, CL_TRUE, 0, sizeof small, small, 0, NULL, NULL);
+  OK(dpr_renderer_create(device, &renderer));
+  OK(dpr_renderer_set_scene(renderer, scene));
+  OK(dpr_attribute_create(device, "depth", &depths));
+  OK(dpr_renderer_set_positions_from(renderer, 0, &from, NULL));
+  OK(dpr_renderer_forward_on_device(renderer, NULL));
+  OK(dpr_attribute_forward_on_device(depths, renderer, NULL));
+  clEnqueueWriteBuffer(queue, vertices, CL_TRUE, 0, sizeof positions, positions, 0, NULL, NULL);
+  OK(dpr_renderer_set_positions_from(renderer, 0, &from, NULL));
+  OK(dpr_renderer_forward_on_device(renderer, NULL));
+  OK(dpr_attribute_forward_on_device(depths, renderer, NULL));
+  OK(dpr_renderer_copy_images(renderer, &to, NULL));
+  clEnqueueReadBuffer(queue, image, CL_TRUE, 0, sizeof emptied, emptied, 0, NULL, NULL);
+  EXPECT(dpr_renderer_forward_on_device(renderer, NULL) == DPR_FRAME_EMPTIED);
+  EXPECT(strstr(dpr_last_error(), "emptied") != NULL);
+  EXPECT(dpr_attribute_forward_on_device(depths, renderer, NULL) == DPR_FRAME_EMPTIED);
+  OK(dpr_renderer_copy_images(renderer, &to, NULL));
+  clEnqueueReadBuffer(queue, image, CL_TRUE, 0, sizeof found, found, 0, NULL, NULL);
+  OK(dpr_renderer_forward_on_device(renderer, NULL));
+  OK(dpr_attribute_forward_on_device(depths, renderer, NULL));
+  OK(dpr_renderer_read_image(renderer, whole, FLOATS));
+  EXPECT(memcmp(found, whole, sizeof whole) == 0);
+  EXPECT(memcmp(emptied, whole, sizeof whole) != 0);
+  dpr_attribute_destroy(depths);
+  dpr_renderer_destroy(renderer);
+  clReleaseMemObject(vertices);
+  clReleaseMemObject(image);
+}
+
 /* Auxiliary outputs and attributes of a frame on the device are those that the host reads. */
 static void test_attributes_on_device(cl_context context, cl_command_queue queue, const dpr_device* device,
                                       dpr_renderer* renderer) {
@@ -680,6 +722,7 @@ static void test_own_opencl(const dpr_scene* scene) {
   EXPECT(memcmp(of_buffer, of_pixels, sizeof of_buffer) == 0);
   REFUSED(dpr_backward_buffer(renderer, NULL, &first), "grad");
   test_on_device(context, queue, renderer, read, of_pixels);
+  test_emptied_frames(context, queue, device, scene);
   test_attributes_on_device(context, queue, device, renderer);
   test_shapes_on_device(context, queue, renderer);
   test_materials_on_device(context, queue, device);

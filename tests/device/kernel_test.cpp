@@ -22,11 +22,12 @@ struct scan_nothing : dpr::kernel::scan_sum {
 TEST_SUITE("unit") {
   TEST_CASE("a kernel is launched with its arguments, over no items not at all") {
     dpr::Launcher<dpr::kernel::scan_apply, dpr::kernel::scan_sum> launch(device_impl());
-    const std::vector<cl_uint> values{1, 2, 3, 4};
-    const dpr::Buffer<cl_uint> in(device_impl(), std::span<const cl_uint>(values));
+    const std::vector<cl_uint> values{1, 2, 3, 4}, four{4};
+    const dpr::Buffer<cl_uint> in(device_impl(), std::span<const cl_uint>(values)),
+        present(device_impl(), std::span<const cl_uint>(four));
     dpr::Buffer<cl_uint> out;
     dpr::test::poison(out, 1, 0xdeadbeefU);
-    const dpr::kernel::scan_sum sum{.count = 4U, .values = in, .sums = out};
+    const dpr::kernel::scan_sum sum{.count = 4U, .present = present, .values = in, .sums = out};
     launch(0, sum);
     CHECK(out.download() == std::vector<cl_uint>{0xdeadbeefU});
     launch(1, sum);

@@ -151,10 +151,11 @@ TEST_SUITE("unit") {
       device.impl().before_work = [&](std::string_view work) { builds += work == "scan.cl" ? 1 : 0; };
       // Options of its own, so that it is a program of its own.
       dpr::Launcher<dpr::kernel::scan_sum> launch(device.impl(), " -DDPR_SCAN_CHUNK=128");
-      const std::vector<cl_uint> values{1, 2, 3, 4};
-      const dpr::Buffer<cl_uint> in(device.impl(), std::span<const cl_uint>(values));
+      const std::vector<cl_uint> values{1, 2, 3, 4}, four{4};
+      const dpr::Buffer<cl_uint> in(device.impl(), std::span<const cl_uint>(values)),
+          present(device.impl(), std::span<const cl_uint>(four));
       dpr::Buffer<cl_uint> out(device.impl(), 1);
-      launch.in_groups(1, dpr::kernel::scan_sum{.count = 4U, .values = in, .sums = out});
+      launch.in_groups(1, dpr::kernel::scan_sum{.count = 4U, .present = present, .values = in, .sums = out});
       return out.download()[0];
     };
     CHECK(sum_of_four() == 10);

@@ -139,6 +139,51 @@ std::vector<Scene> scenes() {
   return all;
 }
 
+/// A sphere that grows from buffers of the caller's.
+struct Growing {
+  explicit Growing(const char* preset) : renderer(adopt_device(caller.context(), caller.queue())) {
+    scene = scene_of(make_icosphere(2), reduced(64, 32), reduced(64, 32));
+    for (glm::vec3& p : scene.meshes[0].mesh.positions) p *= 0.3F;
+    scene.smoothing = smoothing_preset(preset);
+    if (scene.smoothing.noise == Noise::triangle) scene.smoothing.sigma = 1e-5F;  // counts follow the area
+    renderer.set_scene(scene);
+  }
+
+  std::vector<glm::vec3> positions(float scale) const {
+    std::vector<glm::vec3> scaled = scene.meshes[0].mesh.positions;
+    for (glm::vec3& p : scaled) p *= scale;
+    return scaled;
+  }
+
+  std::size_t frame(float scale) {
+    const std::vector<glm::vec3> scaled = positions(scale);
+    buffer = caller.buffer(packed(std::span<const glm::vec3>(scaled)));
+    set_positions(renderer, 0, {buffer()});
+    return forward_on_device(renderer);
+  }
+
+  /// A renderer that has rendered nothing yet, from a buffer too.
+  Renderer fresh(float scale) const {
+    Renderer made(renderer.device());
+    made.set_scene(scene);
+    const std::vector<glm::vec3> scaled = positions(scale);
+    set_positions(made, 0, {caller.buffer(packed(std::span<const glm::vec3>(scaled)))()});
+    return made;
+  }
+
+  /// Whether the image on the device is the one of a renderer that waits.
+  bool is_whole(float scale) {
+    Renderer waiting = fresh(scale);
+    waiting.forward();
+    return dpr::test::pipeline::same_bits(read_image(caller, renderer), waiting.image());
+  }
+
+  Caller caller;
+  Scene scene;
+  Renderer renderer;
+  cl::Buffer buffer;
+};
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
@@ -302,6 +347,85 @@ TEST_SUITE("pipeline") {
       CHECK(dpr::test::pipeline::same_bits(read_image(caller, renderer), fresh.image()));
       SceneGradient expected = fresh.backward(std::span(&grad, 1));
       check_gradients(caller, renderer, expected);
+    }
+  }
+
+  TEST_CASE("on device: after an emptied frame the next call says so, and its frame is whole") {
+    for (const char* preset : {"gaussian", "pixel"}) {
+      Growing growing(preset);
+      CHECK(growing.frame(1.0F) == 0);  // measured
+      CHECK(growing.frame(1.0F) == 0);
+      CHECK(growing.frame(1.6F) == 0);
+      CHECK(!growing.is_whole(1.6F));  // which waits: the device is done
+      CHECK(growing.frame(1.6F) == 1);
+      CHECK(growing.is_whole(1.6F));
+      CHECK(growing.frame(1.6F) == 0);
+      CHECK(growing.is_whole(1.6F));
+      CHECK(growing.frame(3.2F) == 0);
+      CHECK(frame_history(growing.renderer).emptied == 2);
+      CHECK(growing.frame(3.2F) == 0);  // said already
+    }
+  }
+
+  TEST_CASE("on device: room grows with what is rendered, and no frame is emptied") {
+    for (const char* preset : {"gaussian", "pixel"}) {
+      Growing growing(preset);
+      float scale = 1.0F;
+      for (int step = 0; step < 100; ++step, scale *= 1.01F) {
+        CHECK(growing.frame(scale) == 0);
+        if (step % 5 == 0) growing.caller.queue.finish();
+      }
+      const std::size_t waits = growing.renderer.device().impl().host_waits;
+      CHECK(growing.frame(scale) == 0);
+      CHECK(growing.renderer.device().impl().host_waits == waits);
+      CHECK(frame_history(growing.renderer).emptied == 0);
+      CHECK(growing.is_whole(scale));
+    }
+  }
+
+  TEST_CASE("on device: counts that arrive late are of no scene but their own") {
+    Growing growing("gaussian");
+    growing.frame(3.0F);
+    growing.frame(3.0F);
+    growing.caller.queue.finish();
+    const std::size_t large = growing.renderer.impl().last_counts->fragments;
+    growing.renderer.set_scene(growing.scene);
+    growing.frame(0.5F);
+    growing.frame(0.5F);
+    CHECK(growing.renderer.impl().last_counts->fragments < large / 8);
+  }
+
+  TEST_CASE("on device: kernels are launched for what frames take, not for their room") {
+    for (const char* preset : {"gaussian", "pixel"}) {
+      Growing growing(preset);
+      Renderer& renderer = growing.renderer;
+      growing.frame(1.0F);
+      const FrameCounts taken = *renderer.impl().last_counts;
+      constexpr std::size_t k_more = 64;
+      reserve(renderer, {k_more * taken.pairs, k_more * taken.fragments, k_more * taken.contours});
+      for (int frame = 0; frame < 2; ++frame) {  // the second knows of the first
+        growing.frame(1.0F);
+        growing.caller.queue.finish();
+      }
+      growing.frame(1.0F);
+      CHECK(renderer.impl().bin.pairs >= k_more * taken.pairs);
+      CHECK(renderer.impl().bin.launched < 2 * taken.pairs);
+      CHECK(renderer.impl().rasterize.launched_fragments() < 2 * taken.fragments);
+      CHECK(growing.is_whole(1.0F));
+      // Three times as large, it is whole all the same, and its gradients are.
+      growing.frame(3.0F);
+      const std::size_t launched = renderer.impl().bin.launched;
+      CHECK(launched < 2 * taken.pairs);
+      const Image grad = random_image(growing.scene.width, growing.scene.height, -1.0F, 1.0F);
+      const cl::Buffer on_device = growing.caller.buffer(packed(std::span<const glm::vec4>(grad.pixels)));
+      backward_on_device(renderer, {on_device()});
+      CHECK(growing.is_whole(3.0F));
+      Renderer fresh = growing.fresh(3.0F);
+      fresh.forward();
+      CHECK(fresh.statistics().pairs > launched);
+      SceneGradient expected = fresh.backward(std::span(&grad, 1));
+      CHECK(check_gradients(growing.caller, renderer, expected) > 3);
+      CHECK(frame_history(renderer).emptied == 0);
     }
   }
 

@@ -169,6 +169,33 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("textures: a texel that the whole image shows has the sum of what many would have") {
+    const int size = reduced(96, 20);
+    const auto rendered = [&](std::size_t side, std::size_t budget) {
+      Texture texture = random_texture(1, 1, Wrap::repeat, Filter::bilinear);
+      texture.width = texture.height = static_cast<int>(side);
+      texture.texels.resize(side * side, texture.texels[0]);
+      Scene scene = textured_scene(make_cube(), texture, size, size);
+      Device device = open_device();
+      if (budget > 0) device.set_memory_budget(budget);
+      Renderer renderer(device);
+      renderer.set_scene(scene);
+      renderer.forward();
+      CHECK((renderer.statistics().bands > 1) == (budget > 0));
+      return gradient_of(renderer).meshes[0].textures[0];
+    };
+    const std::vector<glm::vec3> one = rendered(1, 0), many = rendered(8, 0);
+    REQUIRE(one.size() == 1);
+    CHECK(one == rendered(1, reduced(400000, 40000)));  // whose bands are parts of rows of tiles, too
+    glm::dvec3 sum(0.0), magnitude(0.0);
+    for (const glm::vec3& texel : many) {
+      sum += glm::dvec3(texel);
+      magnitude += glm::abs(glm::dvec3(texel));
+    }
+    CHECK(glm::length(glm::dvec3(one[0]) - sum) < 1e-5 * glm::length(magnitude));
+    CHECK(glm::length(sum) > 1e-3 * glm::length(magnitude));
+  }
+
   TEST_CASE("textures: coordinates far from the origin show something finite, whole periods nothing new") {
     const int size = reduced(16, 7);
     for (const Wrap wrap : {Wrap::repeat, Wrap::mirror, Wrap::clamp}) {

@@ -235,10 +235,10 @@ TEST_SUITE("unit") {
     ContourFrame frame(mesh, 32, 32);
     frame.contour.forward(frame.inputs());
     const std::size_t pairs = frame.contour.pairs;
-    frame.contour.forward_within(frame.inputs(), pairs - 1);
+    frame.contour.forward_within(frame.inputs(), pairs - 1, pairs);
     CHECK(frame.contour.read_count() == pairs);
     CHECK(frame.contour.tile_starts.download().back() == 0);
-    frame.contour.forward_within(frame.inputs(), pairs + 3);
+    frame.contour.forward_within(frame.inputs(), pairs + 3, 1);
     CHECK(frame.contour.read_count() == pairs);
     frame.contour.settle(pairs);
     CHECK(frame.contour.tile_starts.download().back() == pairs);

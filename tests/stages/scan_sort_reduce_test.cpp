@@ -6,6 +6,7 @@
 #include <numeric>
 #include <random>
 
+#include "stages/bin.hpp"
 #include "stages/reduce.hpp"
 #include "stages/scan.hpp"
 #include "stages/sort.hpp"
@@ -154,6 +155,36 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("scan: of counts that the device alone can number") {
+    for (const std::size_t count : sizes()) {
+      const std::vector<cl_uint> values = random_values(count, 100, static_cast<unsigned>(count) + 2);
+      for (const std::size_t present : {std::size_t{0}, count / 3, count}) {
+        CAPTURE(count);
+        CAPTURE(present);
+        dpr::Scan operation(device_impl());
+        Buffer<cl_uint> scanned = with_room_for_sum(values);
+        operation(count, on_device({static_cast<cl_uint>(present)}), scanned);
+        const std::vector<cl_uint> found = scanned.download();
+        const auto end = values.begin() + static_cast<std::ptrdiff_t>(present);
+        const std::vector<cl_uint> expected = serial_scan({values.begin(), end});
+        CHECK(std::equal(expected.begin(), expected.end(), found.begin()));
+        CHECK(found.back() == expected.back());
+        // Between, nothing is touched.
+        if (present + 1 < count) CHECK(found[present + 1] == values[present + 1]);
+      }
+    }
+  }
+
+  TEST_CASE("scan: a total beyond what gradients of pairs can be numbered by is refused") {
+    static_assert(9 * dpr::k_most_pairs <= k_most && 9 * (dpr::k_most_pairs + 1) > k_most);
+    const auto most = static_cast<cl_uint>(dpr::k_most_pairs);
+    const Buffer<cl_uint> fits = on_device({0, most}), exceeds = on_device({0, most + 1});
+    CHECK(dpr::read_total(fits, 1, "pairs (frame)", dpr::k_most_pairs) == most);
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument,
+                          dpr::read_total(exceeds, 1, "pairs (frame)", dpr::k_most_pairs),
+                          "pairs (frame): got more than " + std::to_string(dpr::k_most_pairs));
+  }
+
   TEST_CASE("scan: sums saturate, and the total then is refused by name") {
     std::vector<cl_uint> values(1000, 0x00ffffffU);  // passes 2^32 after 256
     const std::vector<cl_uint> offsets = scan(values);
@@ -186,6 +217,15 @@ TEST_SUITE("unit") {
         CHECK(is_stably_sorted(keys, key_count, sort(keys, key_count)));
         CHECK(is_stably_sorted(keys, key_count, sort(keys, key_count, 1 + count / 2)));
       }
+    }
+  }
+
+  TEST_CASE("sort: as few passes as the keys have bytes") {
+    CHECK(dpr::sort_passes(1) == 0);
+    for (const unsigned passes : {1U, 2U, 3U, 4U}) {
+      const std::size_t last = std::size_t{1} << (8 * passes);
+      CHECK(dpr::sort_passes(last / 256 + 1) == passes);
+      CHECK(dpr::sort_passes(last) == passes);
     }
   }
 
