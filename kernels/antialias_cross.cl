@@ -41,7 +41,7 @@ kernel void antialias_front(const FrameParams p, const uint last_tile,
   }
 }
 
-/// Whether a contour goes before the one that a step has.
+/// True if a contour goes before the one that a step has.
 static inline int goes_before(uint before, float before_depth, uint contour, float depth) {
   const uint is_crease = contour & DPR_CONTOUR_CREASE, before_is_crease = before & DPR_CONTOUR_CREASE;
   return is_crease < before_is_crease || (is_crease == before_is_crease && depth < before_depth);
@@ -123,8 +123,8 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
           several_down |= by_rows ? 0 : bit;
         }
         if (loses) continue;
-        // Where one of the samples shows what lies beyond another contour, a crease is there, but wins
-        // nothing.
+        // A crease is there but wins nothing where one of the samples shows a surface beyond another
+        // contour.
         if (only_passes || hidden) {
           if (before == DPR_NO_CROSSING) winner[step] = DPR_PASSED;
           continue;

@@ -8,7 +8,7 @@
 // Such steps are few: a tile lists its own, and adds those of the tiles around it to its samples.
 #include "visibility.h"
 
-/// How many lines away a contour looks for a step of its own. Crossings are at most twice as far along the
+/// Most lines between a contour and a step of its own. Crossings are at most twice as far along the
 /// lines, and the samples behind the step one more: all of it lies at most DPR_NEAR_TILES away.
 #define DPR_REFERENCE_LINES 6
 #define DPR_NEAR_TILES 2
@@ -78,7 +78,7 @@ static inline int have_end_in_common(const TileContour a, const TileContour b) {
   return a_is_cut || is_end_of(a.a, a.depths.x, b) || is_end_of(a.b, a.depths.y, b);
 }
 
-/// Whether something hides a contour at a step that another has won. Of the two samples only the one on its
+/// True if something hides a contour at a step that another has won. Of the two samples only the one on its
 /// own side of the winner is asked: the other may show what the winner bounds.
 static inline int is_second_hidden(const FrameParams p, const CrossingScene v, const TileContour winner,
                                    const TileContour c, const RasterEdge e, const Crossing x, float depth) {
@@ -92,7 +92,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
                         depth, slack);
   }
   if (inner_first != is_first && hidden_from(p, v, c, e, x, 0, depth)) return 1;
-  // What the winner bounds hides what lies behind it; contours that meet lie on one surface.
+  // The surface that the winner bounds hides all behind it; contours that meet lie on one surface.
   return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
          mix_depths(p, winner.depths, along_edge(p, of_winner, x.line)) <
              depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&

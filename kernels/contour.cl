@@ -6,12 +6,12 @@
 // Faces are neighbours by the vertices that they share or, at edges where each has vertices of its own, where
 // these coincide (edges.cl): then there are two edges, one on each face's, and one of them stands for both.
 //
-// Where faces cross the near plane, edges end there, and what the plane cuts of a face is a boundary: the
-// cuts of all faces are numbered behind the edges of the scene.
+// Edges end at the near plane where faces cross it, and the plane's cut of a face is a boundary: the cuts
+// of all faces are numbered behind the edges of the scene.
 #include "contour.h"
 #include "face_normal.h"
 
-/// What rounding may move a crossing by, in samples.
+/// Most that rounding moves a crossing, in samples.
 #define DPR_CROSSING_SLACK 0.01f
 
 /// The sine of the angle between faces from which they count as shaded differently.
@@ -26,13 +26,13 @@ typedef struct {
   EdgeScene edges;
 } ContourScene;
 
-/// Which corner of the face a vertex is, or coincides with; 3 where none does.
+/// Number of the face's corner that a vertex is, or coincides with; 3 where none does.
 static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) {
   const float4 v = ndc[vertex];
   return is_same(ndc[face.x], v) ? 0 : is_same(ndc[face.y], v) ? 1 : is_same(ndc[face.z], v) ? 2 : 3;
 }
 
-/// Whether the faces' colours differ at an end of the edge.
+/// True if the faces' colours differ at an end of the edge.
 DPR_ALWAYS_INLINE int color_jumps(const ContourScene s, uint4 edge) {
   const uint own = own_face(edge), other = other_face(edge);
 #pragma unroll 1
@@ -54,7 +54,7 @@ static inline int normals_differ(const ContourScene s, uint4 edge) {
   return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
 }
 
-/// Whether an edge on vertices of its own face alone is the one that stands for both: the one whose face is
+/// True if an edge on vertices of its own face alone is the one that stands for both: the one whose face is
 /// in front.
 static inline int stands_for_both(uint4 edge, global const uchar* facing) {
   const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
@@ -63,7 +63,7 @@ static inline int stands_for_both(uint4 edge, global const uchar* facing) {
   return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
 }
 
-/// Whether an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
+/// True if an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
 static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
   if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
   const uint2 sides_of = s.edges.edges[edge];
@@ -183,7 +183,7 @@ typedef struct {
   global const uint* offsets;                  // of the view's edges: equal where an edge is no contour
 } Contours;
 
-/// Whether an edge that is a contour is that long.
+/// True if an edge that is a contour is that long.
 static inline int is_long(const FrameParams p, const Contours c, uint edge) {
   if (c.offsets[edge] == c.offsets[edge + 1]) return 1;
   const ViewEdge e = view_edge(c.edges, edge);
@@ -205,7 +205,7 @@ static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
   return DPR_NO_MESH_EDGE;
 }
 
-/// Whether all contours that end in a vertex are that long.
+/// True if all contours that end in a vertex are that long.
 static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
   const uint last = 2 * c.corner_starts[vertex + 1];
   for (uint k = 2 * c.corner_starts[vertex]; k < last; ++k) {
@@ -215,7 +215,7 @@ static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
   return 1;
 }
 
-/// Whether all contours that end in the end of an edge are that long: those of its vertex; or, on the near
+/// True if all contours that end in the end of an edge are that long: those of its vertex; or, on the near
 /// plane, the edge that is cut there, and the cuts of its faces.
 static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
   const uint mesh_edges = c.edges.mesh_edges, cut = end == 0 ? e.cut[0] : e.cut[1];
@@ -331,7 +331,7 @@ static inline float4 sum_of_pairs(uint contour, global const uint* pair_starts, 
   return sum;
 }
 
-/// What the end of a contour that is a cut gives to one of the corners that it lies between.
+/// Gradient that a contour's end on a cut gives to one of the corners beside the cut.
 static inline float3 share_of_cut(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                   uint cut, int to_lost, float2 grad) {
   const float part = clipped_cut(c, cut).w;

@@ -7,7 +7,7 @@
 // second t^2 / 2 of the first's. The difference, 1/2 - t, is the area between the edge and the border of the
 // cells.
 //
-// What an edge takes is the area between it and the staircase of the rigid samples' cells. A line adds the
+// An edge takes the area between it and the staircase of the rigid samples' cells. A line adds the
 // piece of that area in its row or column of cells, by the edge's place on the line. An edge's ends lie
 // between lines: there the area is closed by the straight way from the end to the corner of the four cells
 // around it, where the staircases of all edges that meet in the end meet too. So the pieces of edges that
@@ -38,7 +38,7 @@ static inline RasterEdge raster_edge(float2 a, float2 b, int is_by_rows) {
   return e;
 }
 
-/// Of an edge's angle to the lines, the squared sine below which those across alone count it, and the width
+/// Squared sine of an edge's angle to the lines below which the lines across alone count it, and the width
 /// of the range in which both do: slopes of 1/2 to 2.
 #define DPR_FLATTEST 0.2f
 #define DPR_RANGE_OF_BOTH 0.6f
@@ -50,7 +50,7 @@ static inline float range_of_slope(float slope2) {
   return clamp((1.0f / (1.0f + slope2) - DPR_FLATTEST) / DPR_RANGE_OF_BOTH, 0.0f, 1.0f);
 }
 
-/// How much an edge counts by lines to whose normal it has a slope; by those across it counts the rest. A
+/// Weight of an edge by lines to whose normal it has a slope; by those across it counts the rest. A
 /// step function of the slope would leave out, or count twice, up to half a cell where a smooth contour
 /// passes 45 degrees.
 static inline float weight_of_slope(float slope2) {
@@ -74,7 +74,7 @@ typedef struct {
   float along;      // along_edge()
 } Crossing;
 
-/// Whether a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles
+/// True if a sample lies behind the edge: to the right of it, or below. One on the edge does if the triangles
 /// agree: see is_owned_at().
 static inline int is_behind(const RasterEdge e, float2 sample) {
   int side = side_of_line(e.a, e.b, sample);
@@ -82,28 +82,28 @@ static inline int is_behind(const RasterEdge e, float2 sample) {
   return (side < 0) == e.ascends;
 }
 
-/// Whether a point does not lie behind a line. One on the line belongs to its upper or right side, so that a
+/// True if a point does not lie behind a line. One on the line belongs to its upper or right side, so that a
 /// chain of edges crosses it once.
 static inline int is_before_line(const FrameParams p, const RasterEdge e, float2 point, int line) {
   const float2 at = pixel_centre(p, line, line);
   return e.is_by_rows ? point.y >= at.y : point.x <= at.x;
 }
 
-/// Where the edge's line crosses a line of samples, in samples along it.
+/// Position at which the edge's line crosses a line of samples, in samples along it.
 static inline float position_on_line(const FrameParams p, const RasterEdge e, int line) {
   const float2 at = pixel_centre(p, line, line);
   return e.is_by_rows ? column_at(p, e.a.x + (at.y - e.a.y) * e.slope)
                       : row_at(p, e.a.y + (at.x - e.a.x) * e.slope);
 }
 
-/// Where on the edge that is, from its first end to its second, in [0, 1].
+/// Position of that crossing on the edge, from its first end to its second, in [0, 1].
 static inline float along_edge(const FrameParams p, const RasterEdge e, int line) {
   const float2 from_first = pixel_centre(p, line, line) - e.a;
   // Not by ?:, of which a component with an index that varies would be made.
   return clamp(select(from_first.x, from_first.y, e.is_by_rows) * e.inverse, 0.0f, 1.0f);
 }
 
-/// Where an edge crosses a line. The step is the one whose samples lie on different sides of it, as the
+/// Crossing of an edge and a line. The step's samples lie on different sides of the edge, as the
 /// triangles have them.
 static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
   Crossing c;
@@ -114,7 +114,7 @@ static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int l
   const float size = (float)(e.is_by_rows ? p.width : p.height);
   int first = (int)floor(clamp(c.position, -2.0f, size));
   if (c.exists) {
-    // Of the samples around the position, the first behind the edge ends the step.
+    // The first sample behind the edge, of those around the position, ends the step.
     int sample = first;
 #pragma unroll 1
     while (sample < first + 2 &&
@@ -129,7 +129,7 @@ static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int l
   return c;
 }
 
-/// What an edge's end adds to the outermost crossing on its side: half of the way across the lines from the
+/// Area that an edge's end adds to the outermost crossing on its side: half of the way across lines from the
 /// corner of the four cells to the end, times the way along them from the corner to the edge.
 typedef struct {
   float area;
@@ -154,7 +154,7 @@ static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, co
   return c;
 }
 
-/// What a crossing cuts: x is the area between the edge and the cells' border, negative where it is the first
+/// Cut of a crossing: x is the area between the edge and the cells' border, negative where it is the first
 /// sample's cell that is cut, in [-1/2, 1/2] but for what the edge's ends add; y the edge's squared slope to
 /// the lines' normal.
 typedef float2 Cut;

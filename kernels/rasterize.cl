@@ -11,7 +11,7 @@
 #define DPR_TILE_SHARE (DPR_TILE * DPR_TILE)
 #endif
 
-/// What a work-item of the listing kernels has.
+/// State of a work-item of the listing kernels.
 typedef struct {
   uint tile;               // of all views
   uint first;              // of its pixels, as the masks count them: 8 * row + column
@@ -88,7 +88,7 @@ kernel void rasterize_count(const FrameParams p, global const uint* restrict til
   }
 }
 
-/// Where every row of tiles begins: what the host cuts bands by. One work-item per row of tiles of all views,
+/// Finds the first pair of every row of tiles: the host cuts bands there. One work-item per row of all views,
 /// and one more.
 /// in   tile_starts      uint[view * tile + 1]  runs of pairs
 /// in   pair_starts      uint[view * face + 1]  whose last is the number of pairs, fitting or not
@@ -107,7 +107,7 @@ kernel void rasterize_rows(const FrameParams p, const uint last_contour,
       (uint4)(pair, fragment_starts[pair], pair_starts[p.views * p.faces], contour_starts[last_contour]);
 }
 
-/// Whether the totals of a frame, pairs, fragments and contours' pairs, exceed the capacity of its buffers.
+/// True if the totals of a frame, pairs, fragments and contours' pairs, exceed the capacity of its buffers.
 static inline int exceeds(uint4 last, uint4 capacity) {
   return last.z > capacity.x || last.y > capacity.y || last.w > capacity.z;
 }

@@ -54,7 +54,7 @@ using float4 = cl_float4;
 /// The fragment of a slot that is the background.
 #define DPR_BACKGROUND_SLOT 0xffffffffu
 
-/// How noise is drawn, in the order of dpr::Draws.
+/// Ways to draw noise, in the order of dpr::Draws.
 #define DPR_INDEPENDENT 0
 #define DPR_ANTITHETIC 1
 #define DPR_STRATIFIED 2
@@ -71,7 +71,7 @@ using float4 = cl_float4;
 #define DPR_GOURAUD 3
 #define DPR_BLINN 4
 
-/// What lights ask of the kernels beyond points: bits of DPR_LIGHTS.
+/// Kinds of lights beyond points that kernels are built for: bits of DPR_LIGHTS.
 #define DPR_LIGHTS_DISTANT 1   /* infinitely far away: position.w is 0 */
 #define DPR_LIGHTS_CONES 2     /* within a cone about an axis */
 #define DPR_LIGHTS_HARMONICS 4 /* an environment */
@@ -91,12 +91,12 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_COS_INNER 12
 #define DPR_CHANNEL_COS_OUTER 13
 
-/// Where the light finds the base colour of a fragment: in its triangle's corners, or in planes of fragments.
+/// Place of a fragment's base colour for the light: its triangle's corners, or planes of fragments.
 #define DPR_BASE_OF_CORNERS 0
 #define DPR_BASE_OF_FRAGMENTS 1
 
-/// What lies beyond a texture, in the order of dpr::Wrap (lib/image/texture_words.hpp has the names); what
-/// lies between its texels, in that of dpr::Filter; and the texture of a face that has none.
+/// Values of dpr::Wrap (lib/image/texture_words.hpp has the names) and of dpr::Filter, in their order; and
+/// the texture of a face that has none.
 #define DPR_REPEAT 0
 #define DPR_MIRROR 1
 #define DPR_CLAMP 2
@@ -127,7 +127,7 @@ using float4 = cl_float4;
 #define DPR_AUXILIARY_CHANNELS 7
 #define DPR_NO_FACE 0xffffffffu
 
-/// How a face looks from a view: which way its corners wind in NDC. Dropped is what is culled, has no area or
+/// Facing of a face: the sense in which its corners wind in NDC. A dropped one is culled, has no area or
 /// reaches nearer than the near plane, if the plane leaves nothing of it.
 #define DPR_FACE_DROPPED 0
 #define DPR_FACE_FRONT 1 /* counter-clockwise */
@@ -161,7 +161,7 @@ using float4 = cl_float4;
 /// Crossings that a tile has room for beside those that won their steps.
 #define DPR_SECOND_CROSSINGS 8
 
-/// What a mesh's vertices add to its own loss: squared Laplacian, and half the squared excess of edge
+/// Terms of a mesh's own loss by vertex: squared Laplacian, and half the squared excess of edge
 /// lengths; and its hinges: 1 - cos, and that squared.
 #define DPR_MESH_LOSS_CHANNELS 2
 
@@ -185,7 +185,7 @@ typedef struct FrameParams {
   uint normals;      /* of a view: those of the vertices, then those that meshes give */
 } FrameParams;
 
-/// Where a mesh stands: itself, or an instance of it. Each has vertices and given normals of its own in the
+/// A mesh or an instance of it in the frame. Each has vertices and given normals of its own in the
 /// frame; the positions and values of an instance's are its mesh's.
 typedef struct MeshPlace {
   uint vertex_shift; /* the number of a vertex less that of its position */
@@ -216,7 +216,7 @@ typedef struct Triangle {
   uint first_sample, last_sample; /* column | row << 16, inclusive; of the blurred bounding box */
 } Triangle;
 
-/// What is left of a face that crosses the near plane: a triangle or a quadrilateral. Its corners are those
+/// Rest of a face that crosses the near plane: a triangle or a quadrilateral. Its corners are those
 /// of the face that are not nearer than the plane, from `first` on, then the two cuts: of four the first cut
 /// lies between the face's corners first + 1 and first + 2, the second between first and first + 2; of three
 /// between first and first + 1, and first and first + 2 (all modulo 3).
@@ -260,7 +260,7 @@ typedef struct Texture {
   uint unused0, unused1;
 } Texture;
 
-/// How the Monte Carlo estimators sample; part of the structs below.
+/// Sampling of the Monte Carlo estimators; part of the structs below.
 typedef struct Sampling {
   uint samples;
   uint draws;      /* DPR_INDEPENDENT, DPR_ANTITHETIC or DPR_STRATIFIED */
@@ -310,7 +310,7 @@ typedef struct OpenEdge {
   float4 places;    /* of its two ends in the texture, in periods */
 } OpenEdge;
 
-/// What contours are looked for.
+/// Parameters of the search for contours.
 typedef struct ContourParams {
   uint edges;      /* of a view: those of the scene, then, where faces are clipped, the cut of every face */
   uint mesh_edges; /* of the scene */
@@ -318,7 +318,7 @@ typedef struct ContourParams {
   uint unused0;
 } ContourParams;
 
-/// What crossings are looked for.
+/// Parameters of the search for crossings.
 typedef struct AntialiasParams {
   uint edges, mesh_edges; /* as in ContourParams */
   float depth_reach;      /* normalised depth: surfaces that much behind the nearest may still be seen */

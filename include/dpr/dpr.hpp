@@ -21,7 +21,6 @@
 #include "dpr/multi_device.hpp"
 #include "dpr/notes.hpp"
 #include "dpr/optimizer.hpp"
-#include "dpr/perturbed_pose.hpp"
 #include "dpr/photographs.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"

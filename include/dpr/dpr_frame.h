@@ -2,33 +2,41 @@
  * by the same names. What binds a language with arrays of its own needs nothing else; the Python package is
  * made of it. dpr/dpr.h includes this.
  *
- *   vertices            [V, 3] or [N, V, 3]    world space, of every view by itself or the same in all
- *   faces               [F, 3]                 whole numbers: indices of vertices
- *   views               [N, 4, 4]              world to camera, OpenGL axes, acting on column vectors; affine
- *   intrinsics          [N, 4]                 fx, fy, cx, cy in pixels from the corner of the top-left
- * pixel; or [N, 9]                 the same, and OpenCV's k1, k2, p1, p2, k3 of the lens; or [N, 1]
- * orthographic: world units from the lower to the upper edge colors              [V, 3] or [N, V, 3] linear
- * RGB; or face_colors         [F, 3] or [N, F, 3]    white without either background          [3] linear RGB;
- * black without texcoords           [V, 2], [F, 3, 2] of the faces' corners, or [T, 2] with face_texcoords
- * [F, 3]                 whole numbers textures[0], ...    [H, W, 3]              linear RGB, row 0 on top;
- * they need texcoords face_textures       [F]                    whole numbers, -1 for none; all have the
- * first without materials.specular  [M, 3]                 1 without materials.shininess [M] those of the
- * lights without face_materials      [F]                    whole numbers; all have the first without
- *   lights.ambient      [3]                    0.5 without
- *   lights.harmonics    [9, 3]
- *   lights.point        [L, 9]                 position, diffuse, specular
- *   lights.directional  [L, 9]                 direction, diffuse, specular
- *   lights.spot         [L, 14]                position, direction, angle and inner angle in degrees,
- * diffuse, specular sigma, gamma, alpha [] or [1]              instead of the settings'
+ *   vertices             [V, 3] or [N, V, 3]  world space, of every view by itself or the same in all
+ *   faces                [F, 3]               whole numbers: indices of vertices
+ *   views                [N, 4, 4]            world to camera, OpenGL axes, acting on column vectors; affine
+ *   intrinsics           [N, 4]               fx, fy, cx, cy in pixels from the corner of the top-left pixel
+ *                     or [N, 9]               the same, and OpenCV's k1, k2, p1, p2, k3 of the lens
+ *                     or [N, 1]               orthographic: world units from the lower to the upper edge
+ *   colors               [V, 3] or [N, V, 3]  linear RGB
+ *   or face_colors       [F, 3] or [N, F, 3]  white without either
+ *   background           [3]                  linear RGB; black without
+ *   texcoords            [V, 2]               of vertices
+ *                     or [F, 3, 2]            of the faces' corners
+ *                     or [T, 2]               with face_texcoords
+ *   face_texcoords       [F, 3]               whole numbers
+ *   textures[0], ...     [H, W, 3]            linear RGB, row 0 on top; they need texcoords
+ *   face_textures        [F]                  whole numbers, -1 for none; all have the first without
+ *   materials.specular   [M, 3]               1 without
+ *   materials.shininess  [M]                  those of the lights without
+ *   face_materials       [F]                  whole numbers; all have the first without
+ *   lights.ambient       [3]                  0.5 without
+ *   lights.harmonics     [9, 3]
+ *   lights.point         [L, 9]               position, diffuse, specular
+ *   lights.directional   [L, 9]               direction, diffuse, specular
+ *   lights.spot          [L, 14]              position, direction, angle and inner angle in degrees, diffuse,
+ *                                             specular
+ *   sigma, gamma, alpha  [] or [1]            instead of the settings'
  *
  * Textures and lights may have a leading dimension of 1. Outputs, and their gradients:
  *
- *   image               [N, height, width, 4]  linear RGB over the background, and alpha, the silhouette
- *   depth, position, normal, texcoords         [N, height, width, 4], as dpr_attribute_create() has them:
- * sums over the faces, weight times value, and in the last channel of the weights face_id             [N,
- * height, width]     DPR_INT64: the face that weighs most, -1 on the background barycentrics        [N,
- * height, width, 3]  of that face, and uv                  [N, height, width, 2] effective_faces     [N,
- * height, width]     how many faces share a pixel
+ *   image                [N, height, width, 4]  linear RGB over the background, and alpha, the silhouette
+ *   depth, position,     [N, height, width, 4]  as dpr_attribute_create() has them: sums over faces, weight
+ *   normal, texcoords                           times value, and in the last channel of the weights
+ *   face_id              [N, height, width]     DPR_INT64: the face that weighs most, -1 on the background
+ *   barycentrics         [N, height, width, 3]  of that face
+ *   uv                   [N, height, width, 2]  of that face
+ *   effective_faces      [N, height, width]     how many faces share a pixel
  *
  * The last four have no gradients. Errors name the array. All calls may come from several threads at once,
  * those with one frame one after the other. OpenCL does not survive fork(): in a process forked from one that

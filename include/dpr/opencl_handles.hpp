@@ -95,7 +95,7 @@ DPR_API void set_transforms(Renderer& renderer, const BufferSpan& transforms, co
 /// cameras in lit scenes then.
 DPR_API void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events = {});
 
-/// How much room frames have: at most 3435973832 of each, which with the headroom of buffers are fewer than
+/// Room of frames: at most 3435973832 of each, which with the headroom of buffers are fewer than
 /// 2^32.
 struct FrameRoom {
   std::size_t pairs = 0, fragments = 0;  ///< as RenderStatistics counts them

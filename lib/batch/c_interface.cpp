@@ -7,10 +7,7 @@
 #include "c/handles.hpp"
 
 using dpr::InvalidArgument;
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::versioned;
+using namespace dpr::c;
 
 struct dpr_frame {
   static constexpr const char* k_handle = "dpr_frame";
@@ -113,33 +110,33 @@ const char* dpr_frame_settings() {
 }
 
 dpr_status dpr_frame_check(const dpr_frame_options* options) {
-  return guarded([&] { dpr::c::to_settings(dpr::c::to_options(options)); });
+  return guarded([&] { to_settings(to_options(options)); });
 }
 
 dpr_status dpr_frame_render(const dpr_frame_options* options, const dpr_array* arrays, std::size_t count,
                             dpr_frame** frame) {
   return guarded([&] {
     deref(frame, "frame");
-    const dpr_frame_options given = dpr::c::to_options(options);
-    const dpr::batch::RenderSettings settings = dpr::c::to_settings(given);
-    const std::vector<dpr::batch::NamedArray> named = dpr::c::to_arrays(arrays, count, "arrays");
+    const dpr_frame_options given = to_options(options);
+    const dpr::batch::RenderSettings settings = to_settings(given);
+    const std::vector<dpr::batch::NamedArray> named = to_arrays(arrays, count, "arrays");
     const dpr::batch::BatchOptions how{settings, given.is_lit != 0, given.first_view,
-                                       dpr::c::to_words(given.gradients, given.gradient_count, "gradients")};
+                                       to_words(given.gradients, given.gradient_count, "gradients")};
     auto pool = dpr::batch::RendererPools::of_process().get(given.device ? given.device : "");
     give(frame, std::make_unique<dpr::batch::Batch>(std::move(pool), named, how));
   });
 }
 
 dpr_status dpr_frame_read(dpr_frame* frame, const dpr_array* outputs, std::size_t count) {
-  return guarded([&] { deref(frame, "frame").batch->read(dpr::c::to_arrays(outputs, count, "outputs")); });
+  return guarded([&] { deref(frame, "frame").batch->read(to_arrays(outputs, count, "outputs")); });
 }
 
 dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, std::size_t grad_count,
                               const dpr_array* gradients, std::size_t gradient_count) {
   return guarded([&] {
     deref(frame, "frame")
-        .batch->backward(dpr::c::to_arrays(grads, grad_count, "grads"),
-                         dpr::c::to_arrays(gradients, gradient_count, "gradients"));
+        .batch->backward(to_arrays(grads, grad_count, "grads"),
+                         to_arrays(gradients, gradient_count, "gradients"));
   });
 }
 
@@ -147,7 +144,7 @@ dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty) {
   return guarded([&] { deref(is_empty, "is_empty") = deref(frame, "frame").batch->is_empty() ? 1 : 0; });
 }
 
-void dpr_frame_destroy(dpr_frame* frame) { dpr::c::destroy(frame); }
+void dpr_frame_destroy(dpr_frame* frame) { destroy(frame); }
 
 dpr_status dpr_frames_release() {
   return guarded([] { dpr::batch::RendererPools::of_process().clear(); });
@@ -157,8 +154,8 @@ dpr_status dpr_cut_create(const dpr_frame_options* options, const dpr_array* arr
                           float tolerance, dpr_cut** cut) {
   return guarded([&] {
     deref(cut, "cut");
-    const dpr::batch::RenderSettings settings = dpr::c::to_settings(dpr::c::to_options(options));
-    give(cut, dpr::batch::cut_for_lens(dpr::c::to_arrays(arrays, count, "arrays"), settings, tolerance));
+    const dpr::batch::RenderSettings settings = to_settings(to_options(options));
+    give(cut, dpr::batch::cut_for_lens(to_arrays(arrays, count, "arrays"), settings, tolerance));
   });
 }
 
@@ -173,9 +170,9 @@ dpr_status dpr_cut_size(const dpr_cut* cut, std::size_t* faces, std::size_t* ver
 
 dpr_status dpr_cut_read(const dpr_cut* cut, const dpr_array* arrays, std::size_t count) {
   return guarded([&] {
-    for (const dpr::batch::NamedArray& array : dpr::c::to_arrays(arrays, count, "arrays"))
-      dpr::c::read_cut(deref(cut, "cut").faces, array);
+    for (const dpr::batch::NamedArray& array : to_arrays(arrays, count, "arrays"))
+      read_cut(deref(cut, "cut").faces, array);
   });
 }
 
-void dpr_cut_destroy(dpr_cut* cut) { dpr::c::destroy(cut); }
+void dpr_cut_destroy(dpr_cut* cut) { destroy(cut); }

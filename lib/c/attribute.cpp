@@ -8,13 +8,7 @@
 #include "renderer/on_device.hpp"
 
 using dpr::InvalidArgument;
-using dpr::c::deref;
-using dpr::c::fill;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::renderer_of;
-using dpr::c::to_events;
-using dpr::c::to_span;
+using namespace dpr::c;
 
 namespace dpr::c {
 namespace {
@@ -87,7 +81,7 @@ std::vector<dpr_gradient::Array> arrays_of_attribute(const AttributeImages& imag
 dpr_status dpr_renderer_aov_size(const dpr_renderer* renderer, const char* name, std::size_t* count) {
   return guarded([&] {
     deref(count, "count");
-    *count = dpr::c::count_of(renderer_of(renderer), dpr::parse_aov(&deref(name, "name"), "name"));
+    *count = count_of(renderer_of(renderer), dpr::parse_aov(&deref(name, "name"), "name"));
   });
 }
 
@@ -96,9 +90,9 @@ dpr_status dpr_renderer_read_aov(dpr_renderer* renderer, const char* name, float
     dpr::Renderer& r = renderer_of(renderer);
     const dpr::Aov aov = dpr::parse_aov(&deref(name, "name"), "name");
     deref(values, "values");
-    dpr::c::require_count(count, dpr::c::count_of(r, aov), "values");
+    require_count(count, count_of(r, aov), "values");
     for (std::size_t view = 0; view < r.views().size(); ++view)
-      values = dpr::c::write_output(dpr::auxiliary_outputs(r, view), aov, values);
+      values = write_output(dpr::auxiliary_outputs(r, view), aov, values);
   });
 }
 
@@ -135,23 +129,22 @@ dpr_status dpr_attribute_create_values(const dpr_device* device, std::size_t cha
 }
 
 dpr_status dpr_attribute_set_values(dpr_attribute* attribute, const float* values, std::size_t count) {
-  return guarded(
-      [&] { dpr::c::images_of(attribute).set_values(dpr::c::numbers(values, count, 1, "values")); });
+  return guarded([&] { images_of(attribute).set_values(numbers(values, count, 1, "values")); });
 }
 
 dpr_status dpr_attribute_forward(dpr_attribute* attribute, const dpr_renderer* renderer) {
-  return guarded([&] { dpr::c::images_of(attribute).forward(renderer_of(renderer)); });
+  return guarded([&] { images_of(attribute).forward(renderer_of(renderer)); });
 }
 
 dpr_status dpr_attribute_image_size(const dpr_attribute* attribute, std::size_t* count) {
-  return guarded([&] { deref(count, "count") = dpr::c::image_floats_of(deref(attribute, "attribute")); });
+  return guarded([&] { deref(count, "count") = image_floats_of(deref(attribute, "attribute")); });
 }
 
 dpr_status dpr_attribute_read_image(const dpr_attribute* attribute, float* pixels, std::size_t count) {
   return guarded([&] {
     const dpr_attribute& a = deref(attribute, "attribute");
     deref(pixels, "pixels");
-    dpr::c::require_count(count, dpr::c::image_floats_of(a), "pixels");
+    require_count(count, image_floats_of(a), "pixels");
     const dpr::AttributeImages::Impl& m = a.images.impl();
     static_assert(sizeof(cl_float4) == 4 * sizeof(float));
     m.renderer.device().impl().read(m.images().cl_buffer(), 0,
@@ -163,31 +156,30 @@ dpr_status dpr_attribute_backward_pixels(dpr_attribute* attribute, const float* 
                                          dpr_gradient** gradient) {
   return guarded([&] {
     deref(gradient, "gradient");
-    dpr::AttributeImages& images = dpr::c::images_of(attribute);
+    dpr::AttributeImages& images = images_of(attribute);
     deref(grad, "grad");
-    dpr::SceneGradient found = images.backward(dpr::c::to_grad_images(*attribute, grad, count));
-    give(gradient, dpr::c::arrays_of_attribute(images, std::move(found)));
+    dpr::SceneGradient found = images.backward(to_grad_images(*attribute, grad, count));
+    give(gradient, arrays_of_attribute(images, std::move(found)));
   });
 }
 
-void dpr_attribute_destroy(dpr_attribute* attribute) { dpr::c::destroy(attribute); }
+void dpr_attribute_destroy(dpr_attribute* attribute) { destroy(attribute); }
 
 dpr_status dpr_attribute_set_values_from(dpr_attribute* attribute, const dpr_buffer* values,
                                          std::size_t vertices, const dpr_events* events) {
-  return guarded([&] {
-    dpr::set_values(dpr::c::images_of(attribute), to_span(values, "values"), vertices, to_events(events));
-  });
+  return guarded(
+      [&] { dpr::set_values(images_of(attribute), to_span(values, "values"), vertices, to_events(events)); });
 }
 
 dpr_status dpr_attribute_reserve(dpr_attribute* attribute, const dpr_frame_room* room) {
-  return guarded([&] { dpr::reserve(dpr::c::images_of(attribute), dpr::c::to_room(room)); });
+  return guarded([&] { dpr::reserve(images_of(attribute), to_room(room)); });
 }
 
 dpr_status dpr_attribute_forward_on_device(dpr_attribute* attribute, const dpr_renderer* renderer,
                                            const dpr_events* events) {
   return guarded([&] {
     dpr::c::require_none_emptied(
-        dpr::forward_on_device(dpr::c::images_of(attribute), renderer_of(renderer), to_events(events)));
+        dpr::forward_on_device(images_of(attribute), renderer_of(renderer), to_events(events)));
   });
 }
 
@@ -195,27 +187,26 @@ dpr_status dpr_attribute_frame_history(dpr_attribute* attribute, std::size_t* em
                                        dpr_frame_room* largest) {
   return guarded([&] {
     deref(emptied, "emptied");
-    dpr::c::versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
-    dpr::c::fill_history(emptied, largest, dpr::frame_history(dpr::c::images_of(attribute)));
+    versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
+    fill_history(emptied, largest, dpr::frame_history(images_of(attribute)));
   });
 }
 
 dpr_status dpr_attribute_backward_on_device(dpr_attribute* attribute, const dpr_buffer* grad,
                                             const dpr_events* events) {
-  return guarded([&] {
-    dpr::backward_on_device(dpr::c::images_of(attribute), to_span(grad, "grad"), to_events(events));
-  });
+  return guarded(
+      [&] { dpr::backward_on_device(images_of(attribute), to_span(grad, "grad"), to_events(events)); });
 }
 
 dpr_status dpr_attribute_image_view(dpr_attribute* attribute, dpr_buffer* view) {
-  return guarded([&] { fill(view, dpr::image_view(dpr::c::images_of(attribute))); });
+  return guarded([&] { fill(view, dpr::image_view(images_of(attribute))); });
 }
 
 dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* name, dpr_buffer* view,
                                        std::size_t* byte_offset) {
   return guarded([&] {
     deref(byte_offset, "byte_offset");
-    fill(view, dpr::gradient_view(dpr::c::images_of(attribute), &deref(name, "name")));
+    fill(view, dpr::gradient_view(images_of(attribute), &deref(name, "name")));
     *byte_offset = view->byte_offset;
   });
 }
@@ -223,13 +214,13 @@ dpr_status dpr_attribute_gradient_view(dpr_attribute* attribute, const char* nam
 dpr_status dpr_attribute_copy_images(dpr_attribute* attribute, const dpr_buffer* images,
                                      const dpr_events* events) {
   return guarded(
-      [&] { dpr::copy_images(dpr::c::images_of(attribute), to_span(images, "images"), to_events(events)); });
+      [&] { dpr::copy_images(images_of(attribute), to_span(images, "images"), to_events(events)); });
 }
 
 dpr_status dpr_attribute_copy_gradient(dpr_attribute* attribute, const char* name, const dpr_buffer* gradient,
                                        const dpr_events* events) {
   return guarded([&] {
-    dpr::copy_gradient(dpr::c::images_of(attribute), &deref(name, "name"), to_span(gradient, "gradient"),
+    dpr::copy_gradient(images_of(attribute), &deref(name, "name"), to_span(gradient, "gradient"),
                        to_events(events));
   });
 }

@@ -2,11 +2,7 @@
 #include "c/buffers.hpp"
 
 using dpr::InvalidArgument;
-using dpr::c::batch_of;
-using dpr::c::deref;
-using dpr::c::fill;
-using dpr::c::give;
-using dpr::c::guarded;
+using namespace dpr::c;
 
 namespace dpr::c {
 namespace {
@@ -46,10 +42,10 @@ dpr_status dpr_batch_set_scenes(dpr_batch* batch, const dpr_scene* const* scenes
   return guarded([&] {
     dpr::SceneBatch& b = batch_of(batch);
     if (count > 0) deref(scenes, "scenes");
-    std::vector<dpr::Scene> resolved;
+    std::vector<dpr::Scene> copies;
     for (const dpr_scene* scene : std::span(scenes, count))
-      resolved.push_back(dpr::c::resolved(deref(scene, "scenes")));
-    b.set_scenes(resolved);
+      copies.push_back(resolved(deref(scene, "scenes")));
+    b.set_scenes(copies);
   });
 }
 
@@ -66,13 +62,13 @@ dpr_status dpr_batch_forward(dpr_batch* batch) {
 }
 
 dpr_status dpr_batch_image_size(const dpr_batch* batch, std::size_t* count) {
-  return guarded([&] { deref(count, "count") = dpr::c::floats_of_images(batch_of(batch)); });
+  return guarded([&] { deref(count, "count") = floats_of_images(batch_of(batch)); });
 }
 
 dpr_status dpr_batch_read_image(const dpr_batch* batch, float* pixels, std::size_t count) {
   return guarded([&] {
     dpr::SceneBatch& b = batch_of(batch);
-    b.read_pixels(dpr::c::to_pixels(pixels, count, dpr::c::floats_of_images(b)));
+    b.read_pixels(to_pixels(pixels, count, floats_of_images(b)));
   });
 }
 
@@ -83,8 +79,8 @@ dpr_status dpr_batch_image_view(dpr_batch* batch, dpr_buffer* view) {
 dpr_status dpr_batch_backward_loss(dpr_batch* batch, const dpr_loss* loss, dpr_gradient** gradients,
                                    std::size_t count) {
   return guarded([&] {
-    dpr::c::give_gradients(gradients, count, batch,
-                           [&](dpr::SceneBatch& b) { return b.backward(deref(loss, "loss").loss); });
+    give_gradients(gradients, count, batch,
+                   [&](dpr::SceneBatch& b) { return b.backward(deref(loss, "loss").loss); });
   });
 }
 
@@ -92,7 +88,7 @@ dpr_status dpr_batch_backward_losses(dpr_batch* batch, const dpr_loss* loss,
                                      const dpr_mesh_loss* const* mesh_losses, dpr_gradient** gradients,
                                      std::size_t count) {
   return guarded([&] {
-    dpr::c::give_gradients(gradients, count, batch, [&](dpr::SceneBatch& b) {
+    give_gradients(gradients, count, batch, [&](dpr::SceneBatch& b) {
       deref(mesh_losses, "mesh_losses");
       std::vector<const dpr::MeshLoss*> own;
       for (const dpr_mesh_loss* of_scene : std::span(mesh_losses, count))
@@ -105,8 +101,8 @@ dpr_status dpr_batch_backward_losses(dpr_batch* batch, const dpr_loss* loss,
 dpr_status dpr_batch_backward_pixels(dpr_batch* batch, const float* grad, std::size_t grad_count,
                                      dpr_gradient** gradients, std::size_t count) {
   return guarded([&] {
-    dpr::c::give_gradients(gradients, count, batch, [&](dpr::SceneBatch& b) {
-      return b.backward_pixels(dpr::c::to_pixels(grad, grad_count, "grad"));
+    give_gradients(gradients, count, batch, [&](dpr::SceneBatch& b) {
+      return b.backward_pixels(to_pixels(grad, grad_count, "grad"));
     });
   });
 }
@@ -114,9 +110,9 @@ dpr_status dpr_batch_backward_pixels(dpr_batch* batch, const float* grad, std::s
 dpr_status dpr_batch_backward_buffer(dpr_batch* batch, struct _cl_mem* grad, dpr_gradient** gradients,
                                      std::size_t count) {
   return guarded([&] {
-    dpr::c::give_gradients(gradients, count, batch,
-                           [&](dpr::SceneBatch& b) { return dpr::backward(b, &deref(grad, "grad")); });
+    give_gradients(gradients, count, batch,
+                   [&](dpr::SceneBatch& b) { return dpr::backward(b, &deref(grad, "grad")); });
   });
 }
 
-void dpr_batch_destroy(dpr_batch* batch) { dpr::c::destroy(batch); }
+void dpr_batch_destroy(dpr_batch* batch) { destroy(batch); }

@@ -2,9 +2,7 @@
 #include "c/handles.hpp"
 #include "dpr/opencl_handles.hpp"
 
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
+using namespace dpr::c;
 
 dpr_status dpr_device_open(const char* selector, dpr_device** device) {
   return guarded([&] {
@@ -35,7 +33,7 @@ dpr_status dpr_device_describe(std::size_t index, dpr_device_info* info) {
     found.compute_units = kept.compute_units;
     found.lanes = kept.lanes;
     found.is_default = kept.is_default ? 1 : 0;
-    dpr::c::fill(info, found, "info");
+    fill(info, found, "info");
   });
 }
 
@@ -53,4 +51,4 @@ dpr_status dpr_device_name(const dpr_device* device, const char** name) {
   return guarded([&] { deref(name, "name") = deref(device, "device").device.info().name.c_str(); });
 }
 
-void dpr_device_destroy(dpr_device* device) { dpr::c::destroy(device); }
+void dpr_device_destroy(dpr_device* device) { destroy(device); }

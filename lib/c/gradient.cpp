@@ -6,10 +6,7 @@
 #include "scene/gradient_table.hpp"
 
 using dpr::InvalidArgument;
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::renderer_of;
+using namespace dpr::c;
 
 namespace dpr::c {
 
@@ -51,7 +48,7 @@ dpr_status dpr_backward_loss(dpr_renderer* renderer, const dpr_loss* loss, dpr_g
   return guarded([&] {
     deref(gradient, "gradient");
     dpr::Renderer& r = renderer_of(renderer);
-    dpr::c::give_gradient(gradient, r, r.backward(deref(loss, "loss").loss));
+    give_gradient(gradient, r, r.backward(deref(loss, "loss").loss));
   });
 }
 
@@ -60,8 +57,7 @@ dpr_status dpr_backward_losses(dpr_renderer* renderer, const dpr_loss* loss, con
   return guarded([&] {
     deref(gradient, "gradient");
     dpr::Renderer& r = renderer_of(renderer);
-    dpr::c::give_gradient(gradient, r,
-                          r.backward(deref(loss, "loss").loss, deref(mesh_loss, "mesh_loss").loss));
+    give_gradient(gradient, r, r.backward(deref(loss, "loss").loss, deref(mesh_loss, "mesh_loss").loss));
   });
 }
 
@@ -70,7 +66,7 @@ dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad, std::s
   return guarded([&] {
     deref(gradient, "gradient");
     dpr::Renderer& r = renderer_of(renderer);
-    dpr::c::give_gradient(gradient, r, r.backward_pixels(dpr::c::to_pixels(grad, count, "grad")));
+    give_gradient(gradient, r, r.backward_pixels(to_pixels(grad, count, "grad")));
   });
 }
 
@@ -79,7 +75,7 @@ dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr
     deref(gradient, "gradient");
     deref(grad, "grad");
     dpr::Renderer& r = renderer_of(renderer);
-    dpr::c::give_gradient(gradient, r, dpr::backward(r, grad));
+    give_gradient(gradient, r, dpr::backward(r, grad));
   });
 }
 
@@ -97,18 +93,18 @@ dpr_status dpr_gradient_name(const dpr_gradient* gradient, std::size_t index, co
 }
 
 dpr_status dpr_gradient_size(const dpr_gradient* gradient, const char* name, std::size_t* count) {
-  return guarded([&] { deref(count, "count") = dpr::c::array_named(gradient, name).values.size(); });
+  return guarded([&] { deref(count, "count") = array_named(gradient, name).values.size(); });
 }
 
 dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* name, double* values,
                              std::size_t count) {
   return guarded([&] {
     deref(values, "values");
-    const std::vector<double>& found = dpr::c::array_named(gradient, name).values;
+    const std::vector<double>& found = array_named(gradient, name).values;
     if (count != found.size())
       throw InvalidArgument("count (values)", std::to_string(count), std::to_string(found.size()));
     std::ranges::copy(found, values);
   });
 }
 
-void dpr_gradient_destroy(dpr_gradient* gradient) { dpr::c::destroy(gradient); }
+void dpr_gradient_destroy(dpr_gradient* gradient) { destroy(gradient); }

@@ -4,10 +4,7 @@
 
 #include "c/handles.hpp"
 
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::renderer_of;
+using namespace dpr::c;
 
 namespace dpr::c {
 namespace {
@@ -99,7 +96,7 @@ dpr_status dpr_loss_create(const dpr_device* device, const dpr_loss_weights* wei
     deref(weights, "weights");
     dpr_loss_options options = DPR_LOSS_OPTIONS_INIT;
     options.weights = weights;
-    dpr::c::give_loss(loss, device, options, {targets, count, views, width, height});
+    give_loss(loss, device, options, {targets, count, views, width, height});
   });
 }
 
@@ -107,9 +104,8 @@ dpr_status dpr_loss_create_with(const dpr_device* device, const dpr_loss_options
                                 const float* targets, std::size_t count, std::size_t views, int width,
                                 int height, dpr_loss** loss) {
   return guarded([&] {
-    dpr::c::give_loss(loss, device,
-                      dpr::c::versioned<dpr_loss_options>(options, DPR_LOSS_OPTIONS_INIT, "options"),
-                      {targets, count, views, width, height});
+    give_loss(loss, device, versioned<dpr_loss_options>(options, DPR_LOSS_OPTIONS_INIT, "options"),
+              {targets, count, views, width, height});
   });
 }
 
@@ -123,18 +119,18 @@ dpr_status dpr_loss_evaluate(dpr_loss* loss, const dpr_renderer* renderer, doubl
 dpr_status dpr_loss_evaluate_batch(dpr_loss* loss, const dpr_batch* batch, double* value) {
   return guarded([&] {
     deref(value, "value");
-    *value = deref(loss, "loss").loss.evaluate(dpr::c::batch_of(batch));
+    *value = deref(loss, "loss").loss.evaluate(batch_of(batch));
   });
 }
 
-void dpr_loss_destroy(dpr_loss* loss) { dpr::c::destroy(loss); }
+void dpr_loss_destroy(dpr_loss* loss) { destroy(loss); }
 
 dpr_status dpr_mesh_loss_create(const dpr_device* device, const dpr_mesh_loss_weights* weights,
                                 const dpr_mesh* mesh, dpr_mesh_loss** loss) {
   return guarded([&] {
     deref(loss, "loss");
-    const auto w = dpr::c::versioned<dpr_mesh_loss_weights>(weights, DPR_MESH_LOSS_WEIGHTS_INIT, "weights");
-    const dpr::Mesh shape = dpr::c::to_mesh(dpr::c::versioned<dpr_mesh>(mesh, DPR_MESH_INIT, "mesh"));
+    const auto w = versioned<dpr_mesh_loss_weights>(weights, DPR_MESH_LOSS_WEIGHTS_INIT, "weights");
+    const dpr::Mesh shape = to_mesh(versioned<dpr_mesh>(mesh, DPR_MESH_INIT, "mesh"));
     give(loss, dpr::MeshLoss(deref(device, "device").device,
                              {.laplacian = w.laplacian,
                               .edge_length = w.edge_length,
@@ -153,4 +149,4 @@ dpr_status dpr_mesh_loss_evaluate(dpr_mesh_loss* loss, const dpr_renderer* rende
   });
 }
 
-void dpr_mesh_loss_destroy(dpr_mesh_loss* loss) { dpr::c::destroy(loss); }
+void dpr_mesh_loss_destroy(dpr_mesh_loss* loss) { destroy(loss); }

@@ -1,14 +1,8 @@
 // Buffers that stay on the device, in the C interface.
 #include "c/buffers.hpp"
+#include "renderer/mesh_arrays.hpp"
 
-using dpr::c::deref;
-using dpr::c::fill;
-using dpr::c::guarded;
-using dpr::c::renderer_of;
-using dpr::c::require_none_emptied;
-using dpr::c::to_events;
-using dpr::c::to_span;
-using dpr::c::versioned;
+using namespace dpr::c;
 
 namespace dpr::c {
 
@@ -42,46 +36,45 @@ void fill_history(std::size_t* emptied, dpr_frame_room* largest, const FrameHist
                        "largest");
 }
 
+namespace {
+
+dpr_status set_from(dpr_renderer* renderer, const ArrayRef& at, const dpr_buffer* values,
+                    const dpr_events* events) {
+  return guarded(
+      [&] { set_array(renderer_of(renderer), at, to_span(values, row_of(at.id).name), to_events(events)); });
+}
+
+}  // namespace
 }  // namespace dpr::c
 
 dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* positions, const dpr_events* events) {
-  return guarded([&] {
-    dpr::set_positions(renderer_of(renderer), mesh, to_span(positions, "positions"), to_events(events));
-  });
+  return set_from(renderer, {dpr::ArrayId::positions, mesh}, positions, events);
 }
 
 dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* colors,
                                         const dpr_events* events) {
-  return guarded(
-      [&] { dpr::set_colors(renderer_of(renderer), mesh, to_span(colors, "colors"), to_events(events)); });
+  return set_from(renderer, {dpr::ArrayId::colors, mesh}, colors, events);
 }
 
 dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
                                         const dpr_buffer* texels, const dpr_events* events) {
-  return guarded([&] {
-    dpr::set_texels(renderer_of(renderer), mesh, texture, to_span(texels, "texels"), to_events(events));
-  });
+  return set_from(renderer, {dpr::ArrayId::texels, mesh, texture}, texels, events);
 }
 
 dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* texcoords, const dpr_events* events) {
-  return guarded([&] {
-    dpr::set_texcoords(renderer_of(renderer), mesh, to_span(texcoords, "texcoords"), to_events(events));
-  });
+  return set_from(renderer, {dpr::ArrayId::texcoords, mesh}, texcoords, events);
 }
 
 dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* normals,
                                          const dpr_events* events) {
-  return guarded(
-      [&] { dpr::set_normals(renderer_of(renderer), mesh, to_span(normals, "normals"), to_events(events)); });
+  return set_from(renderer, {dpr::ArrayId::normals, mesh}, normals, events);
 }
 
 dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* materials, const dpr_events* events) {
-  return guarded([&] {
-    dpr::set_materials(renderer_of(renderer), mesh, to_span(materials, "materials"), to_events(events));
-  });
+  return set_from(renderer, {dpr::ArrayId::materials, mesh}, materials, events);
 }
 
 dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
@@ -111,7 +104,7 @@ dpr_status dpr_renderer_set_transforms_from(dpr_renderer* renderer, const dpr_bu
 
 dpr_status dpr_renderer_reserve(dpr_renderer* renderer, const dpr_frame_room* room) {
   return guarded([&] {
-    const dpr::FrameRoom wanted = dpr::c::to_room(room);
+    const dpr::FrameRoom wanted = to_room(room);
     dpr::reserve(renderer_of(renderer), wanted);
   });
 }
@@ -125,7 +118,7 @@ dpr_status dpr_renderer_frame_history(dpr_renderer* renderer, std::size_t* empti
   return guarded([&] {
     deref(emptied, "emptied");
     versioned<dpr_frame_room>(largest, DPR_FRAME_ROOM_INIT, "largest");
-    dpr::c::fill_history(emptied, largest, dpr::frame_history(renderer_of(renderer)));
+    fill_history(emptied, largest, dpr::frame_history(renderer_of(renderer)));
   });
 }
 

@@ -4,11 +4,7 @@
 #include "renderer/renderer_impl.hpp"
 #include "scene/cull.hpp"
 
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::numbers;
-using dpr::c::renderer_of;
+using namespace dpr::c;
 
 namespace dpr::c {
 namespace {
@@ -38,6 +34,19 @@ std::size_t floats_of_images(const Renderer& renderer) {
   return image_floats(renderer.views().size(), renderer.scene().width, renderer.scene().height);
 }
 
+dpr_status set_floats(dpr_renderer* renderer, const ArrayRef& at, const float* values, std::size_t count) {
+  return guarded([&] {
+    Renderer& r = renderer_of(renderer);
+    const MeshArray& row = row_of(at.id);
+    const std::span<const float> floats = numbers(values, count, row.components, row.name);
+    if (row.components == 2) {
+      set_array(r, at, to_pairs(floats));
+    } else {
+      set_array(r, at, to_vectors(floats));
+    }
+  });
+}
+
 }  // namespace
 }  // namespace dpr::c
 
@@ -49,69 +58,53 @@ dpr_status dpr_renderer_create(const dpr_device* device, dpr_renderer** renderer
 }
 
 dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene) {
-  return guarded([&] { renderer_of(renderer).set_scene(dpr::c::resolved(deref(scene, "scene"))); });
+  return guarded([&] { renderer_of(renderer).set_scene(resolved(deref(scene, "scene"))); });
 }
 
 dpr_status dpr_renderer_set_views(dpr_renderer* renderer, const dpr_camera* cameras, std::size_t views,
                                   const float* transforms, std::size_t transform_count) {
   return guarded([&] {
     dpr::Renderer& r = renderer_of(renderer);
-    dpr::c::require_views(views);
+    require_views(views);
     std::span<const float> values;
     if (transforms || transform_count > 0) {
-      values = numbers(transforms, transform_count, dpr::c::k_matrix, "transforms");
-      dpr::c::require_count(transform_count, views * r.scene().meshes.size() * dpr::c::k_matrix,
-                            "transforms");
+      values = numbers(transforms, transform_count, k_matrix, "transforms");
+      require_count(transform_count, views * r.scene().meshes.size() * k_matrix, "transforms");
     }
-    r.set_views(dpr::c::to_views(r.scene(), cameras, views, values));
+    r.set_views(to_views(r.scene(), cameras, views, values));
   });
 }
 
 dpr_status dpr_renderer_set_positions(dpr_renderer* renderer, std::size_t mesh, const float* positions,
                                       std::size_t count) {
-  return guarded([&] {
-    dpr::Renderer& r = renderer_of(renderer);
-    r.set_positions(mesh, dpr::c::to_vectors(numbers(positions, count, 3, "positions")));
-  });
+  return set_floats(renderer, {dpr::ArrayId::positions, mesh}, positions, count);
 }
 
 dpr_status dpr_renderer_set_colors(dpr_renderer* renderer, std::size_t mesh, const float* colors,
                                    std::size_t count) {
-  return guarded([&] {
-    dpr::Renderer& r = renderer_of(renderer);
-    r.set_colors(mesh, dpr::c::to_vectors(numbers(colors, count, 3, "colors")));
-  });
+  return set_floats(renderer, {dpr::ArrayId::colors, mesh}, colors, count);
 }
 
 dpr_status dpr_renderer_set_texels(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
                                    const float* texels, std::size_t count) {
-  return guarded([&] {
-    dpr::Renderer& r = renderer_of(renderer);
-    r.set_texels(mesh, texture, dpr::c::to_vectors(numbers(texels, count, 3, "texels")));
-  });
+  return set_floats(renderer, {dpr::ArrayId::texels, mesh, texture}, texels, count);
 }
 
 dpr_status dpr_renderer_set_texcoords(dpr_renderer* renderer, std::size_t mesh, const float* texcoords,
                                       std::size_t count) {
-  return guarded([&] {
-    dpr::Renderer& r = renderer_of(renderer);
-    r.set_texcoords(mesh, dpr::c::to_pairs(numbers(texcoords, count, 2, "texcoords")));
-  });
+  return set_floats(renderer, {dpr::ArrayId::texcoords, mesh}, texcoords, count);
 }
 
 dpr_status dpr_renderer_set_normals(dpr_renderer* renderer, std::size_t mesh, const float* normals,
                                     std::size_t count) {
-  return guarded([&] {
-    dpr::Renderer& r = renderer_of(renderer);
-    r.set_normals(mesh, dpr::c::to_vectors(numbers(normals, count, 3, "normals")));
-  });
+  return set_floats(renderer, {dpr::ArrayId::normals, mesh}, normals, count);
 }
 
 dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, std::size_t mesh, const dpr_material* materials,
                                       std::size_t count) {
   return guarded([&] {
     dpr::Renderer& r = renderer_of(renderer);
-    r.set_materials(mesh, dpr::c::to_materials(materials, count, "materials"));
+    r.set_materials(mesh, to_materials(materials, count, "materials"));
   });
 }
 
@@ -120,8 +113,7 @@ dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* position
   return guarded([&] {
     dpr::Renderer& r = renderer_of(renderer);
     const auto optional_vectors = [](const float* values, std::size_t count, const char* argument) {
-      return values || count > 0 ? dpr::c::to_vectors(numbers(values, count, 3, argument))
-                                 : std::vector<glm::vec3>();
+      return values || count > 0 ? to_vectors(numbers(values, count, 3, argument)) : std::vector<glm::vec3>();
     };
     r.set_shapes(optional_vectors(positions, position_count, "positions"),
                  optional_vectors(colors, color_count, "colors"));
@@ -129,15 +121,15 @@ dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* position
 }
 
 dpr_status dpr_renderer_set_lights(dpr_renderer* renderer, const dpr_lights* lights) {
-  return guarded([&] { renderer_of(renderer).set_lights(dpr::c::to_lights(lights)); });
+  return guarded([&] { renderer_of(renderer).set_lights(to_lights(lights)); });
 }
 
 dpr_status dpr_renderer_set_smoothing(dpr_renderer* renderer, const dpr_scene* scene) {
-  return guarded([&] { renderer_of(renderer).set_smoothing(dpr::c::smoothing_of(deref(scene, "scene"))); });
+  return guarded([&] { renderer_of(renderer).set_smoothing(smoothing_of(deref(scene, "scene"))); });
 }
 
 dpr_status dpr_renderer_set_background(dpr_renderer* renderer, const float color[3]) {
-  return guarded([&] { renderer_of(renderer).set_background(dpr::c::to_vector(&deref(color, "color"))); });
+  return guarded([&] { renderer_of(renderer).set_background(to_vector(&deref(color, "color"))); });
 }
 
 dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word) {
@@ -145,7 +137,7 @@ dpr_status dpr_renderer_set_cull(dpr_renderer* renderer, const char* word) {
 }
 
 dpr_status dpr_renderer_set_gradients(dpr_renderer* renderer, const char* const* names, std::size_t count) {
-  return guarded([&] { renderer_of(renderer).set_gradients(dpr::c::to_request(names, count)); });
+  return guarded([&] { renderer_of(renderer).set_gradients(to_request(names, count)); });
 }
 
 dpr_status dpr_renderer_forward(dpr_renderer* renderer) {
@@ -155,14 +147,14 @@ dpr_status dpr_renderer_forward(dpr_renderer* renderer) {
 dpr_status dpr_renderer_image_size(const dpr_renderer* renderer, std::size_t* count) {
   return guarded([&] {
     deref(count, "count");
-    *count = dpr::c::floats_of_images(renderer_of(renderer));
+    *count = floats_of_images(renderer_of(renderer));
   });
 }
 
 dpr_status dpr_renderer_read_image(const dpr_renderer* renderer, float* pixels, std::size_t count) {
   return guarded([&] {
     const dpr::Renderer& r = renderer_of(renderer);
-    r.read_pixels(dpr::c::to_pixels(pixels, count, dpr::c::floats_of_images(r)));
+    r.read_pixels(to_pixels(pixels, count, floats_of_images(r)));
   });
 }
 
@@ -173,4 +165,4 @@ dpr_status dpr_renderer_image_buffer(const dpr_renderer* renderer, struct _cl_me
   });
 }
 
-void dpr_renderer_destroy(dpr_renderer* renderer) { dpr::c::destroy(renderer); }
+void dpr_renderer_destroy(dpr_renderer* renderer) { destroy(renderer); }

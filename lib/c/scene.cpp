@@ -10,10 +10,7 @@
 #include "smoothing/option_fields.hpp"
 
 using dpr::InvalidArgument;
-using dpr::c::deref;
-using dpr::c::give;
-using dpr::c::guarded;
-using dpr::c::versioned;
+using namespace dpr::c;
 
 namespace dpr::c {
 
@@ -257,7 +254,7 @@ GradientRequest to_request(const char* const* names, std::size_t count) {
 dpr_status dpr_scene_create(int width, int height, dpr_scene** scene) {
   return guarded([&] {
     deref(scene, "scene");
-    dpr::c::require_size(width, height, "size (scene)");
+    require_size(width, height, "size (scene)");
     dpr_scene made;
     made.scene.width = width;
     made.scene.height = height;
@@ -276,25 +273,25 @@ dpr_status dpr_scene_read(const char* file, dpr_scene** scene) {
 }
 
 dpr_status dpr_scene_add_mesh(dpr_scene* scene, const dpr_mesh* mesh) {
-  return guarded([&] { deref(scene, "scene").scene.meshes.push_back(dpr::c::to_instance(mesh)); });
+  return guarded([&] { deref(scene, "scene").scene.meshes.push_back(to_instance(mesh)); });
 }
 
 dpr_status dpr_scene_add_instance(dpr_scene* scene, std::size_t mesh, const float* transform) {
   return guarded([&] {
     dpr::Scene& s = deref(scene, "scene").scene;
     dpr::require_source(s.meshes, s.meshes.size(), mesh, "mesh (instance)");
-    s.meshes.push_back({{}, dpr::c::to_transform(transform, "transform"), mesh});
+    s.meshes.push_back({{}, to_transform(transform, "transform"), mesh});
   });
 }
 
 dpr_status dpr_scene_set_camera(dpr_scene* scene, const dpr_camera* camera) {
-  return guarded([&] { deref(scene, "scene").scene.camera = dpr::c::to_camera(camera, "camera"); });
+  return guarded([&] { deref(scene, "scene").scene.camera = to_camera(camera, "camera"); });
 }
 
 dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[3]) {
   return guarded([&] {
     deref(scene, "scene");
-    const glm::vec3 background = dpr::c::to_vector(&deref(color, "color"));
+    const glm::vec3 background = to_vector(&deref(color, "color"));
     dpr::checks::require_finite(background, "color");
     scene->scene.background = background;
   });
@@ -305,22 +302,22 @@ dpr_status dpr_scene_set_cull(dpr_scene* scene, const char* word) {
 }
 
 dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights) {
-  return guarded([&] { deref(scene, "scene").scene.lights = dpr::c::to_lights(lights); });
+  return guarded([&] { deref(scene, "scene").scene.lights = to_lights(lights); });
 }
 
 dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* key, const char* word) {
-  return guarded([&] { dpr::c::set_smoothing(scene, key, std::string(&deref(word, "word"))); });
+  return guarded([&] { set_smoothing(scene, key, std::string(&deref(word, "word"))); });
 }
 
 dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number) {
   return guarded([&] {
     if (!std::isfinite(number)) throw InvalidArgument("number", dpr::checks::text(number), "a finite number");
-    dpr::c::set_smoothing(scene, key, number);
+    set_smoothing(scene, key, number);
   });
 }
 
 dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, std::size_t count) {
-  return guarded([&] { deref(scene, "scene").scene.gradients = dpr::c::to_request(names, count); });
+  return guarded([&] { deref(scene, "scene").scene.gradients = to_request(names, count); });
 }
 
-void dpr_scene_destroy(dpr_scene* scene) { dpr::c::destroy(scene); }
+void dpr_scene_destroy(dpr_scene* scene) { destroy(scene); }

@@ -56,7 +56,7 @@ class Output {
   cl_mem handle_;
 };
 
-/// Where a kernel stands, e.g. "scan.cl" and "scan_sum".
+/// File and name of a kernel, e.g. "scan.cl" and "scan_sum".
 struct KernelSource {
   const char *file, *name;
 };

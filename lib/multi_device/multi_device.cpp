@@ -31,7 +31,7 @@ void MultiDeviceRenderer::set_scene(const Scene& scene) {
   Impl& m = *impl_;
   Scene new_scene = scene;
   std::vector<View> only{own_view(scene)};
-  Versions versions(scene, m.now.scene + 1);
+  Versions versions{.scene = m.now.scene + 1};
   std::swap(m.scene, new_scene);
   std::swap(m.views, only);
   std::swap(m.now, versions);
@@ -58,46 +58,28 @@ void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
 }
 
 void MultiDeviceRenderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  impl_->require_views("MultiDeviceRenderer::set_positions");
-  check_positions(impl_->scene, mesh, positions);
-  std::ranges::copy(positions, impl_->scene.meshes[mesh].mesh.positions.begin());
-  ++impl_->now.positions[mesh];
+  impl_->set({ArrayId::positions, mesh}, positions);
 }
 
 void MultiDeviceRenderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  impl_->require_views("MultiDeviceRenderer::set_colors");
-  check_colors(impl_->scene, mesh, colors);
-  std::ranges::copy(colors, colors_of(impl_->scene.meshes[mesh].mesh).begin());
-  ++impl_->now.colors[mesh];
+  impl_->set({ArrayId::colors, mesh}, colors);
 }
 
 void MultiDeviceRenderer::set_texels(std::size_t mesh, std::size_t texture,
                                      std::span<const glm::vec3> texels) {
-  impl_->require_views("MultiDeviceRenderer::set_texels");
-  check_texels(impl_->scene, mesh, texture, texels);
-  std::ranges::copy(texels, impl_->scene.meshes[mesh].mesh.textures[texture].texels.begin());
-  ++impl_->now.texels[mesh][texture];
+  impl_->set({ArrayId::texels, mesh, texture}, texels);
 }
 
 void MultiDeviceRenderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  impl_->require_views("MultiDeviceRenderer::set_texcoords");
-  check_texcoords(impl_->scene, mesh, texcoords);
-  std::ranges::copy(texcoords, impl_->scene.meshes[mesh].mesh.texcoords.begin());
-  ++impl_->now.texcoords[mesh];
+  impl_->set({ArrayId::texcoords, mesh}, texcoords);
 }
 
 void MultiDeviceRenderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  impl_->require_views("MultiDeviceRenderer::set_normals");
-  check_normals(impl_->scene, mesh, normals);
-  std::ranges::copy(normals, impl_->scene.meshes[mesh].mesh.normals.begin());
-  ++impl_->now.normals[mesh];
+  impl_->set({ArrayId::normals, mesh}, normals);
 }
 
 void MultiDeviceRenderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
-  impl_->require_views("MultiDeviceRenderer::set_materials");
-  check_materials(impl_->scene, mesh, materials);
-  std::ranges::copy(materials, impl_->scene.meshes[mesh].mesh.materials.begin());
-  ++impl_->now.materials[mesh];
+  impl_->set({ArrayId::materials, mesh}, materials);
 }
 
 void MultiDeviceRenderer::set_lights(const std::optional<Lights>& lights) {

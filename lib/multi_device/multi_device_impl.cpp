@@ -65,7 +65,7 @@ ImageLoss OwnLoss::make(const Device& device, const Chunk& chunk) const {
 /// By the setters that check nothing: what was set is checked, but a scene's own camera, or the views of the
 /// last chunk, need not suit a smoothing and lights that came with other views.
 void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> its_views,
-                                         std::size_t first_view) const {
+                                         std::size_t first_view) {
   Renderer::Impl& renderer = worker.renderer.impl();
   if (worker.has.scene != now.scene) {
     Versions all = now;
@@ -79,33 +79,21 @@ void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> i
   } else {
     renderer.set_views(its_views, first_view);
   }
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    if (worker.has.positions[m] != now.positions[m]) {
-      renderer.set_positions(m, scene.meshes[m].mesh.positions);
-      worker.has.positions[m] = now.positions[m];
-    }
-    if (worker.has.colors[m] != now.colors[m]) {
-      renderer.set_colors(m, colors_of(scene.meshes[m].mesh));
-      worker.has.colors[m] = now.colors[m];
-    }
-    if (worker.has.texcoords[m] != now.texcoords[m]) {
-      renderer.set_texcoords(m, scene.meshes[m].mesh.texcoords);
-      worker.has.texcoords[m] = now.texcoords[m];
-    }
-    if (worker.has.normals[m] != now.normals[m]) {
-      renderer.set_normals(m, scene.meshes[m].mesh.normals);
-      worker.has.normals[m] = now.normals[m];
-    }
-    if (worker.has.materials[m] != now.materials[m]) {
-      renderer.set_materials(m, scene.meshes[m].mesh.materials);
-      worker.has.materials[m] = now.materials[m];
-    }
-    for (std::size_t t = 0; t < now.texels[m].size(); ++t) {
-      if (worker.has.texels[m][t] == now.texels[m][t]) continue;
-      renderer.set_texels(m, t, scene.meshes[m].mesh.textures[t].texels);
-      worker.has.texels[m][t] = now.texels[m][t];
-    }
+  for (const auto& [at, version] : now.arrays) {
+    if (worker.has.arrays[at] == version) continue;
+    renderer.set(at, values_of(require_array(scene, at)));
+    worker.has.arrays[at] = version;
   }
+}
+
+void MultiDeviceRenderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {
+  const char* const name = row_of(at.id).name;
+  require_views((std::string("MultiDeviceRenderer::set_") + name).c_str());
+  const HostArray array = require_array(scene, at);
+  check_values(name, values, count_of(array));
+  std::uint64_t& version = now.arrays[at];
+  assign(array, values);
+  ++version;
 }
 
 void MultiDeviceRenderer::Impl::require_views(const char* caller) const {
@@ -160,7 +148,7 @@ void MultiDeviceRenderer::Impl::for_each_chunk(const Batch& of, const Work& work
   }
 }
 
-void MultiDeviceRenderer::Impl::render(Worker& worker, const Batch& of, std::size_t chunk) const {
+void MultiDeviceRenderer::Impl::render(Worker& worker, const Batch& of, std::size_t chunk) {
   const Chunk part = of.views_of(chunk);
   catch_up(worker, std::span(views).subspan(part.first, part.size()), of.chunks[chunk].first);
   worker.renderer.forward();

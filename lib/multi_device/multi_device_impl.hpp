@@ -11,24 +11,14 @@
 
 #include "dpr/multi_device.hpp"
 #include "multi_device/chunk_dealer.hpp"
+#include "renderer/mesh_arrays.hpp"
 
 namespace dpr {
 
 /// Number of times that each part of the scene has been set.
 struct Versions {
   std::uint64_t scene = 0, smoothing = 0, lights = 0;
-  std::vector<std::uint64_t> positions, colors, texcoords, normals, materials;  // [mesh]
-  std::vector<std::vector<std::uint64_t>> texels;                               // [mesh][texture]
-
-  explicit Versions(const Scene& of = {}, std::uint64_t number = 0)
-      : scene(number),
-        positions(of.meshes.size()),
-        colors(of.meshes.size()),
-        texcoords(of.meshes.size()),
-        normals(of.meshes.size()),
-        materials(of.meshes.size()) {
-    for (const Instance& instance : of.meshes) texels.emplace_back(instance.mesh.textures.size());
-  }
+  std::map<ArrayRef, std::uint64_t> arrays = {};  // since the scene
 };
 
 /// A LossOptions that has what it speaks of.
@@ -81,7 +71,10 @@ struct MultiDeviceRenderer::Impl {
   std::uint64_t losses = 0, mesh_losses = 0;  // how often they have been set
 
   /// Brings a device's renderer up to what has been set, with those views, the first of that number.
-  void catch_up(Worker& worker, std::span<const View> its_views, std::size_t first_view) const;
+  void catch_up(Worker& worker, std::span<const View> its_views, std::size_t first_view);
+
+  /// Common part of the arrays' setters.
+  void set(const ArrayRef& at, const ArrayValues& values);
 
   void require_views(const char* caller) const;
 
@@ -106,7 +99,7 @@ struct MultiDeviceRenderer::Impl {
   /// are not a device's are thrown when all are done, the first in the order of the chunks.
   void for_each_chunk(const Batch& of, const Work& work);
 
-  void render(Worker& worker, const Batch& of, std::size_t chunk) const;
+  void render(Worker& worker, const Batch& of, std::size_t chunk);
 
   /// Notes which devices are lost; where all are, throws what the first has met and forgets that.
   void settle_losses(const ChunkDealer& dealer, const std::vector<std::exception_ptr>& met);

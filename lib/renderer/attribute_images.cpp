@@ -267,7 +267,8 @@ void AttributeImages::Impl::gather() {
     const std::size_t sources = has_own_shapes_ ? views : 1, copies = has_own_shapes_ ? r.views.size() : 1;
     rows_.move_backward(positions_, sources, r.transform.grad_positions, copies, grad_positions_);
   }
-  if (has_rows() && r.wants_colors()) rows_.backward(row_map(), channels, views, r.grad_colors, grad_rows_);
+  if (has_rows() && r.wants(ArrayId::colors))
+    rows_.backward(row_map(), channels, views, r.grad_colors, grad_rows_);
 }
 
 SceneGradient AttributeImages::Impl::backward(const BufferRef<cl_float4>& grad_images) {

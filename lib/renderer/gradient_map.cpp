@@ -19,8 +19,8 @@ using Terms = std::vector<std::vector<Term>>;  // by number
 Range sums_of(const SumList& list, std::size_t channel, const GradientRow& row, GradientIndex index,
               const GradientSums& all, std::size_t meshes) {
   const std::size_t first = list.first + channel * list.segments;
-  if (&list == &all.eye) return {first + index.view, 1};
-  if (&list != &all.poses && &list != &all.normals) return {first, list.segments};
+  if (&list == &all[SumOf::eye]) return {first + index.view, 1};
+  if (&list != &all[SumOf::poses] && &list != &all[SumOf::normals]) return {first, list.segments};
   const std::size_t of_view = first + index.view * meshes;
   return row.of == GradientOf::mesh_in_view ? Range(of_view + index.item, 1) : Range(of_view, meshes);
 }
@@ -71,14 +71,14 @@ GradientMap make_map(Device::Impl& device, const GradientSums& sums, std::size_t
   Terms terms;
   std::vector<float> units(sums.count());
   SceneGradient zero = finish(units);
-  add_terms(zero, sums.pixels, 0, sums, meshes, terms);  // makes room for all numbers
-  for (const SumList* list : sums.all()) {
-    for (std::size_t channel = 0; channel < list->channels; ++channel) {
-      const auto first = units.begin() + static_cast<std::ptrdiff_t>(list->first + channel * list->segments);
-      std::fill_n(first, list->segments, 1.0F);
+  add_terms(zero, sums[SumOf::pixels], 0, sums, meshes, terms);  // makes room for all numbers
+  for (const SumList& list : sums.lists) {
+    for (std::size_t channel = 0; channel < list.channels; ++channel) {
+      const auto first = units.begin() + static_cast<std::ptrdiff_t>(list.first + channel * list.segments);
+      std::fill_n(first, list.segments, 1.0F);
       SceneGradient of_units = finish(units);
-      add_terms(of_units, *list, channel, sums, meshes, terms);
-      std::fill_n(first, list->segments, 0.0F);
+      add_terms(of_units, list, channel, sums, meshes, terms);
+      std::fill_n(first, list.segments, 0.0F);
     }
   }
   return upload(device, terms);

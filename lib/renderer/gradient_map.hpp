@@ -19,20 +19,19 @@ struct SumList {
   std::size_t count() const { return channels * segments; }
 };
 
-/// Those of pixels; of sigma; of poses, by view and mesh; of the eye, by view; of lights; of the rotations
-/// of normals that meshes give, by view and mesh; of materials; and of the scale of the pixel's noise.
-struct GradientSums {
-  SumList pixels, sigma, poses, eye, lights, normals, materials, scale;
+/// Sums: channels of pixels; sigma; poses, by view and mesh; the eye, by view; lights; the rotations of
+/// normals that meshes give, by view and mesh; materials; and the scale of the pixel's noise.
+enum class SumOf { pixels, sigma, poses, eye, lights, normals, materials, scale };
 
-  std::array<SumList*, 8> all() {
-    return {&pixels, &sigma, &poses, &eye, &lights, &normals, &materials, &scale};
-  }
-  std::array<const SumList*, 8> all() const {
-    return {&pixels, &sigma, &poses, &eye, &lights, &normals, &materials, &scale};
-  }
+/// The lists of a backward pass, one after the other in one buffer.
+struct GradientSums {
+  std::array<SumList, 8> lists;  // by SumOf
+
+  SumList& operator[](SumOf of) { return lists[static_cast<std::size_t>(of)]; }
+  const SumList& operator[](SumOf of) const { return lists[static_cast<std::size_t>(of)]; }
   std::size_t count() const {
     std::size_t count = 0;
-    for (const SumList* list : all()) count += list->count();
+    for (const SumList& list : lists) count += list.count();
     return count;
   }
 };

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/checks.hpp"
 #include "renderer/on_device.hpp"
-#include "renderer/setter_checks.hpp"
 
 namespace dpr {
 namespace {
@@ -19,57 +19,28 @@ FloatVectors source(const Renderer::Impl& m, const BufferSpan& span, const Vecto
 }  // namespace
 
 void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_positions");
-  check_mesh(m.scene, mesh);
-  const FloatVectors from = source(m, positions, {m.geometry->meshes[mesh].vertices, k_vector}, "positions");
-  enqueue(m.device.impl(), events, [&] { m.take_positions(mesh, from); });
+  set_array(renderer, {ArrayId::positions, mesh}, positions, events);
 }
 
 void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_colors");
-  check_mesh(m.scene, mesh);
-  if (colors_of(m.scene.meshes[mesh].mesh).empty())
-    throw InvalidArgument("mesh (set_colors)", "a mesh without colours",
-                          "one of which vertices or faces have some");
-  const FloatVectors from = source(m, colors, {m.geometry->meshes[mesh].colors, k_vector}, "colors");
-  enqueue(m.device.impl(), events, [&] { m.take_colors(mesh, from); });
+  set_array(renderer, {ArrayId::colors, mesh}, colors, events);
 }
 
 void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
                 const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_texels");
-  check_texture(m.scene, mesh, texture);
-  const std::size_t count = m.scene.meshes[mesh].mesh.textures[texture].texels.size();
-  const FloatVectors from = source(m, texels, {count, k_vector}, "texels");
-  enqueue(m.device.impl(), events, [&] { m.take_texels(mesh, texture, from); });
+  set_array(renderer, {ArrayId::texels, mesh, texture}, texels, events);
 }
 
 void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_texcoords");
-  check_has_texcoords(m.scene, mesh);
-  const FloatVectors from = source(m, texcoords, {m.geometry->meshes[mesh].texcoords, k_pair}, "texcoords");
-  enqueue(m.device.impl(), events, [&] { m.take_texcoords(mesh, from); });
+  set_array(renderer, {ArrayId::texcoords, mesh}, texcoords, events);
 }
 
 void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_normals");
-  check_has_normals(m.scene, mesh);
-  const FloatVectors from = source(m, normals, {m.geometry->meshes[mesh].normals, k_vector}, "normals");
-  enqueue(m.device.impl(), events, [&] { m.take_normals(mesh, from); });
+  set_array(renderer, {ArrayId::normals, mesh}, normals, events);
 }
 
 void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
-  m.require_scene("set_materials");
-  check_has_materials(m.scene, mesh);
-  const FloatVectors from =
-      source(m, materials, {m.geometry->meshes[mesh].materials, DPR_MATERIAL_CHANNELS}, "materials");
-  enqueue(m.device.impl(), events, [&] { m.take_materials(mesh, from); });
+  set_array(renderer, {ArrayId::materials, mesh}, materials, events);
 }
 
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
@@ -185,61 +156,17 @@ void copy_view(Renderer::Impl& m, const BufferView& view, const BufferSpan& span
 
 namespace {
 
-BufferView view_of(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count,
-                   std::size_t components) {
-  return {buffer.cl_buffer()(), first * sizeof(cl_float4), sizeof(cl_float4), count, components};
-}
-
-/// The texture that "[k]" behind an array's name names.
-std::optional<std::size_t> texture_of(const std::string& name, const std::string& array,
-                                      std::size_t textures) {
-  for (std::size_t k = 0; k < textures; ++k) {
-    if (name == array + "[" + std::to_string(k) + "]") return k;
-  }
-  return std::nullopt;
-}
-
-/// Of the specular coefficients of a mesh's materials, or of their shininess; none where it has none.
-std::optional<BufferView> material_gradient(const Renderer::Impl& m, std::size_t mesh, bool of_specular) {
-  const std::size_t count = m.scene.meshes[mesh].mesh.materials.size();
-  if (count == 0) return std::nullopt;
-  BufferView view = view_of(m.grad_materials, m.geometry->meshes[mesh].first_material, count, k_vector);
-  if (of_specular) return view;
-  view.offset += k_vector * sizeof(float);
-  view.components = 1;
-  return view;
-}
-
-/// The array of a mesh, or of all views' shapes, if the name is its.
-std::optional<BufferView> mesh_gradient(const Renderer::Impl& m, const GradientRow& row, std::size_t mesh,
-                                        const std::string& name) {
-  const std::string array = name_of(row, {0, mesh});
-  const MeshRange& range = m.geometry->meshes[mesh];
-  const bool of_views = row.of == GradientOf::all_views;
-  if (row.wanted == &GradientRequest::texture) {
-    const auto texture = texture_of(name, array, m.scene.meshes[mesh].mesh.textures.size());
-    if (!texture) return std::nullopt;
-    const shared::Texture& t = m.geometry->textures.list[range.first_texture + *texture];
-    return view_of(m.texels->grad, t.first, std::size_t{t.width} * t.height, k_vector);
-  }
-  if (name != array || (!of_views && m.scene.meshes[mesh].instance_of)) return std::nullopt;
-  if (row.wanted == &GradientRequest::positions && of_views == (m.frame.position_stride != 0)) {
-    const Buffer<cl_float4>& grad = m.transform.grad_positions;
-    return of_views ? view_of(grad, 0, grad.size(), k_vector)
-                    : view_of(grad, range.first_position, range.vertices, k_vector);
-  }
-  if (row.wanted == &GradientRequest::colors && m.wants_colors() && of_views == (m.frame.color_stride != 0)) {
-    if (of_views) return view_of(m.grad_colors, 0, m.grad_colors.size(), k_vector);
-    if (!colors_of(m.scene.meshes[mesh].mesh).empty())
-      return view_of(m.grad_colors, range.first_color, range.colors, k_vector);
-  }
-  if (row.wanted == &GradientRequest::normals && m.wants_normals() && range.normals > 0)
-    return view_of(m.shade.grad_given_normals, range.first_normal, range.normals, k_vector);
-  if (row.wanted == &GradientRequest::materials && m.wants_materials())
-    return material_gradient(m, mesh, row.path.ends_with("specular"));
-  if (row.wanted == &GradientRequest::texcoords && range.texcoords > 0)
-    return view_of(m.grad_texcoords, range.first_texcoord, range.texcoords, k_pair);
-  return std::nullopt;
+/// Materials' exponents lie behind the three numbers of their specular coefficients.
+std::optional<BufferView> view_of(const std::optional<DeviceGradient>& gradient, const GradientArray& array) {
+  if (!gradient) return std::nullopt;
+  const bool is_number = std::holds_alternative<std::vector<double>*>(array);
+  const bool is_pair = std::holds_alternative<std::vector<glm::vec2>*>(array);
+  return BufferView{gradient->values.cl_buffer()(),
+                    gradient->first * sizeof(cl_float4) + (is_number ? k_vector * sizeof(float) : 0),
+                    sizeof(cl_float4), gradient->count,
+                    is_number ? 1
+                    : is_pair ? k_pair
+                              : k_vector};
 }
 
 /// A number, a vector or a list of vectors among the numbers, from `first` on.
@@ -272,15 +199,20 @@ void copy_images(Renderer& renderer, const BufferSpan& images, const Events& eve
 }
 
 BufferView gradient_view(Renderer& renderer, const std::string& name) {
-  const Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = renderer.impl();
   m.require_rendered("gradient_view");
   if (m.device_gradient_frame != m.frame_number)
     throw InvalidArgument("gradient_view", "no gradient of the last frame", "backward_on_device() first");
   SceneGradient arrays = m.empty_gradient();
   std::optional<BufferView> found = summed_view(arrays, m, m.grad_numbers, name);
-  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray&) {
-    const bool is_there = m.scene.gradients.*row.wanted && exists(row, index, m.scene, m.views);
-    if (is_there && !is_summed(row) && !found) found = mesh_gradient(m, row, index.item, name);
+  for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    if (is_summed(row) || found) return;
+    const bool of_texels = row.wanted == &GradientRequest::texture;
+    const std::size_t parts = of_texels ? m.scene.meshes[index.item].mesh.textures.size() : 1;
+    for (std::size_t k = 0; k < parts; ++k) {
+      if (name == name_of(row, index) + (of_texels ? checks::element("", k) : ""))
+        found = view_of(m.mesh_gradient(row, index.item, k), array);
+    }
   });
   if (found) return *found;
   throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",

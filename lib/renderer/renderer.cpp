@@ -285,7 +285,7 @@ void Renderer::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images)
   enqueue_backward(grad_images);
   if (!gradient_map) gradient_map = make_gradient_map();
   made_exchange().map(*gradient_map, gradient_sums_, grad_numbers);
-  if (wants_materials()) join_material_gradients();
+  if (wants(ArrayId::materials)) join_material_gradients();
   device_gradient_frame = frame_number;
 }
 

@@ -37,39 +37,27 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
 }
 
 void Renderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  impl_->require_scene("Renderer::set_positions");
-  check_positions(impl_->scene, mesh, positions);
-  impl_->set_positions(mesh, positions);
+  set_array(*this, {ArrayId::positions, mesh}, positions);
 }
 
 void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  impl_->require_scene("Renderer::set_colors");
-  check_colors(impl_->scene, mesh, colors);
-  impl_->set_colors(mesh, colors);
+  set_array(*this, {ArrayId::colors, mesh}, colors);
 }
 
 void Renderer::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels) {
-  impl_->require_scene("Renderer::set_texels");
-  check_texels(impl_->scene, mesh, texture, texels);
-  impl_->set_texels(mesh, texture, texels);
+  set_array(*this, {ArrayId::texels, mesh, texture}, texels);
 }
 
 void Renderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  impl_->require_scene("Renderer::set_texcoords");
-  check_texcoords(impl_->scene, mesh, texcoords);
-  impl_->set_texcoords(mesh, texcoords);
+  set_array(*this, {ArrayId::texcoords, mesh}, texcoords);
 }
 
 void Renderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  impl_->require_scene("Renderer::set_normals");
-  check_normals(impl_->scene, mesh, normals);
-  impl_->set_normals(mesh, normals);
+  set_array(*this, {ArrayId::normals, mesh}, normals);
 }
 
 void Renderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
-  impl_->require_scene("Renderer::set_materials");
-  check_materials(impl_->scene, mesh, materials);
-  impl_->set_materials(mesh, materials);
+  set_array(*this, {ArrayId::materials, mesh}, materials);
 }
 
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {

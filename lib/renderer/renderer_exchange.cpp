@@ -11,10 +11,10 @@ Exchange& Renderer::Impl::made_exchange() {
   return *exchange;
 }
 
-void Renderer::Impl::take_positions(std::size_t mesh, const FloatVectors& from) {
-  const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.vertices, geometry->positions, range.first_position);
-  forget_positions(mesh);
+void Renderer::Impl::take(const ArrayRef& at, std::size_t count, const FloatVectors& from) {
+  const MeshArray& row = row_of(at.id);
+  made_exchange().take(from, count, row.device(*geometry), row.first(*geometry, at));
+  row.changed(*this, at.mesh, /*on_host*/ false);
   rendered = false;
 }
 
@@ -22,39 +22,6 @@ void Renderer::Impl::forget_positions(std::size_t mesh) noexcept {
   near_plane.forget(mesh);
   has_moved = true;
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
-}
-
-void Renderer::Impl::take_colors(std::size_t mesh, const FloatVectors& from) {
-  const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.colors, geometry->color_values, range.first_color);
-  rendered = false;
-}
-
-void Renderer::Impl::take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from) {
-  const shared::Texture& t = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
-  made_exchange().take(from, std::size_t{t.width} * t.height, geometry->textures.texel_values, t.first);
-  geometry->textures.has_levels = false;
-  rendered = false;
-}
-
-/// The edges keep the seams that the host knows.
-void Renderer::Impl::take_texcoords(std::size_t mesh, const FloatVectors& from) {
-  const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.texcoords, geometry->textures.texcoord_values, range.first_texcoord);
-  rendered = false;
-}
-
-/// The edges keep the jumps that the host knows.
-void Renderer::Impl::take_normals(std::size_t mesh, const FloatVectors& from) {
-  const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.normals, geometry->given_normals.values, range.first_normal);
-  rendered = false;
-}
-
-void Renderer::Impl::take_materials(std::size_t mesh, const FloatVectors& from) {
-  const MeshRange& range = geometry->meshes[mesh];
-  made_exchange().take(from, range.materials, geometry->materials.values, range.first_material);
-  rendered = false;
 }
 
 void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,

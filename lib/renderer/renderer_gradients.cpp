@@ -51,45 +51,27 @@ class RowReads {
   std::vector<std::function<void()>> arrivals_;
 };
 
-namespace {
-
-/// A mesh without colours of its own is white.
-bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
-
-}  // namespace
-
-bool Renderer::Impl::wants_colors() const {
-  return scene.gradients.colors &&
-         std::ranges::any_of(scene.meshes, [](const Instance& i) { return has_colors(i.mesh); });
-}
-
-bool Renderer::Impl::wants_texcoords() const {
-  return scene.gradients.texcoords && !geometry->textures.empty();
-}
-
-bool Renderer::Impl::wants_normals() const {
-  return scene.gradients.normals && shade.lit() && !geometry->given_normals.empty();
-}
-
-bool Renderer::Impl::wants_materials() const {
-  return scene.gradients.materials && shade.lit() && has_materials(scene);
+bool Renderer::Impl::wants(ArrayId id) const {
+  const MeshArray& row = row_of(id);
+  return scene.gradients.*row.wanted && (!row.is_lit || shade.lit()) &&
+         std::ranges::any_of(scene.meshes, row.exists, &Instance::mesh);
 }
 
 void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions) {
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_vertices);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
-  if (wants_colors() && frame.color_stride != 0) {
+  if (wants(ArrayId::colors) && frame.color_stride != 0) {
     gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                     grad_colors);
-  } else if (wants_colors()) {
+  } else if (wants(ArrayId::colors)) {
     gather.over_views(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
                       grad_colors);
   }
-  if (wants_texcoords()) {
+  if (wants(ArrayId::texcoords)) {
     gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
                       shade.surface->grad_corner_texcoords, grad_texcoords);
   }
-  if (wants_materials())
+  if (wants(ArrayId::materials))
     gather.over_views(frame, bin, geometry->materials, shade.grad_materials, material_channels);
 }
 
@@ -106,29 +88,35 @@ SceneGradient Renderer::Impl::read_gradient() {
   return gradient;
 }
 
-void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, RowReads& rows) const {
-  const bool own_positions = frame.position_stride != 0, own_colors = frame.color_stride != 0;
-  if (scene.gradients.positions && own_positions)
-    rows.add(transform.grad_positions, 0, transform.grad_positions.size(), gradient.shapes.positions);
-  if (wants_colors() && own_colors) rows.add(grad_colors, 0, grad_colors.size(), gradient.shapes.colors);
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    if (scene.meshes[m].instance_of) continue;
-    const MeshRange& range = geometry->meshes[m];
-    const Mesh& mesh = scene.meshes[m].mesh;
-    MeshGradient& out = gradient.meshes[m];
-    if (scene.gradients.positions && !own_positions)
-      rows.add(transform.grad_positions, range.first_position, range.vertices, out.positions);
-    if (scene.gradients.colors && has_colors(mesh) && !own_colors)
-      rows.add(grad_colors, range.first_color, range.colors, out.colors);
-    if (wants_texcoords()) rows.add(grad_texcoords, range.first_texcoord, range.texcoords, out.texcoords);
-    if (wants_normals()) rows.add(shade.grad_given_normals, range.first_normal, range.normals, out.normals);
-    if (!scene.gradients.texture) continue;
-    out.textures.resize(mesh.textures.size());
-    for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
-      const shared::Texture& t = geometry->textures.list[range.first_texture + i];
-      rows.add(texels->grad, t.first, std::size_t{t.width} * t.height, out.textures[i]);
+std::optional<DeviceGradient> Renderer::Impl::mesh_gradient(const GradientRow& row, std::size_t mesh,
+                                                            std::size_t texture) {
+  const ArrayRef at{id_of(row.wanted), mesh, texture};
+  const MeshArray& array = row_of(at.id);
+  const bool of_views = row.of == GradientOf::all_views;
+  const bool has_views = array.stride != nullptr && frame.*array.stride != 0;
+  if (!wants(at.id) || of_views != has_views) return std::nullopt;
+  const Buffer<cl_float4>& values = array.gradient(*this);
+  if (of_views) return DeviceGradient{values, 0, values.size()};
+  Instance& owner = scene.meshes[mesh];
+  if (owner.instance_of || !array.exists(owner.mesh)) return std::nullopt;
+  return DeviceGradient{values, array.first(*geometry, at), count_of(array.host(owner.mesh, texture))};
+}
+
+/// Those of materials come with the sums.
+void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, RowReads& rows) {
+  for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    if (is_summed(row) || row.wanted == &GradientRequest::materials) return;
+    const auto read = [&](auto& list, std::size_t texture = 0) {
+      if (const auto from = mesh_gradient(row, index.item, texture))
+        rows.add(from->values, from->first, from->count, list);
+    };
+    if (auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array)) read(**vectors);
+    if (auto* const* pairs = std::get_if<std::vector<glm::vec2>*>(&array)) read(**pairs);
+    if (auto* const* textures = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array)) {
+      if (scene.gradients.texture) (*textures)->resize(scene.meshes[index.item].mesh.textures.size());
+      for (std::size_t k = 0; k < (*textures)->size(); ++k) read((**textures)[k], k);
     }
-  }
+  });
 }
 
 namespace {
@@ -252,63 +240,61 @@ void Renderer::Impl::sum_gradients() {
       aggregate.perturbs_distances()
           ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
           : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma, pairs};
-  std::vector<Summation> all{
-      {pixels, channels(wanted.smoothing || wanted.background, aggregate.channel_count()), 1, 1, all_pixels,
-       aggregate.channels},
-      sigma,
-      {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
-       views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
-       transform.slots},
-      {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs},
-      {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
-       shade.light_channels, pairs},
-      {views.size() * geometry->given_normals.count, channels(normals, 3), views.size() * scene.meshes.size(),
-       1, view_normal_starts, shade.normal_channels},
-      {faces_of_view, channels(wants_materials(), DPR_MATERIAL_CHANNELS), geometry->materials.count, 1,
-       geometry->materials.starts, material_channels}};
+  std::vector<std::pair<SumOf, Summation>> all{
+      {SumOf::pixels,
+       {pixels, channels(wanted.smoothing || wanted.background, aggregate.channel_count()), 1, 1, all_pixels,
+        aggregate.channels}},
+      {SumOf::sigma, sigma},
+      {SumOf::poses,
+       {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
+        views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
+        transform.slots}},
+      {SumOf::eye,
+       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs}},
+      {SumOf::lights,
+       {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
+        shade.light_channels, pairs}},
+      {SumOf::normals,
+       {views.size() * geometry->given_normals.count, channels(normals, 3),
+        views.size() * scene.meshes.size(), 1, view_normal_starts, shade.normal_channels}},
+      {SumOf::materials,
+       {faces_of_view, channels(wants(ArrayId::materials), DPR_MATERIAL_CHANNELS), geometry->materials.count,
+        1, geometry->materials.starts, material_channels}}};
   if (scale)
     all.push_back(
-        {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->grad_scale()});
-  add_sums(all);
-}
-
-/// Sums what `summed_` lists.
-void Renderer::Impl::add_sums(std::span<const Summation> all) {
+        {SumOf::scale,
+         {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->grad_scale()}});
   summed_ = {};
-  std::size_t first = 0;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    *summed_.all()[i] = {first, all[i].channels, all[i].segments};
-    first += summed_.all()[i]->count();
-  }
-  gradient_sums_.resize(device.impl(), first);
-  for (std::size_t i = 0; i < all.size(); ++i) reduce.add(all[i], gradient_sums_, summed_.all()[i]->first);
+  for (const auto& [of, what] : all) summed_[of] = {summed_.count(), what.channels, what.segments};
+  gradient_sums_.resize(device.impl(), summed_.count());
+  for (const auto& [of, what] : all) reduce.add(what, gradient_sums_, summed_[of].first);
 }
 
 SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sums,
                                                       SceneGradient gradient) const {
   const GradientRequest& wanted = scene.gradients;
-  const auto list = [&](const SumList& of) { return sums.subspan(of.first, of.count()); };
+  const auto list = [&](SumOf of) { return sums.subspan(summed_[of].first, summed_[of].count()); };
   gradient.meshes.resize(scene.meshes.size());
   gradient.views.resize(views.size());
   for (ViewGradient& view : gradient.views) view.transforms.resize(scene.meshes.size());
-  const std::span<const float> pixel_sums = list(summed_.pixels);
+  const std::span<const float> pixel_sums = list(SumOf::pixels);
   if (wanted.smoothing) {
     gradient.gamma = pixel_sums[DPR_CHANNEL_GAMMA];
     if (pixel_sums.size() > DPR_CHANNEL_ALPHA) gradient.alpha = pixel_sums[DPR_CHANNEL_ALPHA];
     const double by_scale =
         pixel_noise ? pixel_scale(scene.smoothing, std::min(scene.width, scene.height)).by_sigma : 1.0;
-    gradient.sigma = by_scale * static_cast<double>(list(pixel_noise ? summed_.scale : summed_.sigma)[0]);
+    gradient.sigma = by_scale * static_cast<double>(list(pixel_noise ? SumOf::scale : SumOf::sigma)[0]);
   }
   if (wanted.background) {
     gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],
                                 pixel_sums[DPR_CHANNEL_BACKGROUND + 2]);
   }
-  if (summed_.poses.channels > 0) add_pose_gradients(list(summed_.poses), scene, views, gradient);
-  if (summed_.eye.channels > 0) add_eye_gradients(list(summed_.eye), views, gradient);
-  if (summed_.normals.channels > 0) add_normal_gradients(list(summed_.normals), gradient);
-  if (summed_.materials.channels > 0)
-    read_material_gradients(list(summed_.materials), *geometry, scene, gradient);
-  if (summed_.lights.channels > 0) read_light_gradients(*scene.lights, list(summed_.lights), gradient);
+  if (!list(SumOf::poses).empty()) add_pose_gradients(list(SumOf::poses), scene, views, gradient);
+  if (!list(SumOf::eye).empty()) add_eye_gradients(list(SumOf::eye), views, gradient);
+  if (!list(SumOf::normals).empty()) add_normal_gradients(list(SumOf::normals), gradient);
+  if (!list(SumOf::materials).empty())
+    read_material_gradients(list(SumOf::materials), *geometry, scene, gradient);
+  if (!list(SumOf::lights).empty()) read_light_gradients(*scene.lights, list(SumOf::lights), gradient);
   return gradient;
 }
 
@@ -316,7 +302,7 @@ void Renderer::Impl::join_material_gradients() {
   const std::size_t count = geometry->materials.count;
   grad_materials.resize(device.impl(), count);
   for (std::size_t k = 0; k < DPR_MATERIAL_CHANNELS; ++k) {
-    made_exchange().give(vectors_of(gradient_sums_, summed_.materials.first + k * count, 1), count,
+    made_exchange().give(vectors_of(gradient_sums_, summed_[SumOf::materials].first + k * count, 1), count,
                          {grad_materials.cl_buffer()(), k, DPR_MATERIAL_CHANNELS, 1});
   }
 }

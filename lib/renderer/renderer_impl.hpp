@@ -10,6 +10,7 @@
 
 #include "dpr/renderer.hpp"
 #include "renderer/gradient_map.hpp"
+#include "renderer/mesh_arrays.hpp"
 #include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
@@ -67,6 +68,12 @@ enum class FrameSizes { read, kept };
 
 class RowReads;
 
+/// Elements of a buffer.
+struct DeviceGradient {
+  const Buffer<cl_float4>& values;
+  std::size_t first, count;
+};
+
 /// Rows that are on the way between the host's three floats and the device's four at a time: 2 MiB of these.
 inline constexpr std::size_t k_rows_of_piece = std::size_t{1} << 17;
 
@@ -83,20 +90,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
                  const std::optional<Lights>& lights);
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_cull(Cull cull) noexcept;
-  void set_positions(std::size_t mesh, std::span<const glm::vec3> positions);
-  void set_colors(std::size_t mesh, std::span<const glm::vec3> colors);
-  void set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels);
-  void set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords);
-  void set_normals(std::size_t mesh, std::span<const glm::vec3> normals);
-  void set_materials(std::size_t mesh, std::span<const Material> materials);
+  void set(const ArrayRef& at, const ArrayValues& values);
   void set_lights(const std::optional<Lights>& lights);
-  /// The same from the device, in place, for whom the host's copies stay what they were.
-  void take_positions(std::size_t mesh, const FloatVectors& from);
-  void take_colors(std::size_t mesh, const FloatVectors& from);
-  void take_texels(std::size_t mesh, std::size_t texture, const FloatVectors& from);
-  void take_texcoords(std::size_t mesh, const FloatVectors& from);
-  void take_normals(std::size_t mesh, const FloatVectors& from);
-  void take_materials(std::size_t mesh, const FloatVectors& from);
+  /// An array of `count` elements from the device, in place: the host's copy stays what it was.
+  void take(const ArrayRef& at, std::size_t count, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
   void take_shapes(const std::optional<FloatVectors>& positions, const std::optional<FloatVectors>& colors);
   void take_transforms(const FloatVectors& from);
@@ -191,17 +188,19 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Exchange& made_exchange();
   /// The gradient of zero sums: all arrays of the last backward pass but those of vertices, colours, texels.
   SceneGradient empty_gradient() const;
-  bool wants_colors() const;
-  bool wants_texcoords() const;
-  bool wants_normals() const;
-  bool wants_materials() const;
+  /// True if the gradient of the meshes' arrays is asked for, and a mesh has one.
+  bool wants(ArrayId id) const;
+  /// Place of a row's gradient after the last backward pass: of a mesh's array, of one of its textures, or of all
+  /// views' own shapes. None: not asked for, or not there.
+  std::optional<DeviceGradient> mesh_gradient(const GradientRow& row, std::size_t mesh,
+                                              std::size_t texture = 0);
 
  private:
   void fill(ViewSet& prepared, const Scene& of, const Geometry& its, std::span<const View> its_views,
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const cl_float4> values);
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const glm::vec3> vectors);
+  template <class Element>
+  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const Element> elements);
   Buffer<cl_float4>& spare_for(const Buffer<cl_float4>& buffer);
 
   ShadeInputs shade_inputs() const {
@@ -232,8 +231,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
-  void add_sums(std::span<const Summation> all);
-  void read_mesh_gradients(SceneGradient& gradient, RowReads& rows) const;
+  void read_mesh_gradients(SceneGradient& gradient, RowReads& rows);
   /// Adds what was summed to the gradients of the meshes' arrays.
   SceneGradient finish_summed_gradients(std::span<const float> sums, SceneGradient gradient = {}) const;
   GradientMap make_gradient_map() const;

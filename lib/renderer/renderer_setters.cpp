@@ -300,50 +300,12 @@ void Renderer::Impl::set_cull(Cull cull) noexcept {
   rendered = false;
 }
 
-void Renderer::Impl::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  replace(geometry->positions, geometry->meshes[mesh].first_position, positions);
-  std::ranges::copy(positions, scene.meshes[mesh].mesh.positions.begin());
-  near_plane.move(mesh);
-  has_moved = true;
-  if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.move(mesh);
-  rendered = false;
-}
-
-void Renderer::Impl::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  replace(geometry->color_values, geometry->meshes[mesh].first_color, colors);
-  std::ranges::copy(colors, colors_of(scene.meshes[mesh].mesh).begin());
-  rendered = false;
-}
-
-void Renderer::Impl::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> values) {
-  const shared::Texture& on_device = geometry->textures.list[geometry->meshes[mesh].first_texture + texture];
-  replace(geometry->textures.texel_values, on_device.first, values);
-  geometry->textures.has_levels = false;
-  std::ranges::copy(values, scene.meshes[mesh].mesh.textures[texture].texels.begin());
-  rendered = false;
-}
-
-void Renderer::Impl::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  std::vector<cl_float4> values;
-  for (const glm::vec2& uv : texcoords) values.push_back(to_cl(glm::vec3(uv, 0)));
-  replace(geometry->textures.texcoord_values, geometry->meshes[mesh].first_texcoord, values);
-  std::ranges::copy(texcoords, scene.meshes[mesh].mesh.texcoords.begin());
-  if (pixel_noise) pixel_noise->edges.reset();  // which know the seams
-  rendered = false;
-}
-
-void Renderer::Impl::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  replace(geometry->given_normals.values, geometry->meshes[mesh].first_normal, normals);
-  std::ranges::copy(normals, scene.meshes[mesh].mesh.normals.begin());
-  if (pixel_noise) pixel_noise->edges.reset();  // which know where they jump
-  rendered = false;
-}
-
-void Renderer::Impl::set_materials(std::size_t mesh, std::span<const Material> materials) {
-  std::vector<cl_float4> values;
-  for (const Material& material : materials) values.push_back(to_cl(material));
-  replace(geometry->materials.values, geometry->meshes[mesh].first_material, values);
-  std::ranges::copy(materials, scene.meshes[mesh].mesh.materials.begin());
+void Renderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {
+  const MeshArray& row = row_of(at.id);
+  std::visit([&](auto elements) { replace(row.device(*geometry), row.first(*geometry, at), elements); },
+             values);
+  assign(row.host(scene.meshes[at.mesh].mesh, at.texture), values);
+  row.changed(*this, at.mesh, /*on_host*/ true);
   rendered = false;
 }
 
@@ -357,22 +319,23 @@ Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
 }
 
 /// A part of a buffer, in pieces: the host does not hold all of it as rows of four floats.
+template <class Element>
 void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
-                             std::span<const glm::vec3> vectors) {
+                             std::span<const Element> elements) {
   Buffer<cl_float4>& spare = spare_for(buffer);
-  if (vectors.size() < buffer.size()) buffer.copy_to(spare);
-  for (std::size_t done = 0; done < vectors.size(); done += k_rows_of_piece) {
-    const auto piece = vectors.subspan(done, std::min(k_rows_of_piece, vectors.size() - done));
-    write_range(device.impl(), spare, first + done, to_cl(piece));
+  if (elements.size() < buffer.size()) buffer.copy_to(spare);
+  std::vector<cl_float4> rows;
+  for (std::size_t done = 0; done < elements.size(); done += k_rows_of_piece) {
+    rows.clear();
+    for (const Element& e : elements.subspan(done, std::min(k_rows_of_piece, elements.size() - done))) {
+      if constexpr (std::is_same_v<Element, Material>) {
+        rows.push_back(to_cl(e));
+      } else {
+        rows.push_back(to_cl(to_vec3(e)));
+      }
+    }
+    write_range(device.impl(), spare, first + done, rows);
   }
-  std::swap(buffer, spare);
-}
-
-void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
-                             std::span<const cl_float4> values) {
-  Buffer<cl_float4>& spare = spare_for(buffer);
-  if (values.size() < buffer.size()) buffer.copy_to(spare);
-  write_range(device.impl(), spare, first, values);
   std::swap(buffer, spare);
 }
 

@@ -52,15 +52,6 @@ void check_lights(const Scene& scene, std::span<const View> views, const std::op
   for (const View& view : views) require_scales(view.camera, scene.smoothing, true);
 }
 
-void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected) {
-  if (values.size() != expected) {
-    throw InvalidArgument(name, std::to_string(values.size()) + " vectors", std::to_string(expected));
-  }
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!checks::is_finite(values[i])) checks::require_finite(values[i], checks::element(name, i));
-  }
-}
-
 void require_pixel_count(std::size_t found, std::size_t expected) {
   if (found == expected) return;
   throw InvalidArgument("pixels", std::to_string(found),
@@ -78,76 +69,6 @@ std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int wi
     for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, p.w}});
   }
   return pixels;
-}
-
-void check_mesh(const Scene& scene, std::size_t mesh) {
-  if (mesh >= scene.meshes.size())
-    throw InvalidArgument("mesh", std::to_string(mesh), "below " + std::to_string(scene.meshes.size()));
-  if (const auto source = scene.meshes[mesh].instance_of) {
-    throw InvalidArgument("mesh", std::to_string(mesh) + ", an instance of mesh " + std::to_string(*source),
-                          std::to_string(*source) + ": what is set there is its instances' too");
-  }
-}
-
-void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture) {
-  check_mesh(scene, mesh);
-  const std::size_t textures = scene.meshes[mesh].mesh.textures.size();
-  if (texture >= textures)
-    throw InvalidArgument("texture", std::to_string(texture), "below " + std::to_string(textures));
-}
-
-void check_has_texcoords(const Scene& scene, std::size_t mesh) {
-  check_mesh(scene, mesh);
-  if (scene.meshes[mesh].mesh.textures.empty())
-    throw InvalidArgument("mesh (set_texcoords)", "a mesh without textures", "one that has some");
-}
-
-void check_has_normals(const Scene& scene, std::size_t mesh) {
-  check_mesh(scene, mesh);
-  if (scene.meshes[mesh].mesh.face_normals.empty())
-    throw InvalidArgument("mesh (set_normals)", "a mesh without normals of its own", "one that gives some");
-}
-
-void check_has_materials(const Scene& scene, std::size_t mesh) {
-  check_mesh(scene, mesh);
-  if (scene.meshes[mesh].mesh.materials.empty())
-    throw InvalidArgument("mesh (set_materials)", "a mesh without materials", "one that has some");
-}
-
-void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions) {
-  check_mesh(scene, mesh);
-  check_values("positions", positions, scene.meshes[mesh].mesh.positions.size());
-}
-
-void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> colors) {
-  check_mesh(scene, mesh);
-  check_values("colors", colors, colors_of(scene.meshes[mesh].mesh).size());
-}
-
-void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
-                  std::span<const glm::vec3> texels) {
-  check_texture(scene, mesh, texture);
-  check_values("texels", texels, scene.meshes[mesh].mesh.textures[texture].texels.size());
-}
-
-void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  check_has_texcoords(scene, mesh);
-  std::vector<glm::vec3> values;
-  for (const glm::vec2& uv : texcoords) values.emplace_back(uv, 0);
-  check_values("texcoords", values, scene.meshes[mesh].mesh.texcoords.size());
-}
-
-void check_normals(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> normals) {
-  check_has_normals(scene, mesh);
-  check_values("normals", normals, scene.meshes[mesh].mesh.normals.size());
-}
-
-void check_materials(const Scene& scene, std::size_t mesh, std::span<const Material> materials) {
-  check_has_materials(scene, mesh);
-  const std::size_t expected = scene.meshes[mesh].mesh.materials.size();
-  if (materials.size() != expected)
-    throw InvalidArgument("materials", std::to_string(materials.size()), std::to_string(expected));
-  for (std::size_t i = 0; i < expected; ++i) validate(materials[i], checks::element("materials", i));
 }
 
 std::size_t samples_of_side(int pixels, const Raster& raster) {

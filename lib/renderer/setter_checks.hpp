@@ -20,34 +20,13 @@ void check_devices(std::span<const Device> devices);
 
 /// These throw InvalidArgument for what does not suit the scene.
 void check_views(const Scene& scene, std::span<const View> views);
-void check_positions(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> positions);
-void check_colors(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> colors);
-void check_texels(const Scene& scene, std::size_t mesh, std::size_t texture,
-                  std::span<const glm::vec3> texels);
-void check_texcoords(const Scene& scene, std::size_t mesh, std::span<const glm::vec2> texcoords);
-void check_normals(const Scene& scene, std::size_t mesh, std::span<const glm::vec3> normals);
-void check_materials(const Scene& scene, std::size_t mesh, std::span<const Material> materials);
-/// Those of which the values are on the device.
-void check_mesh(const Scene& scene, std::size_t mesh);
-void check_texture(const Scene& scene, std::size_t mesh, std::size_t texture);
-void check_has_texcoords(const Scene& scene, std::size_t mesh);
-void check_has_normals(const Scene& scene, std::size_t mesh);
-void check_has_materials(const Scene& scene, std::size_t mesh);
 void check_lights(const Scene& scene, std::span<const View> views, const std::optional<Lights>& lights);
-/// As many finite values as expected; `name` says of what.
-void check_values(const char* name, std::span<const glm::vec3> values, std::size_t expected);
 
 /// Throws InvalidArgument unless there are as many pixels as the views have.
 void require_pixel_count(std::size_t found, std::size_t expected);
 
 /// The pixels of the images, one after the other, whose derivative by which these are has that size.
 std::vector<cl_float4> checked_pixels(std::span<const Image> grad_images, int width, int height);
-
-/// The colours that a mesh has: of its vertices, or else of its faces.
-template <class AnyMesh>
-auto& colors_of(AnyMesh& mesh) {
-  return mesh.vertex_colors.empty() ? mesh.face_colors : mesh.vertex_colors;
-}
 
 /// Samples along a side of the frame, with the margin.
 std::size_t samples_of_side(int pixels, const Raster& raster);

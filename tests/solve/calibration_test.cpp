@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "dpr/dpr.hpp"
-#include "dpr/perturbed_pose.hpp"
 #include "support/opencv_points.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
@@ -101,17 +100,25 @@ Vector units(std::size_t views) {
   return unit;
 }
 
+/// A world-to-camera matrix turned and shifted, in the chart of its gradients.
+glm::mat4 moved(const glm::mat4& view, const glm::dvec3& rotation, const glm::dvec3& translation) {
+  const glm::dmat4 m(view);
+  const glm::dmat3 linear = rotation_from_vector(rotation) * glm::dmat3(m);
+  glm::dmat4 result(linear);
+  result[3] = glm::dvec4(glm::dvec3(m[3]) + translation, 1);
+  return glm::mat4(result);
+}
+
 /// The views a step further: fx, fy, cx, cy, k1, k2 of all, then rotation and translation of each.
 std::vector<View> moved(std::vector<View> views, const Vector& step) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     const auto pose = step.segment(k_lens + k_pose * static_cast<Eigen::Index>(v), k_pose);
-    PoseParameters p;
-    p.camera_rotation = {pose[0], pose[1], pose[2]};
-    p.camera_translation = {pose[3], pose[4], pose[5]};
-    std::copy_n(step.data(), 4, p.intrinsics.begin());
-    views[v] = dpr::moved(views[v], 0, p);
-    views[v].camera.distortion->k1 += static_cast<float>(step[4]);
-    views[v].camera.distortion->k2 += static_cast<float>(step[5]);
+    Camera& camera = views[v].camera;
+    camera.view = moved(camera.view, {pose[0], pose[1], pose[2]}, {pose[3], pose[4], pose[5]});
+    Intrinsics& k = *camera.intrinsics;
+    float* const lens[] = {&k.fx, &k.fy, &k.cx, &k.cy, &camera.distortion->k1, &camera.distortion->k2};
+    for (Eigen::Index i = 0; i < k_lens; ++i)
+      *lens[i] = static_cast<float>(static_cast<double>(*lens[i]) + step[i]);
   }
   return views;
 }
@@ -223,10 +230,9 @@ std::vector<View> start_from(const std::vector<View>& truth) {
   };
   std::vector<View> views = truth;
   for (View& view : views) {
-    PoseParameters p;
-    p.camera_rotation = glm::radians(3.0) * direction();
-    p.camera_translation = 0.05 * glm::length(glm::dvec3(view.camera.view[3])) * direction();
-    view = dpr::moved(view, 0, p);
+    const glm::dvec3 rotation = glm::radians(3.0) * direction();
+    const double distance = glm::length(glm::dvec3(view.camera.view[3]));
+    view.camera.view = moved(view.camera.view, rotation, 0.05 * distance * direction());
     const Intrinsics& k = *truth.front().camera.intrinsics;
     view.camera.intrinsics = Intrinsics{1.05F * k.fx, 1.05F * k.fy, k_width / 2.0F, k_height / 2.0F};
     view.camera.distortion = Distortion{};

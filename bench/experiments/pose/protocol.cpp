@@ -8,8 +8,8 @@
 
 #include "dpr/image_loss.hpp"
 #include "dpr/optimizer.hpp"
-#include "dpr/perturbed_pose.hpp"
 #include "dpr/renderer.hpp"
+#include "experiments/pose/perturbed_pose.hpp"
 
 namespace dpr::bench {
 namespace {

@@ -30,7 +30,7 @@ struct Protocol {
 PoseResult descend_as_published(const Device& device, const Scene& scene, const Image& target,
                                 const Protocol& protocol, const Pose& initial);
 
-/// The same with dpr::PerturbedPose instead: noise on the rotation, 0.2 radians to begin with, and rigid
+/// The same with PerturbedPose instead: noise on the rotation, 0.2 radians to begin with, and rigid
 /// images.
 PoseResult descend_on_perturbed_pose(const Device& device, const Scene& scene, const Image& target,
                                      const Protocol& protocol, const Pose& initial);

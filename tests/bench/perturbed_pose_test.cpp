@@ -1,7 +1,7 @@
 // The perturbed pose: the score estimator against quadrature for every prior, baseline and kind of draws; the
 // rigid renderer's expected loss and its derivatives against quadrature over one parameter; a pose found with
 // it.
-#include "dpr/perturbed_pose.hpp"
+#include "experiments/pose/perturbed_pose.hpp"
 
 #include <doctest/doctest.h>
 
@@ -15,14 +15,15 @@
 #include "dpr/error.hpp"
 #include "dpr/optimizer.hpp"
 #include "dpr/pose.hpp"
+#include "experiments/pose/score_estimator.hpp"
 #include "reference/priors.hpp"
 #include "smoothing/priors.hpp"
-#include "solve/score_estimator.hpp"
 #include "support/messages.hpp"
 #include "support/priors.hpp"
 #include "support/reduced.hpp"
 
 using namespace dpr;
+using namespace dpr::bench;
 using dpr::test::reduced;
 
 namespace {

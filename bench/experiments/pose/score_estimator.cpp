@@ -1,4 +1,4 @@
-#include "solve/score_estimator.hpp"
+#include "experiments/pose/score_estimator.hpp"
 
 #include <cmath>
 #include <numeric>
@@ -10,7 +10,7 @@
 #include "smoothing/choice_names.hpp"
 #include "smoothing/priors.hpp"
 
-namespace dpr {
+namespace dpr::bench {
 namespace {
 
 constexpr std::uint32_t k_most_draws = 4096;
@@ -163,4 +163,4 @@ ScoreEstimate estimate(const NoiseOptions& options, std::span<const double> valu
   return result;
 }
 
-}  // namespace dpr
+}  // namespace dpr::bench

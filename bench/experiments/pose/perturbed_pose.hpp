@@ -7,14 +7,13 @@
 #include <memory>
 
 #include "dpr/device.hpp"
-#include "dpr/export.h"
 #include "dpr/image.hpp"
 #include "dpr/image_loss.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/vectors.hpp"
 
-namespace dpr {
+namespace dpr::bench {
 
 /// One number for each parameter that can be perturbed: its noise's scale, or a derivative for it. Rotations
 /// are vectors r applied on the left of a matrix' linear part, A <- exp([r]x) A, in radians, the translation
@@ -62,7 +61,7 @@ struct PerturbedPoseResult {
 ///
 /// Costs M forward passes in one batch and no backward pass; its variance grows with d, not with the number
 /// of triangles.
-class DPR_API PerturbedPose {
+class PerturbedPose {
  public:
   /// The scene's smoothing has no part in it. Throws InvalidArgument for a scene that cannot be rendered, a
   /// target of another size, scales that are negative, not finite, all 0, or of camera parameters the scene's
@@ -87,11 +86,11 @@ class DPR_API PerturbedPose {
   void set_scale(const PoseParameters& scale);
 
  private:
-  struct DPR_LOCAL Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
 /// The view moved by a step in its parameters, e.g. one of an optimizer.
-DPR_API View moved(const View& view, std::size_t mesh, const PoseParameters& step);
+View moved(const View& view, std::size_t mesh, const PoseParameters& step);
 
-}  // namespace dpr
+}  // namespace dpr::bench

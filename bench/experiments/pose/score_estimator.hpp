@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "dpr/perturbed_pose.hpp"
+#include "dpr/smoothing.hpp"
 
-namespace dpr {
+namespace dpr::bench {
 
 /// Philox4x32-10 (Salmon et al. 2011) on the host: random words as a pure function of counter and key.
 std::array<std::uint32_t, 4> philox4x32_10(std::array<std::uint32_t, 4> counter,
@@ -45,4 +45,4 @@ struct ScoreEstimate {
 ScoreEstimate estimate(const NoiseOptions& options, std::span<const double> values,
                        std::span<const double> noise, double rigid);
 
-}  // namespace dpr
+}  // namespace dpr::bench

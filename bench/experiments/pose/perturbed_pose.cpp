@@ -1,6 +1,6 @@
 // Noise on poses and cameras, rigid renders of all samples in one batch, and the score estimator on their
 // losses.
-#include "dpr/perturbed_pose.hpp"
+#include "experiments/pose/perturbed_pose.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +11,11 @@
 #include "base/require.hpp"
 #include "dpr/error.hpp"
 #include "dpr/pose.hpp"
+#include "experiments/pose/score_estimator.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/polar.hpp"
-#include "solve/score_estimator.hpp"
 
-namespace dpr {
+namespace dpr::bench {
 namespace {
 
 constexpr std::size_t k_parameters = 17, k_fov = 12, k_intrinsics = 13;
@@ -200,4 +200,4 @@ PerturbedPoseResult PerturbedPose::evaluate(const View& view, std::uint64_t seed
           static_cast<unsigned>(indices.size())};
 }
 
-}  // namespace dpr
+}  // namespace dpr::bench

@@ -1,0 +1,194 @@
+#include "renderer/mesh_arrays.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <type_traits>
+
+#include "base/checks.hpp"
+#include "renderer/on_device.hpp"
+
+namespace dpr {
+namespace {
+
+using Impl = Renderer::Impl;
+using Request = GradientRequest;
+using Params = shared::FrameParams;
+
+template <auto list>
+HostArray host_array(Mesh& mesh, std::size_t) {
+  return &(mesh.*list);
+}
+
+template <std::size_t MeshRange::*first>
+std::size_t first_of(const Geometry& geometry, const ArrayRef& at) {
+  return geometry.meshes[at.mesh].*first;
+}
+
+std::size_t first_texel(const Geometry& geometry, const ArrayRef& at) {
+  return geometry.textures.list[geometry.meshes[at.mesh].first_texture + at.texture].first;
+}
+
+HostArray host_colors(Mesh& mesh, std::size_t) {
+  return mesh.vertex_colors.empty() ? &mesh.face_colors : &mesh.vertex_colors;
+}
+
+bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
+bool has_textures(const Mesh& mesh) { return !mesh.textures.empty(); }
+
+void move_positions(Impl& m, std::size_t mesh, bool on_host) {
+  if (!on_host) return m.forget_positions(mesh);
+  m.near_plane.move(mesh);
+  m.has_moved = true;
+  if (m.pixel_noise && m.pixel_noise->edges) m.pixel_noise->back_faces.move(mesh);
+}
+
+/// Edges know the seams and the jumps of normals that the host knows.
+void forget_edges(Impl& m, std::size_t, bool on_host) {
+  if (on_host && m.pixel_noise) m.pixel_noise->edges.reset();
+}
+
+/// In the order of ArrayId.
+const std::array k_arrays{MeshArray{.name = "positions",
+                                    .components = 3,
+                                    .wanted = &Request::positions,
+                                    .host = host_array<&Mesh::positions>,
+                                    .device = [](Geometry & g) -> auto& {return g.positions;
+}  // namespace
+, .first = first_of<&MeshRange::first_position>, .gradient = [](const Impl& m) -> auto& {
+  return m.transform.grad_positions;
+}
+, .stride = &Params::position_stride, .changed = move_positions
+}  // namespace dpr
+, MeshArray{.name = "colors", .components = 3, .wanted = &Request::colors, .host = host_colors, .device = [
+            ](Geometry & g) -> auto& {return g.color_values;
+}
+, .first = first_of<&MeshRange::first_color>, .gradient = [](const Impl& m) -> auto& { return m.grad_colors; }
+, .stride = &Params::color_stride, .exists = has_colors, .what = "colours"
+}
+, MeshArray{.name = "texels",
+            .components = 3,
+            .wanted = &Request::texture,
+            .host = [](Mesh& mesh, std::size_t i) -> HostArray { return &mesh.textures[i].texels; },
+            .device = [](Geometry & g) -> auto& {return g.textures.texel_values;
+}
+, .first = first_texel, .gradient = [](const Impl& m) -> auto& { return m.texels->grad; }
+, .changed = [](Impl& m, std::size_t, bool) { m.geometry->textures.has_levels = false; },
+  .exists = has_textures, .what = "textures"
+}
+, MeshArray{.name = "texcoords",
+            .components = 2,
+            .wanted = &Request::texcoords,
+            .host = host_array<&Mesh::texcoords>,
+            .device = [](Geometry & g) -> auto& {return g.textures.texcoord_values;
+}
+, .first = first_of<&MeshRange::first_texcoord>, .gradient = [](const Impl& m) -> auto& {
+  return m.grad_texcoords;
+}
+, .changed = forget_edges, .exists = has_textures, .what = "textures"
+}
+, MeshArray{.name = "normals",
+            .components = 3,
+            .wanted = &Request::normals,
+            .is_lit = true,
+            .host = host_array<&Mesh::normals>,
+            .device = [](Geometry & g) -> auto& {return g.given_normals.values;
+}
+, .first = first_of<&MeshRange::first_normal>, .gradient = [](const Impl& m) -> auto& {
+  return m.shade.grad_given_normals;
+}
+, .changed = forget_edges, .exists = [](const Mesh& mesh) { return !mesh.face_normals.empty(); },
+  .what = "normals of its own"
+}
+, MeshArray {
+  .name = "materials", .components = DPR_MATERIAL_CHANNELS, .wanted = &Request::materials, .is_lit = true,
+  .host = host_array<&Mesh::materials>, .device = [](Geometry & g) -> auto& {
+    return g.materials.values;
+  }
+  , .first = first_of<&MeshRange::first_material>, .gradient = [](const Impl& m) -> auto& {
+    return m.grad_materials;
+  }
+  , .exists = [](const Mesh& mesh) { return !mesh.materials.empty(); }, .what = "materials"
+}
+}
+;
+
+std::string setter_of(const ArrayRef& at) { return std::string("set_") + row_of(at.id).name; }
+
+}  // namespace
+
+const MeshArray& row_of(ArrayId id) { return k_arrays[static_cast<std::size_t>(id)]; }
+
+ArrayId id_of(bool GradientRequest::*wanted) {
+  return static_cast<ArrayId>(std::ranges::find(k_arrays, wanted, &MeshArray::wanted) - k_arrays.begin());
+}
+
+HostArray require_array(Scene& scene, const ArrayRef& at) {
+  if (at.mesh >= scene.meshes.size())
+    throw InvalidArgument("mesh", std::to_string(at.mesh), "below " + std::to_string(scene.meshes.size()));
+  if (const auto source = scene.meshes[at.mesh].instance_of) {
+    throw InvalidArgument("mesh",
+                          std::to_string(at.mesh) + ", an instance of mesh " + std::to_string(*source),
+                          std::to_string(*source) + ": what is set there is its instances' too");
+  }
+  Mesh& mesh = scene.meshes[at.mesh].mesh;
+  const MeshArray& row = row_of(at.id);
+  if (at.id == ArrayId::texels && at.texture >= mesh.textures.size())
+    throw InvalidArgument("texture", std::to_string(at.texture),
+                          "below " + std::to_string(mesh.textures.size()));
+  if (!row.exists(mesh))
+    throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row.what,
+                          "one that has some");
+  return row.host(mesh, at.texture);
+}
+
+std::size_t count_of(const HostArray& array) {
+  return std::visit([](const auto* list) { return list->size(); }, array);
+}
+
+ArrayValues values_of(const HostArray& array) {
+  return std::visit([](const auto* list) -> ArrayValues { return std::span(*list); }, array);
+}
+
+void assign(const HostArray& array, const ArrayValues& values) {
+  const auto copy = [&]<class Element>(std::span<const Element> from) {
+    std::ranges::copy(from, std::get<std::vector<Element>*>(array)->begin());
+  };
+  std::visit(copy, values);
+}
+
+void check_values(const char* name, const ArrayValues& values, std::size_t expected) {
+  const auto check = [&]<class Element>(std::span<const Element> list) {
+    constexpr bool is_vector = !std::is_same_v<Element, Material>;
+    if (list.size() != expected) {
+      throw InvalidArgument(name, std::to_string(list.size()) + (is_vector ? " vectors" : ""),
+                            std::to_string(expected));
+    }
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      if constexpr (!is_vector) {
+        validate(list[i], checks::element(name, i));
+      } else if (const glm::vec3 v = to_vec3(list[i]); !checks::is_finite(v)) {
+        checks::require_finite(v, checks::element(name, i));
+      }
+    }
+  };
+  std::visit(check, values);
+}
+
+void set_array(Renderer& renderer, const ArrayRef& at, const ArrayValues& values) {
+  Impl& m = renderer.impl();
+  m.require_scene(("Renderer::" + setter_of(at)).c_str());
+  check_values(row_of(at.id).name, values, count_of(require_array(m.scene, at)));
+  m.set(at, values);
+}
+
+void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events) {
+  Impl& m = renderer.impl();
+  m.require_scene(setter_of(at).c_str());
+  const MeshArray& row = row_of(at.id);
+  const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
+  const FloatVectors from = require_vectors(m.device.impl(), values, shape, Access::read, row.name);
+  enqueue(m.device.impl(), events, [&] { m.take(at, shape.count, from); });
+}
+
+}  // namespace dpr

@@ -1,0 +1,78 @@
+// The arrays of meshes that setters replace and backward passes differentiate, each once. Setters from the host
+// and from buffers, of one device and of several, their checks, the C interface, and gradients on the host and on
+// the device walk this table.
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "device/buffer.hpp"
+#include "dpr/opencl_handles.hpp"
+#include "dpr/renderer.hpp"
+#include "shared_types.h"
+
+namespace dpr {
+
+struct Geometry;
+
+enum class ArrayId { positions, colors, texels, texcoords, normals, materials };
+
+/// An array of a scene: a mesh's, or the texels of one of its textures.
+struct ArrayRef {
+  ArrayId id;
+  std::size_t mesh = 0, texture = 0;
+
+  auto operator<=>(const ArrayRef&) const = default;
+};
+
+inline glm::vec3 to_vec3(const glm::vec3& vector) { return vector; }
+inline glm::vec3 to_vec3(const glm::vec2& pair) { return {pair, 0}; }
+
+/// Elements on the host, and where a scene holds them.
+using ArrayValues =
+    std::variant<std::span<const glm::vec3>, std::span<const glm::vec2>, std::span<const Material>>;
+using HostArray = std::variant<std::vector<glm::vec3>*, std::vector<glm::vec2>*, std::vector<Material>*>;
+
+struct MeshArray {
+  const char* name;        ///< argument of the setter, which is set_<name>
+  std::size_t components;  ///< floats of an element in a buffer
+  bool GradientRequest::*wanted;
+  bool is_lit = false;  ///< has a gradient in lit scenes alone
+  HostArray (*host)(Mesh& mesh, std::size_t texture);
+  /// The joined buffer of all meshes, and the first element of this one.
+  Buffer<cl_float4>& (*device)(Geometry& geometry);
+  std::size_t (*first)(const Geometry& geometry, const ArrayRef& at);
+  /// Gradient that a backward pass leaves, element by element as in that buffer.
+  const Buffer<cl_float4>& (*gradient)(const Renderer::Impl& renderer);
+  /// Elements between two views that have arrays of their own, or 0 where they share the mesh's. Null: always.
+  cl_uint shared::FrameParams::*stride = nullptr;
+  /// Marks what the renderer derives from the array. `on_host`: the host knows the new elements.
+  void (*changed)(Renderer::Impl& renderer, std::size_t mesh, bool on_host) = [](auto&, auto, bool) {};
+  bool (*exists)(const Mesh& mesh) = [](const Mesh&) { return true; };
+  const char* what = "";  ///< that a mesh without the array lacks
+};
+
+const MeshArray& row_of(ArrayId id);
+/// The array whose gradient the member asks for.
+ArrayId id_of(bool GradientRequest::*wanted);
+
+/// The scene's array. Throws InvalidArgument for a mesh or texture that is not there, an instance of another
+/// mesh, and a mesh that has no such array.
+HostArray require_array(Scene& scene, const ArrayRef& at);
+std::size_t count_of(const HostArray& array);
+ArrayValues values_of(const HostArray& array);
+/// Copies as many elements as the array has.
+void assign(const HostArray& array, const ArrayValues& values);
+
+/// Throws InvalidArgument unless there are as many values as expected, all valid; `name` says of what.
+void check_values(const char* name, const ArrayValues& values, std::size_t expected);
+
+/// The setters of dpr/renderer.hpp and dpr/opencl_handles.hpp.
+void set_array(Renderer& renderer, const ArrayRef& at, const ArrayValues& values);
+void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events);
+
+}  // namespace dpr
