@@ -1,23 +1,15 @@
 #include "cli/device_check.hpp"
 
-#include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <functional>
-#include <memory>
 #include <string>
 
+#include "base/child_process.hpp"
 #include "base/module.hpp"
 #include "check/self_test.hpp"
-#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -55,49 +47,11 @@ Json row_to_json(const check::CheckRow& row) {
   return json;
 }
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
-/// This program with the arguments, and what it prints.
-class Child {
- public:
-  explicit Child(std::array<std::string, 3> arguments) {
-    std::array<int, 2> ends{};
-    if (pipe(ends.data()) != 0) throw IoError("pipe", std::strerror(errno));
-    for (const int end : ends) fcntl(end, F_SETFD, FD_CLOEXEC);
-    output_.reset(fdopen(ends[0], "r"));
-    std::string name = running_program();
-    char* const words[] = {name.data(), arguments[0].data(), arguments[1].data(), arguments[2].data(),
-                           nullptr};
-    posix_spawn_file_actions_t actions{};
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    const int error = posix_spawn(&process_, name.c_str(), &actions, nullptr, words, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    close(ends[1]);
-    if (error != 0) throw IoError(name, std::string("cannot be run: ") + std::strerror(error));
-  }
-
-  void for_each_line(const std::function<void(const std::string&)>& take) {
-    char* line = nullptr;
-    std::size_t room = 0;
-    while (getline(&line, &room, output_.get()) >= 0) take(line);
-    std::free(line);
-  }
-
-  /// Waits for its end: what was unusual about it, or nothing.
-  std::string ending() {
-    int status = 0;
-    waitpid(process_, &status, 0);
-    if (WIFSIGNALED(status)) return std::string("ended by a signal: ") + strsignal(WTERMSIG(status));
-    return WEXITSTATUS(status) == 0 ? "" : "ended with status " + std::to_string(WEXITSTATUS(status));
-  }
-
- private:
-  std::unique_ptr<std::FILE, CloseFile> output_;
-  pid_t process_ = 0;
-};
+/// The end of a process in words; empty where it succeeded.
+std::string describe_end(int status) {
+  if (WIFSIGNALED(status)) return std::string("ended by a signal: ") + strsignal(WTERMSIG(status));
+  return WEXITSTATUS(status) == 0 ? "" : "ended with status " + std::to_string(WEXITSTATUS(status));
+}
 
 }  // namespace
 
@@ -111,12 +65,12 @@ DeviceCheck check_device(const DeviceInfo& info, bool prints) {
     if (prints) print(row);
   };
   if (prints) print_heading();
-  Child child({"devices", "--check-rows", std::to_string(info.index)});
-  child.for_each_line([&](const std::string& line) {
+  ChildProcess child({running_program(), "devices", "--check-rows", std::to_string(info.index)});
+  child.for_each_line([&](std::string_view line) {
     const Json row = Json::parse(line, nullptr, /*allow_exceptions=*/false);
     if (row.is_object()) add(row);  // a driver may print too
   });
-  if (const std::string ending = child.ending(); !ending.empty()) {
+  if (const std::string ending = describe_end(child.wait()); !ending.empty()) {
     const std::string last = result.rows.empty() ? "open" : result.rows.back()["stage"].get<std::string>();
     add({{"stage", "after " + last},
          {"passed", false},

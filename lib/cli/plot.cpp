@@ -15,8 +15,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/child_process.hpp"
 #include "base/output_file.hpp"
-#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {

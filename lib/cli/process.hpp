@@ -1,9 +1,6 @@
 // Signals and streams of a program's process.
 #pragma once
 
-/// Declared here because macOS' unistd.h does not.
-extern "C" char** environ;
-
 namespace dpr::cli {
 
 /// To be called before anything else. A signal that ends the program removes its temporary files first; a

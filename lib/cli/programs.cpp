@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "base/module.hpp"
+#include "base/child_process.hpp"
 #include "cli/commands.hpp"
 #include "cli/completion.hpp"
-#include "cli/process.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {

@@ -1,25 +1,18 @@
 #include "device/trial.hpp"
 
-#include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <vector>
 
+#include "base/child_process.hpp"
 #include "base/module.hpp"
 #include "device/context.hpp"
-
-/// Declared here because macOS' unistd.h does not.
-extern "C" char** environ;
+#include "dpr/error.hpp"
 
 namespace dpr {
 namespace {
@@ -49,13 +42,6 @@ std::vector<std::string> environment_of(const DeviceInfo& info) {
   return variables;
 }
 
-std::vector<char*> pointers(std::vector<std::string>& words) {
-  std::vector<char*> list;
-  for (std::string& word : words) list.push_back(word.data());
-  list.push_back(nullptr);
-  return list;
-}
-
 /// The trial's process: what it printed, and how it ended.
 struct Ending {
   std::string kernel, text;  // the last that was begun; the driver's last line
@@ -63,51 +49,21 @@ struct Ending {
   int status = 0;  // of waitpid()
 };
 
-void read_lines(std::FILE* file, Ending& ending) {
-  char* line = nullptr;
-  std::size_t room = 0;
-  for (ssize_t length = 0; (length = getline(&line, &room, file)) >= 0;) {
-    std::string_view text(line, static_cast<std::size_t>(length));
-    if (text.ends_with('\n')) text.remove_suffix(1);
-    constexpr std::string_view k_begins = "begins ", k_milliseconds = "milliseconds ";
-    if (text.starts_with(k_begins)) {
-      ending.kernel = text.substr(k_begins.size());
-    } else if (text.starts_with(k_milliseconds)) {
-      ending.milliseconds = std::strtod(text.data() + k_milliseconds.size(), nullptr);
-    } else if (!text.empty()) {
-      ending.text = text;
-    }
-  }
-  std::free(line);
-}
-
-std::optional<Ending> run_trial(const DeviceInfo& info, const std::filesystem::path& command) {
-  std::array<int, 2> ends{};
-#ifdef __APPLE__
-  if (pipe(ends.data()) != 0) return std::nullopt;
-  for (const int end : ends) fcntl(end, F_SETFD, FD_CLOEXEC);
-#else
-  if (pipe2(ends.data(), O_CLOEXEC) != 0) return std::nullopt;  // at once: other threads may start processes
-#endif
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> output(fdopen(ends[0], "r"), std::fclose);
-  std::vector<std::string> words{command.string(), "devices", "--trial", trial_name(info)};
-  std::vector<std::string> variables = environment_of(info);
-  posix_spawn_file_actions_t actions{};
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  pid_t process = 0;
-  const int error = posix_spawn(&process, words[0].c_str(), &actions, nullptr, pointers(words).data(),
-                                pointers(variables).data());
-  posix_spawn_file_actions_destroy(&actions);
-  close(ends[1]);
-  if (error != 0) return std::nullopt;
+Ending run_trial(const DeviceInfo& info, const std::filesystem::path& command) {
+  ChildProcess process({command.string(), "devices", "--trial", trial_name(info)}, /*takes_errors=*/true,
+                       environment_of(info));
   Ending ending;
-  read_lines(output.get(), ending);
-  while (waitpid(process, &ending.status, 0) < 0) {
-    if (errno != EINTR) return std::nullopt;  // a host that ignores SIGCHLD
-  }
+  process.for_each_line([&](std::string_view line) {
+    constexpr std::string_view k_begins = "begins ", k_milliseconds = "milliseconds ";
+    if (line.starts_with(k_begins)) {
+      ending.kernel = line.substr(k_begins.size());
+    } else if (line.starts_with(k_milliseconds)) {
+      ending.milliseconds = std::strtod(line.data() + k_milliseconds.size(), nullptr);
+    } else if (!line.empty()) {
+      ending.text = line;
+    }
+  });
+  ending.status = process.wait();
   return ending;
 }
 
@@ -143,12 +99,16 @@ std::optional<Trial> try_device(const DeviceInfo& info, const Store& store) {
   const std::string key = key_of(info);
   store.save(key, k_started);
   if (store.load(key) != k_started) return std::nullopt;  // every start would try anew
-  const auto ending = run_trial(info, command);
-  if (!ending) return std::nullopt;
-  if (WIFSIGNALED(ending->status) && is_crash(WTERMSIG(ending->status))) {
-    store.save(key, std::string(k_fails) + describe(info, *ending));
-  } else if (WIFEXITED(ending->status) && WEXITSTATUS(ending->status) == 0 && ending->milliseconds > 0) {
-    store.save(key, std::string(k_runs) + std::to_string(ending->milliseconds));
+  Ending ending;
+  try {
+    ending = run_trial(info, command);
+  } catch (const IoError&) {
+    return std::nullopt;
+  }
+  if (WIFSIGNALED(ending.status) && is_crash(WTERMSIG(ending.status))) {
+    store.save(key, std::string(k_fails) + describe(info, ending));
+  } else if (WIFEXITED(ending.status) && WEXITSTATUS(ending.status) == 0 && ending.milliseconds > 0) {
+    store.save(key, std::string(k_runs) + std::to_string(ending.milliseconds));
   }
   return remembered_trial(info, store);
 }
