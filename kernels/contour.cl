@@ -280,7 +280,8 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
 }
 
 /// Adds the gradients of contours' ends to those of the vertices: each vertex the contours at its corners in
-/// order, each contour its pairs. Any number of work-items, by end of a pair: vertices are many, and few have a contour.
+/// order, each contour its pairs. Any number of work-items, by end of a pair: vertices are many,
+/// and few have a contour.
 /// That of the first pair of the first contour of a vertex sums for the vertex. Deterministic.
 /// in      pairs         uint[1]                how many there are
 /// in      pair_contour  uint[pair]             see DPR_CONTOUR_FLAGS

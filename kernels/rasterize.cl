@@ -201,7 +201,8 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
   return corner + (bit % DPR_TILE | bit / DPR_TILE << 16);
 }
 
-/// What a fragment is: distance, depth, barycentrics. One work-item per group of pairs in `range`. Deterministic.
+/// What a fragment is: distance, depth, barycentrics. One work-item per group of pairs in
+/// `range`. Deterministic.
 /// in   triangles, pair_face, pair_tile, masks  as rasterize_cover
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// out  fragment_pair  uint[fragment]

@@ -42,7 +42,8 @@ typedef struct {
   const GroupSort name = {name##_keys, name##_order, name##_counts, name##_sums}
 
 /// Sorts the first `here` keys of the first list by their bits from `shift` to `end`, with their places in the
-/// block. Returns where the list with the result begins. To be called by all of the group, after the keys are there.
+/// block. Returns where the list with the result begins. To be called by all of the group, after the keys
+/// are there.
 static inline uint sort_group(const GroupSort s, uint here, uint shift, uint end) {
   const uint each = DPR_EACH(DPR_SORT_BLOCK), digits = DPR_SORT_GROUP_DIGITS;
   const uint item = (uint)get_local_id(0), first = item * each, last = min(here, first + each);
