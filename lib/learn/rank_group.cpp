@@ -56,8 +56,15 @@ std::string own_address(const Ranks& ranks) {
   return text;
 }
 
+/// Debian's libtorch has no libuv, which torch 2.4 and later use unless told otherwise.
+template <class Options>
+void leave_libuv(Options& options) {
+  if constexpr (requires { options.useLibuv; }) options.useLibuv = false;
+}
+
 c10::intrusive_ptr<c10d::Store> open_store(const Ranks& ranks) {
   c10d::TCPStoreOptions options;
+  leave_libuv(options);
   options.port = ranks.port;
   options.isServer = ranks.rank == 0 && !ranks.launcher_listens;
   options.numWorkers = static_cast<std::size_t>(ranks.count);
