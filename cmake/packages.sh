@@ -13,7 +13,7 @@ dpr_packages_tests=(
   doctest-dev clang clang-19 libclc-19 doxygen git pkg-config libzip-dev python3 file dpkg-dev
 )
 # dpr learn, and the tests of the Python package.
-dpr_packages_learning=(libgloo-dev libtorch-dev libopenblas0-pthread python3-torch)
+dpr_packages_learning=(libgloo-dev libtorch-dev libopenblas0-pthread python3-torch python3-setuptools)
 # The tests under a simulator of the kernels.
 dpr_packages_oclgrind=(oclgrind)
 
