@@ -33,7 +33,6 @@ HostArray host_colors(Mesh& mesh, std::size_t) {
   return mesh.vertex_colors.empty() ? &mesh.face_colors : &mesh.vertex_colors;
 }
 
-bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
 bool has_textures(const Mesh& mesh) { return !mesh.textures.empty(); }
 
 void move_positions(Impl& m, std::size_t mesh, bool on_host) {
@@ -48,72 +47,99 @@ void forget_edges(Impl& m, std::size_t, bool on_host) {
   if (on_host && m.pixel_noise) m.pixel_noise->edges.reset();
 }
 
+/// The joined buffers of all meshes' arrays.
+struct OnDevice {
+  static Buffer<cl_float4>& positions(Geometry& g) { return g.positions; }
+  static Buffer<cl_float4>& colors(Geometry& g) { return g.color_values; }
+  static Buffer<cl_float4>& texels(Geometry& g) { return g.textures.texel_values; }
+  static Buffer<cl_float4>& texcoords(Geometry& g) { return g.textures.texcoord_values; }
+  static Buffer<cl_float4>& normals(Geometry& g) { return g.given_normals.values; }
+  static Buffer<cl_float4>& materials(Geometry& g) { return g.materials.values; }
+};
+
+/// The gradients of them that a backward pass leaves.
+struct Gradients {
+  static const Buffer<cl_float4>& positions(const Impl& m) { return m.transform.grad_positions; }
+  static const Buffer<cl_float4>& colors(const Impl& m) { return m.grad_colors; }
+  static const Buffer<cl_float4>& texels(const Impl& m) { return m.texels->grad; }
+  static const Buffer<cl_float4>& texcoords(const Impl& m) { return m.grad_texcoords; }
+  static const Buffer<cl_float4>& normals(const Impl& m) { return m.shade.grad_given_normals; }
+  static const Buffer<cl_float4>& materials(const Impl& m) { return m.grad_materials; }
+};
+
+HostArray host_texels(Mesh& mesh, std::size_t texture) { return &mesh.textures[texture].texels; }
+bool has_normals(const Mesh& mesh) { return !mesh.face_normals.empty(); }
+bool has_materials(const Mesh& mesh) { return !mesh.materials.empty(); }
+void forget_levels(Impl& m, std::size_t, bool) { m.geometry->textures.has_levels = false; }
+
+constexpr MeshArray k_positions{.name = "positions",
+                                .components = 3,
+                                .wanted = &Request::positions,
+                                .host = host_array<&Mesh::positions>,
+                                .device = OnDevice::positions,
+                                .first = first_of<&MeshRange::first_position>,
+                                .gradient = Gradients::positions,
+                                .stride = &Params::position_stride,
+                                .changed = move_positions};
+constexpr MeshArray k_colors{.name = "colors",
+                             .components = 3,
+                             .wanted = &Request::colors,
+                             .host = host_colors,
+                             .device = OnDevice::colors,
+                             .first = first_of<&MeshRange::first_color>,
+                             .gradient = Gradients::colors,
+                             .stride = &Params::color_stride,
+                             .what = "colours"};
+constexpr MeshArray k_texels{.name = "texels",
+                             .components = 3,
+                             .wanted = &Request::texture,
+                             .host = host_texels,
+                             .device = OnDevice::texels,
+                             .first = first_texel,
+                             .gradient = Gradients::texels,
+                             .changed = forget_levels,
+                             .exists = has_textures,
+                             .what = "textures"};
+constexpr MeshArray k_texcoords{.name = "texcoords",
+                                .components = 2,
+                                .wanted = &Request::texcoords,
+                                .host = host_array<&Mesh::texcoords>,
+                                .device = OnDevice::texcoords,
+                                .first = first_of<&MeshRange::first_texcoord>,
+                                .gradient = Gradients::texcoords,
+                                .changed = forget_edges,
+                                .exists = has_textures,
+                                .what = "textures"};
+constexpr MeshArray k_normals{.name = "normals",
+                              .components = 3,
+                              .wanted = &Request::normals,
+                              .is_lit = true,
+                              .host = host_array<&Mesh::normals>,
+                              .device = OnDevice::normals,
+                              .first = first_of<&MeshRange::first_normal>,
+                              .gradient = Gradients::normals,
+                              .changed = forget_edges,
+                              .exists = has_normals,
+                              .what = "normals of its own"};
+constexpr MeshArray k_materials{.name = "materials",
+                                .components = DPR_MATERIAL_CHANNELS,
+                                .wanted = &Request::materials,
+                                .is_lit = true,
+                                .host = host_array<&Mesh::materials>,
+                                .device = OnDevice::materials,
+                                .first = first_of<&MeshRange::first_material>,
+                                .gradient = Gradients::materials,
+                                .exists = has_materials,
+                                .what = "materials"};
 /// In the order of ArrayId.
-const std::array k_arrays{MeshArray{.name = "positions",
-                                    .components = 3,
-                                    .wanted = &Request::positions,
-                                    .host = host_array<&Mesh::positions>,
-                                    .device = [](Geometry & g) -> auto& {return g.positions;
-}  // namespace
-, .first = first_of<&MeshRange::first_position>, .gradient = [](const Impl& m) -> auto& {
-  return m.transform.grad_positions;
-}
-, .stride = &Params::position_stride, .changed = move_positions
-}  // namespace dpr
-, MeshArray{.name = "colors", .components = 3, .wanted = &Request::colors, .host = host_colors, .device = [
-            ](Geometry & g) -> auto& {return g.color_values;
-}
-, .first = first_of<&MeshRange::first_color>, .gradient = [](const Impl& m) -> auto& { return m.grad_colors; }
-, .stride = &Params::color_stride, .exists = has_colors, .what = "colours"
-}
-, MeshArray{.name = "texels",
-            .components = 3,
-            .wanted = &Request::texture,
-            .host = [](Mesh& mesh, std::size_t i) -> HostArray { return &mesh.textures[i].texels; },
-            .device = [](Geometry & g) -> auto& {return g.textures.texel_values;
-}
-, .first = first_texel, .gradient = [](const Impl& m) -> auto& { return m.texels->grad; }
-, .changed = [](Impl& m, std::size_t, bool) { m.geometry->textures.has_levels = false; },
-  .exists = has_textures, .what = "textures"
-}
-, MeshArray{.name = "texcoords",
-            .components = 2,
-            .wanted = &Request::texcoords,
-            .host = host_array<&Mesh::texcoords>,
-            .device = [](Geometry & g) -> auto& {return g.textures.texcoord_values;
-}
-, .first = first_of<&MeshRange::first_texcoord>, .gradient = [](const Impl& m) -> auto& {
-  return m.grad_texcoords;
-}
-, .changed = forget_edges, .exists = has_textures, .what = "textures"
-}
-, MeshArray{.name = "normals",
-            .components = 3,
-            .wanted = &Request::normals,
-            .is_lit = true,
-            .host = host_array<&Mesh::normals>,
-            .device = [](Geometry & g) -> auto& {return g.given_normals.values;
-}
-, .first = first_of<&MeshRange::first_normal>, .gradient = [](const Impl& m) -> auto& {
-  return m.shade.grad_given_normals;
-}
-, .changed = forget_edges, .exists = [](const Mesh& mesh) { return !mesh.face_normals.empty(); },
-  .what = "normals of its own"
-}
-, MeshArray {
-  .name = "materials", .components = DPR_MATERIAL_CHANNELS, .wanted = &Request::materials, .is_lit = true,
-  .host = host_array<&Mesh::materials>, .device = [](Geometry & g) -> auto& {
-    return g.materials.values;
-  }
-  , .first = first_of<&MeshRange::first_material>, .gradient = [](const Impl& m) -> auto& {
-    return m.grad_materials;
-  }
-  , .exists = [](const Mesh& mesh) { return !mesh.materials.empty(); }, .what = "materials"
-}
-}
-;
+constexpr std::array k_arrays{k_positions, k_colors, k_texels, k_texcoords, k_normals, k_materials};
 
 std::string setter_of(const ArrayRef& at) { return std::string("set_") + row_of(at.id).name; }
+
+[[noreturn]] void refuse_mesh(const ArrayRef& at) {
+  throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row_of(at.id).what,
+                        "one that has some");
+}
 
 }  // namespace
 
@@ -136,9 +162,7 @@ HostArray require_array(Scene& scene, const ArrayRef& at) {
   if (at.id == ArrayId::texels && at.texture >= mesh.textures.size())
     throw InvalidArgument("texture", std::to_string(at.texture),
                           "below " + std::to_string(mesh.textures.size()));
-  if (!row.exists(mesh))
-    throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row.what,
-                          "one that has some");
+  if (!row.exists(mesh)) refuse_mesh(at);
   return row.host(mesh, at.texture);
 }
 
@@ -187,6 +211,7 @@ void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values,
   m.require_scene(setter_of(at).c_str());
   const MeshArray& row = row_of(at.id);
   const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
+  if (shape.count == 0) refuse_mesh(at);  // one without colours
   const FloatVectors from = require_vectors(m.device.impl(), values, shape, Access::read, row.name);
   enqueue(m.device.impl(), events, [&] { m.take(at, shape.count, from); });
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -176,7 +177,7 @@ class Rasterize {
   std::array<PendingRead<cl_uint4>, 8> notes_;  // a ring; frames beyond are in the next note
   std::size_t oldest_note_ = 0, notes_under_way_ = 0, disowned_notes_ = 0;
   cl_uint noted_emptied_ = 0;  // frames, in the notes so far
-  std::size_t likely_fragments_ = 0;
+  std::size_t likely_fragments_ = std::numeric_limits<std::size_t>::max();
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
   bool counted_ = true;                // the counts are the frame's, not the capacity
   bool in_bands_ = false;              // the starts above are a band's, those below the frame's

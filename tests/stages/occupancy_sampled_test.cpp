@@ -8,6 +8,7 @@
 #include "reference/occupancy.hpp"
 #include "stages/occupancy.hpp"
 #include "support/estimates.hpp"
+#include "support/made_bin.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
@@ -52,8 +53,7 @@ class OccupancySamples {
     frame_.height = static_cast<cl_uint>(count_ / k_width + 1);
     frame_.faces = static_cast<cl_uint>(xs.size());
     frame_.views = 1;
-    bin_.pairs = faces.size();
-    bin_.pair_face.upload(device_impl(), faces);
+    dpr::test::make_pairs(bin_, faces);
     rasterize_.fragments = pixels.size();
     rasterize_.masks.upload(device_impl(), masks);
     rasterize_.fragment_starts.upload(device_impl(), starts);

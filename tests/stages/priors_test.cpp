@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "stages/occupancy.hpp"
+#include "support/made_bin.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
@@ -121,7 +122,7 @@ class Distances {
     while (starts.back() < values.size()) {
       starts.push_back(static_cast<cl_uint>(std::min(starts.back() + k_run, values.size())));
     }
-    bin_.pairs = starts.size() - 1;
+    dpr::test::make_pairs(bin_, std::vector<cl_uint>(starts.size() - 1));
     rasterize_.fragments = values.size();
     rasterize_.fragment_starts.upload(device_impl(), starts);
     rasterize_.distance.upload(device_impl(), values);

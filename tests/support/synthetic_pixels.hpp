@@ -7,6 +7,7 @@
 
 #include "reference/aggregate.hpp"
 #include "stages/aggregate.hpp"
+#include "support/made_bin.hpp"
 #include "support/probe.hpp"
 
 namespace dpr::test {
@@ -100,8 +101,7 @@ class SyntheticFrame {
     frame_.width = static_cast<cl_uint>(pixels.size());
     frame_.height = 1;
     frame_.faces = static_cast<cl_uint>(faces.size());
-    bin_.pairs = faces.size();
-    bin_.pair_face.upload(device_impl(), faces);
+    make_pairs(bin_, faces);
     rasterize_.fragments = fragments_;
     rasterize_.pixel_starts.upload(device_impl(), starts);
     rasterize_.list.resize(device_impl(), std::max<std::size_t>(count, 1));
