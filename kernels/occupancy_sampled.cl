@@ -39,7 +39,7 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 #endif
 }
 
-/// One work-item per pair, up to `last_pair`. Deterministic.
+/// Any number of work-items, by pair, up to `last_pair`. Deterministic.
 /// in   pair_face        uint[pair]       view * faces + face
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixels           uint[fragment]   x | y << 16
@@ -51,22 +51,23 @@ kernel void occupancy_sampled_forward(
     global const uint* restrict pair_face, global const uint* restrict fragment_starts,
     global const uint* restrict pixels, global const float* restrict distance,
     global float* restrict log_occupancy, global float* restrict occupancy) {
-  const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
-  const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
-  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
-  for (uint i = first; i < last; ++i) {
-    const float x = distance[i] / p.sigma;
-    occupancy[i] = always_covers(x) ? 1.0f : 0.0f;
-    if (always_covers(x) || never_covers(x)) continue;
-    const NoiseName name = fragment_noise(p, view, face, pixels[i]);
-    realn sum = 0.0f;
-    for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
-      sum += heaviside(p, x, draw_noise(p.sampling, DPR_PRIOR, name, block), block);
+  const uint end = min(last_pair, pairs[0]);
+  for (uint pair = (uint)get_global_id(0); pair < end; pair += (uint)get_global_size(0)) {
+    const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
+    const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    for (uint i = first; i < last; ++i) {
+      const float x = distance[i] / p.sigma;
+      occupancy[i] = always_covers(x) ? 1.0f : 0.0f;
+      if (always_covers(x) || never_covers(x)) continue;
+      const NoiseName name = fragment_noise(p, view, face, pixels[i]);
+      realn sum = 0.0f;
+      for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
+        sum += heaviside(p, x, draw_noise(p.sampling, DPR_PRIOR, name, block), block);
+      }
+      occupancy[i] = sum_lanes(sum) / (float)p.sampling.samples;
     }
-    occupancy[i] = sum_lanes(sum) / (float)p.sampling.samples;
+    write_logarithms(first, last, occupancy, log_occupancy);
   }
-  write_logarithms(first, last, occupancy, log_occupancy);
 }
 
 /// Score estimates of sigma dp/ds, with nu'(X), and of sigma dp/dsigma, with nu'(X) X - 1: d = 1 here.

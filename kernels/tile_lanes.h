@@ -14,13 +14,16 @@
 #include "shared_types.h"
 
 /// The pairs [x, y) of a work-item, out of those in `range` that there are; none if x is not less. Where there
-/// are more than the host has launched for, groups are larger.
+/// are more than the host has launched for, groups are larger, by at most one pair than others.
 static inline uint2 pair_group(uint2 range, uint pairs) {
   const uint last = min(range.y, pairs), count = last > range.x ? last - range.x : 0;
-  const uint items = (uint)get_global_size(0), least = DPR_WIDTH == 1 ? 1 : DPR_PAIR_GROUP;
-  const uint size = max(count / items + (count % items != 0), least);
-  const uint first = range.x + (uint)get_global_id(0) * size;
-  return (uint2)(first, min(first + size, last));
+  const uint item = (uint)get_global_id(0), size = DPR_WIDTH == 1 ? 1 : DPR_PAIR_GROUP;
+  const uint items = (uint)get_global_size(0);
+  if (count <= items * size) {
+    const uint first = range.x + item * size;
+    return (uint2)(first, min(first + size, last));
+  }
+  return range.x + (uint2)((uint)((ulong)count * item / items), (uint)((ulong)count * (item + 1) / items));
 }
 
 /// Lanes of the vector at `first` that lie before `last`.

@@ -138,12 +138,12 @@ std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   return expected;
 }
 
-/// What kernels are launched for: not more than the room, and a quarter more than the last frame took that is
-/// known.
+/// Counts that kernels are launched for: those of the last known frame, within the room. Work-items take more
+/// where there are more; those without any would leave a CPU's last threads idle.
 FrameCounts Renderer::Impl::likely_counts(const FrameCounts& room) const {
   if (!known_counts) return room;
   const auto likely = [](std::size_t known, std::size_t most) {
-    return std::min(with_headroom(known) + 1, most);
+    return std::min(std::max<std::size_t>(known, 1), most);
   };
   return {likely(known_counts->pairs, room.pairs), likely(known_counts->fragments, room.fragments),
           likely(known_counts->contours, room.contours)};

@@ -65,7 +65,7 @@ void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rast
                                                      .log_occupancy = log_occupancy,
                                                      .occupancy = occupancy});
   } else {
-    (*now_.kernels->sampled)(pairs,
+    (*now_.kernels->sampled)(Range(pairs.first, std::min(pairs.count, bin.launched)),
                              kernel::occupancy_sampled_forward{.p = params(p),
                                                                .last_pair = pairs.last(),
                                                                .pairs = bin.pair_count,
