@@ -178,7 +178,7 @@ dpr_status dpr_attribute_reserve(dpr_attribute* attribute, const dpr_frame_room*
 dpr_status dpr_attribute_forward_on_device(dpr_attribute* attribute, const dpr_renderer* renderer,
                                            const dpr_events* events) {
   return guarded([&] {
-    dpr::c::require_none_emptied(
+    require_none_emptied(
         dpr::forward_on_device(images_of(attribute), renderer_of(renderer), to_events(events)));
   });
 }

@@ -33,6 +33,7 @@ HostArray host_colors(Mesh& mesh, std::size_t) {
   return mesh.vertex_colors.empty() ? &mesh.face_colors : &mesh.vertex_colors;
 }
 
+bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
 bool has_textures(const Mesh& mesh) { return !mesh.textures.empty(); }
 
 void move_positions(Impl& m, std::size_t mesh, bool on_host) {
@@ -89,6 +90,8 @@ constexpr MeshArray k_colors{.name = "colors",
                              .first = first_of<&MeshRange::first_color>,
                              .gradient = Gradients::colors,
                              .stride = &Params::color_stride,
+                             .exists = has_colors,
+                             .may_be_empty = true,
                              .what = "colours"};
 constexpr MeshArray k_texels{.name = "texels",
                              .components = 3,
@@ -162,7 +165,7 @@ HostArray require_array(Scene& scene, const ArrayRef& at) {
   if (at.id == ArrayId::texels && at.texture >= mesh.textures.size())
     throw InvalidArgument("texture", std::to_string(at.texture),
                           "below " + std::to_string(mesh.textures.size()));
-  if (!row.exists(mesh)) refuse_mesh(at);
+  if (!row.may_be_empty && !row.exists(mesh)) refuse_mesh(at);
   return row.host(mesh, at.texture);
 }
 
@@ -211,7 +214,7 @@ void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values,
   m.require_scene(setter_of(at).c_str());
   const MeshArray& row = row_of(at.id);
   const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
-  if (shape.count == 0) refuse_mesh(at);  // one without colours
+  if (shape.count == 0) refuse_mesh(at);
   const FloatVectors from = require_vectors(m.device.impl(), values, shape, Access::read, row.name);
   enqueue(m.device.impl(), events, [&] { m.take(at, shape.count, from); });
 }

@@ -53,6 +53,7 @@ struct MeshArray {
   /// Marks what the renderer derives from the array. `on_host`: the host knows the new elements.
   void (*changed)(Renderer::Impl& renderer, std::size_t mesh, bool on_host) = [](auto&, auto, bool) {};
   bool (*exists)(const Mesh& mesh) = [](const Mesh&) { return true; };
+  bool may_be_empty = false;  ///< a mesh without the array takes an empty list from the host
   const char* what = "";  ///< that a mesh without the array lacks
 };
 
@@ -61,7 +62,7 @@ const MeshArray& row_of(ArrayId id);
 ArrayId id_of(bool GradientRequest::*wanted);
 
 /// The scene's array. Throws InvalidArgument for a mesh or texture that is not there, an instance of another
-/// mesh, and a mesh that has no such array.
+/// mesh, and a mesh that lacks an array which may not be empty.
 HostArray require_array(Scene& scene, const ArrayRef& at);
 std::size_t count_of(const HostArray& array);
 ArrayValues values_of(const HostArray& array);

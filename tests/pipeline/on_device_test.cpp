@@ -569,6 +569,15 @@ TEST_SUITE("robustness") {
     forward_on_device(with_lights);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, backward_on_device(with_lights, image_view(with_lights).span()),
                           "set_views()");
+    Scene white = scene;
+    white.meshes[0].mesh.vertex_colors.clear();
+    white.meshes[0].mesh.face_colors.clear();
+    Renderer of_white(renderer.device());
+    of_white.set_scene(white);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, set_colors(of_white, 0, {buffer()}), "without colours");
+    forward_on_device(of_white);
+    backward_on_device(of_white, image_view(of_white).span());
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_view(of_white, "meshes[0].colors"), "name");
     const cl_event none = nullptr;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, forward_on_device(renderer, {.wait = {&none, 1}}), "wait[0]");
     const cl::UserEvent foreign(stranger.context);
