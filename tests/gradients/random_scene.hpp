@@ -141,6 +141,9 @@ inline void draw_smoothing(Draw& draw, Trial& trial) {
   const bool many_faces = trial.scene.meshes[0].mesh.faces.size() > 200;
   if (!pixel && many_faces && smoothing.occupancy_prior == Prior::cauchy)
     smoothing.occupancy_prior = Prior::gaussian;  // whose blur does not reach across the frame
+  if (!pixel && trial.scene.meshes.size() * trial.scene.meshes[0].mesh.faces.size() > 200 &&
+      smoothing.depth_prior == Prior::cauchy)
+    smoothing.depth_prior = Prior::gaussian;  // under which a pixel's hundreds of faces do not all compete
   smoothing.gamma = draw.of({1e-4F, 1e-2F, 4e-2F});
   smoothing.background_depth = 0.45F;
   if (pixel) {

@@ -154,7 +154,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       CHECK(numbers_of(gradient_of(renderer)) == numbers);
       Device small = open_device();
-      small.set_memory_budget(reduced(400000, 40000));
+      small.set_memory_budget(reduced(400000, 60000));
       Renderer banded(small);
       banded.set_scene(scene);
       banded.forward();
@@ -186,7 +186,7 @@ TEST_SUITE("pipeline") {
     };
     const std::vector<glm::vec3> one = rendered(1, 0), many = rendered(8, 0);
     REQUIRE(one.size() == 1);
-    CHECK(one == rendered(1, reduced(400000, 40000)));  // whose bands are parts of rows of tiles, too
+    CHECK(one == rendered(1, reduced(400000, 60000)));  // whose bands are parts of rows of tiles, too
     glm::dvec3 sum(0.0), magnitude(0.0);
     for (const glm::vec3& texel : many) {
       sum += glm::dvec3(texel);
