@@ -24,7 +24,7 @@ static inline float4 silhouette_gradient(float weight, const LossPixel p, const 
 #else
 
 inline double silhouette_value(double weight, const double* sums, double /*channels*/) {
-  const double iou = sums[1] > 0 ? sums[0] / sums[1] : 1.0;
+  const double iou = sums[1] <= 0 ? 1.0 : sums[0] / sums[1];  // NaN stays NaN
   return weight * (1 - iou);
 }
 

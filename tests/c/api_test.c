@@ -327,11 +327,12 @@ static void test_losses(const dpr_device* device, const dpr_scene* scene) {
     float mse, l1, silhouette;
   } older;
   dpr_loss_weights weights = DPR_LOSS_WEIGHTS_INIT, as_older;
-  double mse, robust;
-  float unused[FLOATS];
+  float* const each[] = {&weights.mse, &weights.l1, &weights.silhouette, &weights.robust, &weights.ssim};
+  double mse, robust, value = 0;
+  float unused[FLOATS], huge[FLOATS];
   size_t i;
   dpr_renderer* renderer = NULL;
-  dpr_loss* none = NULL;
+  dpr_loss *none = NULL, *loss = NULL;
   for (i = 0; i < FLOATS; ++i) unused[i] = 0;
   OK(dpr_renderer_create(device, &renderer));
   OK(dpr_renderer_set_scene(renderer, scene));
@@ -356,6 +357,15 @@ static void test_losses(const dpr_device* device, const dpr_scene* scene) {
   REFUSED(dpr_loss_create(device, &weights, unused, FLOATS, 1, SIDE, SIDE, &none), "robust_scale");
   weights.robust = 0, weights.robust_scale = 0.1f, weights.ssim = 1;
   EXPECT(loss_of(device, renderer, &weights) > 0.01);
+  weights.ssim = 0;
+  for (i = 0; i < FLOATS; ++i) huge[i] = 1e38f;
+  for (i = 0; i < sizeof each / sizeof each[0]; ++i) { /* finite, but not their sums */
+    *each[i] = 1;
+    OK(dpr_loss_create(device, &weights, huge, FLOATS, 1, SIDE, SIDE, &loss));
+    REFUSED(dpr_loss_evaluate(loss, renderer, &value), "single precision");
+    dpr_loss_destroy(loss);
+    *each[i] = 0;
+  }
   weights.ssim = -1;
   REFUSED(dpr_loss_create(device, &weights, unused, FLOATS, 1, SIDE, SIDE, &none), "weight");
   weights.size = sizeof weights + 1;

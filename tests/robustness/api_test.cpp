@@ -342,6 +342,28 @@ TEST_SUITE("robustness") {
     CHECK(is_finite(renderer.backward(loss)));
   }
 
+  TEST_CASE("api: losses of finite targets that single precision does not hold are refused") {
+    const Device device = open_device();
+    Renderer renderer(device);
+    const int size = reduced(16, 11);  // a window of ssim
+    render(renderer, cube_scene(size, size));
+    const Image huge(size, size, glm::vec4(1e38F)), large(size, size, glm::vec4(1e17F));
+    for (const LossKind kind :
+         {LossKind::mse, LossKind::l1, LossKind::silhouette, LossKind::robust, LossKind::ssim}) {
+      CAPTURE(to_string(kind));
+      const LossWeights weights = LossWeights::only(kind);
+      ImageLoss of_large(device, weights, {&large, 1}), of_huge(device, weights, {&huge, 1});
+      CHECK(std::isfinite(of_large.evaluate(renderer)));
+      CHECK(is_finite(renderer.backward(of_large)));
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, of_huge.evaluate(renderer), "single precision");
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.backward(of_huge), "loss");
+      if (kind == LossKind::silhouette || kind == LossKind::ssim) continue;  // attributes have neither
+      const std::vector<AttributeTarget> depth{{Attribute::depth, weights, {&huge, 1}}};
+      ImageLoss of_depth(device, LossOptions{.attributes = depth}, {&large, 1});
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, of_depth.evaluate(renderer), "single precision");
+    }
+  }
+
   TEST_CASE("api: a loss that was not evaluated on the last image has no gradient to give") {
     const Device device = open_device();
     Renderer renderer(device);
