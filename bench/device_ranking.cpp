@@ -31,15 +31,15 @@ double median(std::vector<double> values) {
 /// Microseconds from the launch of a small kernel to the end of the host's wait for it.
 double launch_microseconds(const Device& device) {
   constexpr int k_launches = 200;
-  Launcher<kernel::scan_sum> launch(device.impl());
+  Launcher<kernel::scan_sum> launch(impl_of(device));
   const std::vector<cl_uint> one{1};
-  const Buffer<cl_uint> value(device.impl(), std::span<const cl_uint>(one));
-  Buffer<cl_uint> result(device.impl(), 1);
+  const Buffer<cl_uint> value(impl_of(device), std::span<const cl_uint>(one));
+  Buffer<cl_uint> result(impl_of(device), 1);
   std::vector<double> times;
   for (int i = 0; i < k_launches; ++i) {
     const Clock::time_point start = Clock::now();
     launch.in_groups(1, kernel::scan_sum{.count = 1U, .present = value, .values = value, .sums = result});
-    check_cl(device.impl().queue.finish(), "clFinish");
+    check_cl(impl_of(device).queue.finish(), "clFinish");
     times.push_back(seconds_since(start) * 1e6);
   }
   return median(times);
@@ -50,11 +50,11 @@ double transfer_rate(const Device& device) {
   constexpr std::size_t k_bytes = std::size_t{64} << 20;
   constexpr int k_transfers = 5;
   std::vector<cl_uint> values(k_bytes / sizeof(cl_uint));
-  Buffer<cl_uint> buffer(device.impl(), values.size());
+  Buffer<cl_uint> buffer(impl_of(device), values.size());
   std::vector<double> times;
   for (int i = 0; i < k_transfers; ++i) {
     const Clock::time_point start = Clock::now();
-    buffer.upload(device.impl(), values);
+    buffer.upload(impl_of(device), values);
     buffer.download(values);
     times.push_back(seconds_since(start));
   }

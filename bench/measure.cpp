@@ -108,7 +108,7 @@ Json to_json(const TransferCounts& before, const TransferCounts& after) {
 
 /// Counts the transfers of a frame of a descent: the vertices have moved, and no image goes to the host.
 void count_transfers(Row& row, const Workload& workload, Json& result) {
-  const Device::Impl& device = row.renderer.device().impl();
+  const Device::Impl& device = impl_of(row.renderer.device());
   const TransferCounts before = device.transfers();
   for (std::size_t m = 0; m < workload.scene.meshes.size(); ++m)
     row.renderer.set_positions(m, workload.scene.meshes[m].mesh.positions);
@@ -187,7 +187,7 @@ Json describe_row(const Workload& workload, const Variant& variant) {
 
 void measure_into(Json& result, const Device& device, const Peaks& peaks, const Workload& workload,
                   const Variant& variant, const MeasureOptions& options) {
-  Device::Impl& impl = device.impl();
+  Device::Impl& impl = impl_of(device);
   impl.peak_allocated_bytes = impl.allocated_bytes.load();
   reset_peak_resident_bytes();
   Row row(device, workload, variant);

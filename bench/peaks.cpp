@@ -84,7 +84,7 @@ double measure_bandwidth(Device::Impl& device, const cl::Program& program) {
 }  // namespace
 
 Peaks measure_peaks(const Device& device) {
-  Device::Impl& impl = device.impl();
+  Device::Impl& impl = impl_of(device);
   const cl::Program program = build(impl);
   return {measure_flops(impl, program) / k_giga, measure_bandwidth(impl, program) / k_giga};
 }

@@ -83,9 +83,9 @@ class DPR_API AttributeImages {
   std::span<const float> grad_values() const;
 
   struct DPR_LOCAL Impl;
-  Impl& impl() const { return *impl_; }
 
  private:
+  friend struct Internals;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -57,9 +57,8 @@ class DPR_API Device {
   /// of 8x8 pixels does not fit. Throws InvalidArgument for 0.
   void set_memory_budget(std::size_t bytes);
 
-  Impl& impl() const { return *impl_; }
-
  private:
+  friend struct Internals;
   std::shared_ptr<Impl> impl_;
 };
 

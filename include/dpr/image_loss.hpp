@@ -90,9 +90,9 @@ class DPR_API ImageLoss {
   std::span<const double> per_view() const;
 
   struct DPR_LOCAL Impl;
-  Impl& impl() const { return *impl_; }
 
  private:
+  friend struct Internals;
   std::unique_ptr<Impl> impl_;
 };
 

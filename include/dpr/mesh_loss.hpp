@@ -47,9 +47,9 @@ class DPR_API MeshLoss {
   /// The terms of the last evaluate().
   const MeshLossTerms& terms() const;
   struct DPR_LOCAL Impl;
-  Impl& impl() const { return *impl_; }
 
  private:
+  friend struct Internals;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -72,9 +72,9 @@ class DPR_API SceneBatch {
   const Device& device() const;
 
   struct DPR_LOCAL Impl;
-  Impl& impl() const { return *impl_; }
 
  private:
+  friend struct Internals;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -232,9 +232,9 @@ void Batch::backward(NamedArrays grads, NamedArrays gradients) {
 
 bool Batch::is_empty() {
   const Renderer& renderer = frame_.renderer();
-  renderer.impl().require_forward("dpr_frame_is_empty");
+  impl_of(renderer).require_forward("dpr_frame_is_empty");
   // The statistics read a word of every triangle from the device, which only a frame without fragments needs.
-  if (renderer.impl().rasterize.frame_fragments > 0) return false;
+  if (impl_of(renderer).rasterize.frame_fragments > 0) return false;
   const RenderStatistics statistics = renderer.statistics();
   return statistics.faces_dropped == statistics.faces;
 }

@@ -23,7 +23,7 @@ std::size_t floats_of(Aov aov) {
 }
 
 std::size_t count_of(const Renderer& renderer, Aov aov) {
-  renderer.impl().require_scene("auxiliary output");
+  impl_of(renderer).require_scene("auxiliary output");
   const Scene& scene = renderer.scene();
   require_shown(scene, aov);
   return renderer.views().size() * static_cast<std::size_t>(scene.width) *
@@ -40,7 +40,7 @@ float* write_output(const AuxiliaryOutputs& outputs, Aov aov, float* out) {
 }
 
 std::size_t image_floats_of(const dpr_attribute& attribute) {
-  const AttributeImages::Impl& m = attribute.images.impl();
+  const AttributeImages::Impl& m = impl_of(attribute.images);
   m.require_forward("dpr_attribute");
   return m.images().size() * k_channels_of_pixel;
 }
@@ -48,7 +48,7 @@ std::size_t image_floats_of(const dpr_attribute& attribute) {
 /// [group][view] of the images' size.
 std::vector<Image> to_grad_images(const dpr_attribute& attribute, const float* grad, std::size_t count) {
   require_count(count, image_floats_of(attribute), "grad");
-  const AttributeImages::Impl& m = attribute.images.impl();
+  const AttributeImages::Impl& m = impl_of(attribute.images);
   const Scene& scene = m.renderer.scene();
   std::vector<Image> images(m.groups() * m.views, Image(scene.width, scene.height));
   for (Image& image : images) {
@@ -70,7 +70,7 @@ std::vector<dpr_gradient::Array> arrays_of_attribute(const AttributeImages& imag
   }
   const std::span<const float> values = images.grad_values();
   if (!values.empty()) arrays.push_back({"values", {values.begin(), values.end()}});
-  for (dpr_gradient::Array& array : arrays_of(images.impl().renderer, std::move(gradient)))
+  for (dpr_gradient::Array& array : arrays_of(impl_of(images).renderer, std::move(gradient)))
     arrays.push_back(std::move(array));
   return arrays;
 }
@@ -145,10 +145,10 @@ dpr_status dpr_attribute_read_image(const dpr_attribute* attribute, float* pixel
     const dpr_attribute& a = deref(attribute, "attribute");
     deref(pixels, "pixels");
     require_count(count, image_floats_of(a), "pixels");
-    const dpr::AttributeImages::Impl& m = a.images.impl();
+    const dpr::AttributeImages::Impl& m = impl_of(a.images);
     static_assert(sizeof(cl_float4) == 4 * sizeof(float));
-    m.renderer.device().impl().read(m.images().cl_buffer(), 0,
-                                    std::as_writable_bytes(std::span(pixels, count)));
+    impl_of(m.renderer.device())
+        .read(m.images().cl_buffer(), 0, std::as_writable_bytes(std::span(pixels, count)));
   });
 }
 

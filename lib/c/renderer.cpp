@@ -30,7 +30,7 @@ std::vector<View> to_views(const Scene& scene, const dpr_camera* cameras, std::s
 }
 
 std::size_t floats_of_images(const Renderer& renderer) {
-  renderer.impl().require_scene("image");
+  impl_of(renderer).require_scene("image");
   return image_floats(renderer.views().size(), renderer.scene().width, renderer.scene().height);
 }
 

@@ -24,7 +24,7 @@ using Pixel = std::vector<Fragment>;
 
 /// The fragments of every pixel of the last frame, which is one band.
 inline std::vector<Pixel> pixels_of(const Renderer& renderer) {
-  const Renderer::Impl& m = renderer.impl();
+  const Renderer::Impl& m = impl_of(renderer);
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
   const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
                            red = m.shade.color.red.download(), green = m.shade.color.green.download(),

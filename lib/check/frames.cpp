@@ -91,7 +91,7 @@ void log_gradients(Twins& t, CheckLog& log) {
 }
 
 void log_vertices(const Twins& t, const reference::PreparedScene& prepared, CheckLog& log) {
-  const std::vector<cl_float4> ndc = t.renderer.impl().transform.ndc.download();
+  const std::vector<cl_float4> ndc = impl_of(t.renderer).transform.ndc.download();
   Largest worst;
   if (ndc.size() != prepared.vertices.size()) worst.add(INFINITY);
   for (std::size_t i = 0; i < std::min(ndc.size(), prepared.vertices.size()); ++i) {

@@ -83,9 +83,9 @@ void check_reduce(Device::Impl& device, CheckLog& log) {
 }  // namespace
 
 void check_lists(const Device& device, CheckLog& log) {
-  check_scan(device.impl(), log);
-  check_sort(device.impl(), log);
-  check_reduce(device.impl(), log);
+  check_scan(impl_of(device), log);
+  check_sort(impl_of(device), log);
+  check_reduce(impl_of(device), log);
 }
 
 }  // namespace dpr::check

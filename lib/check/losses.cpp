@@ -22,7 +22,7 @@ double relative(double found, double expected) { return std::fabs(found / expect
 /// The gradient that a loss left for the backward pass, [pixel][RGBA].
 std::vector<double> grad_image(const ImageLoss& loss) {
   std::vector<double> values;
-  for (const cl_float4& pixel : loss.impl().grad_image().download())
+  for (const cl_float4& pixel : impl_of(loss).grad_image().download())
     values.insert(values.end(), {pixel.s[0], pixel.s[1], pixel.s[2], pixel.s[3]});
   return values;
 }
@@ -80,11 +80,11 @@ void log_mesh_loss(const Device& device, CheckLog& log) {
   const auto expected = [&](const std::vector<double>& x) { return reference_loss(mesh, weights, x); };
   std::vector<cl_float4> values;
   for (const glm::vec3& p : mesh.positions) values.push_back({{p.x, p.y, p.z, 0}});
-  const Buffer<cl_float4> positions(device.impl(), std::span<const cl_float4>(values));
-  Buffer<cl_float4> grad(device.impl(), std::span<const cl_float4>(std::vector<cl_float4>(values.size())));
+  const Buffer<cl_float4> positions(impl_of(device), std::span<const cl_float4>(values));
+  Buffer<cl_float4> grad(impl_of(device), std::span<const cl_float4>(std::vector<cl_float4>(values.size())));
   MeshLoss loss(device, weights, mesh);
-  const double found = loss.impl().evaluate(positions, 0);
-  loss.impl().add_gradient(positions, grad);
+  const double found = impl_of(loss).evaluate(positions, 0);
+  impl_of(loss).add_gradient(positions, grad);
   std::vector<double> gradient;
   for (const cl_float4& g : grad.download()) gradient.insert(gradient.end(), {g.s[0], g.s[1], g.s[2]});
   log.add("mesh_loss", "value, relative", relative(found, expected(at)), k_value);

@@ -34,8 +34,8 @@ void log_sampled_occupancy(const Device& device, CheckLog& log) {
   sampled.forward();
   exact.image();  // both frames are known to be complete
   sampled.image();
-  const std::vector<float> expected = exact.impl().occupancy.occupancy.download(),
-                           found = sampled.impl().occupancy.occupancy.download();
+  const std::vector<float> expected = impl_of(exact).occupancy.occupancy.download(),
+                           found = impl_of(sampled).occupancy.occupancy.download();
   Largest worst;
   if (found.size() != expected.size() || found.empty()) worst.add(INFINITY);
   for (std::size_t i = 0; i < std::min(found.size(), expected.size()); ++i)

@@ -33,7 +33,7 @@ Device open_for_trial(const std::string& name) {
 void run_trial(const std::string& name) {
   constexpr int k_size = 128, k_frames = 3;
   const Device device = open_for_trial(name);
-  Device::Impl& impl = device.impl();
+  Device::Impl& impl = impl_of(device);
   impl.before_work = [&impl](std::string_view work) {
     impl.queue.finish();
     std::printf("begins %.*s\n", static_cast<int>(work.size()), work.data());

@@ -17,7 +17,7 @@ Json provenance(const Device& device) {
             {"driver", info.driver},
             {"compute_units", info.compute_units},
             {"lanes", info.lanes}}},
-          {"build_options", build_options(device.impl())}};
+          {"build_options", build_options(impl_of(device))}};
 }
 
 PageSource page_source(const std::string& title, const CommonOptions& common,

@@ -147,7 +147,7 @@ namespace {
 
 /// The device, whose notes begin with these.
 Device noted(Device device, const std::vector<std::string>& passed_over) {
-  std::vector<std::string>& notes = device.impl().info.passed_over;
+  std::vector<std::string>& notes = impl_of(device).info.passed_over;
   notes.insert(notes.begin(), passed_over.begin(), passed_over.end());
   return device;
 }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/internals.hpp"
 #include "device/opencl_bindings.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"

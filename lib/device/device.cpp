@@ -233,8 +233,8 @@ Device open_found(const FoundDevice& found) {
     check_cl(error, "clCreateContext");
     Device device = make_device(found.device, context, make_queue(context, found.device));
     if (trial) info.frame_milliseconds = trial->milliseconds;
-    device.impl().info = info;
-    device.impl().group_size = choose_group(info, found.device);
+    impl_of(device).info = info;
+    impl_of(device).group_size = choose_group(info, found.device);
     return device;
   }
   std::string failures;
@@ -247,10 +247,10 @@ Device open_found(const FoundDevice& found) {
 void try_out(const Device& device) {
   constexpr std::array<cl_uint, 4> k_values{1, 20, 300, 4000};
   constexpr std::array<cl_uint, 1> k_count{k_values.size()};
-  Launcher<kernel::scan_sum> launch(device.impl());
-  const Buffer<cl_uint> values(device.impl(), std::span<const cl_uint>(k_values)),
-      count(device.impl(), std::span<const cl_uint>(k_count));
-  Buffer<cl_uint> sums(device.impl(), 1);
+  Launcher<kernel::scan_sum> launch(impl_of(device));
+  const Buffer<cl_uint> values(impl_of(device), std::span<const cl_uint>(k_values)),
+      count(impl_of(device), std::span<const cl_uint>(k_count));
+  Buffer<cl_uint> sums(impl_of(device), 1);
   launch.in_groups(1,
                    kernel::scan_sum{.count = k_count[0], .present = count, .values = values, .sums = sums});
   if (sums.download()[0] != 4321)
@@ -282,7 +282,7 @@ Device open_device(const std::string& selector) {
       return candidate;
     });
     if (failure)
-      device.impl().info.passed_over.push_back(std::string("a device does not answer: ") + failure->what());
+      impl_of(device).info.passed_over.push_back(std::string("a device does not answer: ") + failure->what());
     return device;
   }
   const auto chosen = std::ranges::find_if(

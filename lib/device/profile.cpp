@@ -2,8 +2,8 @@
 
 namespace dpr {
 
-Profile::Profile(const Device& device) : device_(device), replaced_(device.impl().queue) {
-  Device::Impl& impl = device_.impl();
+Profile::Profile(const Device& device) : device_(device), replaced_(impl_of(device).queue) {
+  Device::Impl& impl = impl_of(device_);
   int error = CL_SUCCESS;
   const cl::CommandQueue queue(impl.context, impl.device,
                                cl_command_queue_properties{CL_QUEUE_PROFILING_ENABLE}, &error);
@@ -14,7 +14,7 @@ Profile::Profile(const Device& device) : device_(device), replaced_(device.impl(
 }
 
 Profile::~Profile() {
-  Device::Impl& impl = device_.impl();
+  Device::Impl& impl = impl_of(device_);
   impl.queue.finish();
   impl.profile = nullptr;
   impl.queue = replaced_;
@@ -25,7 +25,7 @@ void Profile::record(const std::string& file, const std::string& kernel, const c
 }
 
 std::vector<Profile::Launch> Profile::take() {
-  check_cl(device_.impl().queue.finish(), "clFinish");
+  check_cl(impl_of(device_).queue.finish(), "clFinish");
   constexpr double k_milliseconds = 1e-6;  // events count nanoseconds
   std::vector<Launch> launches;
   for (const Pending& launch : pending_) {

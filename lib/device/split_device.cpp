@@ -15,7 +15,7 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units) {
   }
   const std::array<cl_device_partition_property, 3> properties{
       CL_DEVICE_PARTITION_EQUALLY, static_cast<cl_device_partition_property>(compute_units), 0};
-  cl::Device whole = device.impl().device;
+  cl::Device whole = impl_of(device).device;
   std::vector<cl::Device> parts;
   check_cl(whole.createSubDevices(properties.data(), &parts), "clCreateSubDevices of " + info.name);
 
@@ -27,10 +27,10 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units) {
     const cl::CommandQueue queue(context, part, cl_command_queue_properties{0}, &error);
     check_cl(error, "clCreateCommandQueue");
     devices.push_back(make_device(part, context, queue));
-    Device::Impl& impl = devices.back().impl();
+    Device::Impl& impl = impl_of(devices.back());
     impl.info.index = info.index;
     impl.info.lanes = info.lanes;  // where the driver fails with more
-    impl.group_size = device.impl().group_size;
+    impl.group_size = impl_of(device).group_size;
   }
   return devices;
 }

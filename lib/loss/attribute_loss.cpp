@@ -45,36 +45,36 @@ void check_attribute_target(const AttributeTarget& target, std::span<const Image
 AttributeLoss::AttributeLoss(const Device& device, const AttributeTarget& target, unsigned levels)
     : images_(device, target.attribute),
       loss_(loss_of_differences(device, target, levels)),
-      launch_(device.impl()) {
+      launch_(impl_of(device)) {
   std::vector<cl_float4> pixels;
   for (const Image& image : target.targets) {
     for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, 0}});
   }
-  target_.upload(device.impl(), pixels);
-  residual_.resize(device.impl(), pixels.size());
-  grad_images_.resize(device.impl(), pixels.size());
+  target_.upload(impl_of(device), pixels);
+  residual_.resize(impl_of(device), pixels.size());
+  grad_images_.resize(impl_of(device), pixels.size());
 }
 
 std::span<const double> AttributeLoss::evaluate(const Renderer& renderer) {
   images_.forward(renderer);
   const std::size_t pixels = target_.size();
   launch_(pixels, kernel::attribute_residual_forward{.pixels = static_cast<cl_uint>(pixels),
-                                                     .images = images_.impl().images(),
+                                                     .images = impl_of(images_).images(),
                                                      .target = target_,
                                                      .residual = residual_});
-  loss_.impl().evaluate(residual_);
+  impl_of(loss_).evaluate(residual_);
   return loss_.per_view();
 }
 
-void AttributeLoss::set_views_of_mean(std::size_t count) { loss_.impl().set_views_of_mean(count); }
+void AttributeLoss::set_views_of_mean(std::size_t count) { impl_of(loss_).set_views_of_mean(count); }
 
 SceneGradient AttributeLoss::backward() {
   const std::size_t pixels = target_.size();
   launch_(pixels, kernel::attribute_residual_backward{.pixels = static_cast<cl_uint>(pixels),
                                                       .target = target_,
-                                                      .grad_residual = loss_.impl().grad_image(),
+                                                      .grad_residual = impl_of(loss_).grad_image(),
                                                       .grad_images = grad_images_});
-  return images_.impl().backward(grad_images_);
+  return impl_of(images_).backward(grad_images_);
 }
 
 }  // namespace dpr

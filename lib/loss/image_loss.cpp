@@ -174,8 +174,8 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
       views_of_mean(targets.size()),
       per_view(targets.size()),
       inverse_scale_squared(1 / (options.weights.robust_scale * options.weights.robust_scale)),
-      launch(device.impl()),
-      reduce(device.impl()) {
+      launch(impl_of(device)),
+      reduce(impl_of(device)) {
   for (std::size_t view = 0; view < views; ++view) {
     const bool shows_alpha = options.has_alpha.empty() || options.has_alpha[view] != 0;
     for (const ImageLossRow& loss : k_losses)
@@ -183,9 +183,9 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
     for (std::size_t loss = 0; loss < k_losses.size(); ++loss)
       used |= weight(view, loss) != 0 ? 1U << loss : 0U;
   }
-  device_weights.upload(device.impl(), view_weights);
+  device_weights.upload(impl_of(device), view_weights);
   if (options.weights.ssim > 0) {
-    ssim.emplace(device.impl());
+    ssim.emplace(impl_of(device));
     ssim_weight = options.weights.ssim / static_cast<float>(options.levels);
     set_views_of_mean(views);
   }
@@ -195,7 +195,7 @@ ImageLoss::Impl::Impl(const Device& device_, const LossOptions& options, std::sp
     smaller = dpr::shrink(l == 1 ? targets : smaller);
     masks = dpr::shrink(l == 1 ? options.masks : masks);
     levels.push_back(make_level(smaller, masks));
-    levels[l].image.resize(device.impl(), levels[l].pixels_per_view() * views);
+    levels[l].image.resize(impl_of(device), levels[l].pixels_per_view() * views);
   }
   for (const AttributeTarget& target : options.attributes)
     attributes.emplace_back(device, target, options.levels);
@@ -211,7 +211,7 @@ void ImageLoss::Impl::set_views_of_mean(std::size_t count) {
   views_of_mean = count;
   for (AttributeLoss& attribute : attributes) attribute.set_views_of_mean(count);
   if (ssim)
-    ssim_weights.upload(device.impl(), std::vector(views, ssim_weight / static_cast<float>(views_of_mean)));
+    ssim_weights.upload(impl_of(device), std::vector(views, ssim_weight / static_cast<float>(views_of_mean)));
 }
 
 ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> targets,
@@ -221,7 +221,7 @@ ImageLoss::Impl::Level ImageLoss::Impl::make_level(std::span<const Image> target
   level.width = targets[0].width;
   level.height = targets[0].height;
   const std::size_t size = level.pixels_per_view(), pixels = views * size;
-  Device::Impl& d = device.impl();
+  Device::Impl& d = impl_of(device);
   level.target.upload(d, rgba_of(targets, pixels));
   const std::vector<float> weights = weights_of(masks, pixels);
   level.mask.upload(d, weights);
@@ -274,8 +274,8 @@ double ImageLoss::evaluate(const SceneBatch& batch) {
     throw InvalidArgument("attributes (ImageLoss::evaluate)", std::to_string(m.attributes.size()),
                           "none for a SceneBatch: they need a Renderer");
   }
-  batch.impl().require_forward("ImageLoss::evaluate");
-  const FrameImages images = batch.impl().images();
+  impl_of(batch).require_forward("ImageLoss::evaluate");
+  const FrameImages images = impl_of(batch).images();
   m.evaluate(images);
   return m.finish(images.number);
 }
@@ -321,7 +321,7 @@ void ImageLoss::Impl::evaluate(const Buffer<cl_float4>& full) {
       continue;
     }
     const Buffer<cl_float4>& image = l == 0 ? full : level.image;
-    const std::size_t run = pixel_run(device.impl()), runs = (pixels + run - 1) / run;
+    const std::size_t run = pixel_run(impl_of(device)), runs = (pixels + run - 1) / run;
     launch(runs, kernel::image_loss_forward{.pixels = static_cast<cl_uint>(pixels),
                                             .used = used,
                                             .inverse_scale_squared = inverse_scale_squared,

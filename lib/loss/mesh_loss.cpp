@@ -29,7 +29,7 @@ void check_mesh_loss(const MeshLossWeights& weights, const Mesh& mesh) {
 }
 
 MeshLoss::Impl::Impl(const Device& device_, const MeshLossWeights& weights_, const Mesh& mesh)
-    : device(device_), weights(weights_), launch(device.impl()), reduce(device.impl()) {
+    : device(device_), weights(weights_), launch(impl_of(device)), reduce(impl_of(device)) {
   const Adjacency adjacency = make_adjacency(mesh);
   const std::size_t vertices = mesh.positions.size(), hinge_count = adjacency.hinges.size();
   edges = adjacency.edges();
@@ -52,7 +52,7 @@ MeshLoss::Impl::Impl(const Device& device_, const MeshLossWeights& weights_, con
   for (std::size_t place = 0; place < places.size(); ++place)
     places[next[corners[place / 4].s[place % 4]]++] = static_cast<cl_uint>(place);
 
-  Device::Impl& d = device.impl();
+  Device::Impl& d = impl_of(device);
   ring_starts.upload(d, adjacency.ring_starts);
   ring.resize(d, 1);  // soup may have no edge; a kernel's argument must be some buffer
   ring.upload(d, adjacency.ring);

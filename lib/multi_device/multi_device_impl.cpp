@@ -66,7 +66,7 @@ ImageLoss OwnLoss::make(const Device& device, const Chunk& chunk) const {
 /// last chunk, need not suit a smoothing and lights that came with other views.
 void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> its_views,
                                          std::size_t first_view) {
-  Renderer::Impl& renderer = worker.renderer.impl();
+  Renderer::Impl& renderer = impl_of(worker.renderer);
   if (worker.has.scene != now.scene) {
     Versions all = now;
     renderer.set_scene(scene);
@@ -187,7 +187,7 @@ ImageLoss& MultiDeviceRenderer::Impl::loss_of(Worker& worker, const Batch& of, s
     });
     known = worker.losses.emplace(key, loss.make(worker.renderer.device(), part)).first;
   }
-  known->second.impl().set_views_of_mean(of.chunks.back().last);
+  impl_of(known->second).set_views_of_mean(of.chunks.back().last);
   return known->second;
 }
 

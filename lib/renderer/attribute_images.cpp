@@ -92,9 +92,9 @@ AttributeImages::Impl::Impl(const Device& device, std::optional<Attribute> attri
     : attribute(attribute_),
       channels(channels_),
       renderer(device),
-      rows_(device.impl()),
-      launch_(device.impl()) {
-  if (!has_rows()) renderer.impl().geometry_colors.emplace(device.impl(), *attribute);
+      rows_(impl_of(device)),
+      launch_(impl_of(device)) {
+  if (!has_rows()) impl_of(renderer).geometry_colors.emplace(impl_of(device), *attribute);
 }
 
 AttributeDomain AttributeImages::Impl::domain() const {
@@ -135,11 +135,11 @@ bool AttributeImages::Impl::shows_faces_of(const Scene& scene) const {
 void AttributeImages::Impl::show_faces_of(const Renderer::Impl& source) {
   const Scene& scene = source.scene;
   const Geometry& geometry = *source.geometry;
-  Device::Impl& device = renderer.device().impl();
+  Device::Impl& device = impl_of(renderer.device());
   meshes_.clear();
   fold_.reset();
   renderer.set_scene(shown_scene(scene, domain()));
-  if (room) renderer.impl().reserve(*room);
+  if (room) impl_of(renderer).reserve(*room);
   positions_ = RowMap(device, vertices_shown(scene, domain(), geometry, &MeshRange::first_position),
                       geometry.position_count);
   vertices_ =
@@ -164,7 +164,7 @@ void AttributeImages::Impl::follow(Renderer::Impl& source) {
 }
 
 void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   const Smoothing& smoothing = source.scene.smoothing;
   std::vector<View> of_passes;
   for (std::size_t pass = 0; pass < passes(smoothing); ++pass)
@@ -188,7 +188,7 @@ void AttributeImages::Impl::follow_views(const Renderer::Impl& source) {
 }
 
 void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   r.has_moved = r.has_moved || r.frame.position_stride != 0;
   r.frame.position_stride = 0;
   r.near_plane.set_boxes_of_views({});
@@ -211,7 +211,7 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
 }
 
 void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   rows_.move(positions_, source.views.size(), source.geometry->view_positions, r.views.size(),
              r.geometry->view_positions);
   r.frame.position_stride = r.frame.vertices;
@@ -228,7 +228,7 @@ void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
   views = 0;  // until everything is there
   if (attribute == Attribute::texcoords) texcoords_ = source.corner_texcoords;
   follow(source);
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   r.frame.color_stride = to_uint(r.geometry->colors);
   if (has_rows()) {
     rows_.forward(row_map(), channels, row_values(), passes(), source.views.size(), r.geometry->view_colors);
@@ -239,7 +239,7 @@ void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
   if (sizes == FrameSizes::read) r.require_forward("AttributeImages::forward");
   if (shows_weights()) {
     const std::size_t pixels = r.image().size() / passes(), count = groups() * pixels;
-    weighed_.resize(r.device.impl(), count);
+    weighed_.resize(impl_of(r.device), count);
     launch_(count, kernel::attribute_weigh_forward{.groups = to_uint(groups()),
                                                    .pixels = to_uint(pixels),
                                                    .rendered = r.image(),
@@ -250,9 +250,9 @@ void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
 
 BufferRef<cl_float4> AttributeImages::Impl::grad_of_rendered(const BufferRef<cl_float4>& grad_images) {
   if (!shows_weights()) return grad_images;
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   const std::size_t pixels = r.image().size() / passes();
-  grad_rendered_.resize(r.device.impl(), r.image().size());
+  grad_rendered_.resize(impl_of(r.device), r.image().size());
   launch_(pixels, kernel::attribute_weigh_backward{.groups = to_uint(groups()),
                                                    .pixels = to_uint(pixels),
                                                    .grad_images = grad_images,
@@ -262,7 +262,7 @@ BufferRef<cl_float4> AttributeImages::Impl::grad_of_rendered(const BufferRef<cl_
 
 /// From what the renderer's backward pass left of positions and colours to those of the source's.
 void AttributeImages::Impl::gather() {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   if (wanted_.positions) {
     const std::size_t sources = has_own_shapes_ ? views : 1, copies = has_own_shapes_ ? r.views.size() : 1;
     rows_.move_backward(positions_, sources, r.transform.grad_positions, copies, grad_positions_);
@@ -272,18 +272,18 @@ void AttributeImages::Impl::gather() {
 }
 
 SceneGradient AttributeImages::Impl::backward(const BufferRef<cl_float4>& grad_images) {
-  SceneGradient of_passes = renderer.impl().backward(grad_of_rendered(grad_images));
+  SceneGradient of_passes = impl_of(renderer).backward(grad_of_rendered(grad_images));
   gather();
   return folded(std::move(of_passes));
 }
 
 void AttributeImages::Impl::backward_on_device(const BufferRef<cl_float4>& grad_images) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   r.backward_on_device(grad_of_rendered(grad_images));
   gather();
   if (!fold_) {
     SceneGradient of_passes = r.empty_gradient(), of_views = empty_gradient();
-    fold_ = make_fold(r.device.impl(), of_passes, of_views);
+    fold_ = make_fold(impl_of(r.device), of_passes, of_views);
   }
   r.made_exchange().map(*fold_, r.grad_numbers, grad_numbers_);
 }
@@ -344,18 +344,18 @@ void AttributeImages::Impl::require_own_values() const {
 }
 
 void AttributeImages::Impl::set_values(std::span<const float> values) {
-  values_.upload(renderer.device().impl(), values);
+  values_.upload(impl_of(renderer.device()), values);
   value_count_ = values.size();
 }
 
 void AttributeImages::Impl::take_values(const FloatVectors& from, std::size_t count) {
-  values_.resize(renderer.device().impl(), count * channels);
-  renderer.impl().made_exchange().take(from, count, values_, channels);
+  values_.resize(impl_of(renderer.device()), count * channels);
+  impl_of(renderer).made_exchange().take(from, count, values_, channels);
   value_count_ = count * channels;
 }
 
 BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   if (r.device_gradient_frame != r.frame_number)
     throw InvalidArgument("gradient_view", "no gradient of the last images", "backward_on_device() first");
   const auto rows = [&](std::size_t first, std::size_t count) {

@@ -53,8 +53,8 @@ void AttributeImages::set_values(std::span<const float> values) {
 
 void AttributeImages::forward(const Renderer& of) {
   require_same_device(impl_->renderer.device(), of.device(), "AttributeImages::forward");
-  of.impl().require_forward("AttributeImages::forward");
-  impl_->forward(of.impl(), FrameSizes::read);
+  impl_of(of).require_forward("AttributeImages::forward");
+  impl_->forward(impl_of(of), FrameSizes::read);
 }
 
 std::size_t AttributeImages::channels() const { return impl_->channels; }
@@ -83,7 +83,7 @@ SceneGradient AttributeImages::backward(std::span<const Image> grad_images) {
                           std::to_string(m.groups() * m.views) + ", groups x views");
   }
   const std::vector<cl_float4> pixels = checked_pixels(grad_images, scene.width, scene.height);
-  m.host_grad_images.upload(m.renderer.device().impl(), pixels);
+  m.host_grad_images.upload(impl_of(m.renderer.device()), pixels);
   return m.backward(m.host_grad_images);
 }
 

@@ -36,7 +36,7 @@ struct AttributeImages::Impl {
   /// Enqueues the images, and reads of the frame what Renderer::Impl::forward() does.
   void forward(Renderer::Impl& source, FrameSizes sizes);
   /// [group][view][height][width] RGBA
-  const Buffer<cl_float4>& images() const { return shows_weights() ? weighed_ : renderer.impl().image(); }
+  const Buffer<cl_float4>& images() const { return shows_weights() ? weighed_ : impl_of(renderer).image(); }
   SceneGradient backward(const BufferRef<cl_float4>& grad_images);
   /// Leaves the gradients on the device: `grad_positions`, `grad_rows` and `numbers`.
   void backward_on_device(const BufferRef<cl_float4>& grad_images);

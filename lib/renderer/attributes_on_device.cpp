@@ -10,13 +10,13 @@ namespace {
 
 constexpr std::size_t k_rgba = 4;  // floats
 
-Device::Impl& device_of(const AttributeImages& images) { return images.impl().renderer.device().impl(); }
+Device::Impl& device_of(const AttributeImages& images) { return impl_of(impl_of(images).renderer.device()); }
 
 }  // namespace
 
 void set_values(AttributeImages& images, const BufferSpan& values, std::size_t vertices,
                 const Events& events) {
-  AttributeImages::Impl& m = images.impl();
+  AttributeImages::Impl& m = impl_of(images);
   m.require_own_values();
   const FloatVectors from =
       require_vectors(device_of(images), values, {vertices, m.channels}, Access::read, "values");
@@ -24,52 +24,52 @@ void set_values(AttributeImages& images, const BufferSpan& values, std::size_t v
 }
 
 void reserve(AttributeImages& images, const FrameRoom& room) {
-  AttributeImages::Impl& m = images.impl();
+  AttributeImages::Impl& m = impl_of(images);
   m.room = counts_of(room);
-  if (m.renderer.impl().geometry) m.renderer.impl().reserve(*m.room);
+  if (impl_of(m.renderer).geometry) impl_of(m.renderer).reserve(*m.room);
 }
 
 std::size_t forward_on_device(AttributeImages& images, const Renderer& renderer, const Events& events) {
-  AttributeImages::Impl& m = images.impl();
+  AttributeImages::Impl& m = impl_of(images);
   require_same_device(m.renderer.device(), renderer.device(), "forward_on_device");
-  renderer.impl().require_rendered("forward_on_device");
-  enqueue(device_of(images), events, [&] { m.forward(renderer.impl(), FrameSizes::kept); });
-  return m.renderer.impl().take_emptied();
+  impl_of(renderer).require_rendered("forward_on_device");
+  enqueue(device_of(images), events, [&] { m.forward(impl_of(renderer), FrameSizes::kept); });
+  return impl_of(m.renderer).take_emptied();
 }
 
 FrameHistory frame_history(AttributeImages& images) {
-  images.impl().require_forward("frame_history");
-  return history_of(images.impl().renderer.impl());
+  impl_of(images).require_forward("frame_history");
+  return history_of(impl_of(impl_of(images).renderer));
 }
 
 void backward_on_device(AttributeImages& images, const BufferSpan& grad_images, const Events& events) {
-  AttributeImages::Impl& m = images.impl();
+  AttributeImages::Impl& m = impl_of(images);
   m.require_forward("backward_on_device");
   const std::size_t count = m.images().size();
   const FloatVectors from =
       require_vectors(device_of(images), grad_images, {count, k_rgba}, Access::read, "grad_images");
   enqueue(device_of(images), events,
-          [&] { m.backward_on_device(gradient_of_images(m.renderer.impl(), from, count)); });
+          [&] { m.backward_on_device(gradient_of_images(impl_of(m.renderer), from, count)); });
 }
 
 BufferView image_view(const AttributeImages& images) {
-  const AttributeImages::Impl& m = images.impl();
+  const AttributeImages::Impl& m = impl_of(images);
   m.require_forward("image_view");
   return {m.images().cl_buffer()(), 0, sizeof(cl_float4), m.images().size(), k_rgba};
 }
 
 void copy_images(AttributeImages& images, const BufferSpan& to, const Events& events) {
-  copy_view(images.impl().renderer.impl(), image_view(images), to, events, "images");
+  copy_view(impl_of(impl_of(images).renderer), image_view(images), to, events, "images");
 }
 
 BufferView gradient_view(AttributeImages& images, const std::string& name) {
-  images.impl().require_forward("gradient_view");
-  return images.impl().gradient_view(name);
+  impl_of(images).require_forward("gradient_view");
+  return impl_of(images).gradient_view(name);
 }
 
 void copy_gradient(AttributeImages& images, const std::string& name, const BufferSpan& gradient,
                    const Events& events) {
-  copy_view(images.impl().renderer.impl(), gradient_view(images, name), gradient, events, "gradient");
+  copy_view(impl_of(impl_of(images).renderer), gradient_view(images, name), gradient, events, "gradient");
 }
 
 }  // namespace dpr

@@ -40,19 +40,19 @@ Aov parse_aov(std::string_view word, std::string_view where) {
 }
 
 std::shared_ptr<CornerTexcoords> Renderer::Impl::corner_texcoords_in_force() {
-  if (!corner_texcoords) corner_texcoords = std::make_shared<CornerTexcoords>(device.impl(), scene);
+  if (!corner_texcoords) corner_texcoords = std::make_shared<CornerTexcoords>(impl_of(device), scene);
   corner_texcoords->update(*geometry, made_exchange());
   return corner_texcoords;
 }
 
 void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
-  if (!aov) aov.emplace(device.impl());
+  if (!aov) aov.emplace(impl_of(device));
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);
   }
-  aov_surface.resize(device.impl(), 0);
+  aov_surface.resize(impl_of(device), 0);
   if (pixel_noise) {
     aov->weigh(frame, aggregate);
     pixel_noise->smooth(contour_inputs(), aov->surface, image_size(), aov_surface);
@@ -66,7 +66,7 @@ void Renderer::Impl::render_aov() {
 }
 
 AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_forward("auxiliary_outputs");
   if (view >= m.views.size()) {
     throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views.size()));
@@ -97,10 +97,10 @@ AuxiliaryOutputs auxiliary_outputs(Renderer& renderer, std::size_t view) {
 }
 
 BufferView aov_view(Renderer& renderer, Aov aov, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_rendered("aov_view");
   require_shown(m.scene, aov);
-  enqueue(m.device.impl(), events, [&] { m.render_aov(); });
+  enqueue(impl_of(m.device), events, [&] { m.render_aov(); });
   const std::size_t count = m.image().size();
   const auto part = [&](const auto& buffer, std::size_t first, std::size_t components) {
     using Element = typename std::decay_t<decltype(buffer)>::Element;
@@ -124,7 +124,7 @@ BufferView aov_view(Renderer& renderer, Aov aov, const Events& events) {
 }
 
 void copy_aov(Renderer& renderer, Aov aov, const BufferSpan& outputs, const Events& events) {
-  copy_view(renderer.impl(), aov_view(renderer, aov, {.wait = events.wait}), outputs, {.done = events.done},
+  copy_view(impl_of(renderer), aov_view(renderer, aov, {.wait = events.wait}), outputs, {.done = events.done},
             "outputs");
 }
 

@@ -5,7 +5,7 @@
 namespace dpr {
 
 Frame last_frame(const Renderer& renderer, const char* caller) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   r.require_forward(caller);
   return {{r.frame_number, r.views.size(), r.scene.width, r.scene.height, r.image()},
           r.geometry->positions,
@@ -14,7 +14,7 @@ Frame last_frame(const Renderer& renderer, const char* caller) {
 }
 
 FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
-  Renderer::Impl& r = renderer.impl();
+  Renderer::Impl& r = impl_of(renderer);
   r.require_forward(caller);
   if (r.bands.size() > 1) {
     throw InvalidArgument(std::string("bands (") + caller + ")", std::to_string(r.bands.size()),
@@ -25,7 +25,7 @@ FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
 }
 
 void require_same_device(const Device& device, const Device& other, const char* what) {
-  const Device::Impl &mine = device.impl(), &its = other.impl();
+  const Device::Impl &mine = impl_of(device), &its = impl_of(other);
   if (mine.context() == its.context() && mine.queue() == its.queue()) return;
   throw InvalidArgument(std::string("device (") + what + ")",
                         mine.info.name + (mine.device() == its.device() ? ", opened a second time" : ""),

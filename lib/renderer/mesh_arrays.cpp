@@ -203,20 +203,20 @@ void check_values(const char* name, const ArrayValues& values, std::size_t expec
 }
 
 void set_array(Renderer& renderer, const ArrayRef& at, const ArrayValues& values) {
-  Impl& m = renderer.impl();
+  Impl& m = impl_of(renderer);
   m.require_scene(("Renderer::" + setter_of(at)).c_str());
   check_values(row_of(at.id).name, values, count_of(require_array(m.scene, at)));
   m.set(at, values);
 }
 
 void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events) {
-  Impl& m = renderer.impl();
+  Impl& m = impl_of(renderer);
   m.require_scene(setter_of(at).c_str());
   const MeshArray& row = row_of(at.id);
   const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
   if (shape.count == 0) refuse_mesh(at);
-  const FloatVectors from = require_vectors(m.device.impl(), values, shape, Access::read, row.name);
-  enqueue(m.device.impl(), events, [&] { m.take(at, shape.count, from); });
+  const FloatVectors from = require_vectors(impl_of(m.device), values, shape, Access::read, row.name);
+  enqueue(impl_of(m.device), events, [&] { m.take(at, shape.count, from); });
 }
 
 }  // namespace dpr

@@ -13,7 +13,7 @@ constexpr std::size_t k_rows = 3, k_columns = 4;              // of an affine ma
 
 FloatVectors source(const Renderer::Impl& m, const BufferSpan& span, const VectorShape& shape,
                     const char* name) {
-  return require_vectors(m.device.impl(), span, shape, Access::read, name);
+  return require_vectors(impl_of(m.device), span, shape, Access::read, name);
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& mater
 
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
                 const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_scene("set_shapes");
   const auto optional_source = [&](const BufferSpan& span, std::size_t of_view, const char* name) {
     std::optional<FloatVectors> from;
@@ -54,22 +54,22 @@ void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpa
   };
   const auto from_positions = optional_source(positions, m.geometry->position_count, "positions");
   const auto from_colors = optional_source(colors, m.geometry->colors, "colors");
-  enqueue(m.device.impl(), events, [&] { m.take_shapes(from_positions, from_colors); });
+  enqueue(impl_of(m.device), events, [&] { m.take_shapes(from_positions, from_colors); });
 }
 
 void set_transforms(Renderer& renderer, const BufferSpan& transforms, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_scene("set_transforms");
   const VectorShape shape{m.views.size() * m.scene.meshes.size(), k_columns, k_rows};
   const FloatVectors from = source(m, transforms, shape, "transforms");
-  enqueue(m.device.impl(), events, [&] { m.take_transforms(from); });
+  enqueue(impl_of(m.device), events, [&] { m.take_transforms(from); });
 }
 
 void set_view_matrices(Renderer& renderer, const BufferSpan& matrices, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_scene("set_view_matrices");
   const FloatVectors from = source(m, matrices, {m.views.size(), k_columns, k_rows}, "matrices");
-  enqueue(m.device.impl(), events, [&] { m.take_view_matrices(from); });
+  enqueue(impl_of(m.device), events, [&] { m.take_view_matrices(from); });
 }
 
 namespace {
@@ -93,14 +93,14 @@ FrameCounts counts_of(const FrameRoom& room) {
 }
 
 void reserve(Renderer& renderer, const FrameRoom& room) {
-  renderer.impl().require_scene("reserve");
-  renderer.impl().reserve(counts_of(room));
+  impl_of(renderer).require_scene("reserve");
+  impl_of(renderer).reserve(counts_of(room));
 }
 
 std::size_t forward_on_device(Renderer& renderer, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_scene("forward_on_device");
-  enqueue(m.device.impl(), events, [&] { m.forward(FrameSizes::kept); });
+  enqueue(impl_of(m.device), events, [&] { m.forward(FrameSizes::kept); });
   return m.take_emptied();
 }
 
@@ -114,33 +114,33 @@ FrameHistory history_of(Renderer::Impl& m) {
 }
 
 FrameHistory frame_history(Renderer& renderer) {
-  renderer.impl().require_scene("frame_history");
-  return history_of(renderer.impl());
+  impl_of(renderer).require_scene("frame_history");
+  return history_of(impl_of(renderer));
 }
 
 BufferView frame_history_view(Renderer& renderer) {
-  return {renderer.impl().rasterize.history().cl_buffer()(), 0, sizeof(cl_uint4), 1, 4};
+  return {impl_of(renderer).rasterize.history().cl_buffer()(), 0, sizeof(cl_uint4), 1, 4};
 }
 
 BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& from, std::size_t count) {
   const bool is_packed = from.first == 0 && from.stride == k_pixel;
   if (is_packed && !(m.pixel_noise && m.pixel_noise->blur.loads_behind_images()))
     return BufferRef<cl_float4>(from.buffer);
-  m.host_grad_images.resize(m.device.impl(), count);
+  m.host_grad_images.resize(impl_of(m.device), count);
   m.made_exchange().give(from, count, vectors_of(m.host_grad_images, 0, k_pixel));
   return m.host_grad_images;
 }
 
 void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_rendered("backward_on_device");
   const std::size_t count = m.image().size();
   const FloatVectors from = source(m, grad_images, {count, k_pixel}, "grad_images");
-  enqueue(m.device.impl(), events, [&] { m.backward_on_device(gradient_of_images(m, from, count)); });
+  enqueue(impl_of(m.device), events, [&] { m.backward_on_device(gradient_of_images(m, from, count)); });
 }
 
 BufferView image_view(Renderer& renderer) {
-  const Renderer::Impl& m = renderer.impl();
+  const Renderer::Impl& m = impl_of(renderer);
   m.require_rendered("image_view");
   return {m.image().cl_buffer()(), 0, sizeof(cl_float4), m.image().size(), k_pixel};
 }
@@ -148,10 +148,10 @@ BufferView image_view(Renderer& renderer) {
 void copy_view(Renderer::Impl& m, const BufferView& view, const BufferSpan& span, const Events& events,
                const char* name) {
   const FloatVectors to =
-      require_vectors(m.device.impl(), span, {view.count, view.components}, Access::write, name);
+      require_vectors(impl_of(m.device), span, {view.count, view.components}, Access::write, name);
   const FloatVectors from{view.buffer, view.offset / sizeof(float), view.stride / sizeof(float),
                           view.components};
-  enqueue(m.device.impl(), events, [&] { m.made_exchange().give(from, view.count, to); });
+  enqueue(impl_of(m.device), events, [&] { m.made_exchange().give(from, view.count, to); });
 }
 
 namespace {
@@ -195,11 +195,11 @@ std::optional<BufferView> summed_view(SceneGradient& arrays, const Renderer::Imp
 }
 
 void copy_images(Renderer& renderer, const BufferSpan& images, const Events& events) {
-  copy_view(renderer.impl(), image_view(renderer), images, events, "images");
+  copy_view(impl_of(renderer), image_view(renderer), images, events, "images");
 }
 
 BufferView gradient_view(Renderer& renderer, const std::string& name) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_rendered("gradient_view");
   if (m.device_gradient_frame != m.frame_number)
     throw InvalidArgument("gradient_view", "no gradient of the last frame", "backward_on_device() first");
@@ -222,16 +222,16 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
 
 void copy_gradient(Renderer& renderer, const std::string& name, const BufferSpan& gradient,
                    const Events& events) {
-  copy_view(renderer.impl(), gradient_view(renderer, name), gradient, events, "gradient");
+  copy_view(impl_of(renderer), gradient_view(renderer, name), gradient, events, "gradient");
 }
 
 cl_mem image_handle(const Renderer& renderer) {
-  renderer.impl().require_forward("image_handle");
-  return renderer.impl().image().cl_buffer()();
+  impl_of(renderer).require_forward("image_handle");
+  return impl_of(renderer).image().cl_buffer()();
 }
 
 SceneGradient backward(Renderer& renderer, cl_mem grad_images) {
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.require_forward("backward");
   const std::size_t count = m.image().size();
   const FloatVectors from = source(m, {grad_images}, {count, k_pixel}, "grad_images");

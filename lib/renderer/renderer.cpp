@@ -33,16 +33,16 @@ std::uint64_t next_frame_number() {
 
 Renderer::Impl::Impl(Device device_)
     : OnDevice{std::move(device_)},
-      transform(device.impl()),
-      setup(device.impl()),
-      clip(device.impl()),
-      bin(device.impl()),
-      rasterize(device.impl()),
-      shade(device.impl()),
-      occupancy(device.impl()),
-      aggregate(device.impl()),
-      gather(device.impl()),
-      reduce(device.impl()) {}
+      transform(impl_of(device)),
+      setup(impl_of(device)),
+      clip(impl_of(device)),
+      bin(impl_of(device)),
+      rasterize(impl_of(device)),
+      shade(impl_of(device)),
+      occupancy(impl_of(device)),
+      aggregate(impl_of(device)),
+      gather(impl_of(device)),
+      reduce(impl_of(device)) {}
 
 void Renderer::Impl::require_scene(const char* caller) const {
   if (!geometry) throw InvalidArgument(std::string(caller), "no scene", "set_scene() first");
@@ -90,7 +90,7 @@ void Renderer::Impl::build_pyramids() {
 void Renderer::Impl::find_edges() {
   if (!pixel_noise) return;
   if (!pixel_noise->edges) {
-    pixel_noise->edges.emplace(device.impl(), scene);
+    pixel_noise->edges.emplace(impl_of(device), scene);
     pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
     for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
       if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
@@ -113,7 +113,7 @@ void Renderer::Impl::hide_back_faces() {
   if (may_hide) hidden = pixel_noise->back_faces.hidden(scene, views, depth_reach(scene.smoothing));
   if (hidden == uploaded_hidden_) return;
   uploaded_hidden_.clear();
-  hidden_.upload(device.impl(), hidden);
+  hidden_.upload(impl_of(device), hidden);
   uploaded_hidden_ = std::move(hidden);
 }
 

@@ -104,7 +104,7 @@ namespace {
 /// The pixels of a frame from `first` on. Blocks.
 void read_image(const Renderer::Impl& m, std::size_t first, std::span<glm::vec4> pixels) {
   static_assert(sizeof(glm::vec4) == sizeof(cl_float4));
-  m.device.impl().read(m.image().cl_buffer(), first * sizeof(cl_float4), std::as_writable_bytes(pixels));
+  impl_of(m.device).read(m.image().cl_buffer(), first * sizeof(cl_float4), std::as_writable_bytes(pixels));
 }
 
 }  // namespace
@@ -132,8 +132,8 @@ SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) 
   m.require_forward("Renderer::backward_pixels");
   require_pixel_count(grad_pixels.size(), m.image().size());
   checks::require_finite(grad_pixels, "grad_pixels");
-  m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
-  m.device.impl().write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
+  m.host_grad_images.resize(impl_of(m.device), grad_pixels.size());
+  impl_of(m.device).write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
   return m.backward(m.host_grad_images);
 }
 
@@ -144,7 +144,7 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
-  m.host_grad_images.upload(m.device.impl(), checked_pixels(grad_images, m.scene.width, m.scene.height));
+  m.host_grad_images.upload(impl_of(m.device), checked_pixels(grad_images, m.scene.width, m.scene.height));
   return m.backward(m.host_grad_images);
 }
 

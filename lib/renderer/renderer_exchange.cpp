@@ -7,7 +7,7 @@
 namespace dpr {
 
 Exchange& Renderer::Impl::made_exchange() {
-  if (!exchange) exchange.emplace(device.impl());
+  if (!exchange) exchange.emplace(impl_of(device));
   return *exchange;
 }
 
@@ -29,7 +29,7 @@ void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
   const auto take = [&](const std::optional<FloatVectors>& from, std::size_t of_view,
                         Buffer<cl_float4>& values) {
     const std::size_t count = from ? views.size() * of_view : 0;
-    values.resize(device.impl(), count);
+    values.resize(impl_of(device), count);
     if (from) made_exchange().take(*from, count, values, 0);
     return static_cast<cl_uint>(from ? of_view : 0);
   };

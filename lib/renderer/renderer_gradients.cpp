@@ -79,7 +79,7 @@ SceneGradient Renderer::Impl::read_gradient() {
   std::vector<float> sums(gradient_sums_.size());
   SceneGradient by_mesh;
   by_mesh.meshes.resize(scene.meshes.size());
-  RowReads reads(device.impl());
+  RowReads reads(impl_of(device));
   reads.add(gradient_sums_, sums);
   read_mesh_gradients(by_mesh, reads);
   reads.finish();
@@ -235,7 +235,7 @@ void Renderer::Impl::sum_gradients() {
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
   const bool scale = wanted.smoothing && pixel_noise != nullptr;
   const std::size_t sigmas = channels(wanted.smoothing && !scale, 1);
-  const Buffer<cl_uint>& all_pixels = all_pixels_.of(device.impl(), pixels);
+  const Buffer<cl_uint>& all_pixels = all_pixels_.of(impl_of(device), pixels);
   const Summation sigma =
       aggregate.perturbs_distances()
           ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
@@ -263,10 +263,10 @@ void Renderer::Impl::sum_gradients() {
   if (scale)
     all.push_back(
         {SumOf::scale,
-         {views.size(), 1, 1, 1, all_views_.of(device.impl(), views.size()), pixel_noise->grad_scale()}});
+         {views.size(), 1, 1, 1, all_views_.of(impl_of(device), views.size()), pixel_noise->grad_scale()}});
   summed_ = {};
   for (const auto& [of, what] : all) summed_[of] = {summed_.count(), what.channels, what.segments};
-  gradient_sums_.resize(device.impl(), summed_.count());
+  gradient_sums_.resize(impl_of(device), summed_.count());
   for (const auto& [of, what] : all) reduce.add(what, gradient_sums_, summed_[of].first);
 }
 
@@ -300,7 +300,7 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
 
 void Renderer::Impl::join_material_gradients() {
   const std::size_t count = geometry->materials.count;
-  grad_materials.resize(device.impl(), count);
+  grad_materials.resize(impl_of(device), count);
   for (std::size_t k = 0; k < DPR_MATERIAL_CHANNELS; ++k) {
     made_exchange().give(vectors_of(gradient_sums_, summed_[SumOf::materials].first + k * count, 1), count,
                          {grad_materials.cl_buffer()(), k, DPR_MATERIAL_CHANNELS, 1});
@@ -308,7 +308,7 @@ void Renderer::Impl::join_material_gradients() {
 }
 
 GradientMap Renderer::Impl::make_gradient_map() const {
-  return make_map(device.impl(), summed_, scene.meshes.size(),
+  return make_map(impl_of(device), summed_, scene.meshes.size(),
                   [this](std::span<const float> sums) { return finish_summed_gradients(sums); });
 }
 

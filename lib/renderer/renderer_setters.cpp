@@ -149,11 +149,11 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   const View view = own_view(wanted);
   check_frame_size(wanted, 1, 0);
   Scene new_scene = wanted;
-  Geometry new_geometry(device.impl(), wanted);
+  Geometry new_geometry(impl_of(device), wanted);
   NearPlane new_near_plane(wanted.meshes.size());
   if (is_textured(wanted)) {
     shade.make_surface();
-    if (!texels) texels.emplace(device.impl());
+    if (!texels) texels.emplace(impl_of(device));
   }
   Shade::Lighting lighting = shade.prepare(wanted.lights, is_textured(wanted));
   SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1);
@@ -208,10 +208,10 @@ void Renderer::Impl::fill(ViewSet& prepared, const Scene& of, const Geometry& it
   prepared.frame = frame_params(of, its, its_views, first_view, raster);
   prepared.has_device_poses = prepared.has_device_cameras = false;
   prepared.views.assign(its_views.begin(), its_views.end());
-  prepared.device_views.cameras.upload(device.impl(), cameras);
-  prepared.device_views.models.upload(device.impl(), models);
-  prepared.device_views.vertex_starts.upload(device.impl(), starts);
-  prepared.view_normal_starts.upload(device.impl(), normal_starts);
+  prepared.device_views.cameras.upload(impl_of(device), cameras);
+  prepared.device_views.models.upload(impl_of(device), models);
+  prepared.device_views.vertex_starts.upload(impl_of(device), starts);
+  prepared.view_normal_starts.upload(impl_of(device), normal_starts);
 }
 
 void Renderer::Impl::set(ViewSet& prepared) noexcept {
@@ -239,10 +239,10 @@ SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene
   const Raster around{kernel.supersampling, kernel.margin};
   check_raster(of, its_views, around);
   const std::shared_ptr<PixelNoise> stages =
-      pixel_noise ? pixel_noise : std::make_shared<PixelNoise>(device.impl());
+      pixel_noise ? pixel_noise : std::make_shared<PixelNoise>(impl_of(device));
   std::shared_ptr<BlurSampled> sampled;
   if (smoothing.occupancy_estimator == Estimator::monte_carlo) {
-    sampled = std::make_shared<BlurSampled>(device.impl(), smoothing, pixel_shifts(smoothing, of), kernel);
+    sampled = std::make_shared<BlurSampled>(impl_of(device), smoothing, pixel_shifts(smoothing, of), kernel);
   }
   Blur::Setting blur = stages->blur.prepare(std::move(kernel));
   const Smoothing rigid = without_distance_noise(smoothing);
@@ -271,10 +271,10 @@ void Renderer::Impl::set(SmoothingSetting&& prepared) noexcept {
 }
 
 void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
-  spare_view_positions_.resize(device.impl(), positions.size());
-  spare_view_colors_.resize(device.impl(), colors.size());
-  write_range(device.impl(), spare_view_positions_, 0, to_cl(positions));
-  write_range(device.impl(), spare_view_colors_, 0, to_cl(colors));
+  spare_view_positions_.resize(impl_of(device), positions.size());
+  spare_view_colors_.resize(impl_of(device), colors.size());
+  write_range(impl_of(device), spare_view_positions_, 0, to_cl(positions));
+  write_range(impl_of(device), spare_view_colors_, 0, to_cl(colors));
   std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, *geometry);
 
   std::swap(geometry->view_positions, spare_view_positions_);
@@ -314,7 +314,7 @@ void Renderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {
 Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
   Buffer<cl_float4>& spare = buffer.size() == vertices ? grad_vertices : spare_values_;
-  spare.resize(device.impl(), buffer.size());
+  spare.resize(impl_of(device), buffer.size());
   return spare;
 }
 
@@ -334,7 +334,7 @@ void Renderer::Impl::replace(Buffer<cl_float4>& buffer, std::size_t first,
         rows.push_back(to_cl(to_vec3(e)));
       }
     }
-    write_range(device.impl(), spare, first + done, rows);
+    write_range(impl_of(device), spare, first + done, rows);
   }
   std::swap(buffer, spare);
 }

@@ -150,10 +150,10 @@ class Restored {
 SamplingError replicate(Renderer& renderer, unsigned replicates,
                         const std::function<SceneGradient()>& backward) {
   require(replicates >= 2, "replicates (sampling error)", replicates, "at least 2");
-  renderer.impl().require_scene("estimate_sampling_error");
-  const Restored restored(renderer.impl());
+  impl_of(renderer).require_scene("estimate_sampling_error");
+  const Restored restored(impl_of(renderer));
   const Smoothing& own = restored.smoothing();
-  Replicates found(renderer.impl());
+  Replicates found(impl_of(renderer));
   // The renderer's own seed comes last. Exact estimators need no second frame.
   for (unsigned i = is_sampled(own) ? replicates : 1; i-- > 0;) {
     Smoothing seeded = own;

@@ -71,17 +71,17 @@ std::size_t SceneBatch::Impl::pixels_per_view() const {
 void SceneBatch::Impl::require_forward(const char* caller) {
   if (frames.empty()) throw InvalidArgument(caller, "no images of the scenes", "forward() first");
   for (std::size_t i = 0; i < renderers.size(); ++i) {
-    const Renderer::Impl& scene = renderers[i].impl();
+    const Renderer::Impl& scene = impl_of(renderers[i]);
     if (scene.rendered && scene.frame_number == frames[i]) continue;
     throw InvalidArgument(std::string(checks::element("scenes", i)) + " (" + caller + ")",
                           "a scene that was set or rendered since forward()", "forward() again");
   }
   if (is_gathered) return;
-  image.resize(device.impl(), views() * pixels_per_view());
+  image.resize(impl_of(device), views() * pixels_per_view());
   std::size_t first = 0;
   for (Renderer& renderer : renderers) {
-    renderer.impl().require_forward(caller);
-    const Buffer<cl_float4>& own = renderer.impl().image();
+    impl_of(renderer).require_forward(caller);
+    const Buffer<cl_float4>& own = impl_of(renderer).image();
     own.copy_to(image, first);
     first += own.size();
   }
@@ -97,16 +97,16 @@ std::vector<SceneGradient> SceneBatch::Impl::backward(const BufferRef<cl_float4>
                                                       std::span<const AddToGradient> add_to_positions) {
   std::size_t first = 0;
   for (std::size_t i = 0; i < renderers.size(); ++i) {
-    Renderer::Impl& scene = renderers[i].impl();
+    Renderer::Impl& scene = impl_of(renderers[i]);
     const std::size_t pixels = scene.image().size();
-    scene.host_grad_images.resize(device.impl(), pixels);
-    copy_part(device.impl(), grad_images, first, scene.host_grad_images);
+    scene.host_grad_images.resize(impl_of(device), pixels);
+    copy_part(impl_of(device), grad_images, first, scene.host_grad_images);
     scene.enqueue_backward(scene.host_grad_images,
                            add_to_positions.empty() ? AddToGradient() : add_to_positions[i]);
     first += pixels;
   }
   std::vector<SceneGradient> gradients;
-  for (Renderer& renderer : renderers) gradients.push_back(renderer.impl().read_gradient());
+  for (Renderer& renderer : renderers) gradients.push_back(impl_of(renderer).read_gradient());
   return gradients;
 }
 
@@ -123,7 +123,7 @@ void SceneBatch::set_scenes(std::span<const Scene> scenes) {
   std::vector<Renderer> renderers = std::exchange(m.renderers, {});
   while (renderers.size() > scenes.size()) renderers.pop_back();
   while (renderers.size() < scenes.size()) renderers.emplace_back(m.device);
-  for (std::size_t i = 0; i < scenes.size(); ++i) renderers[i].impl().set_scene(scenes[i]);
+  for (std::size_t i = 0; i < scenes.size(); ++i) impl_of(renderers[i]).set_scene(scenes[i]);
   m.renderers = std::move(renderers);
 }
 
@@ -146,7 +146,7 @@ void SceneBatch::forward() {
   std::vector<std::uint64_t> frames;
   for (Renderer& renderer : m.renderers) {
     renderer.forward();
-    frames.push_back(renderer.impl().frame_number);
+    frames.push_back(impl_of(renderer).frame_number);
   }
   m.frames = std::move(frames);
   m.frame_number = next_frame_number();
@@ -159,8 +159,8 @@ Image SceneBatch::image(std::size_t view) const {
     throw InvalidArgument("view", std::to_string(view), "below " + std::to_string(m.views()));
   const FrameImages images = m.images();
   Image image(images.width, images.height);
-  m.device.impl().read(m.image.cl_buffer(), view * m.pixels_per_view() * sizeof(cl_float4),
-                       std::as_writable_bytes(std::span(image.pixels)));
+  impl_of(m.device).read(m.image.cl_buffer(), view * m.pixels_per_view() * sizeof(cl_float4),
+                         std::as_writable_bytes(std::span(image.pixels)));
   return image;
 }
 
@@ -168,7 +168,7 @@ void SceneBatch::read_pixels(std::span<glm::vec4> pixels) const {
   Impl& m = *impl_;
   m.require_forward("SceneBatch::read_pixels");
   require_pixel_count(pixels.size(), m.image.size());
-  m.device.impl().read(m.image.cl_buffer(), 0, std::as_writable_bytes(pixels));
+  impl_of(m.device).read(m.image.cl_buffer(), 0, std::as_writable_bytes(pixels));
 }
 
 std::vector<SceneGradient> SceneBatch::backward(std::span<const Image> grad_images) {
@@ -179,7 +179,7 @@ std::vector<SceneGradient> SceneBatch::backward(std::span<const Image> grad_imag
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(images.views) + " views");
   }
-  m.host_grad_images.upload(m.device.impl(), checked_pixels(grad_images, images.width, images.height));
+  m.host_grad_images.upload(impl_of(m.device), checked_pixels(grad_images, images.width, images.height));
   return m.backward(m.host_grad_images);
 }
 
@@ -188,8 +188,8 @@ std::vector<SceneGradient> SceneBatch::backward_pixels(std::span<const glm::vec4
   m.require_forward("SceneBatch::backward_pixels");
   require_pixel_count(grad_pixels.size(), m.image.size());
   checks::require_finite(grad_pixels, "grad_pixels");
-  m.host_grad_images.resize(m.device.impl(), grad_pixels.size());
-  m.device.impl().write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
+  m.host_grad_images.resize(impl_of(m.device), grad_pixels.size());
+  impl_of(m.device).write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
   return m.backward(m.host_grad_images);
 }
 
@@ -211,17 +211,17 @@ RenderStatistics SceneBatch::statistics() const {
 }
 
 BufferView image_view(SceneBatch& batch) {
-  SceneBatch::Impl& m = batch.impl();
+  SceneBatch::Impl& m = impl_of(batch);
   m.require_forward("image_view");
   return {m.image.cl_buffer()(), 0, sizeof(cl_float4), m.image.size(), k_rgba};
 }
 
 std::vector<SceneGradient> backward(SceneBatch& batch, cl_mem grad_images) {
-  SceneBatch::Impl& m = batch.impl();
+  SceneBatch::Impl& m = impl_of(batch);
   m.require_forward("backward");
   const VectorShape shape{m.image.size(), k_rgba};
   const FloatVectors from =
-      require_vectors(m.device.impl(), {grad_images}, shape, Access::read, "grad_images");
+      require_vectors(impl_of(m.device), {grad_images}, shape, Access::read, "grad_images");
   return m.backward(BufferRef<cl_float4>(from.buffer));
 }
 

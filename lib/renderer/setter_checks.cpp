@@ -18,7 +18,7 @@ void check_devices(std::span<const Device> devices) {
   if (devices.empty()) throw InvalidArgument("devices", "none", "at least one");
   for (std::size_t d = 0; d < devices.size(); ++d) {
     for (std::size_t other = 0; other < d; ++other) {
-      if (&devices[d].impl() != &devices[other].impl()) continue;
+      if (&impl_of(devices[d]) != &impl_of(devices[other])) continue;
       throw InvalidArgument(checks::element("devices", d),
                             "the same Device as " + checks::element("devices", other),
                             "one with a queue of its own, open_device() or split_device()");

@@ -74,7 +74,7 @@ TEST_SUITE("bench-smoke") {
               doctest::Approx(stage["gflops"].get<double>() / peaks.gflops));
       }
     }
-    CHECK(device.impl().profile == nullptr);
+    CHECK(impl_of(device).profile == nullptr);
   }
 
   TEST_CASE("a row that the library refuses is a row with a reason") {
@@ -174,11 +174,11 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("peaks are above what any program needs, and the device's queue is put back") {
     if (test::is_reduced()) return;
     const Device device = open_device();
-    const cl_command_queue before = device.impl().queue();
+    const cl_command_queue before = impl_of(device).queue();
     const bench::Peaks peaks = bench::measure_peaks(device);
     CHECK(peaks.gflops > 0.1);
     CHECK(peaks.gbytes_per_s > 0.1);
-    CHECK(device.impl().queue() == before);
+    CHECK(impl_of(device).queue() == before);
   }
 }
 

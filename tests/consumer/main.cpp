@@ -5,6 +5,16 @@
 
 #include <cstdio>
 
+/// What stands behind the library's classes is not for its users.
+template <class Object>
+constexpr bool k_shows_state = requires(const Object& object) {
+  object.impl();
+}
+|| requires(const Object& object) { object.impl_; };
+static_assert(!k_shows_state<dpr::Device> && !k_shows_state<dpr::Renderer> &&
+              !k_shows_state<dpr::SceneBatch> && !k_shows_state<dpr::AttributeImages> &&
+              !k_shows_state<dpr::ImageLoss> && !k_shows_state<dpr::MeshLoss>);
+
 int main(int argc, char** argv) {
   dpr::Scene scene;
   scene.width = scene.height = 32;

@@ -15,7 +15,7 @@ TEST_SUITE("unit") {
     scene.meshes.push_back({make_cube()});
     scene.camera = orbit_camera(6.7F, 30.0F, 120.0F);
     const Device device = open_device();
-    const cl_command_queue before = device.impl().queue();
+    const cl_command_queue before = impl_of(device).queue();
     Renderer renderer(device);
     renderer.set_scene(scene);
     {
@@ -30,8 +30,8 @@ TEST_SUITE("unit") {
       for (const Profile::Launch& launch : launches) CHECK(launch.milliseconds >= 0);
       CHECK(profile.take().empty());
     }
-    CHECK(device.impl().queue() == before);
+    CHECK(impl_of(device).queue() == before);
     renderer.forward();  // nothing is recorded any more
-    CHECK(device.impl().profile == nullptr);
+    CHECK(impl_of(device).profile == nullptr);
   }
 }

@@ -147,14 +147,14 @@ TEST_SUITE("unit") {
     std::size_t builds = 0;
     const auto sum_of_four = [&] {
       const dpr::Device device = dpr::open_device("cpu");
-      device.impl().keeps_binaries = true;
-      device.impl().before_work = [&](std::string_view work) { builds += work == "scan.cl" ? 1 : 0; };
+      impl_of(device).keeps_binaries = true;
+      impl_of(device).before_work = [&](std::string_view work) { builds += work == "scan.cl" ? 1 : 0; };
       // Options of its own, so that it is a program of its own.
-      dpr::Launcher<dpr::kernel::scan_sum> launch(device.impl(), " -DDPR_SCAN_CHUNK=128");
+      dpr::Launcher<dpr::kernel::scan_sum> launch(impl_of(device), " -DDPR_SCAN_CHUNK=128");
       const std::vector<cl_uint> values{1, 2, 3, 4}, four{4};
-      const dpr::Buffer<cl_uint> in(device.impl(), std::span<const cl_uint>(values)),
-          present(device.impl(), std::span<const cl_uint>(four));
-      dpr::Buffer<cl_uint> out(device.impl(), 1);
+      const dpr::Buffer<cl_uint> in(impl_of(device), std::span<const cl_uint>(values)),
+          present(impl_of(device), std::span<const cl_uint>(four));
+      dpr::Buffer<cl_uint> out(impl_of(device), 1);
       launch.in_groups(1, dpr::kernel::scan_sum{.count = 4U, .present = present, .values = in, .sums = out});
       return out.download()[0];
     };

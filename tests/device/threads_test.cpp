@@ -116,7 +116,7 @@ TEST_SUITE("robustness") {
     check_threads(std::vector<Device>(k_threads, device));
     CHECK(device.allocated_bytes() == 0);
     CHECK(device.peak_allocated_bytes() > 0);
-    CHECK(device.impl().host_waits > k_threads);
+    CHECK(impl_of(device).host_waits > k_threads);
   }
 
   TEST_CASE("threads: renderers that stay on the device share a buffer and a queue") {

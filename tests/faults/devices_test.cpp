@@ -32,7 +32,7 @@ struct Devices {
   Devices(const Devices&) = delete;
   Devices& operator=(const Devices&) = delete;
 
-  void* queue(std::size_t device) const { return list[device].impl().queue(); }
+  void* queue(std::size_t device) const { return impl_of(list[device]).queue(); }
   void lose(std::size_t device, std::size_t nth) const { dpr_lose_queue(queue(device), nth); }
   void slow(std::size_t device, unsigned microseconds) const { dpr_slow_queue(queue(device), microseconds); }
   void heal() const {

@@ -105,7 +105,7 @@ std::vector<Operation> operations(const Device& device) {
   const Scene scene = old_scene();
   const Mesh& mesh = scene.meshes[0].mesh;
   std::vector<glm::vec3> values = moved(mesh.positions, 0.6F);
-  const cl::Buffer positions(device.impl().context, CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR,
+  const cl::Buffer positions(impl_of(device).context, CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR,
                              values.size() * sizeof(glm::vec3), values.data());
   return {
       {"set_positions from a buffer", [positions](Renderer& r) { set_positions(r, 0, {positions()}); }},

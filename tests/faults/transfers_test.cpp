@@ -89,7 +89,7 @@ class Program {
     }
   }
 
-  TransferCounts transfers() const { return renderer_.device().impl().transfers(); }
+  TransferCounts transfers() const { return impl_of(renderer_.device()).transfers(); }
   std::vector<float> colors() const { return caller_.read(colors_); }
   std::size_t emptied() {
     std::size_t frames = frame_history(renderer_).emptied;

@@ -325,7 +325,7 @@ class Planted : public Profile {
     if (kernel != kernels_[passed_]) return;
     passed_ = (passed_ + 1) % kernels_.size();
     if (passed_ != 0 || renderer == nullptr) return;
-    scale_(renderer->impl());
+    scale_(impl_of(*renderer));
     has_scaled = true;
   }
   Renderer* renderer = nullptr;

@@ -78,7 +78,7 @@ struct Weighted {
 };
 
 std::vector<Weighted> reference_weights(const Renderer& renderer) {
-  const Renderer::Impl& m = renderer.impl();
+  const Renderer::Impl& m = impl_of(renderer);
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download(),
                              pair = m.rasterize.fragment_pair.download(),
                              pair_face = m.bin.pair_face.download();
@@ -226,13 +226,13 @@ TEST_SUITE("pipeline") {
     Renderer renderer(open_device());
     renderer.set_scene(scene);
     renderer.forward();
-    REQUIRE_FALSE(renderer.impl().pixel_noise->blur.scale_reads_raster());
+    REQUIRE_FALSE(impl_of(renderer).pixel_noise->blur.scale_reads_raster());
     const std::vector<Image> grads(1, random_image(scene.width, scene.height, -1.0F, 1.0F));
     const SceneGradient first = renderer.backward(grads), second = renderer.backward(grads);
     CHECK(first.sigma != 0);
     CHECK(same_bits(first, second));
-    CHECK(&renderer.impl().pixel_noise->grad_raster(renderer.impl().aggregate.image) ==
-          &renderer.impl().aggregate.image);
+    CHECK(&impl_of(renderer).pixel_noise->grad_raster(impl_of(renderer).aggregate.image) ==
+          &impl_of(renderer).aggregate.image);
     static_cast<void>(auxiliary_outputs(renderer));
     CHECK(same_bits(first, renderer.backward(grads)));
   }

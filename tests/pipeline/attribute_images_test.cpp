@@ -207,7 +207,7 @@ TEST_SUITE("gradient") {
       Renderer renderer(open_device());
       renderer.set_scene(cut);
       renderer.forward();
-      CHECK(renderer.impl().frame.clips == 1);
+      CHECK(impl_of(renderer).frame.clips == 1);
       check_against_reference(attribute, cut);
       Scene orthographic = soup;
       orthographic.camera.orthographic_height = 3.5F;

@@ -41,7 +41,7 @@ Mesh inside_out(Mesh mesh) {
 }
 
 std::ptrdiff_t kept_faces(const Renderer& renderer) {
-  return std::ranges::count(renderer.impl().setup.kept.download(), 1U);
+  return std::ranges::count(impl_of(renderer).setup.kept.download(), 1U);
 }
 
 struct Seen {

@@ -32,7 +32,7 @@ std::vector<glm::dvec2> pixels_of(const Camera& camera, const std::vector<glm::v
   scene.meshes = {{mesh}};
   Renderer renderer(test::test_device());
   renderer.set_scene(scene);
-  Renderer::Impl& m = renderer.impl();
+  Renderer::Impl& m = impl_of(renderer);
   m.transform.forward(m.frame, m.device_views, *m.geometry);
   std::vector<glm::dvec2> pixels;
   for (const cl_float4& ndc : m.transform.ndc.download()) {

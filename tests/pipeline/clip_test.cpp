@@ -30,7 +30,7 @@ Scene with_triangle(Scene scene, const std::vector<glm::vec3>& in_camera) {
 
 std::size_t clipped_faces(const Renderer& renderer) {
   std::size_t count = 0;
-  for (const shared::ClippedFace& face : renderer.impl().clip.faces.download()) count += face.corners != 0;
+  for (const shared::ClippedFace& face : impl_of(renderer).clip.faces.download()) count += face.corners != 0;
   return count;
 }
 
@@ -63,8 +63,8 @@ TEST_SUITE("pipeline") {
       spared.set_scene(with_triangle_beside(scene));
       searched.set_scene(with_triangle_behind(scene));
       const Result a = render(spared), b = render(searched);
-      CHECK(spared.impl().frame.clips == 0);
-      CHECK(searched.impl().frame.clips == 1);
+      CHECK(impl_of(spared).frame.clips == 0);
+      CHECK(impl_of(searched).frame.clips == 1);
       CHECK(clipped_faces(searched) == 0);
       CHECK(same_bits(a.image, b.image));
       CHECK(a.gradient.meshes[0].positions == b.gradient.meshes[0].positions);
@@ -83,7 +83,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       CHECK(clipped_faces(renderer) >= 4);
       const Image image = renderer.image();
-      const std::vector<cl_uint> starts = renderer.impl().rasterize.pixel_starts.download();
+      const std::vector<cl_uint> starts = impl_of(renderer).rasterize.pixel_starts.download();
       std::size_t covered = 0;
       for (std::size_t i = 0; i < image.pixels.size(); ++i) {
         CHECK(starts[i + 1] - starts[i] <= 1);
@@ -193,7 +193,7 @@ TEST_SUITE("pipeline") {
     Renderer renderer(open_device());
     renderer.set_scene(scene);
     renderer.forward();
-    CHECK(renderer.impl().frame.clips == 0);
+    CHECK(impl_of(renderer).frame.clips == 0);
     std::vector<glm::vec3> large = scene.meshes[0].mesh.positions;
     for (glm::vec3& p : large) p *= 5.0F;
     renderer.set_positions(0, large);
@@ -201,12 +201,12 @@ TEST_SUITE("pipeline") {
     CHECK(clipped_faces(renderer) > 0);
     renderer.set_positions(0, scene.meshes[0].mesh.positions);
     renderer.forward();
-    CHECK(renderer.impl().frame.clips == 0);
+    CHECK(impl_of(renderer).frame.clips == 0);
     renderer.set_shapes(large, {});
     renderer.forward();
     CHECK(same_bits(renderer.image(), moved));
     renderer.set_views(std::vector<View>{{scene.camera, {scene.meshes[0].transform}}});
     renderer.forward();
-    CHECK(renderer.impl().frame.clips == 0);
+    CHECK(impl_of(renderer).frame.clips == 0);
   }
 }

@@ -233,7 +233,8 @@ TEST_SUITE("pipeline") {
 
       std::size_t most_bands = 1, least_bytes = renderer.statistics().device_bytes;
       std::string refusal;
-      for (std::size_t budget = 2 * fragment_memory(renderer.impl()); refusal.empty(); budget -= budget / 3) {
+      for (std::size_t budget = 2 * fragment_memory(impl_of(renderer)); refusal.empty();
+           budget -= budget / 3) {
         device.set_memory_budget(budget);
         Renderer banded(device);
         banded.set_scene(scene);
@@ -248,14 +249,14 @@ TEST_SUITE("pipeline") {
         CHECK(same_bits(banded.backward(grads), gradient));
         CHECK(same_bits(banded.backward(grads), gradient));
         CHECK(same_bits(banded.image(views.size() - 1), whole));
-        CHECK(fragment_memory(banded.impl()) <= budget);
+        CHECK(fragment_memory(impl_of(banded)) <= budget);
         most_bands = std::max(most_bands, banded.statistics().bands);
         least_bytes = std::min(least_bytes, banded.statistics().device_bytes);
       }
       // More than rows of tiles: rows have been cut. The small frames have one tile a row that holds
       // fragments.
       CHECK(most_bands >=
-            views.size() * renderer.impl().frame.tiles_y + static_cast<std::size_t>(reduced(1, 0)));
+            views.size() * impl_of(renderer).frame.tiles_y + static_cast<std::size_t>(reduced(1, 0)));
       CHECK(least_bytes < renderer.statistics().device_bytes);
       CHECK(dpr::test::contains(refusal, "memory budget (frame)"));
       CHECK(dpr::test::contains(refusal, "for the fragments of one tile"));

@@ -28,9 +28,9 @@ struct HiddenFrame {
 HiddenFrame frame_of(const Device& device, const Scene& scene, bool hides) {
   Renderer renderer(device);
   renderer.set_scene(scene);
-  if (!hides) renderer.impl().hidden_reach = std::numeric_limits<float>::infinity();
+  if (!hides) impl_of(renderer).hidden_reach = std::numeric_limits<float>::infinity();
   HiddenFrame frame{0, render(renderer), auxiliary_outputs(renderer)};
-  frame.fragments = renderer.impl().rasterize.fragments;
+  frame.fragments = impl_of(renderer).rasterize.fragments;
   return frame;
 }
 

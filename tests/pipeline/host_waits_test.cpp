@@ -23,7 +23,7 @@ namespace {
 
 /// How often forward() makes the host wait.
 std::size_t waits_of_forward(Renderer& renderer) {
-  const std::atomic<std::size_t>& waits = renderer.device().impl().host_waits;
+  const std::atomic<std::size_t>& waits = impl_of(renderer.device()).host_waits;
   const std::size_t before = waits;
   renderer.forward();
   return waits - before;
@@ -131,7 +131,7 @@ TEST_SUITE("pipeline") {
     Image image(scene.width, scene.height);
     const std::size_t bytes = image.pixels.size() * sizeof(glm::vec4);
     const cl::Buffer buffer(image_handle(embedded), true);
-    REQUIRE(device.impl().queue.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, image.pixels.data()) ==
+    REQUIRE(impl_of(device).queue.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, image.pixels.data()) ==
             CL_SUCCESS);
     CHECK(same_bits(image, fresh.image()));
   }
@@ -143,7 +143,7 @@ TEST_SUITE("pipeline") {
       const Image grad = random_image(scene.width, scene.height, -1.0F, 1.0F);
       renderer.forward();
       renderer.image();
-      const std::atomic<std::size_t>& waits = renderer.device().impl().host_waits;
+      const std::atomic<std::size_t>& waits = impl_of(renderer.device()).host_waits;
       const std::size_t before = waits;
       const SceneGradient gradient = renderer.backward(std::span(&grad, 1));
       CHECK(waits - before == 1);
@@ -191,7 +191,7 @@ TEST_SUITE("pipeline") {
     renderer.forward();
     renderer.image();
     constexpr std::size_t k_ample = 200;  // bytes of a fragment, all buffers and their headroom
-    device.set_memory_budget((renderer.impl().rasterize.fragments + 1) * k_ample);
+    device.set_memory_budget((impl_of(renderer).rasterize.fragments + 1) * k_ample);
     renderer.set_positions(0, scene.meshes[0].mesh.positions);
     renderer.forward();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.image(), "memory budget (frame)");

@@ -375,9 +375,9 @@ TEST_SUITE("pipeline") {
         CHECK(growing.frame(scale) == 0);
         if (step % 5 == 0) growing.caller.queue.finish();
       }
-      const std::size_t waits = growing.renderer.device().impl().host_waits;
+      const std::size_t waits = impl_of(growing.renderer.device()).host_waits;
       CHECK(growing.frame(scale) == 0);
-      CHECK(growing.renderer.device().impl().host_waits == waits);
+      CHECK(impl_of(growing.renderer.device()).host_waits == waits);
       CHECK(frame_history(growing.renderer).emptied == 0);
       CHECK(growing.is_whole(scale));
     }
@@ -388,11 +388,11 @@ TEST_SUITE("pipeline") {
     growing.frame(3.0F);
     growing.frame(3.0F);
     growing.caller.queue.finish();
-    const std::size_t large = growing.renderer.impl().last_counts->fragments;
+    const std::size_t large = impl_of(growing.renderer).last_counts->fragments;
     growing.renderer.set_scene(growing.scene);
     growing.frame(0.5F);
     growing.frame(0.5F);
-    CHECK(growing.renderer.impl().last_counts->fragments < large / 8);
+    CHECK(impl_of(growing.renderer).last_counts->fragments < large / 8);
   }
 
   TEST_CASE("on device: kernels are launched for what frames take, not for their room") {
@@ -400,7 +400,7 @@ TEST_SUITE("pipeline") {
       Growing growing(preset);
       Renderer& renderer = growing.renderer;
       growing.frame(1.0F);
-      const FrameCounts taken = *renderer.impl().last_counts;
+      const FrameCounts taken = *impl_of(renderer).last_counts;
       constexpr std::size_t k_more = 64;
       reserve(renderer, {k_more * taken.pairs, k_more * taken.fragments, k_more * taken.contours});
       for (int frame = 0; frame < 2; ++frame) {  // the second knows of the first
@@ -408,13 +408,13 @@ TEST_SUITE("pipeline") {
         growing.caller.queue.finish();
       }
       growing.frame(1.0F);
-      CHECK(renderer.impl().bin.pairs >= k_more * taken.pairs);
-      CHECK(renderer.impl().bin.launched < 2 * taken.pairs);
-      CHECK(renderer.impl().rasterize.launched_fragments() < 2 * taken.fragments);
+      CHECK(impl_of(renderer).bin.pairs >= k_more * taken.pairs);
+      CHECK(impl_of(renderer).bin.launched < 2 * taken.pairs);
+      CHECK(impl_of(renderer).rasterize.launched_fragments() < 2 * taken.fragments);
       CHECK(growing.is_whole(1.0F));
       // Three times as large, it is whole all the same, and its gradients are.
       growing.frame(3.0F);
-      const std::size_t launched = renderer.impl().bin.launched;
+      const std::size_t launched = impl_of(renderer).bin.launched;
       CHECK(launched < 2 * taken.pairs);
       const Image grad = random_image(growing.scene.width, growing.scene.height, -1.0F, 1.0F);
       const cl::Buffer on_device = growing.caller.buffer(packed(std::span<const glm::vec4>(grad.pixels)));
@@ -438,9 +438,9 @@ TEST_SUITE("pipeline") {
     const RenderStatistics taken = fresh.statistics();
     renderer.set_scene(test_scene());
     reserve(renderer, {taken.pairs, taken.fragments});
-    const std::size_t before = device.impl().host_waits;
+    const std::size_t before = impl_of(device).host_waits;
     forward_on_device(renderer);
-    CHECK(device.impl().host_waits == before);
+    CHECK(impl_of(device).host_waits == before);
     CHECK(dpr::test::pipeline::same_bits(read_image(caller, renderer), fresh.image()));
     // A little less, and a frame of another size is emptied.
     Renderer tight(device);

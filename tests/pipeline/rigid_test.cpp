@@ -175,7 +175,7 @@ Coverage compare_coverage(Renderer& renderer, const GridScene& grid) {
     }
   }
   renderer.set_scene(grid.scene);
-  renderer.impl().hidden_reach = INFINITY;  // what covers a sample is asked for, not what is seen
+  impl_of(renderer).hidden_reach = INFINITY;  // what covers a sample is asked for, not what is seen
   renderer.forward();
   const Image image = renderer.image();
   const std::vector<Pixel> found = pixels_of(renderer);

@@ -45,7 +45,7 @@ std::vector<double> numbers(const std::vector<glm::vec3>& list) {
 
 /// Gradients of a pixel's fragments: dL/dz and dL/ds in scales of their noise, one after the other.
 std::vector<double> scaled_fragment_gradients(const Renderer& renderer) {
-  const Renderer::Impl& m = renderer.impl();
+  const Renderer::Impl& m = impl_of(renderer);
   const std::vector<float> depth = m.aggregate.grad_depth.download(),
                            distance = m.occupancy.grad_distance.download();
   const Smoothing& s = m.scene.smoothing;

@@ -252,8 +252,8 @@ TEST_SUITE("pipeline") {
       Renderer renderer(open_device());
       renderer.set_scene(of);
       renderer.forward();
-      renderer.impl().require_forward("test");
-      return renderer.impl().pixel_noise->contour.pairs;
+      impl_of(renderer).require_forward("test");
+      return impl_of(renderer).pixel_noise->contour.pairs;
     };
     const std::size_t smooth = contours(scene);
     Scene two = scene, turned = scene, same = scene;
@@ -271,8 +271,8 @@ TEST_SUITE("pipeline") {
     flattened.forward();
     flattened.set_normals(0, same.meshes[0].mesh.normals);
     flattened.forward();
-    flattened.impl().require_forward("test");
-    CHECK(flattened.impl().pixel_noise->contour.pairs == smooth);
+    impl_of(flattened).require_forward("test");
+    CHECK(impl_of(flattened).pixel_noise->contour.pairs == smooth);
     two.lights.reset();
     CHECK(contours(two) == smooth);
     if (dpr::test::is_reduced()) return;

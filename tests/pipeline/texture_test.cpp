@@ -224,7 +224,7 @@ TEST_SUITE("pipeline") {
       renderer.set_scene(scene);
       renderer.forward();
       renderer.image();
-      return renderer.impl().pixel_noise->contour.pairs;
+      return impl_of(renderer).pixel_noise->contour.pairs;
     };
     Mesh mesh = welded_cube();
     mesh.face_colors.clear();

@@ -98,7 +98,7 @@ NdcTriangle shifted(float x, float y) {
 /// All that binning leaves.
 std::vector<std::vector<cl_uint>> lists_of(const NdcFrame& frame, const std::vector<NdcTriangle>& triangles,
                                            const dpr::Device& device) {
-  NdcStages s(frame, triangles, device.impl());
+  NdcStages s(frame, triangles, impl_of(device));
   s.list_pairs();
   return {s.bin.pair_starts.download(), s.bin.pair_face.download(), s.bin.pair_tile.download(),
           s.bin.face_pairs.download()};

@@ -317,9 +317,9 @@ TEST_SUITE("unit") {
   TEST_CASE("every width of the lanes does the same") {
     for (const unsigned lanes : {1U, 8U, 16U}) {
       const dpr::Device device = dpr::open_device(dpr::test::test_device().info().name);
-      device.impl().info.lanes = lanes;
+      impl_of(device).info.lanes = lanes;
       for (const Case& c : cases()) {
-        Run run(c, k_views, device.impl()), usual(c);
+        Run run(c, k_views, impl_of(device)), usual(c);
         CAPTURE(lanes);
         CAPTURE(text(c));
         DPR_CHECK_WORST(difference(run.forward(), doubles(usual.forward())), 1e-6);

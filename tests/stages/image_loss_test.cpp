@@ -67,7 +67,7 @@ TEST_SUITE("gradient") {
     const dpr::LossWeights weights{.mse = 2, .l1 = 0.5F, .silhouette = 0.7F, .robust = 3};
     dpr::ImageLoss loss(dpr::test::test_device(), weights, targets, has_alpha);
     const double total = loss.evaluate(renderer);
-    const std::vector<cl_float4> grad = loss.impl().grad_image().download();
+    const std::vector<cl_float4> grad = impl_of(loss).grad_image().download();
 
     double expected = 0;
     for (std::size_t view = 0; view < k_views; ++view) {
@@ -129,7 +129,7 @@ TEST_SUITE("gradient") {
       CHECK(masked.per_view()[view] ==
             doctest::Approx(masked_mse(renderer.image(view), targets[view], masks[view])).epsilon(1e-5));
     }
-    CHECK(masked.impl().grad_image().download()[targets[0].pixels.size()].s[0] == 0);
+    CHECK(impl_of(masked).grad_image().download()[targets[0].pixels.size()].s[0] == 0);
 
     dpr::ImageLoss loss(
         device,
@@ -138,10 +138,10 @@ TEST_SUITE("gradient") {
                          .levels = 3},
         targets);
     loss.evaluate(renderer);
-    const std::vector<cl_float4> grad = loss.impl().grad_image().download();
+    const std::vector<cl_float4> grad = impl_of(loss).grad_image().download();
     const dpr::cl::Buffer buffer(dpr::image_handle(renderer), true);
     std::vector<cl_float4> pixels(grad.size());
-    const auto& queue = device.impl().queue;
+    const auto& queue = impl_of(device).queue;
     REQUIRE(queue.enqueueReadBuffer(buffer, CL_TRUE, 0, pixels.size() * sizeof(cl_float4), pixels.data()) ==
             CL_SUCCESS);
     const auto loss_with = [&](std::size_t i, int channel, float step) {
@@ -211,7 +211,7 @@ TEST_SUITE("robustness") {
     const int width = renderer.scene().width, height = renderer.scene().height;
     const std::vector<dpr::Image> empty(k_views, dpr::Image(width, height, glm::vec4(0)));
     dpr::ImageLoss loss(renderer.device(), {.silhouette = 1}, empty);
-    const dpr::Device::Impl& device = renderer.device().impl();
+    const dpr::Device::Impl& device = impl_of(renderer.device());
     const dpr::cl::Buffer image(dpr::image_handle(renderer), true);
     for (const float alpha : {0.0F, 1e-40F, 1e-25F, 1e-12F}) {
       CAPTURE(alpha);
@@ -219,7 +219,7 @@ TEST_SUITE("robustness") {
       REQUIRE(device.queue.enqueueWriteBuffer(image, CL_TRUE, 0, pixels.size() * sizeof(cl_float4),
                                               pixels.data()) == CL_SUCCESS);
       CHECK(std::isfinite(loss.evaluate(renderer)));
-      for (const cl_float4& g : loss.impl().grad_image().download()) CHECK(std::isfinite(g.s[3]));
+      for (const cl_float4& g : impl_of(loss).grad_image().download()) CHECK(std::isfinite(g.s[3]));
     }
   }
 

@@ -65,8 +65,8 @@ Evaluation evaluate(const Mesh& mesh, const MeshLossWeights& weights) {
       device, std::span<const cl_float4>(std::vector<cl_float4>(values.size(), {{1, 1, 1, 1}})));
   MeshLoss loss(dpr::test::test_device(), weights, mesh);
   Evaluation result;
-  result.loss = loss.impl().evaluate(positions, k_before);
-  loss.impl().add_gradient(positions, grad);
+  result.loss = impl_of(loss).evaluate(positions, k_before);
+  impl_of(loss).add_gradient(positions, grad);
   const std::vector<cl_float4> sums = grad.download();
   for (std::size_t i = 0; i < k_before; ++i) CHECK(sums[i].s[0] == 1.0F);
   for (std::size_t i = k_before; i < sums.size(); ++i) {

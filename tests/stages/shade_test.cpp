@@ -110,7 +110,7 @@ class Shaded {
     read();
   }
 
-  dpr::Renderer::Impl& impl() { return renderer_.impl(); }
+  dpr::Renderer::Impl& impl() { return impl_of(renderer_); }
   dpr::ShadeInputs inputs() {
     dpr::Renderer::Impl& m = impl();
     return {m.frame,           m.device_views, *m.geometry, m.transform,
@@ -216,9 +216,9 @@ ShadeErrors all_errors(const Model& model) {
   for (const cl_uint fragment : s.list) {
     for (auto& plane : grad) plane[fragment] = random(-1, 1);
   }
-  device_grad.red.upload(m.device.impl(), grad[0]);
-  device_grad.green.upload(m.device.impl(), grad[1]);
-  device_grad.blue.upload(m.device.impl(), grad[2]);
+  device_grad.red.upload(impl_of(m.device), grad[0]);
+  device_grad.green.upload(impl_of(m.device), grad[1]);
+  device_grad.blue.upload(impl_of(m.device), grad[2]);
   poison(m.shade.grad_bary1, fragments);
   poison(m.shade.grad_bary2, fragments);
   poison(m.shade.grad_corner_colors, 9 * m.bin.pairs);
@@ -329,11 +329,11 @@ TEST_SUITE("unit") {
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> lit = renderer.impl().shade.color.red.download();
+    const std::vector<float> lit = impl_of(renderer).shade.color.red.download();
     scene.lights.reset();
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> unlit = renderer.impl().shade.color.red.download();
+    const std::vector<float> unlit = impl_of(renderer).shade.color.red.download();
     REQUIRE(lit.size() == unlit.size());
     Worst worst;
     for (std::size_t i = 0; i < lit.size(); ++i)

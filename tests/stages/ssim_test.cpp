@@ -53,10 +53,10 @@ Evaluated evaluate(const LossOptions& options, std::span<const Image> images,
   for (const Image& image : images) {
     for (const glm::vec4& p : image.pixels) pixels.push_back({{p.x, p.y, p.z, p.w}});
   }
-  const Buffer<cl_float4> buffer(device.impl(), pixels);
+  const Buffer<cl_float4> buffer(impl_of(device), pixels);
   ImageLoss loss(device, options, targets);
-  loss.impl().evaluate(buffer);
-  return {loss.impl().per_view, loss.impl().grad_image().download()};
+  impl_of(loss).evaluate(buffer);
+  return {impl_of(loss).per_view, impl_of(loss).grad_image().download()};
 }
 
 }  // namespace

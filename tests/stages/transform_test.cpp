@@ -91,7 +91,7 @@ class TwoMeshes {
     }
   }
 
-  dpr::Renderer::Impl& impl() { return renderer.impl(); }
+  dpr::Renderer::Impl& impl() { return impl_of(renderer); }
   ref::Mat4d model(std::size_t view, std::size_t vertex) const {
     return to_reference(views[view].transforms[mesh[vertex]]);
   }
@@ -161,9 +161,9 @@ TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
     grad_world.push_back(lit ? cl_float4{{random(-1, 1), random(-1, 1), random(-1, 1), 0}}
                              : cl_float4{{NAN, NAN, NAN, NAN}});
   }
-  dpr::Buffer<cl_float4> grad(m.device.impl(), std::span<const cl_float4>(grad_ndc));
-  const dpr::Buffer<cl_float4> clip_buffer(m.device.impl(), std::span<const cl_float4>(grad_clip));
-  const dpr::Buffer<cl_float4> world_buffer(m.device.impl(), std::span<const cl_float4>(grad_world));
+  dpr::Buffer<cl_float4> grad(impl_of(m.device), std::span<const cl_float4>(grad_ndc));
+  const dpr::Buffer<cl_float4> clip_buffer(impl_of(m.device), std::span<const cl_float4>(grad_clip));
+  const dpr::Buffer<cl_float4> world_buffer(impl_of(m.device), std::span<const cl_float4>(grad_world));
   const std::size_t channel_count = lens == Lens::distorting ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
   const std::size_t segments = 2 * t.views.size(), slots = dpr::slots_of_segments(vertices / 2);
   poison(m.transform.partial_sums, channel_count * segments * 2 * slots);
@@ -250,7 +250,7 @@ TEST_SUITE("unit") {
     scene.meshes = {{mesh, glm::mat4(1.0F)}};
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
-    dpr::Renderer::Impl& m = renderer.impl();
+    dpr::Renderer::Impl& m = impl_of(renderer);
     m.transform.forward(m.frame, m.device_views, *m.geometry);
     const std::vector<cl_float4> ndc = m.transform.ndc.download();
     const ref::Projection p = to_reference(dpr::projection(scene.camera, 8, 8), scene.camera);
@@ -300,11 +300,11 @@ TEST_SUITE("gradient") {
     scene.meshes = {{mesh, glm::mat4(1.0F)}};  // the camera stands at the origin
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
-    dpr::Renderer::Impl& m = renderer.impl();
+    dpr::Renderer::Impl& m = impl_of(renderer);
     m.transform.forward(m.frame, m.device_views, *m.geometry);
     const std::vector<cl_float4> zeros(3, cl_float4{});
-    const dpr::Buffer<cl_float4> grad_lit(m.device.impl(), std::span<const cl_float4>(zeros));
-    dpr::Buffer<cl_float4> grad(m.device.impl(), std::span<const cl_float4>(zeros));
+    const dpr::Buffer<cl_float4> grad_lit(impl_of(m.device), std::span<const cl_float4>(zeros));
+    dpr::Buffer<cl_float4> grad(impl_of(m.device), std::span<const cl_float4>(zeros));
     m.transform.backward(m.frame, m.device_views, true, {}, grad_lit, grad);
     CHECK(m.transform.partial_sums.download() ==
           std::vector<float>(DPR_POSE_CHANNELS * 2 * m.transform.slots, 0.0F));

@@ -21,7 +21,7 @@ inline const Device& test_device() {
   return device;
 }
 
-inline Device::Impl& device_impl() { return test_device().impl(); }
+inline Device::Impl& device_impl() { return impl_of(test_device()); }
 
 /// Content of output buffers before a launch that should fill them.
 inline constexpr float k_poison = std::numeric_limits<float>::quiet_NaN();
