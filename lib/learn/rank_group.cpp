@@ -59,7 +59,7 @@ std::string own_address(const Ranks& ranks) {
 /// Debian's libtorch has no libuv, which torch 2.4 and later use unless told otherwise.
 template <class Options>
 void leave_libuv(Options& options) {
-  if constexpr (requires { options.useLibuv; }) options.useLibuv = false;
+  if constexpr (requires { options.useLibUV; }) options.useLibUV = false;
 }
 
 c10::intrusive_ptr<c10d::Store> open_store(const Ranks& ranks) {
