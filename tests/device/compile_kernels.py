@@ -2,7 +2,7 @@
 """Compiles every kernel with every set of options that a stage builds it with, at 1, 8 and 16 lanes.
 
 compile_kernels.py lint CLANG KERNELS [MORE...]            as strict OpenCL C 1.2; warnings are errors
-compile_kernels.py driver [--lanes N...] KERNELS [MORE...] to machine code, by the driver of the first OpenCL device
+compile_kernels.py driver KERNELS [MORE...] [--lanes N...] to machine code, by the driver of the first OpenCL device
 
 KERNELS is the folder with the headers, MORE other folders or files: with files the folder's own are left out.
 
