@@ -1,9 +1,10 @@
 // The gradient fuzzer: random scenes over all features, and of each every gradient against differences of the
 // image; the mean gradient over a pixel's motion against what that changes; and wrong gradients, which must
 // be found. The seeds come from the commit (DPR_COMMIT), so that each has scenes of its own, or from
-// DPR_GRADIENT_SEED. DPR_GRADIENT_SECONDS says how long a run is, DPR_GRADIENT_SCENES how many scenes at most,
-// DPR_GRADIENT_STAGE which of the wrong gradients is tried, or "all"; by default one, another one with every
-// commit. What has failed once is a line of tests/data/gradient_seeds.txt.
+// DPR_GRADIENT_SEED; the mean gradient's scenes are the same for all commits. DPR_GRADIENT_SECONDS says how
+// long a run is, DPR_GRADIENT_SCENES how many scenes at most, DPR_GRADIENT_STAGE which of the wrong gradients is
+// tried, or "all"; by default one, another one with every commit. What has failed once is a line of
+// tests/data/gradient_seeds.txt.
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -138,11 +138,10 @@ inline void draw_smoothing(Draw& draw, Trial& trial) {
   smoothing.composition = draw.of({Composition::joint, Composition::barrier});
   smoothing.depth_prior = draw.of({Prior::gaussian, Prior::logistic, Prior::gumbel, Prior::cauchy});
   smoothing.occupancy_prior = draw.of({Prior::gaussian, Prior::logistic, Prior::cauchy});
-  const bool many_faces = trial.scene.meshes[0].mesh.faces.size() > 200;
-  if (!pixel && many_faces && smoothing.occupancy_prior == Prior::cauchy)
+  const std::size_t faces = trial.scene.meshes[0].mesh.faces.size();
+  if (!pixel && faces > 200 && smoothing.occupancy_prior == Prior::cauchy)
     smoothing.occupancy_prior = Prior::gaussian;  // whose blur does not reach across the frame
-  if (!pixel && trial.scene.meshes.size() * trial.scene.meshes[0].mesh.faces.size() > 200 &&
-      smoothing.depth_prior == Prior::cauchy)
+  if (!pixel && trial.scene.meshes.size() * faces > 200 && smoothing.depth_prior == Prior::cauchy)
     smoothing.depth_prior = Prior::gaussian;  // under which a pixel's hundreds of faces do not all compete
   smoothing.gamma = draw.of({1e-4F, 1e-2F, 4e-2F});
   smoothing.background_depth = 0.45F;

@@ -154,7 +154,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       CHECK(numbers_of(gradient_of(renderer)) == numbers);
       Device small = open_device();
-      small.set_memory_budget(reduced(400000, 60000));
+      small.set_memory_budget(reduced(400000, 40000));
       Renderer banded(small);
       banded.set_scene(scene);
       banded.forward();
