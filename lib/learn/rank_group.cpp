@@ -157,7 +157,10 @@ struct GradientAverage::Bucket {
 GradientAverage::GradientAverage(RankGroupPtr ranks, const std::vector<at::Tensor>& parameters)
     : ranks_(std::move(ranks)) {
   constexpr std::int64_t k_bucket_bytes = 25 << 20;  // as torch's DistributedDataParallel
-  if (ranks_->is_alone()) return;
+  if (ranks_->is_alone()) {
+    for (const at::Tensor& parameter : parameters) gradients_.emplace_back(parameter, at::Tensor());
+    return;
+  }
   std::vector<at::Tensor> bucket;
   std::int64_t bytes = 0;
   // The last layers have their gradients first.
@@ -181,9 +184,9 @@ void GradientAverage::add_bucket(const std::vector<at::Tensor>& parameters) {
   Bucket& bucket = *buckets_.emplace_back(std::make_unique<Bucket>());
   bucket.values = torch::zeros({size});
   std::int64_t first = 0;
-  for (at::Tensor parameter : parameters) {
+  for (const at::Tensor& parameter : parameters) {
     const at::Tensor part = bucket.values.slice(0, first, first + parameter.numel()).view(parameter.sizes());
-    parameter.mutable_grad() = part.variable_data();
+    gradients_.emplace_back(parameter, part.variable_data());
     first += parameter.numel();
     bucket.accumulators.push_back(torch::autograd::impl::grad_accumulator(parameter));
     bucket.accumulators.back()->add_post_hook(std::make_unique<torch::autograd::utils::LambdaPostHook>(
@@ -195,7 +198,12 @@ void GradientAverage::add_bucket(const std::vector<at::Tensor>& parameters) {
 }
 
 void GradientAverage::backward(const at::Tensor& loss) {
-  for (const auto& bucket : buckets_) bucket->missing = bucket->accumulators.size();
+  for (const auto& bucket : buckets_) {
+    bucket->values.zero_();
+    bucket->missing = bucket->accumulators.size();
+  }
+  // Optimizer::zero_grad of torch 2 takes gradients away.
+  for (auto& [parameter, gradient] : gradients_) parameter.mutable_grad() = gradient;
   (loss / ranks_->ranks().count).backward();
   for (const auto& bucket : buckets_) ranks_->finish(*bucket->sum);
 }

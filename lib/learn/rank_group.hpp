@@ -11,6 +11,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "learn/ranks.hpp"
@@ -59,13 +60,13 @@ using RankGroupPtr = c10::intrusive_ptr<RankGroup>;
 /// Takes the place of c10d::Reducer, whose header includes others that Debian's libtorch 1.13 lacks.
 class GradientAverage {
  public:
-  /// Every backward pass must reach each parameter once. Parameters get gradients that stay in place.
+  /// Every backward pass must reach each parameter once.
   GradientAverage(RankGroupPtr ranks, const std::vector<at::Tensor>& parameters);
   ~GradientAverage();
   GradientAverage(const GradientAverage&) = delete;
   GradientAverage& operator=(const GradientAverage&) = delete;
 
-  /// The backward pass of the mean of the ranks' losses, and the exchange. The gradients are zero before.
+  /// The backward pass of the mean of the ranks' losses, and the exchange. Replaces earlier gradients.
   void backward(const at::Tensor& loss);
 
  private:
@@ -73,6 +74,8 @@ class GradientAverage {
   void add_bucket(const std::vector<at::Tensor>& parameters);
 
   RankGroupPtr ranks_;
+  /// Each parameter, and its part of a bucket; undefined on a rank that is alone.
+  std::vector<std::pair<at::Tensor, at::Tensor>> gradients_;
   std::vector<std::unique_ptr<Bucket>> buckets_;
 };
 

@@ -144,7 +144,6 @@ class Trainer {
       throw Error("loss (dpr learn): got " + checks::text(record.loss) + " in step " +
                   std::to_string(number) + ", expected a finite number; the last checkpoint stands");
     }
-    run.optimizer->zero_grad();
     gradients_.backward(loss);
     run.optimizer->step();
     return record;

@@ -84,6 +84,33 @@ TEST_SUITE("unit") {
 }
 
 TEST_SUITE("gradient") {
+  TEST_CASE("rank group: every step of an optimizer on ranks is that on the whole batch") {
+    if (is_without_gloo()) return;
+    constexpr int k_ranks = 3;
+    torch::manual_seed(5);
+    const at::Tensor inputs = torch::randn({6, 4}), wanted = torch::randn({6, 2});
+    const at::Tensor initial = torch::randn({2, 4});
+    const auto train = [&](const RankGroupPtr& ranks) {
+      const at::Tensor weight = initial.clone().requires_grad_();
+      GradientAverage average(ranks, {weight});
+      torch::optim::SGD optimizer({weight}, /*lr=*/0.1);  // Adam would not show a gradient's scale
+      for (int step = 0; step < 4; ++step) {
+        if (step != 2) optimizer.zero_grad();  // which backward does not need
+        const at::Tensor found = part_of(inputs, ranks->ranks()).matmul(weight.t());
+        average.backward((found - part_of(wanted, ranks->ranks())).square().mean());
+        optimizer.step();
+      }
+      return weight.detach();
+    };
+    const at::Tensor whole = train(c10::make_intrusive<RankGroup>(Ranks{}));
+    CHECK(largest(whole - initial) > 0.1);
+    std::vector<at::Tensor> found(k_ranks);
+    with_ranks(k_ranks, std::chrono::seconds(30), [&](const RankGroupPtr& ranks) {
+      found[static_cast<std::size_t>(ranks->ranks().rank)] = train(ranks);
+    });
+    for (const at::Tensor& weight : found) CHECK(largest(weight - whole) < 1e-5);
+  }
+
   // The reference is torch's BatchNorm2d in double precision, on the whole batch in one process.
   TEST_CASE("batch normalisation: of parts on ranks as of the whole, forward and backward") {
     if (is_without_gloo()) return;
