@@ -15,28 +15,36 @@
 // the contour on that side alone has a contour of its own in the same step, which is nearer.
 //
 // What crosses a step that another contour wins is left to antialias_second.cl.
-#include "tile_rows.h"
 #include "visibility.h"
 
-/// The depth of the front-most fragment of samples near contours, INFINITY where there is none. One work-item
+/// The front-most fragment of samples near contours, its depth INFINITY where there is none. One work-item
 /// per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), last_tile). Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   starts       uint[pixel + 1]        runs of `list`
 /// in   list         uint[...]              fragments, by pixel
 /// in   depth        float[fragment]        view depth
+/// in   fragment_pair, pair_face            uint[fragment], uint[pair]
 /// out  front        float[pixel]           not written in tiles further than one from a contour
+/// out  front_face   uint[pixel]            the same; view * faces + face, DPR_NO_FACE where there is none
 kernel void antialias_front(const FrameParams p, const uint last_tile,
                             global const uint* restrict tile_starts, global const uint* restrict starts,
                             global const uint* restrict list, global const float* restrict depth,
-                            global float* restrict front) {
+                            global const uint* restrict fragment_pair, global const uint* restrict pair_face,
+                            global float* restrict front, global uint* restrict front_face) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.tile >= last_tile || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   for (uint row = rows.first; row < rows.last; ++row) {
     const uint first = (rows.view * p.height + row) * p.width + rows.first_column;
     for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
       float nearest = INFINITY;
-      for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) nearest = fmin(nearest, depth[list[i]]);
+      uint fragment = DPR_NO_FACE;
+      for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
+        if (!(depth[list[i]] < nearest)) continue;
+        fragment = list[i];
+        nearest = depth[fragment];
+      }
       front[pixel] = nearest;
+      front_face[pixel] = fragment == DPR_NO_FACE ? DPR_NO_FACE : pair_face[fragment_pair[fragment]];
     }
   }
 }
@@ -53,21 +61,28 @@ static inline float depth_on_line(const FrameParams p, const TileContour c, int 
   return mix_depths(p, c.depths, along_edge(p, raster_edge(c.a, c.b, by_rows), line));
 }
 
-static inline void clear_steps(const FrameParams p, const TileSamples s, uint first_pixel,
-                               global uint* restrict winner) {
-  const uint pixels = p.views * p.width * p.height, columns = (uint)(s.last_column - s.first_column);
-  for (int row = s.first_row; row < s.last_row; ++row) {
-    global uint* right = winner + first_pixel + (uint)row * p.width + (uint)s.first_column;
-    if (columns == DPR_TILE) {
-      vstore8((uint8)(DPR_NO_CROSSING), 0, right);
-      vstore8((uint8)(DPR_NO_CROSSING), 0, right + pixels);
-      continue;
-    }
-    for (uint k = 0; k < columns; ++k) right[k] = right[pixels + k] = DPR_NO_CROSSING;
+static inline void clear_in_row(int first, int last, global uint* restrict winner) {
+  if (last - first == DPR_TILE) {
+    vstore8((uint8)(DPR_NO_CROSSING), 0, winner + first);
+    return;
   }
+  for (int column = first; column < last; ++column) winner[column] = DPR_NO_CROSSING;
 }
 
-/// Finds what crosses the steps of a tile. One work-item per tile of all views. Deterministic.
+static inline void clear_steps(const FrameParams p, const TileSamples s, const TileLines own,
+                               uint first_pixel, global uint* restrict winner) {
+  const int first_row = s.first_row + own.first, first_column = s.first_column + own.first,
+            last_column = min(s.first_column + own.last, s.last_column);
+  global uint* right = winner + first_pixel;
+  global uint* down = right + p.views * p.width * p.height;
+  for (int row = first_row; row < min(s.first_row + own.last, s.last_row); ++row)
+    clear_in_row(s.first_column, s.last_column, right + (uint)row * p.width);
+  for (int row = s.first_row; row < s.last_row; ++row)
+    clear_in_row(first_column, last_column, down + (uint)row * p.width);
+}
+
+/// Finds what crosses the steps of a tile. One work-item per DPR_ROWS rows, and as many columns, of a tile.
+/// Deterministic.
 /// in   edges         uint2[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
 /// in   facing        uchar[view][face]
@@ -80,21 +95,21 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, uint fi
 ///                                          Not written in tiles further than two from a contour: nothing
 ///                                          asks for their steps
 /// out  cut           Cut[2][pixel]         what it cuts. Not written where nothing crosses
-/// out  crowded       uint[tile][4]         see bit_in_tile(): steps that several contours cross. Not
-///                                          written where the winners are not
+/// out  crowded       uchar[tile][DPR_TILE_BYTES]  steps that several contours cross. Not written where the
+///                                          winners are not
 kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
                             global const ViewParams* restrict views, global const uint2* restrict edges,
                             global const uint4* restrict faces, global const uchar* restrict facing,
                             global const float4* restrict ndc, global const ClippedFace* restrict clipped,
                             global const uint* restrict tile_starts, global const uint* restrict pair_contour,
                             global const float* restrict front, global uint* restrict winner,
-                            global float2* restrict cut, global uint* restrict crowded) {
-  const uint tile = (uint)get_global_id(0);
-  const uint tiles = p.tiles_x * p.tiles_y, view = tile / tiles;
+                            global float2* restrict cut, global uchar* restrict crowded) {
+  const TileLines own = tile_lines((uint)get_global_id(0));
+  const uint tile = own.tile, view = tile / (p.tiles_x * p.tiles_y);
   if (view >= p.views || !is_near_contour(p, tile, 2, tile_starts)) return;
   const uint first_pixel = view * p.width * p.height;
   const TileSamples s = tile_samples(p, tile);
-  clear_steps(p, s, first_pixel, winner);
+  clear_steps(p, s, own, first_pixel, winner);
   const CrossingScene v = {faces, ndc, front + first_pixel, a.depth_reach / views[view].inverse_range};
   ulong several_right = 0, several_down = 0;  // steps, a bit each
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
@@ -103,12 +118,12 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
       const int only_passes = weight_of_slope(e.slope * e.slope) == 0.0f;
-      const int2 lines = lines_of_edge(p, e, s);
+      const int2 lines = own_lines_of_edge(p, e, s, own);
       for (int line = lines.x; line < lines.y; ++line) {
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
         const uint step = step_of(p, view, e, x), before = winner[step];
-        const ulong bit = 1ul << bit_in_tile(e, x) % (DPR_TILE * DPR_TILE);
+        const ulong bit = 1ul << bit_in_tile(e, x);
         const float depth = mix_depths(p, c.depths, x.along);
         int loses = is_contour(before);
         if (loses && !only_passes) {
@@ -134,19 +149,21 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
       }
     }
   }
-  vstore4((uint4)((uint)several_right, (uint)(several_right >> 32), (uint)several_down,
-                  (uint)(several_down >> 32)),
-          tile, crowded);
+  global uchar* bytes = crowded + DPR_TILE_BYTES * tile;
+  for (int line = own.first; line < own.last; ++line) {
+    bytes[line] = (uchar)(several_right >> DPR_TILE * line);
+    bytes[DPR_TILE + line] = (uchar)(several_down >> DPR_TILE * line);
+  }
 }
 
 /// The gradient of what a contour cuts at a step of a tile, as its winner or as a second.
-static inline Cut gradient_of_cut(uint contour, uint step, uint tile, global const uint* restrict winner,
+static inline Cut gradient_of_cut(uint contour, uint step, uint list, global const uint* restrict winner,
                                   global const float2* restrict grad_cut,
                                   global const uint* restrict second_counts,
                                   global const SecondCrossing* restrict seconds,
                                   global const float2* restrict grad_seconds) {
   if (winner[step] == contour) return grad_cut[step];
-  const uint first = DPR_SECOND_CROSSINGS * tile, last = first + second_counts[tile];
+  const uint first = DPR_SECOND_ROOM * list, last = first + second_counts[list];
   for (uint k = first; k < last; ++k) {
     if (seconds[k].step == step && seconds[k].contour == contour) return grad_seconds[k];
   }
@@ -185,8 +202,9 @@ kernel void antialias_cross_backward(
     for (int line = lines.x; line < lines.y; ++line) {
       const Crossing x = cross_line(p, e, line);
       if (!is_step_of(p, e, x, s)) continue;
-      const Cut grad_of = gradient_of_cut(contour, step_of(p, c.view, e, x), pair_tile[pair], winner,
-                                          grad_cut, second_counts, seconds, grad_seconds);
+      const uint list = pair_tile[pair] * DPR_TILE_ITEMS + (uint)(line % DPR_TILE) / DPR_ROWS;
+      const Cut grad_of = gradient_of_cut(contour, step_of(p, c.view, e, x), list, winner, grad_cut,
+                                          second_counts, seconds, grad_seconds);
       const float grad = grad_of.x;
       of_slope2 += grad_of.y;
       if (grad == 0.0f) continue;

@@ -2,10 +2,10 @@
 // (antialias_cross.cl) takes the whole jump from one sample to the other for its own, and what lies between
 // the two has a colour that neither sample shows: without more, gradients lack about a sample's length at
 // every corner. The second contour knows its own jump J from the nearest step along it that it has for
-// itself: both samples get back what J has added to the winner's parts of them, and the second adds its own.
-// So each jump counts where it is.
+// itself, or a crease from samples that show its two faces: both samples get back what J has added to the
+// winner's parts of them, and the second adds its own. So each jump counts where it is.
 //
-// Such steps are few: a tile lists its own, and adds those of the tiles around it to its samples.
+// Such steps are few: a tile's work-items list their own, and add those of the tiles around to their samples.
 #include "visibility.h"
 
 /// Most lines between a contour and a step of its own. Crossings are at most twice as far along the
@@ -13,12 +13,21 @@
 #define DPR_REFERENCE_LINES 6
 #define DPR_NEAR_TILES 2
 
+/// From so many lines away on, samples that show a crease's faces go before a step.
+#define DPR_NEAR_LINES 3
+
 /// Set in a reference whose samples lie the other way round.
 #define DPR_TURNED 0x80000000u
 
 static inline int lies_on_raster(const FrameParams p, const RasterEdge e, const Crossing x) {
   return x.exists && x.column >= 0 && x.row >= 0 && x.column + e.is_by_rows < (int)p.width &&
          x.row + !e.is_by_rows < (int)p.height;
+}
+
+/// The samples at both ends of a step.
+static inline uint2 ends_of_step(const FrameParams p, uint step) {
+  const uint pixels = p.views * p.width * p.height;
+  return step < pixels ? (uint2)(step, step + 1) : (uint2)(step - pixels, step - pixels + p.width);
 }
 
 static inline uint tile_of_sample(const FrameParams p, uint view, uint column, uint row) {
@@ -29,30 +38,73 @@ static inline uint tile_of_sample(const FrameParams p, uint view, uint column, u
 /// the other side of the contour.
 static inline uint own_step(const FrameParams p, uint view, uint contour, const TileContour c, int by_rows,
                             int line, int first_is_within, global const uint* restrict winner,
-                            global const uint* restrict crowded) {
+                            global const uchar* restrict crowded) {
   const RasterEdge e = raster_edge(c.a, c.b, by_rows);
   const Crossing x = cross_line(p, e, line);
   if (!lies_on_raster(p, e, x)) return DPR_NO_CROSSING;
   const uint step = step_of(p, view, e, x);
   const uint tile = tile_of_sample(p, view, (uint)x.column, (uint)x.row);
-  if (winner[step] != contour || has_bit(crowded + DPR_TILE_WORDS * tile, bit_in_tile(e, x)))
-    return DPR_NO_CROSSING;
+  if (winner[step] != contour || has_bit(crowded + DPR_TILE_BYTES * tile, e, x)) return DPR_NO_CROSSING;
   return first_is_inner(c, e) == first_is_within ? step : step | DPR_TURNED;
 }
 
-/// The nearest such step, on the lines of a crossing or on those across; DPR_NO_CROSSING if there is none.
-static inline uint find_reference(const FrameParams p, uint view, uint contour, const TileContour c,
-                                  const RasterEdge e, const Crossing x, global const uint* restrict winner,
-                                  global const uint* restrict crowded) {
+/// How many samples away from a step one that shows a face is looked for, and how many that are along a line.
+#define DPR_FACE_REACH 3
+#define DPR_FACE_SPAN (2 * DPR_FACE_REACH + 2)
+
+/// References below it are two samples, each counted by its column, then its row, from the first within reach
+/// of the step; from it on they are steps.
+#define DPR_SAMPLE_PAIRS (DPR_FACE_SPAN * DPR_FACE_SPAN * DPR_FACE_SPAN * DPR_FACE_SPAN)
+
+/// The samples nearest to a crossing that show the faces before and behind it, as a reference;
+/// DPR_NO_CROSSING if none shows one of them.
+static inline uint find_samples(const FrameParams p, uint view, uint before, uint behind, const RasterEdge e,
+                                const Crossing x, global const uint* restrict front_face) {
+  const float2 at = e.is_by_rows ? (float2)(x.position, (float)x.line) : (float2)((float)x.line, x.position);
+  float least_before = INFINITY, least_behind = INFINITY;
+  uint found_before = 0, found_behind = 0;
+#pragma unroll 1
+  for (uint k = 0; k < DPR_FACE_SPAN * DPR_FACE_SPAN; ++k) {
+    const int column = x.column - DPR_FACE_REACH + (int)(k % DPR_FACE_SPAN),
+              row = x.row - DPR_FACE_REACH + (int)(k / DPR_FACE_SPAN);
+    if (column < 0 || row < 0 || column >= (int)p.width || row >= (int)p.height) continue;
+    const uint face = front_face[(view * p.height + (uint)row) * p.width + (uint)column];
+    const float2 away = (float2)((float)column, (float)row) - at;
+    const float distance2 = dot(away, away);
+    if (face == before && distance2 < least_before) {
+      least_before = distance2;
+      found_before = k;
+    } else if (face == behind && distance2 < least_behind) {
+      least_behind = distance2;
+      found_behind = k;
+    }
+  }
+  return fmax(least_before, least_behind) < INFINITY
+             ? found_before + DPR_FACE_SPAN * DPR_FACE_SPAN * found_behind
+             : DPR_NO_CROSSING;
+}
+
+/// What shows the jump across a contour; DPR_NO_CROSSING if nothing does. The colours of a step of its own,
+/// the nearest on the lines of the crossing or on those across, continue to it.
+static inline uint reference_of(const FrameParams p, uint view, uint contour, const TileContour c,
+                                const RasterEdge e, const Crossing x, global const uint* restrict front_face,
+                                global const uint* restrict winner, global const uchar* restrict crowded) {
   const int is_inner = first_is_inner(c, e), across = e.is_by_rows ? x.column : x.row;
+#pragma unroll 1
   for (int away = 1; away <= DPR_REFERENCE_LINES; ++away) {
+    if (away == DPR_NEAR_LINES && c.flags & DPR_CONTOUR_CREASE) {
+      const uint own = view * p.faces + own_face(c.record), other = view * p.faces + other_face(c.record);
+      const uint samples =
+          find_samples(p, view, is_inner ? own : other, is_inner ? other : own, e, x, front_face);
+      if (samples != DPR_NO_CROSSING) return samples;
+    }
 #pragma unroll 1
     for (int turn = 0; turn < 4; ++turn) {
       const int is_across = turn % 2, from = is_across ? across : x.line;
       const int line = turn / 2 ? from + away : from - away + is_across;
       const uint step = own_step(p, view, contour, c, is_across ? !e.is_by_rows : e.is_by_rows, line,
                                  is_inner, winner, crowded);
-      if (step != DPR_NO_CROSSING) return step;
+      if (step != DPR_NO_CROSSING) return step + DPR_SAMPLE_PAIRS;
     }
   }
   return DPR_NO_CROSSING;
@@ -115,10 +167,11 @@ static inline int may_be_second(const FrameParams p, uint view, uint contour, co
   return 0;
 }
 
-/// Lists the seconds of a tile, as many as there is room for. One work-item per tile of all views.
-/// Deterministic. Inputs as antialias_cross has and leaves them, and
-/// out  counts   uint[tile]
-/// out  seconds  SecondCrossing[tile][DPR_SECOND_CROSSINGS]
+/// Lists the seconds of a tile, as many as there is room for. One work-item, with a list of its own, per
+/// DPR_ROWS rows, and as many columns, of a tile. Deterministic. Inputs as antialias_cross has and leaves
+/// them, and
+/// out  counts   uint[list]
+/// out  seconds  SecondCrossing[list][DPR_SECOND_ROOM]
 kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
                                   global const ViewParams* restrict views, global const uint2* restrict edges,
                                   global const uint4* restrict faces, global const uchar* restrict facing,
@@ -126,12 +179,14 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
                                   global const ClippedFace* restrict clipped,
                                   global const uint* restrict tile_starts,
                                   global const uint* restrict pair_contour,
-                                  global const float* restrict front, global const uint* restrict winner,
-                                  global const uint* restrict crowded, global uint* restrict counts,
-                                  global SecondCrossing* restrict seconds) {
-  const uint tile = (uint)get_global_id(0), view = tile / (p.tiles_x * p.tiles_y);
+                                  global const float* restrict front, global const uint* restrict front_face,
+                                  global const uint* restrict winner, global const uchar* restrict crowded,
+                                  global uint* restrict counts, global SecondCrossing* restrict seconds) {
+  const uint list = (uint)get_global_id(0);
+  const TileLines own = tile_lines(list);
+  const uint tile = own.tile, view = tile / (p.tiles_x * p.tiles_y);
   if (view >= p.views) return;
-  counts[tile] = 0;
+  counts[list] = 0;
   if (tile_starts[tile + 1] - tile_starts[tile] < 2) return;
   const TileSamples s = tile_samples(p, tile);
   const CrossingScene v = {faces, ndc, front + view * p.width * p.height,
@@ -140,10 +195,12 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
     const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
+    uint found = count;
+#pragma unroll 1
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
-      const int2 lines = lines_of_edge(p, e, s);
-      for (int line = lines.x; line < lines.y && count < DPR_SECOND_CROSSINGS; ++line) {
+      const int2 lines = own_lines_of_edge(p, e, s, own);
+      for (int line = lines.x; line < lines.y && found < DPR_SECOND_ROOM; ++line) {
         if (!may_be_second(p, view, contour, e, line, s, winner)) continue;
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
@@ -152,31 +209,52 @@ kernel void antialias_second_find(const FrameParams p, const AntialiasParams a,
         if (first == contour) continue;
         const TileContour other = load_contour(p, a, first, edges, faces, facing, ndc, clipped);
         if (is_second_hidden(p, v, other, c, e, x, mix_depths(p, c.depths, x.along))) continue;
-        const uint reference = find_reference(p, view, contour, c, e, x, winner, crowded);
-        if (reference == DPR_NO_CROSSING) continue;
         const Cut cut = cut_of(p, c, e, x);
-        const SecondCrossing second = {step, contour, reference, cut.x, cut.y};
-        seconds[DPR_SECOND_CROSSINGS * tile + count++] = second;
+        const SecondCrossing second = {step, contour, DPR_NO_CROSSING, cut.x, cut.y};
+        seconds[DPR_SECOND_ROOM * list + found++] = second;
       }
     }
+    // In a loop of its own, which loads the contour again: in those above, the search would need more registers
+    // than 128.
+    for (uint k = count; k < found; ++k) {
+      SecondCrossing second = seconds[DPR_SECOND_ROOM * list + k];
+      const TileContour again = load_contour(p, a, second.contour, edges, faces, facing, ndc, clipped);
+      const int by_rows = second.step < p.views * p.width * p.height;
+      const int2 at = sample_at(p, ends_of_step(p, second.step).x).at;
+      const RasterEdge e = raster_edge(again.a, again.b, by_rows);
+      const Crossing x = cross_line(p, e, by_rows ? at.y : at.x);
+      second.reference = reference_of(p, view, second.contour, again, e, x, front_face, winner, crowded);
+      if (second.reference != DPR_NO_CROSSING) seconds[DPR_SECOND_ROOM * list + count++] = second;
+    }
   }
-  counts[tile] = count;
+  counts[list] = count;
 }
 
-/// The samples at both ends of a step.
-static inline uint2 ends_of_step(const FrameParams p, uint step) {
-  const uint pixels = p.views * p.width * p.height;
-  return step < pixels ? (uint2)(step, step + 1) : (uint2)(step - pixels, step - pixels + p.width);
+/// The sample that a reference counts, from the first within reach of its step.
+static inline uint within_reach(const FrameParams p, uint first_of_step, uint k) {
+  return first_of_step + k % DPR_FACE_SPAN + k / DPR_FACE_SPAN * p.width - DPR_FACE_REACH * (p.width + 1);
 }
 
-static inline int is_in_tile(const FrameParams p, uint tile, uint sample) {
-  const uint line = sample / p.width;
-  return tile_of_sample(p, line / p.height, sample % p.width, line % p.height) == tile;
+/// The samples of a reference to two: before the contour, and behind it.
+static inline uint2 reference_samples(const FrameParams p, const SecondCrossing c) {
+  const uint first = ends_of_step(p, c.step).x, pairs = DPR_FACE_SPAN * DPR_FACE_SPAN;
+  return (uint2)(within_reach(p, first, c.reference % pairs), within_reach(p, first, c.reference / pairs));
 }
 
-static inline uint near_tile(const FrameParams p, const NearTiles tiles, uint k) {
-  return tiles.first + k / tiles.columns * p.tiles_x + k % tiles.columns;
+static inline int is_in_rows(const FrameParams p, const TileRows rows, uint sample) {
+  const uint line = sample / p.width, row = line % p.height;
+  return tile_of_sample(p, line / p.height, sample % p.width, row) == rows.tile && row >= rows.first &&
+         row < rows.last;
 }
+
+/// The lists of the tiles near one, in a fixed order.
+static inline uint near_list(const FrameParams p, const NearTiles tiles, uint k) {
+  const uint in_tiles = k / DPR_TILE_ITEMS;
+  const uint tile = tiles.first + in_tiles / tiles.columns * p.tiles_x + in_tiles % tiles.columns;
+  return tile * DPR_TILE_ITEMS + k % DPR_TILE_ITEMS;
+}
+
+static inline uint near_lists(const NearTiles tiles) { return tiles.columns * tiles.rows * DPR_TILE_ITEMS; }
 
 static inline Cut own_cut(const SecondCrossing c) { return (Cut)(c.cut, c.slope2); }
 
@@ -203,10 +281,11 @@ typedef struct {
 
 static inline Reference load_reference(const FrameParams p, const Steps steps, uint reference) {
   Reference r;
-  r.place = reference & ~DPR_TURNED;
+  const uint turned_step = reference - DPR_SAMPLE_PAIRS;
+  r.place = turned_step & ~DPR_TURNED;
   const uint2 ends = ends_of_step(p, r.place);
   const float t = 0.5f + steps.cut[r.place].x;
-  const int is_turned = (reference & DPR_TURNED) != 0, ahead = r.place < steps.pixels ? 0 : 1;
+  const int is_turned = (turned_step & DPR_TURNED) != 0, ahead = r.place < steps.pixels ? 0 : 1;
   r.step = is_turned ? DPR_OPPOSITE(ahead) : ahead;
   r.first = sample_at(p, is_turned ? ends.y : ends.x);
   r.second = sample_beside(p, r.first, r.step);
@@ -223,17 +302,25 @@ static inline float4 jump_at(const FrameParams p, const Steps steps, const Refer
          raster[r.first.index] - r.way_first * change_towards(p, steps, r.first, r.step, raster);
 }
 
-/// Adds what a jump's gradient is to the sample at one end of its step, and to the one behind.
-static inline void add_to_end(const FrameParams p, const Steps steps, uint tile, Sample s, int step,
-                              float way, float4 grad, global float4* grad_raster) {
-  const float changes = continues(p, steps, s, step) ? way : 0.0f;
-  if (is_in_tile(p, tile, s.index)) grad_raster[s.index] += (1.0f + changes) * grad;
-  if (changes == 0.0f) return;
-  const Sample behind = sample_beside(p, s, DPR_OPPOSITE(step));
-  if (is_in_tile(p, tile, behind.index)) grad_raster[behind.index] -= changes * grad;
+static inline float4 jump_of(const FrameParams p, const Steps steps, const SecondCrossing c,
+                             global const float4* restrict raster) {
+  if (c.reference >= DPR_SAMPLE_PAIRS)
+    return jump_at(p, steps, load_reference(p, steps, c.reference), raster);
+  const uint2 samples = reference_samples(p, c);
+  return raster[samples.y] - raster[samples.x];
 }
 
-/// Puts the seconds' jumps where they are. One work-item per tile. Deterministic.
+/// Adds what a jump's gradient is to the sample at one end of its step, and to the one behind.
+static inline void add_to_end(const FrameParams p, const Steps steps, const TileRows rows, Sample s, int step,
+                              float way, float4 grad, global float4* grad_raster) {
+  const float changes = continues(p, steps, s, step) ? way : 0.0f;
+  if (is_in_rows(p, rows, s.index)) grad_raster[s.index] += (1.0f + changes) * grad;
+  if (changes == 0.0f) return;
+  const Sample behind = sample_beside(p, s, DPR_OPPOSITE(step));
+  if (is_in_rows(p, rows, behind.index)) grad_raster[behind.index] -= changes * grad;
+}
+
+/// Puts the seconds' jumps where they are. One work-item per DPR_ROWS of a tile. Deterministic.
 /// in      tile_starts      as antialias_cross has it: seconds are where contours are
 /// in      counts, seconds  as antialias_second_find leaves them
 /// in      winner, cut      as antialias_cross does
@@ -244,43 +331,44 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
                                      global const SecondCrossing* restrict seconds,
                                      global const uint* restrict winner, global const float2* restrict cut,
                                      global const float4* restrict raster, global float4* restrict blended) {
-  const uint tile = (uint)get_global_id(0);
-  if (tile >= p.views * p.tiles_x * p.tiles_y) return;
-  if (!is_near_contour(p, tile, DPR_NEAR_TILES, tile_starts)) return;
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
-  for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {
-    const uint near = near_tile(p, tiles, i);
-    for (uint k = 0; k < counts[near]; ++k) {
-      const SecondCrossing c = seconds[DPR_SECOND_CROSSINGS * near + k];
-      const float4 jump = jump_at(p, steps, load_reference(p, steps, c.reference), raster);
+  const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
+  for (uint i = 0; i < near_lists(tiles); ++i) {
+    const uint list = near_list(p, tiles, i);
+    for (uint k = 0; k < counts[list]; ++k) {
+      const SecondCrossing c = seconds[DPR_SECOND_ROOM * list + k];
       const uint2 samples = ends_of_step(p, c.step);
+      const int has_first = is_in_rows(p, rows, samples.x), has_second = is_in_rows(p, rows, samples.y);
+      if (!has_first && !has_second) continue;
+      const float4 jump = jump_of(p, steps, c, raster);
       const float2 parts = parts_gained(c, cut[c.step]);
-      if (is_in_tile(p, tile, samples.x)) blended[samples.x] += parts.x * jump;
-      if (is_in_tile(p, tile, samples.y)) blended[samples.y] += parts.y * jump;
+      if (has_first) blended[samples.x] += parts.x * jump;
+      if (has_second) blended[samples.y] += parts.y * jump;
     }
   }
 }
 
 /// What the gradient of a second's jump is to the samples at its reference, and to the reference's cut.
-static inline void add_to_reference(const FrameParams p, const Steps steps, uint tile, const Reference r,
-                                    float4 grad_jump, global const float4* restrict raster,
+static inline void add_to_reference(const FrameParams p, const Steps steps, const TileRows rows,
+                                    const Reference r, float4 grad_jump, global const float4* restrict raster,
                                     global float2* grad_cut, global float4* grad_raster) {
   const int back = DPR_OPPOSITE(r.step);
-  add_to_end(p, steps, tile, r.first, r.step, r.way_first, -grad_jump, grad_raster);
-  add_to_end(p, steps, tile, r.second, back, r.way_second, grad_jump, grad_raster);
-  if (!is_in_tile(p, tile, ends_of_step(p, r.place).x)) return;
+  add_to_end(p, steps, rows, r.first, r.step, r.way_first, -grad_jump, grad_raster);
+  add_to_end(p, steps, rows, r.second, back, r.way_second, grad_jump, grad_raster);
+  if (!is_in_rows(p, rows, ends_of_step(p, r.place).x)) return;
   const float4 changes =
       change_towards(p, steps, r.first, r.step, raster) + change_towards(p, steps, r.second, back, raster);
   grad_cut[r.place].x += turn_of(r.step) * dot(grad_jump, changes);
 }
 
 /// The gradients of what winners and seconds cut, and of the samples at the references. One work-item per
-/// tile. Deterministic. Inputs as antialias_second_forward, and
+/// DPR_ROWS of a tile. Deterministic. Inputs as antialias_second_forward, and
 /// in      grad_blended  float4[pixel]
 /// in out  grad_cut      Cut[2][pixel]
 /// in out  grad_raster   float4[pixel]
-/// out     grad_seconds  Cut[tile][DPR_SECOND_CROSSINGS]
+/// out     grad_seconds  Cut[list][DPR_SECOND_ROOM]
 kernel void antialias_second_backward(const FrameParams p, global const uint* restrict tile_starts,
                                       global const uint* restrict counts,
                                       global const SecondCrossing* restrict seconds,
@@ -289,23 +377,29 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
                                       global const float4* restrict grad_blended,
                                       global float2* restrict grad_cut, global float4* restrict grad_raster,
                                       global float2* restrict grad_seconds) {
-  const uint tile = (uint)get_global_id(0);
-  if (tile >= p.views * p.tiles_x * p.tiles_y) return;
-  if (!is_near_contour(p, tile, DPR_NEAR_TILES, tile_starts)) return;
+  const TileRows rows = tile_rows(p, (uint)get_global_id(0));
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
-  const NearTiles tiles = near_tiles(p, tile, DPR_NEAR_TILES);
-  for (uint i = 0; i < tiles.columns * tiles.rows; ++i) {
-    const uint near = near_tile(p, tiles, i);
-    for (uint k = 0; k < counts[near]; ++k) {
-      const uint place = DPR_SECOND_CROSSINGS * near + k;
+  const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
+  for (uint i = 0; i < near_lists(tiles); ++i) {
+    const uint list = near_list(p, tiles, i);
+    for (uint k = 0; k < counts[list]; ++k) {
+      const uint place = DPR_SECOND_ROOM * list + k;
       const SecondCrossing c = seconds[place];
-      const Reference r = load_reference(p, steps, c.reference);
       const uint2 samples = ends_of_step(p, c.step);
       const float4 first = grad_blended[samples.x], second = grad_blended[samples.y];
       const float2 parts = parts_gained(c, cut[c.step]);
-      add_to_reference(p, steps, tile, r, parts.x * first + parts.y * second, raster, grad_cut, grad_raster);
-      if (near != tile) continue;
-      const float4 jump = jump_at(p, steps, r, raster);
+      const float4 grad_jump = parts.x * first + parts.y * second;
+      if (c.reference >= DPR_SAMPLE_PAIRS) {
+        add_to_reference(p, steps, rows, load_reference(p, steps, c.reference), grad_jump, raster, grad_cut,
+                         grad_raster);
+      } else {
+        const uint2 of_jump = reference_samples(p, c);
+        if (is_in_rows(p, rows, of_jump.y)) grad_raster[of_jump.y] += grad_jump;
+        if (is_in_rows(p, rows, of_jump.x)) grad_raster[of_jump.x] -= grad_jump;
+      }
+      if (!is_in_rows(p, rows, samples.x)) continue;
+      const float4 jump = jump_of(p, steps, c, raster);
       const float of_first = dot(first, jump), of_second = dot(second, jump);
       grad_cut[c.step] -= gradient_by_parts(cut[c.step], of_first, of_second);
       grad_seconds[place] = gradient_by_parts(own_cut(c), of_first, of_second);

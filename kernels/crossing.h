@@ -15,7 +15,7 @@
 #ifndef DPR_CROSSING_H
 #define DPR_CROSSING_H
 
-#include "contour.h"
+#include "tile_rows.h"
 
 /// An edge on the raster, as the rows cross it or the columns.
 typedef struct {
@@ -167,6 +167,14 @@ static inline int2 lines_of_edge(const FrameParams p, const RasterEdge e, const 
   const float first = (float)(e.is_by_rows ? s.first_row : s.first_column);
   const float last = (float)(e.is_by_rows ? s.last_row : s.last_column);
   return (int2)((int)clamp(floor(low), first, last), (int)clamp(ceil(high) + 1.0f, first, last));
+}
+
+/// Those of them that are a work-item's.
+static inline int2 own_lines_of_edge(const FrameParams p, const RasterEdge e, const TileSamples s,
+                                     const TileLines own) {
+  const int first = e.is_by_rows ? s.first_row : s.first_column;
+  const int2 lines = lines_of_edge(p, e, s);
+  return (int2)(max(lines.x, first + own.first), min(lines.y, first + own.last));
 }
 
 /// Whether the tile owns the crossing's step, and the step has a second sample.

@@ -158,7 +158,7 @@ using float4 = cl_float4;
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu
 
-/// Crossings that a tile has room for beside those that won their steps.
+/// Crossings that two lines of a tile have room for beside those that won their steps.
 #define DPR_SECOND_CROSSINGS 8
 
 /// Terms of a mesh's own loss by vertex: squared Laplacian, and half the squared excess of edge
@@ -328,7 +328,7 @@ typedef struct AntialiasParams {
 /// A crossing of a step that another contour has won. Planes of steps as antialias_cross.cl has them.
 typedef struct SecondCrossing {
   uint step, contour;
-  uint reference;    /* the nearest step that the contour has won: it shows the jump across it */
+  uint reference;    /* what shows the jump across it: see reference_of() in antialias_second.cl */
   float cut, slope2; /* of the contour: Cut of crossing.h */
 } SecondCrossing;
 

@@ -16,6 +16,12 @@
 #define DPR_ROWS DPR_TILE
 #endif
 
+/// Work-items of a tile.
+#define DPR_TILE_ITEMS (DPR_TILE / DPR_ROWS)
+
+/// Room of a work-item's list of crossings beside those that won their steps.
+#define DPR_SECOND_ROOM (DPR_SECOND_CROSSINGS * DPR_ROWS / 2)
+
 /// The rows of a tile that are a work-item's: [first, last) of its view.
 typedef struct {
   uint tile, view;
@@ -24,16 +30,28 @@ typedef struct {
 
 /// None beyond the last tile.
 static inline TileRows tile_rows(const FrameParams p, uint item) {
-  const uint items = DPR_TILE / DPR_ROWS;
   TileRows r;
-  r.tile = item / items;
+  r.tile = item / DPR_TILE_ITEMS;
   r.view = r.tile / (p.tiles_x * p.tiles_y);
   const TileSamples s = tile_samples(p, r.tile);
   r.first_column = (uint)s.first_column;
   r.columns = (uint)(s.last_column - s.first_column);
-  r.first = (uint)s.first_row + item % items * DPR_ROWS;
+  r.first = (uint)s.first_row + item % DPR_TILE_ITEMS * DPR_ROWS;
   r.last = r.view < p.views ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
   return r;
+}
+
+/// The lines of a tile that are a work-item's, [first, last) of those of its tile: its rows where contours
+/// cross rows, its columns where they cross columns. So each step is of one work-item.
+typedef struct {
+  uint tile;
+  int first, last;
+} TileLines;
+
+static inline TileLines tile_lines(uint item) {
+  const int first = (int)(item % DPR_TILE_ITEMS) * DPR_ROWS;
+  const TileLines l = {item / DPR_TILE_ITEMS, first, first + DPR_ROWS};
+  return l;
 }
 
 #endif

@@ -131,17 +131,17 @@ static inline uint step_of(const FrameParams p, uint view, const RasterEdge e, c
   return (e.is_by_rows ? 0 : pixels) + (view * p.height + (uint)x.row) * p.width + (uint)x.column;
 }
 
-/// Words that hold a bit for every step of a tile.
-#define DPR_TILE_WORDS 4
+/// Bytes that hold a bit for every step of a tile: one a row, for the steps along it, then one a column.
+#define DPR_TILE_BYTES (2 * DPR_TILE)
 
-/// The bit of a crossing's step among those of its tile.
+/// The bit of a crossing's step among those along the lines of its tile in the same direction.
 static inline uint bit_in_tile(const RasterEdge e, const Crossing x) {
-  const uint in_tile = (uint)(x.row % DPR_TILE) * DPR_TILE + (uint)(x.column % DPR_TILE);
-  return (e.is_by_rows ? 0 : DPR_TILE * DPR_TILE) + in_tile;
+  return (uint)(x.line % DPR_TILE) * DPR_TILE + (uint)(e.is_by_rows ? x.column : x.row) % DPR_TILE;
 }
 
-static inline int has_bit(global const uint* words, uint bit) {
-  return (int)(words[bit / 32] >> bit % 32 & 1u);
+static inline int has_bit(global const uchar* bytes, const RasterEdge e, const Crossing x) {
+  const uint bit = bit_in_tile(e, x);
+  return bytes[(e.is_by_rows ? 0 : DPR_TILE) + bit / DPR_TILE] >> bit % DPR_TILE & 1;
 }
 
 #endif

@@ -271,7 +271,7 @@ void Renderer::Impl::shade_and_aggregate() {
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   if (!pixel_noise) return;
-  pixel_noise->antialias.find_front(frame, rasterize, pixel_noise->contour);
+  pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour);
   pixel_noise->unblend();
 }
 

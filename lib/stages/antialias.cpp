@@ -3,7 +3,7 @@
 namespace dpr {
 namespace {
 
-constexpr std::size_t k_tile_words = 4;  // as kernels/visibility.h has them
+constexpr std::size_t k_tile_bytes = 2 * DPR_TILE;  // as kernels/visibility.h has them
 
 std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
 
@@ -22,8 +22,10 @@ shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
 
 }  // namespace
 
-void Antialias::find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour) {
+void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
+                           const Contour& contour) {
   front.resize(device_, samples_of(p));
+  front_face.resize(device_, samples_of(p));
   const Range tiles = rasterize.tiles(p);
   const std::size_t rows = row_items(device_);
   launch_(Range{tiles.first * rows, tiles.count * rows},
@@ -33,17 +35,20 @@ void Antialias::find_front(const shared::FrameParams& p, const Rasterize& raster
                                   .starts = rasterize.pixel_starts,
                                   .list = rasterize.list,
                                   .depth = rasterize.depth,
-                                  .front = front});
+                                  .fragment_pair = rasterize.fragment_pair,
+                                  .pair_face = bin.pair_face,
+                                  .front = front,
+                                  .front_face = front_face});
 }
 
 void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
-  const std::size_t tiles = tiles_of(in.p);
-  crowded_.resize(device_, k_tile_words * tiles);
-  second_counts.resize(device_, tiles);
-  seconds.resize(device_, DPR_SECOND_CROSSINGS * tiles);
-  launch_(tiles, kernel::antialias_cross{.p = in.p,
+  const std::size_t tiles = tiles_of(in.p), items = tiles * row_items(device_);
+  crowded_.resize(device_, k_tile_bytes * tiles);
+  second_counts.resize(device_, items);
+  seconds.resize(device_, DPR_SECOND_CROSSINGS * DPR_TILE / 2 * tiles);
+  launch_(items, kernel::antialias_cross{.p = in.p,
                                          .a = params(in, depth_reach),
                                          .views = in.views.cameras,
                                          .edges = in.edges.edges,
@@ -57,7 +62,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
                                          .winner = winner,
                                          .cut = cut,
                                          .crowded = crowded_});
-  launch_(tiles, kernel::antialias_second_find{.p = in.p,
+  launch_(items, kernel::antialias_second_find{.p = in.p,
                                                .a = params(in, depth_reach),
                                                .views = in.views.cameras,
                                                .edges = in.edges.edges,
@@ -68,6 +73,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
                                                .tile_starts = contour.tile_starts,
                                                .pair_contour = contour.pair_contour,
                                                .front = front,
+                                               .front_face = front_face,
                                                .winner = winner,
                                                .crowded = crowded_,
                                                .counts = second_counts,
@@ -94,14 +100,14 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
                                           .cut = cut,
                                           .raster = kept.faded,
                                           .blended = samples});
-  launch_(tiles_of(p), kernel::antialias_second_forward{.p = p,
-                                                        .tile_starts = contour.tile_starts,
-                                                        .counts = second_counts,
-                                                        .seconds = seconds,
-                                                        .winner = winner,
-                                                        .cut = cut,
-                                                        .raster = kept.faded,
-                                                        .blended = samples});
+  launch_(rows, kernel::antialias_second_forward{.p = p,
+                                                 .tile_starts = contour.tile_starts,
+                                                 .counts = second_counts,
+                                                 .seconds = seconds,
+                                                 .winner = winner,
+                                                 .cut = cut,
+                                                 .raster = kept.faded,
+                                                 .blended = samples});
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
@@ -121,17 +127,17 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                                            .grad_blended = kept_grad_,
                                            .grad_cut = grad_cut_,
                                            .grad_raster = grad});
-  launch_(tiles_of(in.p), kernel::antialias_second_backward{.p = in.p,
-                                                            .tile_starts = contour.tile_starts,
-                                                            .counts = second_counts,
-                                                            .seconds = seconds,
-                                                            .winner = winner,
-                                                            .cut = cut,
-                                                            .raster = kept.faded,
-                                                            .grad_blended = kept_grad_,
-                                                            .grad_cut = grad_cut_,
-                                                            .grad_raster = grad,
-                                                            .grad_seconds = grad_seconds_});
+  launch_(rows, kernel::antialias_second_backward{.p = in.p,
+                                                  .tile_starts = contour.tile_starts,
+                                                  .counts = second_counts,
+                                                  .seconds = seconds,
+                                                  .winner = winner,
+                                                  .cut = cut,
+                                                  .raster = kept.faded,
+                                                  .grad_blended = kept_grad_,
+                                                  .grad_cut = grad_cut_,
+                                                  .grad_raster = grad,
+                                                  .grad_seconds = grad_seconds_});
   launch_(rows, kernel::antialias_keep{
                     .p = in.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad_});
   launch_(rows, kernel::antialias_fade_backward{.p = in.p,
@@ -164,7 +170,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
 std::size_t Antialias::bytes() const {
   std::size_t bytes = kept_grad_.capacity_bytes() + winner.capacity_bytes() + crowded_.capacity_bytes() +
                       second_counts.capacity_bytes() + seconds.capacity_bytes() + grad_ends.capacity_bytes() +
-                      front.capacity_bytes();
+                      front.capacity_bytes() + front_face.capacity_bytes();
   for (const Buffer<cl_float2>* buffer : {&cut, &grad_cut_, &grad_seconds_})
     bytes += buffer->capacity_bytes();
   return bytes;

@@ -26,7 +26,8 @@ class Antialias {
   explicit Antialias(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// The front-most depths of the samples near contours of the rasterizer's band.
-  void find_front(const shared::FrameParams& p, const Rasterize& rasterize, const Contour& contour);
+  void find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
+                  const Contour& contour);
   /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces `depth_reach`
   /// (normalised depth) behind the nearest count as seen.
   void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
@@ -40,11 +41,12 @@ class Antialias {
 
   Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is; only near
                                   ///< contours
+  Buffer<cl_uint> front_face;     ///< [view][height][width] view * faces + face of what is there
   Buffer<cl_uint> winner;         ///< [2][view][height][width] what crosses the steps to the right, and down;
                                   ///< only near contours
   Buffer<cl_float2> cut;          ///< [2][view][height][width] what it cuts: Cut of kernels/crossing.h
-  Buffer<cl_uint> second_counts;  ///< [tile] of `seconds`
-  Buffer<shared::SecondCrossing> seconds;  ///< [tile][DPR_SECOND_CROSSINGS] beside the winners
+  Buffer<cl_uint> second_counts;  ///< [tile][DPR_TILE_ITEMS] of `seconds`
+  Buffer<shared::SecondCrossing> seconds;  ///< [tile][DPR_TILE_ITEMS][DPR_SECOND_ROOM] beside the winners
   Buffer<cl_float4> grad_ends;             ///< [pair] of the contour's two ends, NDC
 
   std::size_t bytes() const;
@@ -56,9 +58,9 @@ class Antialias {
            kernel::antialias_backward, kernel::antialias_second_forward, kernel::antialias_second_backward,
            kernel::antialias_fade_backward, kernel::antialias_cross_backward>
       launch_;
-  Buffer<cl_uint> crowded_;         // [tile] of four words
+  Buffer<cl_uchar> crowded_;        // [tile][DPR_TILE_BYTES]
   Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
-  Buffer<cl_float2> grad_seconds_;  // [tile][DPR_SECOND_CROSSINGS]
+  Buffer<cl_float2> grad_seconds_;  // as `seconds`
   Buffer<cl_float4> kept_grad_;     // [view][height][width] near contours
 };
 

@@ -397,9 +397,65 @@ glm::dvec3 by_camera(Renderer& renderer, const Mesh& mesh, const glm::vec3& came
   return derivative;
 }
 
+/// A torus of 280 faces of their own colours, turned at random.
+Scene faceted_scene(int size, check::Random& random) {
+  Scene scene = sphere_scene(0, size, sigma_of_pixels(1, size));
+  Mesh& mesh = scene.meshes[0].mesh;
+  mesh = make_torus(0.8F, 0.35F, 20, 7);
+  mesh.vertex_colors.clear();
+  for (std::size_t i = 0; i < mesh.faces.size(); ++i) mesh.face_colors.push_back(random.vector(0, 1));
+  scene.meshes[0].transform = check::placed(random(0, 360), 1.0F, random.vector(-0.05F, 0.05F));
+  return scene;
+}
+
+/// How far the mean gradient over a motion of a pixel is from the change of the image, relative to the larger
+/// of that and the mean size of the gradient.
+double error_of_motion(Renderer& renderer, Scene scene, const glm::vec3& way, const Image& weights) {
+  constexpr int k_parts = 16;
+  const glm::vec4 start = scene.meshes[0].transform[3];
+  const auto render = [&](float part) {
+    scene.meshes[0].transform[3] = start + glm::vec4(part * way, 0.0F);
+    renderer.set_scene(scene);
+    renderer.forward();
+  };
+  double sum = 0, size = 0;
+  for (int i = 0; i < k_parts; ++i) {
+    render((static_cast<float>(i) + 0.5F) / k_parts);
+    const glm::dvec3 gradient = renderer.backward(std::span(&weights, 1)).views[0].transforms[0].translation;
+    const double slope = glm::dot(gradient, glm::dvec3(way)) / k_parts;
+    sum += slope;
+    size += std::abs(slope);
+  }
+  render(1);
+  double change = weighted_sum(renderer.image(), weights);
+  render(0);
+  change -= weighted_sum(renderer.image(), weights);
+  return std::abs(change - sum) / std::max(std::abs(change), size);
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("pixel noise: gradients of faces of their own colours are right in the mean") {
+    if (test::is_reduced()) return;
+    constexpr std::size_t k_paths = 24;
+    Renderer renderer(open_device());
+    const std::pair<int, double> sizes[] = {{32, 0.2}, {64, 5e-2}, {128, 3e-2}};
+    for (const auto& [size, tolerance] : sizes) {
+      const Image weights = varying_weights(size);
+      check::Random random(11);
+      std::vector<double> errors;
+      for (std::size_t i = 0; i < k_paths; ++i) {
+        const Scene scene = faceted_scene(size, random);
+        const glm::vec3 way = glm::normalize(random.vector(-1, 1)) * (3.15F / static_cast<float>(size));
+        errors.push_back(error_of_motion(renderer, scene, way, weights));
+      }
+      std::ranges::sort(errors);
+      MESSAGE(size << "x" << size << ": off by a median of " << 100 * errors[k_paths / 2] << "%");
+      CHECK(errors[k_paths / 2] < tolerance);
+    }
+  }
+
   TEST_CASE("pixel noise: gradients are right in the mean where colours fall off towards silhouettes") {
     if (test::is_reduced()) return;
     const Image weights = varying_weights(64);
