@@ -311,14 +311,19 @@ typedef struct {
   float part[2];
 } OutlineGradients;
 
+/// The gradient of where a cut is seen.
+static inline float2 gradient_of_cut(const ClippedFace c, const OutlineGradients g, uint cut) {
+  const int is_quad = c.corners == 4;
+  return cut == 0 ? (is_quad ? g.corner[2].xy : g.corner[1].xy) : is_quad ? g.corner[3].xy : g.corner[2].xy;
+}
+
 /// From there to the face's own corners: of those that are kept in NDC, and of all by way of the cuts.
 static inline void store_corners(const FrameParams p, global const ViewParams* view, const ClippedFace c,
                                  const OutlineGradients g, global float* restrict grad_corners,
                                  global float* restrict grad_clip) {
   const int is_quad = c.corners == 4;
-  const float3 by_cut[2] = {
-      cut_gradient(p, view, c, 0, is_quad ? g.corner[2].xy : g.corner[1].xy, g.part[0]),
-      cut_gradient(p, view, c, 1, is_quad ? g.corner[3].xy : g.corner[2].xy, g.part[1])};
+  const float3 by_cut[2] = {cut_gradient(p, view, c, 0, gradient_of_cut(c, g, 0), g.part[0]),
+                            cut_gradient(p, view, c, 1, gradient_of_cut(c, g, 1), g.part[1])};
 #pragma unroll
   for (uint k = 0; k < 3; ++k) {
     const float3 none = 0.0f;
@@ -412,17 +417,21 @@ static inline void add_outline_barycentrics(const FrameParams p, const ClippedFa
 }
 
 /// Gradients of the corners of clipped faces, summed over a pair's fragments. One work-item per pair, up to
-/// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward.
+/// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward, and
+/// in      capacity      of the pairs' buffers
 /// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
 /// out     grad_clip     float[pair][9]   of the corners' homogeneous coordinates, by way of the cuts
-kernel void clip_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
-                          global const ViewParams* restrict views, global const ClippedFace* restrict clipped,
+/// out     grad_cuts     float[2][2][capacity]  x and y of where the two cuts of a clipped face are seen,
+///                       where some view distorts
+kernel void clip_backward(const FrameParams p, const uint capacity, const uint last_pair,
+                          global const uint* restrict pairs, global const ViewParams* restrict views,
+                          global const ClippedFace* restrict clipped,
                           global const Triangle* restrict triangles, global const uint* restrict pair_face,
                           global const uint* restrict fragment_starts, global const uint* restrict pixels,
                           global const float* restrict distance, global const float* restrict grad_distance,
                           global const float* restrict grad_depth, global const float* restrict grad_bary1,
                           global const float* restrict grad_bary2, global float* restrict grad_corners,
-                          global float* restrict grad_clip) {
+                          global float* restrict grad_clip, global float* restrict grad_cuts) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(last_pair, pairs[0])) return;
   const uint face = pair_face[pair], last = fragment_starts[pair + 1];
@@ -447,4 +456,38 @@ kernel void clip_backward(const FrameParams p, const uint last_pair, global cons
   const OutlineGradients of_outline = {{sum[0][0] + sum[1][0], sum[0][1], sum[0][2] + sum[1][1], sum[1][2]},
                                        {sum_lanes(part[0]), sum_lanes(part[1])}};
   store_corners(p, views + face / p.faces, c, of_outline, grad_corners + 9 * pair, grad_clip + 9 * pair);
+  if (!p.distorts) return;
+#pragma unroll
+  for (uint cut = 0; cut < 2; ++cut) {
+    const float2 grad = gradient_of_cut(c, of_outline, cut);
+    grad_cuts[(size_t)(2 * cut) * capacity + pair] = grad.x;
+    grad_cuts[(size_t)(2 * cut + 1) * capacity + pair] = grad.y;
+  }
+}
+
+/// From the gradients of where cuts are seen to what they give to projections and lenses, in place, where
+/// some view distorts: a kernel of its own, for want of registers. One work-item per pair, up to `last_pair`.
+/// Deterministic. Inputs as clip_backward, and
+/// in out  grad_cuts  float[DPR_CUT_CHANNELS][capacity]  of which clip_backward has written the first four
+kernel void clip_backward_lens(const FrameParams p, const uint capacity, const uint last_pair,
+                               global const uint* restrict pairs, global const ViewParams* restrict views,
+                               global const ClippedFace* restrict clipped,
+                               global const uint* restrict pair_face,
+                               global const uint* restrict fragment_starts,
+                               global float* restrict grad_cuts) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= min(last_pair, pairs[0])) return;
+  const uint face = pair_face[pair];
+  global const ViewParams* view = views + face / p.faces;
+  CutChannels sum = {0.0f, 0.0f};
+  if (view->distorts && clipped[face].corners != 0 && fragment_starts[pair] != fragment_starts[pair + 1]) {
+    const ClippedFace c = clipped[face];
+#pragma unroll
+    for (uint cut = 0; cut < 2; ++cut) {
+      const float2 grad = (float2)(grad_cuts[(size_t)(2 * cut) * capacity + pair],
+                                   grad_cuts[(size_t)(2 * cut + 1) * capacity + pair]);
+      add_cut_channels(p, view, c, cut, grad, &sum);
+    }
+  }
+  store_cut_channels(sum, capacity, pair, grad_cuts);
 }

@@ -64,4 +64,34 @@ static inline float3 cut_gradient(const FrameParams p, global const ViewParams* 
   return (float3)(g, (grad_part + dot(g, lost.xy - kept.xy)) / (kept.z - lost.z));
 }
 
+/// Gradients of the projection, scale and offset, and of the lens' coefficients.
+typedef struct {
+  float4 projection;
+  float8 lens;
+} CutChannels;
+
+/// Adds what a cut's gradient, of x and y in NDC, gives to projection and lens beyond what it gives by way of
+/// the homogeneous coordinates, which cut_gradient() has. Seen at b(t) scale + offset, with b the lens and
+/// t = (n - offset) / scale of the cut's NDC n but for the lens: the derivatives where n stays.
+static inline void add_cut_channels(const FrameParams p, global const ViewParams* view, const ClippedFace c,
+                                    uint cut, float2 grad, CutChannels* sum) {
+  const float3 kept = clipped_corner(c, kept_corner(c, cut)).xyz;
+  const float3 lost = clipped_corner(c, lost_corner(c, cut)).xyz;
+  const float4 at = clipped_cut(c, cut);
+  const float2 scale = view->projection.xy, offset = view->projection.zw;
+  const float2 tangent = (cut_ndc(p, kept, lost, at.w, at.z) - offset) / scale;
+  const float2 by_corners = bend_tangent_backward(view, tangent, grad * scale) / scale;
+  sum->projection += (float4)((at.xy - offset) / scale * grad - tangent * by_corners, grad - by_corners);
+  sum->lens += coefficients_gradient(view, tangent, grad * scale);
+}
+
+/// Stores them as float[DPR_CUT_CHANNELS][count].
+static inline void store_cut_channels(const CutChannels sum, size_t count, size_t i, global float* channels) {
+#pragma unroll
+  for (uint k = 0; k < 4; ++k) channels[k * count + i] = ((const float*)&sum.projection)[k];
+#pragma unroll
+  for (uint k = 0; k < DPR_CUT_CHANNELS - 4; ++k)
+    channels[(4 + k) * count + i] = ((const float*)&sum.lens)[k];
+}
+
 #endif

@@ -345,21 +345,22 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
 /// in      views          ViewParams[view]
 /// in out  grad_ndc       float4[view][vertex]
 /// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates
-kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
-                                global const ViewParams* restrict views, global const uint2* restrict edges,
-                                global const uint4* restrict faces, global const float4* restrict ndc,
-                                global const ClippedFace* restrict clipped,
-                                global const uint* restrict pair_starts,
-                                global const uint* restrict edge_pairs,
-                                global const uint* restrict face_edges,
-                                global const uint* restrict corner_starts,
-                                global const uint* restrict corners, global const float4* restrict grad_ends,
-                                global float4* restrict grad_ndc, global float4* restrict grad_clip) {
+/// out     grad_cuts      float[DPR_CUT_CHANNELS][view][vertex]  where some view distorts; cuts count at the
+///                        corner that is kept
+kernel void contour_gather_cuts(
+    const FrameParams p, const ContourParams c, global const ViewParams* restrict views,
+    global const uint2* restrict edges, global const uint4* restrict faces, global const float4* restrict ndc,
+    global const ClippedFace* restrict clipped, global const uint* restrict pair_starts,
+    global const uint* restrict edge_pairs, global const uint* restrict face_edges,
+    global const uint* restrict corner_starts, global const uint* restrict corners,
+    global const float4* restrict grad_ends, global float4* restrict grad_ndc,
+    global float4* restrict grad_clip, global float* restrict grad_cuts) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * c.edges;
   const EdgeScene s = edges_of_view(p, view, c.mesh_edges, edges, faces, ndc, clipped);
   float3 sum = 0.0f;
+  CutChannels of_cuts = {0.0f, 0.0f};
   int is_near = 0;
   for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
     const uint face = corners[k] / 3, corner = corners[k] % 3;
@@ -367,9 +368,10 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
     const ClippedFace of = s.clipped[face];
     const float4 grad = sum_of_pairs(first_edge + c.mesh_edges + face, pair_starts, edge_pairs, grad_ends);
     for (uint cut = 0; cut < 2; ++cut) {
-      const int to_lost = lost_corner(of, cut) == corner;
-      if (to_lost || kept_corner(of, cut) == corner)
-        sum += share_of_cut(p, views + view, of, cut, to_lost, cut == 0 ? grad.xy : grad.zw);
+      const float2 at_cut = cut == 0 ? grad.xy : grad.zw;
+      const int to_lost = lost_corner(of, cut) == corner, to_kept = kept_corner(of, cut) == corner;
+      if (to_lost || to_kept) sum += share_of_cut(p, views + view, of, cut, to_lost, at_cut);
+      if (to_kept && views[view].distorts) add_cut_channels(p, views + view, of, cut, at_cut, &of_cuts);
     }
     is_near = is_near || is_lost(of, corner);
   }
@@ -381,9 +383,12 @@ kernel void contour_gather_cuts(const FrameParams p, const ContourParams c,
     const uint end = e.cut[0] != DPR_NO_CUT ? 0 : 1, cut = min(e.cut[0], e.cut[1]);
     if (!e.is_there || cut == DPR_NO_CUT) continue;
     const float4 grad = sum_of_pairs(first_edge + edge, pair_starts, edge_pairs, grad_ends);
-    sum += share_of_cut(p, views + view, s.clipped[e.cut_face], cut, own_end == end,
-                        end == 0 ? grad.xy : grad.zw);
+    const ClippedFace of = s.clipped[e.cut_face];
+    const float2 at_cut = end == 0 ? grad.xy : grad.zw;
+    sum += share_of_cut(p, views + view, of, cut, own_end == end, at_cut);
+    if (own_end != end && views[view].distorts) add_cut_channels(p, views + view, of, cut, at_cut, &of_cuts);
   }
   if (is_near) grad_ndc[i] = 0.0f;
+  if (p.distorts) store_cut_channels(of_cuts, p.views * p.vertices, i, grad_cuts);
   grad_clip[i] += (float4)(sum, 0.0f);
 }

@@ -112,6 +112,7 @@ using float4 = cl_float4;
 #define DPR_POSE_CHANNELS 16
 #define DPR_CHANNEL_DISTORTION 16 /* k1, k2, p1, p2, k3, where some view distorts: 5 */
 #define DPR_LENS_CHANNELS 21
+#define DPR_CUT_CHANNELS 9 /* of the projection and the distortion, what cuts add where some view distorts */
 
 /// Channels that aggregation's backward pass leaves per pixel, at most: the joint composition has no alpha.
 #define DPR_CHANNEL_BACKGROUND 0 /* 3 */

@@ -64,10 +64,8 @@ static inline VertexGradient vertex_gradient(const FrameParams p, global const V
     used = 1;
     g_camera +=
         (float3)(clip.xy * projection.xy, -clip.z - (p.orthographic ? 0.0f : dot(clip.xy, projection.zw)));
-    if (!camera->distorts) {
-      g_scale += clip.xy * c.xy;
-      g_offset += clip.xy * (p.orthographic ? 1.0f : -c.z);
-    }
+    g_scale += clip.xy * c.xy;
+    g_offset += clip.xy * (p.orthographic ? 1.0f : -c.z);
   }
   VertexGradient v;
   v.world = apply_transposed(camera->row[0], camera->row[1], camera->row[2], g_camera) + lit;
@@ -109,8 +107,8 @@ static inline void store_sums(float8 sum, float8 error, uint first, uint count, 
 /// in      starts      uint[view * mesh + 1]  of the vertices, [view][vertex]
 /// in      grad_clip   float4[view][vertex]   what clipped faces add, of homogeneous coordinates: x and y in
 ///                     NDC, times depth, and depth; orthographic: x, y, depth. Where the lens distorts,
-///                     without its distortion: what it does to cuts is left out of its own gradients. Read
-///                     where p.clips is set
+///                     without its distortion: what cuts add is in DPR_CUT_CHANNELS. Read where p.clips is
+///                     set
 /// in      lit         0: nothing was lit, grad_lit is not read
 /// in      grad_lit    float4[view][vertex]   what shading adds to d loss / d world position
 /// in      slots       of a segment

@@ -25,8 +25,7 @@ struct Intrinsics {
 /// It moves vertices. Between them edges and what is on faces stay straight, an edge of length l in tangents
 /// off by up to about 3/4 |k1| l^2 r: subdivide_for_lens() (dpr/subdivision.hpp) cuts faces that are too
 /// large for that. From the radius on where the image would fold over (largest_radius()) points are held at
-/// it. Of faces that cross the near plane what is left is distorted; how the lens moves the cuts is not in
-/// its own gradients, nor in those of the intrinsics beside it, but in all others.
+/// it. Of faces that cross the near plane what is left is distorted.
 struct Distortion {
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
 

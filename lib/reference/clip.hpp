@@ -109,27 +109,47 @@ inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, const P
   return fragment;
 }
 
-/// Gradient to the homogeneous corners: differences of clipped_forward(), which must have a fragment there.
-inline HomogeneousFace clipped_backward(const HomogeneousFace& h, const Projection& projection,
+/// Of the homogeneous corners, and of the projection and the lens where the corners stay.
+struct ClippedGradient {
+  HomogeneousFace corners{};
+  Projection projection;
+  Distortion distortion{};
+};
+
+/// Differences of clipped_forward(), which must have a fragment there.
+inline ClippedGradient clipped_backward(const HomogeneousFace& h, const Projection& projection,
                                         const Vec2d& point, RasterizeParameters p,
                                         const FragmentGradient& grad_fragment) {
   constexpr double k_step = 1e-6;  // of the corners' size
   p.blur_radius = std::numeric_limits<double>::infinity();
-  const auto value = [&](const HomogeneousFace& moved) {
-    const Fragment f = *clipped_forward(moved, projection, 0, point, p);
+  const auto value = [&](const HomogeneousFace& moved, const Projection& with) {
+    const Fragment f = *clipped_forward(moved, with, 0, point, p);
     return grad_fragment.distance * f.distance + grad_fragment.depth * f.depth +
            dot(grad_fragment.barycentric, f.barycentric);
   };
-  HomogeneousFace grad{};
+  ClippedGradient grad;
   for (std::size_t corner = 0; corner < 3; ++corner) {
     const double step = k_step * (1e-3 + length(h[corner]));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       HomogeneousFace above = h, below = h;
       above[corner][axis] += step;
       below[corner][axis] -= step;
-      grad[corner][axis] = (value(above) - value(below)) / (2.0 * step);
+      grad.corners[corner][axis] = (value(above, projection) - value(below, projection)) / (2.0 * step);
     }
   }
+  if (!projection.distortion) return grad;
+  const auto slope = [&](const auto& number) {
+    Projection above = projection, below = projection;
+    number(above) += k_step;
+    number(below) -= k_step;
+    return (value(h, above) - value(h, below)) / (2.0 * k_step);
+  };
+  grad.projection.scale = {slope([](Projection& with) -> double& { return with.scale.x; }),
+                           slope([](Projection& with) -> double& { return with.scale.y; })};
+  grad.projection.offset = {slope([](Projection& with) -> double& { return with.offset.x; }),
+                            slope([](Projection& with) -> double& { return with.offset.y; })};
+  for (std::size_t k = 0; k < grad.distortion.size(); ++k)
+    grad.distortion[k] = slope([&](Projection& with) -> double& { return (*with.distortion)[k]; });
   return grad;
 }
 

@@ -286,6 +286,7 @@ struct PixelSums {
   std::vector<Vec3d> ndc;          ///< per vertex: x, y in NDC and depth
   std::vector<Vec3d> homogeneous;  ///< per vertex, from faces that cross the near plane
   ShadeGradient shade;
+  Projection projection;  ///< from those faces, where their corners stay
 };
 
 inline void add_color_gradient(const Scene& scene, const PreparedScene& prepared, std::size_t face,
@@ -329,11 +330,19 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
     add_color_gradient(scene, prepared, fragment.face, shade, grad);
     const FragmentGradient grad_fragment{occupancy.distance, input.depth, shade.barycentric};
     const bool clips = is_clipped(prepared, fragment.face);
-    const NdcTriangle corners =
-        clips ? clipped_backward(homogeneous_face(prepared, fragment.face), prepared.projection, point,
-                                 prepared.rasterize, grad_fragment)
-              : rasterize_backward(ndc_triangle(prepared, fragment.face), point, prepared.rasterize,
-                                   grad_fragment);
+    NdcTriangle corners;
+    if (clips) {
+      const ClippedGradient g =
+          clipped_backward(homogeneous_face(prepared, fragment.face), prepared.projection, point,
+                           prepared.rasterize, grad_fragment);
+      corners = g.corners;
+      sums.projection.scale += g.projection.scale;
+      sums.projection.offset += g.projection.offset;
+      for (std::size_t i = 0; i < g.distortion.size(); ++i) grad.camera.distortion[i] += g.distortion[i];
+    } else {
+      corners =
+          rasterize_backward(ndc_triangle(prepared, fragment.face), point, prepared.rasterize, grad_fragment);
+    }
     std::vector<Vec3d>& sum = clips ? sums.homogeneous : sums.ndc;
     for (std::size_t i = 0; i < 3; ++i) sum[prepared.shade.faces[fragment.face][i]] += corners[i];
   }
@@ -342,7 +351,7 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
 /// From the sums over the pixels to positions, transforms and camera.
 inline void geometry_backward(const Scene& scene, const PreparedScene& prepared, const PixelSums& sums,
                               Gradients& grad) {
-  Projection grad_projection;
+  Projection grad_projection = sums.projection;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m];
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -387,8 +396,10 @@ inline Gradients gradient(const Scene& scene, const Image& grad_image) {
     for (const Texture& texture : mesh.textures)
       grad.meshes.back().textures.emplace_back(texture.texels.size());
   }
-  PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()), std::vector<Vec3d>(prepared.vertices.size()),
-                 make_shade_gradient(prepared.shade)};
+  PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()),
+                 std::vector<Vec3d>(prepared.vertices.size()),
+                 make_shade_gradient(prepared.shade),
+                 {}};
   for (int row = 0; row < scene.height; ++row) {
     for (int column = 0; column < scene.width; ++column) {
       const double* rgba = &grad_image.rgba[4 * static_cast<std::size_t>(row * scene.width + column)];

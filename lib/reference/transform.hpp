@@ -200,8 +200,7 @@ inline Vec3d ndc_backward(const Vec3d& view, const Projection& projection, const
 }
 
 /// `grad_ndc` belongs to NDC x, y and depth, `grad_world` to the world position (from the lighting),
-/// `grad_homogeneous` to the homogeneous coordinates (from faces that cross the near plane), where a lens
-/// that distorts does not count for its own gradients.
+/// `grad_homogeneous` to the homogeneous coordinates (from faces that cross the near plane).
 inline TransformGradient transform_backward(const Vec3d& position, const Mat4d& model, const Mat4d& view,
                                             const Projection& projection, const Vec3d& grad_ndc,
                                             const Vec3d& grad_world, const Vec3d& grad_homogeneous = {}) {
@@ -220,11 +219,9 @@ inline TransformGradient transform_backward(const Vec3d& position, const Mat4d& 
   const bool ortho = projection.is_orthographic;
   const double grad_w = ortho ? 0.0 : h.x * projection.offset.x + h.y * projection.offset.y;
   const Vec3d grad_view = {h.x * projection.scale.x, h.y * projection.scale.y, -h.z - grad_w};
-  if (!projection.distortion) {
-    const double w = ortho ? 1.0 : -v.view.z;
-    g.projection.scale += {h.x * v.view.x, h.y * v.view.y};
-    g.projection.offset += {h.x * w, h.y * w};
-  }
+  const double w = ortho ? 1.0 : -v.view.z;
+  g.projection.scale += {h.x * v.view.x, h.y * v.view.y};
+  g.projection.offset += {h.x * w, h.y * w};
   g.view_rotation += cross(linear_part(view) * v.world, grad_view);
   g.view_translation += grad_view;
   grad_total_world += transposed_times(linear_part(view), grad_view);

@@ -19,7 +19,9 @@ using Terms = std::vector<std::vector<Term>>;  // by number
 Range sums_of(const SumList& list, std::size_t channel, const GradientRow& row, GradientIndex index,
               const GradientSums& all, std::size_t meshes) {
   const std::size_t first = list.first + channel * list.segments;
-  if (&list == &all[SumOf::eye]) return {first + index.view, 1};
+  for (const SumOf of : {SumOf::cuts, SumOf::contour_cuts, SumOf::eye}) {
+    if (&list == &all[of]) return {first + index.view, 1};
+  }
   if (&list != &all[SumOf::poses] && &list != &all[SumOf::normals]) return {first, list.segments};
   const std::size_t of_view = first + index.view * meshes;
   return row.of == GradientOf::mesh_in_view ? Range(of_view + index.item, 1) : Range(of_view, meshes);

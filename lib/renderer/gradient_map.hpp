@@ -19,13 +19,14 @@ struct SumList {
   std::size_t count() const { return channels * segments; }
 };
 
-/// Sums: channels of pixels; sigma; poses, by view and mesh; the eye, by view; lights; the rotations of
-/// normals that meshes give, by view and mesh; materials; and the scale of the pixel's noise.
-enum class SumOf { pixels, sigma, poses, eye, lights, normals, materials, scale };
+/// Sums: channels of pixels; sigma; poses, by view and mesh; what cuts of faces and of contours add to
+/// projections and lenses, by view; the eye, by view; lights; the rotations of normals that meshes give, by
+/// view and mesh; materials; and the scale of the pixel's noise.
+enum class SumOf { pixels, sigma, poses, cuts, contour_cuts, eye, lights, normals, materials, scale };
 
 /// The lists of a backward pass, one after the other in one buffer.
 struct GradientSums {
-  std::array<SumList, 8> lists;  // by SumOf
+  std::array<SumList, 10> lists;  // by SumOf
 
   SumList& operator[](SumOf of) { return lists[static_cast<std::size_t>(of)]; }
   const SumList& operator[](SumOf of) const { return lists[static_cast<std::size_t>(of)]; }

@@ -140,9 +140,10 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
   out.fov_y_degrees = (grad[0] + grad[1]) * scale_by_half_angle * glm::radians(0.5);
 }
 
-/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh].
-void add_pose_gradients(std::span<const float> sums, const Scene& scene, std::span<const View> views,
-                        SceneGradient& gradient) {
+/// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh], and
+/// two by [DPR_CUT_CHANNELS][view], or none.
+void add_pose_gradients(std::span<const float> sums, const std::array<std::span<const float>, 2>& of_cuts,
+                        const Scene& scene, std::span<const View> views, SceneGradient& gradient) {
   const std::size_t meshes = scene.meshes.size(), segments = views.size() * meshes;
   const auto sum = [&](std::size_t channel, std::size_t segment) {
     return static_cast<double>(sums[channel * segments + segment]);
@@ -165,6 +166,11 @@ void add_pose_gradients(std::span<const float> sums, const Scene& scene, std::sp
       for (std::size_t k = 0; k < 4; ++k) projected[k] += sum(DPR_CHANNEL_PROJECTION + k, segment);
       for (std::size_t k = 0; k < 5 && views[v].camera.distortion; ++k)
         distortion[k] += sum(DPR_CHANNEL_DISTORTION + k, segment);
+    }
+    for (const std::span<const float> cuts : of_cuts) {
+      if (cuts.empty() || !views[v].camera.distortion) continue;
+      for (std::size_t k = 0; k < DPR_CUT_CHANNELS; ++k)
+        (k < 4 ? projected[k] : distortion[k - 4]) += static_cast<double>(cuts[k * views.size() + v]);
     }
     add_projection_gradient(projected, views[v].camera, scene.width, scene.height, camera);
     if (scene.gradients.camera) gradient.views[v].camera = camera;
@@ -229,6 +235,7 @@ void Renderer::Impl::sum_gradients() {
   // Every kept face has a tile, and every tile some face: so many pairs, whatever room there is for them.
   const std::size_t pairs = faces + std::size_t{frame.views} * frame.tiles_x * frame.tiles_y;
   const bool poses = wanted.transform || wanted.camera || wanted.distortion;
+  const bool cuts = (wanted.camera || wanted.distortion) && frame.clips != 0 && frame.distorts != 0;
   const bool eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
   const bool normals = wanted.transform && shade.lit() && !geometry->given_normals.empty();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
@@ -249,6 +256,9 @@ void Renderer::Impl::sum_gradients() {
        {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
         views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
         transform.slots}},
+      {SumOf::cuts,
+       {bin.pairs, channels(cuts, DPR_CUT_CHANNELS), views.size(), frame.faces, bin.pair_starts,
+        clip.grad_cuts, pairs}},
       {SumOf::eye,
        {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs}},
       {SumOf::lights,
@@ -260,6 +270,11 @@ void Renderer::Impl::sum_gradients() {
       {SumOf::materials,
        {faces_of_view, channels(wants(ArrayId::materials), DPR_MATERIAL_CHANNELS), geometry->materials.count,
         1, geometry->materials.starts, material_channels}}};
+  if (pixel_noise) {
+    all.push_back({SumOf::contour_cuts,
+                   {vertices, channels(cuts, DPR_CUT_CHANNELS), views.size(), scene.meshes.size(),
+                    device_views.vertex_starts, pixel_noise->contour.grad_cuts}});
+  }
   if (scale)
     all.push_back(
         {SumOf::scale,
@@ -289,7 +304,10 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
     gradient.background = dvec3(pixel_sums[DPR_CHANNEL_BACKGROUND], pixel_sums[DPR_CHANNEL_BACKGROUND + 1],
                                 pixel_sums[DPR_CHANNEL_BACKGROUND + 2]);
   }
-  if (!list(SumOf::poses).empty()) add_pose_gradients(list(SumOf::poses), scene, views, gradient);
+  if (!list(SumOf::poses).empty()) {
+    add_pose_gradients(list(SumOf::poses), {list(SumOf::cuts), list(SumOf::contour_cuts)}, scene, views,
+                       gradient);
+  }
   if (!list(SumOf::eye).empty()) add_eye_gradients(list(SumOf::eye), views, gradient);
   if (!list(SumOf::normals).empty()) add_normal_gradients(list(SumOf::normals), gradient);
   if (!list(SumOf::materials).empty())

@@ -57,7 +57,9 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                     const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
   const Range pairs = rasterize.pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
+  grad_cuts.resize(device_, p.distorts != 0 ? DPR_CUT_CHANNELS * bin.pairs : 1);
   (*launch_)(pairs, kernel::clip_backward{.p = p,
+                                          .capacity = static_cast<cl_uint>(bin.pairs),
                                           .last_pair = pairs.last(),
                                           .pairs = bin.pair_count,
                                           .views = views_->cameras,
@@ -72,7 +74,18 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                                           .grad_bary1 = grad_bary1,
                                           .grad_bary2 = grad_bary2,
                                           .grad_corners = rasterize.grad_corners,
-                                          .grad_clip = grad_corners});
+                                          .grad_clip = grad_corners,
+                                          .grad_cuts = grad_cuts});
+  if (p.distorts == 0) return;
+  (*launch_)(pairs, kernel::clip_backward_lens{.p = p,
+                                               .capacity = static_cast<cl_uint>(bin.pairs),
+                                               .last_pair = pairs.last(),
+                                               .pairs = bin.pair_count,
+                                               .views = views_->cameras,
+                                               .clipped = faces,
+                                               .pair_face = bin.pair_face,
+                                               .fragment_starts = rasterize.fragment_starts,
+                                               .grad_cuts = grad_cuts});
 }
 
 }  // namespace dpr

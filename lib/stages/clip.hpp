@@ -28,8 +28,8 @@ class Clip {
   /// shading needs to know nothing.
   void fragments(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                  Rasterize& rasterize);
-  /// Replaces the gradients of their corners, and adds those that go by way of the near plane. The gradients
-  /// of fragments are those that Rasterize::backward() was given.
+  /// Replaces the gradients of their corners, and adds those that go by way of the near plane, with what these
+  /// give to projections and lenses. The gradients of fragments are those that Rasterize::backward() was given.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 Rasterize& rasterize, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
                 const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
@@ -37,15 +37,18 @@ class Clip {
   Buffer<shared::ClippedFace> faces;  ///< [view][face] which of them are clipped, and to what
   Buffer<float> grad_corners;         ///< [pair][9] of the corners' x times depth, y times depth, depth
   Buffer<cl_float4> grad;             ///< [view][vertex] the same, gathered
+  Buffer<float> grad_cuts;            ///< [DPR_CUT_CHANNELS][pair] where a lens distorts
 
   std::size_t bytes() const {
-    return faces.capacity_bytes() + grad_corners.capacity_bytes() + grad.capacity_bytes();
+    return faces.capacity_bytes() + grad_corners.capacity_bytes() + grad.capacity_bytes() +
+           grad_cuts.capacity_bytes();
   }
 
  private:
   Device::Impl& device_;
   std::optional<
-      Launcher<kernel::clip_forward, kernel::clip_cover, kernel::clip_fragments, kernel::clip_backward>>
+      Launcher<kernel::clip_forward, kernel::clip_cover, kernel::clip_fragments, kernel::clip_backward,
+               kernel::clip_backward_lens>>
       launch_;                          // made for the first frame that may have such faces
   const DeviceViews* views_ = nullptr;  // of the frame
 };

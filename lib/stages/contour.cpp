@@ -119,6 +119,8 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
                                                .grad_ends = grad_ends,
                                                .grad_ndc = grad_ndc});
   if (in.p.clips == 0) return;
+  grad_cuts.resize(device_,
+                   in.p.distorts != 0 ? std::size_t{DPR_CUT_CHANNELS} * in.p.views * in.p.vertices : 1);
   launch_(std::size_t{in.p.views} * in.p.vertices,
           kernel::contour_gather_cuts{.p = in.p,
                                       .c = params(in),
@@ -134,11 +136,12 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
                                       .corners = corners.corners,
                                       .grad_ends = grad_ends,
                                       .grad_ndc = grad_ndc,
-                                      .grad_clip = grad_clip});
+                                      .grad_clip = grad_clip,
+                                      .grad_cuts = grad_cuts});
 }
 
 std::size_t Contour::bytes() const {
-  std::size_t bytes = scan_.bytes() + sort_.bytes();
+  std::size_t bytes = scan_.bytes() + sort_.bytes() + grad_cuts.capacity_bytes();
   for (const Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &tile_starts, &pair_count, &pair_starts,
                                         &edge_pairs_, &place_contour_, &places_}) {
     bytes += buffer->capacity_bytes();

@@ -43,7 +43,7 @@ class Contour {
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
   /// Adds the gradients of the pairs' ends to those of the vertices; where faces are clipped, those of ends
-  /// on the near plane to `grad_clip`, as Transform::backward() has it.
+  /// on the near plane to `grad_clip`, as Transform::backward() has it, and fills `grad_cuts`.
   void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
               Buffer<cl_float4>& grad_clip);
 
@@ -54,6 +54,7 @@ class Contour {
   Buffer<cl_uint> pair_contour;  ///< [pair] see DPR_CONTOUR_FLAGS
   Buffer<cl_uint> pair_tile;     ///< [pair] view * tiles + tile
   Buffer<cl_uint> tile_starts;   ///< [view * tile + 1] runs of pairs
+  Buffer<float> grad_cuts;       ///< [DPR_CUT_CHANNELS][view][vertex] where a lens distorts cuts
 
   std::size_t bytes() const;
 
