@@ -85,6 +85,10 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
   std::vector<std::string_view> names = bench::workload_names();
   std::ranges::copy(bench::sweep_names(), std::back_inserter(names));
   complete_with(*workload, names);
+  command.add_option("--preset", options.presets, "Measure the rows of this preset only, may be repeated")
+      ->check(CLI::IsMember(
+          std::vector<std::string>{"gaussian", "softras", "default", "pixel", "pixel-sharp", "sharp"}))
+      ->type_name("NAME");
   command.add_flag("--sweeps", options.sweeps, "Measure the sweeps too");
   command
       .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")

@@ -8,8 +8,8 @@ namespace {
 
 /// JSON paths of the columns within a row.
 std::vector<std::string> columns() {
-  std::vector<std::string> paths{"workload", "preset",    "composition", "estimator", "samples", "sigma",
-                                 "seed",     "triangles", "width",       "height",    "views"};
+  std::vector<std::string> paths{"workload", "preset", "composition", "estimator", "samples", "sigma",
+                                 "seed",     "moves",  "triangles",   "width",     "height",  "views"};
   for (const char* const timing : {"forward_ms", "backward_ms"}) {
     for (const char* const part : {"median", "q1", "q3", "min", "p95", "n"})
       paths.push_back(std::string(timing) + "/" + part);

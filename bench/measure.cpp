@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <new>
@@ -31,18 +32,57 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+/// Parameters that change from frame to frame.
+struct Pose {
+  std::vector<glm::vec3> positions, colors;  // of the first mesh; empty: unchanged
+  std::vector<View> views;
+};
+
+/// Poses that frames take in turn. Vertices move by up to two thousandths of the shape's size, each in a direction of its
+/// own, or the camera moves as far.
+std::vector<Pose> poses_of(const Workload& workload, Moves moves) {
+  constexpr unsigned k_poses = 4;
+  constexpr float k_way = 2e-3F, k_waves = 9;
+  const Mesh& mesh = workload.scene.meshes[0].mesh;
+  std::vector<Pose> poses(k_poses);
+  for (unsigned i = 0; i < k_poses; ++i) {
+    const auto phase = static_cast<float>(i);
+    Pose& pose = poses[i];
+    if (moves == Moves::camera) {
+      pose.views = workload.views;
+      for (View& view : pose.views) view.camera.view[3].x += k_way * std::sin(phase);
+      continue;
+    }
+    for (const glm::vec3& p : mesh.positions)
+      pose.positions.push_back(p + k_way * glm::sin(k_waves * glm::vec3(p.y, p.z, p.x) + phase));
+    for (const glm::vec3& color : mesh.vertex_colors)
+      pose.colors.push_back(color * (1 - k_way * (1 + std::sin(phase))));
+  }
+  return poses;
+}
+
 /// A renderer of a row, and the loss whose gradient goes backward.
 struct Row {
   Row(const Device& device, const Workload& workload, const Variant& variant)
-      : renderer(device), loss(device, LossWeights::only(LossKind::mse), targets(workload)) {
+      : renderer(device),
+        loss(device, LossWeights::only(LossKind::mse), targets(workload)),
+        poses(poses_of(workload, variant.moves)) {
     Scene scene = workload.scene;
     scene.smoothing = variant.smoothing;
     renderer.set_scene(scene);
     renderer.set_views(workload.views);
   }
 
-  /// Until the images are on the host.
+  void move() {
+    const Pose& pose = poses[next++ % poses.size()];
+    if (!pose.positions.empty()) renderer.set_positions(0, pose.positions);
+    if (!pose.colors.empty()) renderer.set_colors(0, pose.colors);
+    if (!pose.views.empty()) renderer.set_views(pose.views);
+  }
+
+  /// From new parameters until the images are on the host.
   void forward() {
+    move();
     renderer.forward();
     for (std::size_t view = 0; view < renderer.views().size(); ++view) renderer.image(view);
   }
@@ -60,6 +100,8 @@ struct Row {
 
   Renderer renderer;
   ImageLoss loss;
+  std::vector<Pose> poses;
+  std::size_t next = 0;
 };
 
 /// Stops repeating after a number of runs or a time.
@@ -106,12 +148,11 @@ Json to_json(const TransferCounts& before, const TransferCounts& after) {
           {"host_waits", after.host_waits - before.host_waits}};
 }
 
-/// Counts the transfers of a frame of a descent: the vertices have moved, and no image goes to the host.
-void count_transfers(Row& row, const Workload& workload, Json& result) {
+/// Counts the transfers of a frame of which no image goes to the host.
+void count_transfers(Row& row, Json& result) {
   const Device::Impl& device = impl_of(row.renderer.device());
   const TransferCounts before = device.transfers();
-  for (std::size_t m = 0; m < workload.scene.meshes.size(); ++m)
-    row.renderer.set_positions(m, workload.scene.meshes[m].mesh.positions);
+  row.move();
   row.renderer.forward();
   row.backward();
   result["transfers"] = to_json(before, device.transfers());
@@ -179,6 +220,7 @@ Json describe_row(const Workload& workload, const Variant& variant) {
           {"samples", exact ? 0 : s.samples},
           {"sigma", rounded(static_cast<double>(s.sigma))},
           {"seed", s.seed},
+          {"moves", variant.moves == Moves::shape ? "shape" : "camera"},
           {"triangles", workload.scene.meshes[0].mesh.faces.size()},
           {"width", workload.scene.width},
           {"height", workload.scene.height},
@@ -194,7 +236,7 @@ void measure_into(Json& result, const Device& device, const Peaks& peaks, const 
   row.forward();  // kernels are compiled, buffers grow
   row.backward();
   measure_passes(row, options, result);
-  count_transfers(row, workload, result);
+  count_transfers(row, result);
   const std::size_t device_bytes = device.peak_allocated_bytes(), resident_bytes = peak_resident_bytes();
   measure_stages(row, device, peaks, options, result);
   const RenderStatistics statistics = row.renderer.statistics();

@@ -113,6 +113,9 @@ void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
   for (const std::string& name : names) {
     for (const bench::Workload& workload : bench::make_workloads(name)) {
       for (const bench::Variant& variant : workload.variants) {
+        if (!options.presets.empty() &&
+            std::ranges::find(options.presets, variant.preset) == options.presets.end())
+          continue;
         Json row = bench::measure(device, peaks, workload, variant, options.each);
         keep_stages(row, options.stages);
         if (!common.quiet) print(row);
@@ -122,10 +125,14 @@ void run_bench(BenchMeasureOptions options, const CommonOptions& common) {
         file["results"].push_back(std::move(row));
       }
     }
+    if (file["results"].empty()) continue;
     file["load"]["after"] = bench::load();
     if (!options.output.empty()) write_json(options.output, file);
     if (!options.csv.empty()) write_whole_file(options.csv, bench::to_csv(file));
   }
+  if (file["results"].empty())
+    throw InvalidArgument("--preset (command line)", "\"" + options.presets.front() + "\"",
+                          "one that a chosen workload has");
 }
 
 }  // namespace dpr::cli

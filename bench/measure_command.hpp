@@ -12,6 +12,7 @@ namespace dpr::cli {
 struct BenchMeasureOptions {
   std::vector<std::string> workloads;  ///< by name; none: all that are no sweeps
   bool sweeps = false;                 ///< the sweeps too
+  std::vector<std::string> presets;    ///< of the rows to measure; none: all
   std::vector<std::string> stages;     ///< whose figures to keep and print; none: all are kept
   std::string devices;                 ///< "all": every device is ranked; empty: the one that is chosen
   std::string output, csv;             ///< files of results, empty: none

@@ -53,8 +53,11 @@ std::string row_name(const Json& row) {
   for (const char* const key : {"preset", "composition", "estimator"}) {
     text += " " + row[key].get<std::string>();
   }
-  const auto samples = row["samples"].get<unsigned>();
-  return samples == 0 ? text : text + " M=" + std::to_string(samples);
+  if (const auto samples = row["samples"].get<unsigned>(); samples > 0)
+    text += " M=" + std::to_string(samples);
+  // Files of 0.2 lack the key: their scenes do not move.
+  const std::string moves = row.value("moves", "nothing");
+  return moves == "shape" ? text : text + ", " + moves + " moves";
 }
 
 bool is_measured(const Json& row) { return row["status"] == "ok"; }

@@ -143,6 +143,7 @@ std::vector<View> make_views(const Definition& d, const Scene& scene) {
 }
 
 std::vector<Variant> make_variants(const Definition& d, const Smoothing& published) {
+  const float half_a_pixel = 1.0F / static_cast<float>(d.size);  // NDC, of which sigma is the square
   std::vector<Variant> list;
   for (const std::uint32_t samples : d.samples) {
     Smoothing smoothing = published;
@@ -172,9 +173,13 @@ std::vector<Variant> make_variants(const Definition& d, const Smoothing& publish
     Smoothing smoothing = smoothing_preset("pixel", d.size, d.size);
     smoothing.sigma = d.pixel_sigma;
     list.push_back({"pixel", smoothing});
+    if (d.own) {
+      list.push_back({"pixel", smoothing, Moves::camera});
+      smoothing.sigma = half_a_pixel * half_a_pixel;
+      list.push_back({"pixel-sharp", smoothing});
+    }
   }
   if (d.pixel_sigma > 0 && d.own && d.scenery == Scenery::plain) {
-    const float half_a_pixel = 1.0F / static_cast<float>(d.size);  // NDC, of which sigma is the square
     for (const Composition composition : {Composition::barrier, Composition::joint}) {
       Smoothing smoothing = smoothing_preset("gaussian");
       smoothing.sigma = half_a_pixel * half_a_pixel;

@@ -11,12 +11,17 @@
 
 namespace dpr::bench {
 
+/// What a step of a descent changes before it renders.
+enum class Moves { shape, camera };
+
 /// One way in which a workload is rendered.
 struct Variant {
-  /// "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel"; "sharp": noise
-  /// of the triangles that comes nearest to a z-buffer with antialiased silhouettes, a sigma of half a pixel.
+  /// "gaussian" and "softras": the priors; "default": what Smoothing{} says; "pixel", with a blur of four
+  /// pixels; "pixel-sharp" and "sharp": noise of the pixel and of the triangles of half a pixel, which comes
+  /// nearest to a z-buffer with antialiased silhouettes.
   std::string preset;
   Smoothing smoothing;
+  Moves moves = Moves::shape;  ///< shape: positions and vertex colours
 };
 
 /// A scene, its views, and every way in which it is measured: estimators, samples, priors, compositions.

@@ -108,6 +108,22 @@ TEST_SUITE("bench-smoke") {
     CHECK_FALSE(in_bands.contains("gflops"));
   }
 
+  TEST_CASE("bench: a preset chooses rows, in which the shape or the camera moves") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    const Outcome measured = bench(folder, {"--workload", "cube128", "--repetitions", "1", "--max-seconds",
+                                            "0", "--preset", "pixel", "-o", "r.json"});
+    CAPTURE(measured.err);
+    REQUIRE(measured.status == 0);
+    std::set<std::string> moves;
+    const dpr::bench::Json results = dpr::bench::read_results(folder / "r.json");
+    for (const auto& row : results["results"]) {
+      CHECK(row["preset"] == "pixel");
+      moves.insert(row["moves"].get<std::string>());
+    }
+    CHECK(moves == std::set<std::string>{"camera", "shape"});
+  }
+
   TEST_CASE("bench: the help lists every workload") {
     if (is_skipped()) return;
     const Outcome help = bench(TempDir(), {"--help"});
@@ -125,6 +141,8 @@ TEST_SUITE("bench-smoke") {
     folder.write("text.json", "no results");
     check_fails(folder, {"--workload", "sphere", "-o", "r.json"}, "sphere256");
     check_fails(folder, {"--workload", "cube128", "--stage", "nonsense"}, "rasterize");
+    check_fails(folder, {"--workload", "cube128", "--preset", "nonsense"}, "pixel-sharp");
+    check_fails(folder, {"--workload", "cube128", "--preset", "softras", "-o", "r.json"}, "softras");
     check_fails(folder, {"--workload", "cube128", "-o", "no_folder/r.json"}, "no_folder");
     check_fails(folder, {"--repetitions", "0"}, "--repetitions");
     check_fails(folder, {"--compare", "empty.json"}, "--compare");

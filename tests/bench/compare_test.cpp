@@ -22,9 +22,10 @@ Json timing(double q1, double median, double q3, unsigned n = 15) {
 }
 
 Json row(const std::string& workload, const Json& forward, const Json& backward) {
-  return {{"workload", workload},    {"preset", "gaussian"}, {"composition", "barrier"},
-          {"estimator", "exact"},    {"samples", 0},         {"forward_ms", forward},
-          {"backward_ms", backward}, {"status", "ok"},       {"reason", ""}};
+  return {{"workload", workload},  {"preset", "gaussian"},    {"composition", "barrier"},
+          {"estimator", "exact"},  {"moves", "shape"},        {"samples", 0},
+          {"forward_ms", forward}, {"backward_ms", backward}, {"status", "ok"},
+          {"reason", ""}};
 }
 
 Json results(const Json& rows) {
@@ -121,9 +122,11 @@ TEST_SUITE("bench-smoke") {
   TEST_CASE("rows of a sweep differ by what it varies") {
     Json few = row("sweep-views", timing(1, 1, 1), timing(1, 1, 1));
     few.update(Json{{"triangles", 1280}, {"width", 128}, {"height", 128}, {"views", 1}});
-    Json many = few;
+    Json many = few, still = few;
     many["views"] = 64;
+    still.erase("moves");
     CHECK(dpr::bench::row_name(few) != dpr::bench::row_name(many));
+    CHECK(dpr::bench::row_name(few) != dpr::bench::row_name(still));
     CHECK(compare(results(Json::array({few, many})), results(Json::array({many})))["rows"].size() == 1);
   }
 

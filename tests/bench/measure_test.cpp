@@ -56,11 +56,11 @@ TEST_SUITE("bench-smoke") {
       CHECK(row["backward_ms"]["median"].get<double>() > 0);
       CHECK(row["fragments"].get<std::size_t>() > 0);
       CHECK(row["peak_device_bytes"].get<std::size_t>() > 0);
-      // The vertices go there, their gradients come back, and no image.
+      // The vertices and their colours go there, gradients come back, and no image.
       const Json& transfers = row["transfers"];
       const std::size_t vertices = 16 * workload.scene.meshes[0].mesh.positions.size();
-      CHECK(transfers["bytes_to_device"].get<std::size_t>() >= vertices);
-      CHECK(transfers["bytes_to_device"].get<std::size_t>() < 2 * vertices);
+      CHECK(transfers["bytes_to_device"].get<std::size_t>() >= 2 * vertices);
+      CHECK(transfers["bytes_to_device"].get<std::size_t>() < 3 * vertices);
       CHECK(transfers["bytes_from_device"].get<std::size_t>() >= vertices);
       CHECK(transfers["host_waits"].get<std::size_t>() > 0);
       CHECK(row["peak_rss_bytes"].get<std::size_t>() > 0);
@@ -75,6 +75,20 @@ TEST_SUITE("bench-smoke") {
       }
     }
     CHECK(impl_of(device).profile == nullptr);
+  }
+
+  TEST_CASE("where the camera moves, no vertices go to the device") {
+    const Device device = open_device();
+    const bench::Workload workload = small("sphere256");
+    const auto moved = std::ranges::find(workload.variants, bench::Moves::camera, &bench::Variant::moves);
+    REQUIRE(moved != workload.variants.end());
+    const Json row =
+        bench::measure(device, {100, 10}, workload, *moved, {.repetitions = 2, .max_seconds = 5});
+    CAPTURE(row.dump());
+    CHECK(row["moves"] == "camera");
+    const auto sent = row["transfers"]["bytes_to_device"].get<std::size_t>();
+    CHECK(sent > 0);
+    CHECK(sent < 12 * workload.scene.meshes[0].mesh.positions.size());
   }
 
   TEST_CASE("a row that the library refuses is a row with a reason") {
