@@ -1,6 +1,6 @@
 // dpr-bench: the benchmark, as `dpr bench` runs it.
 #include "bench_command.hpp"
-#include "cli/application.hpp"
+#include "cli/commands.hpp"
 
 int main(int argc, char** argv) {
   dpr::cli::CommonOptions common;

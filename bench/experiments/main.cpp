@@ -2,7 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "cli/folder.hpp"
+#include "base/output_file.hpp"
 #include "cli/process.hpp"
 #include "dpr/error.hpp"
 #include "experiment.hpp"
@@ -23,7 +23,7 @@ void add_command(CLI::App& application, const dpr::experiments::Experiment& expe
   command->add_flag("--quiet", options.quiet, "Print errors only");
   command->add_option("--device", options.device, "cpu, gpu, an index or a part of the name");
   command->callback([&experiment, &options] {
-    dpr::cli::make_folder(options.folder);
+    dpr::make_folder(options.folder);
     experiment.run({dpr::open_device(options.device), options.folder, options.smoke, options.quiet});
   });
 }

@@ -6,7 +6,7 @@
 #include <set>
 #include <sstream>
 
-#include "cli/folder.hpp"
+#include "base/output_file.hpp"
 #include "cli/page.hpp"
 #include "cli/plot.hpp"
 #include "cli/text.hpp"
@@ -294,7 +294,7 @@ std::vector<std::string> write_report(const std::filesystem::path& folder, std::
   if (std::ranges::all_of(plots, [](const NamedPlot& plot) { return plot.plot.script.empty(); })) {
     throw InvalidArgument("results (report)", "no measured rows", "rows of the workloads, or of --sweeps");
   }
-  cli::make_folder(folder);
+  make_folder(folder);
   std::vector<std::string> written;
   for (const auto& [name, heading, plot] : plots) {
     if (plot.script.empty()) continue;

@@ -6,8 +6,9 @@
  * Threads may work at the same time on handles that nothing connects: each thread has a device, and what is
  * made from it, of its own.
  *
- * dpr/dpr_frame.h, views rendered from named arrays, dpr/dpr_batch.h, batches of scenes, and
- * dpr/dpr_on_device.h, buffers of the caller's, come with this header.
+ * dpr/dpr_attribute.h, what a pixel shows beside its colour, dpr/dpr_frame.h, views rendered from named
+ * arrays, dpr/dpr_batch.h, batches of scenes, and dpr/dpr_on_device.h, buffers of the caller's, come with this
+ * header.
  *
  * Arrays are copied. Matrices are row-major and act on column vectors; a colour is linear RGB, a pixel is
  * linear RGBA. Structs begin with their size: fill them by their DPR_..._INIT, so that a program which was
@@ -384,41 +385,11 @@ DPR_API dpr_status dpr_gradient_read(const dpr_gradient* gradient, const char* n
                                      size_t count);
 DPR_API void dpr_gradient_destroy(dpr_gradient* gradient);
 
-/* ---- What a pixel shows beside its colour ---- */
-
-/* Auxiliary outputs of the last forward pass by name: "depth", "normal" (3 floats), "face_id" (exact up to
- * 2^24, -1 for the background), "barycentrics" (3), "uv" (2), "effective_faces"; dpr/aov.hpp says what each
- * is. The floats of one, and its values, [view][height][width] and so on. Waits for the device. */
-DPR_API dpr_status dpr_renderer_aov_size(const dpr_renderer* renderer, const char* name, size_t* count);
-DPR_API dpr_status dpr_renderer_read_aov(dpr_renderer* renderer, const char* name, float* values,
-                                         size_t count);
-
-/* Images of "depth", "position", "normal" or "texcoords", with gradients; dpr/attribute_images.hpp has the
- * formulas. */
-DPR_API dpr_status dpr_attribute_create(const dpr_device* device, const char* name,
-                                        dpr_attribute** attribute);
-/* Images of the caller's values at the vertices, `channels` of them, set by dpr_attribute_set_values(). */
-DPR_API dpr_status dpr_attribute_create_values(const dpr_device* device, size_t channels,
-                                               dpr_attribute** attribute);
-/* [vertex][channel], the vertices of all meshes one after the other, instances' among them, which may have
- * numbers of their own. */
-DPR_API dpr_status dpr_attribute_set_values(dpr_attribute* attribute, const float* values, size_t count);
-/* Renders what the renderer's last forward pass shows. */
-DPR_API dpr_status dpr_attribute_forward(dpr_attribute* attribute, const dpr_renderer* renderer);
-/* The floats of the images, and these, [group][view][height][width][4]: three channels a group, and alpha.
- * Waits for the device. */
-DPR_API dpr_status dpr_attribute_image_size(const dpr_attribute* attribute, size_t* count);
-DPR_API dpr_status dpr_attribute_read_image(const dpr_attribute* attribute, float* pixels, size_t count);
-/* Gradients of sum <grad, image>: of what the renderer's scene asked for of its geometry, poses, cameras and
- * smoothing; "values", [vertex][channel], are the caller's numbers'. */
-DPR_API dpr_status dpr_attribute_backward_pixels(dpr_attribute* attribute, const float* grad, size_t count,
-                                                 dpr_gradient** gradient);
-DPR_API void dpr_attribute_destroy(dpr_attribute* attribute);
-
 #ifdef __cplusplus
 }
 #endif
 
+#include "dpr/dpr_attribute.h"
 #include "dpr/dpr_batch.h"
 #include "dpr/dpr_frame.h"
 #include "dpr/dpr_on_device.h"

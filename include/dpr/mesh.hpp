@@ -88,10 +88,4 @@ DPR_API Mesh make_icosphere(unsigned subdivisions, float radius = 1.0F);
 DPR_API Mesh make_torus(float major_radius, float minor_radius, unsigned major_segments,
                         unsigned minor_segments);
 
-/// A mailbox on a post with a flag, in [-1, 1]^3, coloured by part: the stand-in for the paper's Figure 11.
-DPR_API Mesh make_mailbox();
-
-/// A bag with a flap and a handle, in [-1, 1]^3, coloured by part: the stand-in for the paper's Figure 11.
-DPR_API Mesh make_bag();
-
 }  // namespace dpr

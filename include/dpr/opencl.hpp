@@ -2,7 +2,6 @@
 #pragma once
 
 #include <CL/opencl.hpp>
-#include <vector>
 
 #include "dpr/opencl_handles.hpp"
 
@@ -25,14 +24,6 @@ struct BufferAt {
   std::size_t offset = 0;  ///< bytes before the view's first vector
 };
 inline BufferAt buffer_of(const BufferView& view) { return {cl::Buffer(view.buffer, true), view.offset}; }
-
-/// Both live at least as long as the call that takes them. `done` lets go of what it held.
-inline Events events_of(const std::vector<cl::Event>& wait, cl::Event* done = nullptr) {
-  static_assert(sizeof(cl::Event) == sizeof(cl_event));
-  if (done != nullptr) *done = cl::Event();
-  return {{reinterpret_cast<const cl_event*>(wait.data()), wait.size()},
-          done != nullptr ? &(*done)() : nullptr};
-}
 
 /// Retained: outlives the renderer's own use of it.
 inline cl::Buffer image_buffer(const Renderer& renderer) { return cl::Buffer(image_handle(renderer), true); }

@@ -119,3 +119,13 @@ inline void require_pixels(const Image& image, const std::string& argument) {
 }
 
 }  // namespace dpr::checks
+
+namespace dpr {
+
+/// Throws InvalidArgument unless `ok`.
+template <typename Number>
+void require(bool ok, const char* argument, Number got, const char* expected) {
+  if (!ok) throw InvalidArgument(argument, checks::text(got), expected);
+}
+
+}  // namespace dpr

@@ -147,4 +147,12 @@ void write_whole_file(const std::filesystem::path& file, const std::function<voi
   write_whole_file(file, text.str());
 }
 
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw IoError(folder, "the folder cannot be made: " + (error ? error.message() : "a file has its name"));
+  }
+}
+
 }  // namespace dpr

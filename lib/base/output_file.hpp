@@ -50,4 +50,7 @@ void write_whole_file(const std::filesystem::path& file, std::string_view bytes)
 /// The same with what `write` puts into the stream (binary); what it throws passes through.
 void write_whole_file(const std::filesystem::path& file, const std::function<void(std::ostream&)>& write);
 
+/// Makes the folder where it is missing, those above it too. Throws IoError.
+void make_folder(const std::filesystem::path& folder);
+
 }  // namespace dpr

@@ -24,7 +24,7 @@ Attribute attribute_of(const NamedArray& output) { return parse_attribute(output
 
 /// One view that every valid smoothing goes with, and all lights.
 View neutral_view() {
-  constexpr float k_longest = 1e36F;  // of the lengths that renderer/finite.hpp lets pass, for any gamma
+  constexpr float k_longest = 1e36F;  // of the lengths that require_scales() lets pass, for any gamma
   View view{{}, {glm::mat4(1.0F)}};
   view.camera.znear = 1;
   view.camera.zfar = k_longest;

@@ -12,7 +12,7 @@
 #include "dpr/error.hpp"
 #include "image/texture_words.hpp"
 #include "renderer/depth_range.hpp"
-#include "scene/cull.hpp"
+#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
 
 namespace dpr::batch {

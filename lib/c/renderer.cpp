@@ -2,7 +2,7 @@
 #include "c/handles.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "renderer/renderer_impl.hpp"
-#include "scene/cull.hpp"
+#include "scene/scene_parts.hpp"
 
 using namespace dpr::c;
 

@@ -3,9 +3,8 @@
 
 #include "base/checks.hpp"
 #include "c/handles.hpp"
-#include "scene/cull.hpp"
 #include "scene/gradient_table.hpp"
-#include "scene/instance_check.hpp"
+#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 

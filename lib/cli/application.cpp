@@ -1,4 +1,4 @@
-#include "cli/application.hpp"
+#include "cli/commands.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -10,7 +10,7 @@
 #include "dpr/multi_device.hpp"
 #include "scene/scene_json.hpp"
 #include "smoothing/option_fields.hpp"
-#include "smoothing/presets.hpp"
+#include "smoothing/choice_names.hpp"
 
 namespace dpr::cli {
 namespace {

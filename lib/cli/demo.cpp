@@ -6,7 +6,7 @@
 #include "base/uniform_number.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
-#include "cli/folder.hpp"
+#include "base/output_file.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"
 #include "dpr/renderer.hpp"

@@ -1,4 +1,4 @@
-#include "cli/device_trial.hpp"
+#include "cli/commands.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -7,7 +7,6 @@
 
 #include "cli/commands.hpp"
 #include "cli/device_check.hpp"
-#include "cli/device_trial.hpp"
 #include "cli/json.hpp"
 #include "device/choose_device.hpp"
 #include "device/pocl_cache.hpp"

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "cli/difference.hpp"
-#include "cli/folder.hpp"
+#include "base/output_file.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/text.hpp"

@@ -1,6 +1,5 @@
 // The dpr command.
 
-#include "cli/application.hpp"
 #include "cli/commands.hpp"
 #include "dpr/version.hpp"
 

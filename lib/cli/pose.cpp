@@ -7,7 +7,6 @@
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "cli/commands.hpp"
-#include "cli/folder.hpp"
 #include "cli/option_names.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"

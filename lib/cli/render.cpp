@@ -16,7 +16,7 @@
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
-#include "scene/cull.hpp"
+#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
 #include "smoothing/option_fields.hpp"
 

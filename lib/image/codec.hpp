@@ -2,6 +2,7 @@
 // OpenImageIO brings some 260 libraries, which take longer to load than most images to render.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -36,5 +37,8 @@ struct ImageCodec {
 /// The function by which a module names its codec.
 inline constexpr const char* k_image_codec_symbol = "dpr_image_codec";
 using ImageCodecFunction = const ImageCodec*();
+
+/// As the public read_image(), with what the file says of its pixels.
+Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts);
 
 }  // namespace dpr

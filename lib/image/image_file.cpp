@@ -12,7 +12,7 @@
 #include "base/module.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
-#include "image/image_file.hpp"
+#include "image/codec.hpp"
 #include "image/srgb.hpp"
 
 namespace dpr {

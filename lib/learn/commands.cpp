@@ -10,7 +10,6 @@
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "cli/completion.hpp"
-#include "cli/folder.hpp"
 #include "cli/json.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"

@@ -135,8 +135,6 @@ std::size_t Dataset::place(std::size_t object) const {
   return static_cast<std::size_t>(std::ranges::upper_bound(first_, object) - first_.begin()) - 1;
 }
 
-std::size_t Dataset::class_of(std::size_t object) const { return classes_[place(object)]; }
-
 std::span<const std::uint8_t> Dataset::image(std::size_t object, std::size_t view) const {
   const std::size_t i = place(object), index = (object - first_[i]) * k_views + view;
   return std::span(images_[i].values).subspan(index * k_image_bytes, k_image_bytes);

@@ -64,7 +64,6 @@ class Dataset {
   std::span<const std::size_t> classes() const { return classes_; }
   /// The objects of classes()[i] are first_object(i) to first_object(i + 1) - 1.
   std::size_t first_object(std::size_t i) const { return first_[i]; }
-  std::size_t class_of(std::size_t object) const;
 
   /// RGBA planes [4][64][64].
   std::span<const std::uint8_t> image(std::size_t object, std::size_t view) const;

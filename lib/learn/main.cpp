@@ -1,5 +1,5 @@
 // dpr-learn: the commands that need libtorch, as `dpr learn` runs them.
-#include "cli/application.hpp"
+#include "cli/commands.hpp"
 #include "learn/commands.hpp"
 
 int main(int argc, char** argv) {

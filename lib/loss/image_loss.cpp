@@ -10,7 +10,6 @@
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
-#include "base/require.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/frame.hpp"
 #include "renderer/scene_batch_impl.hpp"

@@ -51,7 +51,6 @@ class ChunkDealer {
   /// To be called at the end, with the time that everything took.
   void finish_all(double seconds);
 
-  bool is_lost(std::size_t device) const { return lost_[device]; }
   bool is_done() const { return left_ == 0; }
 
  private:

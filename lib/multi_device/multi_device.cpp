@@ -7,10 +7,9 @@
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "loss/mesh_loss_impl.hpp"
-#include "multi_device/gradient_sum.hpp"
 #include "multi_device/multi_device_impl.hpp"
-#include "renderer/finite.hpp"
 #include "renderer/setter_checks.hpp"
+#include "scene/gradient_table.hpp"
 
 namespace dpr {
 

@@ -1,8 +1,6 @@
 /// Reference renderer: double precision, serial, brute force. The image of a scene and every gradient of the
-/// gradient file.
-///
-/// Per pixel: rasterize -> occupancy -> shade -> aggregate. Nothing is stored between forward and backward;
-/// the backward pass walks the pixels again.
+/// gradient file. Per pixel: rasterize -> occupancy -> shade -> aggregate. Nothing is stored between forward
+/// and backward; the backward pass walks the pixels again.
 #pragma once
 
 #include "aggregate.hpp"
@@ -139,15 +137,12 @@ inline bool is_perspective_correct(const Scene& scene) {
 
 /// A normal as a transform turns the plane that it is normal to, of length one.
 inline Vec3d transformed_normal(const Mat4d& m, const Vec3d& normal) {
-  const auto linear = [&](const Vec3d& v) {
-    return Vec3d{m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z, m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
-                 m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
-  };
-  const Vec3d other = std::fabs(normal.x) < 0.5 * std::sqrt(dot(normal, normal)) ? Vec3d{1.0, 0.0, 0.0}
-                                                                                 : Vec3d{0.0, 1.0, 0.0};
+  const Mat3d linear = linear_part(m);
+  const bool is_along_x = std::fabs(normal.x) >= 0.5 * length(normal);
+  const Vec3d other = is_along_x ? Vec3d{0.0, 1.0, 0.0} : Vec3d{1.0, 0.0, 0.0};
   const Vec3d u = cross(normal, other), v = cross(normal, u);
-  const Vec3d turned = cross(linear(u), linear(v));
-  return unit(dot(turned, linear(normal)) < 0.0 ? -turned : turned);
+  const Vec3d turned = cross(linear * u, linear * v);
+  return unit(dot(turned, linear * normal) < 0.0 ? -turned : turned);
 }
 
 /// Empty where no mesh has materials or normals of its own.

@@ -6,7 +6,6 @@
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
-#include "base/require.hpp"
 #include "dpr/attribute_images.hpp"
 #include "renderer/attribute_images_impl.hpp"
 #include "renderer/frame.hpp"

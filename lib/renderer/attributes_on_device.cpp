@@ -1,5 +1,5 @@
 // Images of attributes for programs that keep everything on the device: dpr/opencl_handles.hpp.
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "renderer/attribute_images_impl.hpp"
 #include "renderer/frame.hpp"

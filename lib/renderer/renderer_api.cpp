@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "base/checks.hpp"
-#include "renderer/finite.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 

@@ -5,7 +5,6 @@
 #include <functional>
 #include <memory>
 
-#include "renderer/finite.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/light_table.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/gradient_table.hpp"
 

@@ -7,7 +7,6 @@
 #include "base/checks.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "renderer/buffer_span.hpp"
-#include "renderer/finite.hpp"
 #include "renderer/scene_batch_impl.hpp"
 #include "renderer/setter_checks.hpp"
 

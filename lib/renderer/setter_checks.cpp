@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/checks.hpp"
-#include "renderer/finite.hpp"
 #include "shared_types.h"
 
 namespace dpr {
@@ -110,6 +109,27 @@ std::size_t most_views(const Scene& scene, const Raster& raster) {
   const std::size_t largest =
       std::max({samples * DPR_PIXEL_CHANNELS, vertices * DPR_LENS_CHANNELS, faces * 3});
   return 0xfffffffeU / largest;
+}
+
+void require_scales(const Camera& camera, const Smoothing& smoothing, bool lit) {
+  constexpr float k_largest = 1e36F, k_largest_length = 1e9F;
+  const float range = camera.zfar - camera.znear;
+  if (!(range <= k_largest && 1 / range <= k_largest)) {
+    throw InvalidArgument("zfar - znear (camera)", checks::text(range),
+                          "a length from 1e-36 to 1e36, whose inverse single precision holds");
+  }
+  if (!(1 / range / smoothing.gamma <= k_largest)) {
+    throw InvalidArgument(
+        "gamma (smoothing)", checks::text(smoothing.gamma),
+        "at least " + checks::text(1 / range / k_largest) +
+            " with these clipping planes: single precision holds 1 / (gamma (zfar - znear))");
+  }
+  if (lit && (camera.znear > k_largest_length || camera.zfar < 1 / k_largest_length)) {
+    throw InvalidArgument(
+        "znear to zfar (camera)",
+        checks::text(camera.znear) + " to " + checks::text(camera.zfar) + " with lights",
+        "lengths from 1e-9 to 1e9, whose powers single precision holds: another unit of length");
+  }
 }
 
 }  // namespace dpr

@@ -43,4 +43,8 @@ Raster raster_of(const Scene& scene);
 /// raster's samples, vertices and faces.
 std::size_t most_views(const Scene& scene, const Raster& raster = {});
 
+/// Throws InvalidArgument where the depth range, or gamma in it, or the lengths that lighting squares are
+/// beyond single precision.
+void require_scales(const Camera& camera, const Smoothing& smoothing, bool lit);
+
 }  // namespace dpr

@@ -1,6 +1,8 @@
 #include "scene/gradient_table.hpp"
 
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "base/checks.hpp"
@@ -200,6 +202,79 @@ std::string name_of(const GradientRow& row, GradientIndex index) {
     name.insert(list + 1, std::to_string(index.item));
   const bool is_of_one_view = row.of == GradientOf::view || row.of == GradientOf::mesh_in_view;
   return is_of_one_view ? checks::element("views", index.view) + "." + name : name;
+}
+
+namespace {
+
+/// Adds the gradients of chunks, which come in their order, in double precision.
+class GradientSum {
+ public:
+  void add_chunk(SceneGradient&& chunk) {
+    std::size_t next = 0;
+    for_each_array(chunk, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
+      if (is_per_view(row.of)) return;
+      if (next == sums_.size()) sums_.emplace_back();
+      add(sums_[next++], array);
+    });
+    std::ranges::move(chunk.views, std::back_inserter(views_));
+    last_ = std::move(chunk);
+  }
+
+  SceneGradient finish() {
+    std::size_t next = 0;
+    for_each_array(last_, [&](const GradientRow& row, GradientIndex, const GradientArray& array) {
+      if (is_per_view(row.of)) return;
+      auto value = sums_[next++].begin();
+      transform_numbers(array, [&](double) { return *value++; });
+    });
+    last_.views = std::move(views_);
+    return std::move(last_);
+  }
+
+ private:
+  static void add(std::vector<double>& sum, const GradientArray& array) {
+    std::size_t i = 0;
+    transform_numbers(array, [&](double value) {
+      if (i == sum.size()) sum.push_back(0.0);
+      sum[i++] += value;
+      return value;
+    });
+  }
+
+  std::vector<std::vector<double>> sums_;  // [array that is a sum over the views]
+  std::vector<ViewGradient> views_;
+  SceneGradient last_;
+};
+
+[[noreturn]] void refuse_gradient(const std::string& name, double value) {
+  throw InvalidArgument("gradient of " + name + " (backward)", checks::text(value),
+                        "a finite number; the scene's lengths or the smoothing are beyond single precision");
+}
+
+}  // namespace
+
+SceneGradient sum_of(std::vector<SceneGradient>&& parts) {
+  if (parts.size() == 1) return std::move(parts.front());
+  GradientSum sum;
+  for (SceneGradient& part : parts) sum.add_chunk(std::move(part));
+  return sum.finish();
+}
+
+void require_finite(SceneGradient& gradient) {
+  for_each_array(gradient, [](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    std::size_t count = 0;
+    transform_numbers(array, [&](double value) {
+      if (!std::isfinite(value)) {
+        const std::string name = name_of(row, index);
+        const std::size_t components = std::holds_alternative<std::vector<glm::vec3>*>(array)   ? 3
+                                       : std::holds_alternative<std::vector<glm::vec2>*>(array) ? 2
+                                                                                                : 0;
+        refuse_gradient(components > 0 ? checks::element(name, count / components) : name, value);
+      }
+      ++count;
+      return value;
+    });
+  });
 }
 
 }  // namespace dpr

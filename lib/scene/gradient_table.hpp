@@ -107,4 +107,11 @@ void transform_numbers(SceneGradient& gradient, F&& f) {
   });
 }
 
+/// Sums over views are added in the order of the chunks, in double precision; what is one view's comes one
+/// after the other. A single chunk's is that chunk's. At least one.
+SceneGradient sum_of(std::vector<SceneGradient>&& chunks);
+
+/// Throws InvalidArgument that names the first gradient that is not finite.
+void require_finite(SceneGradient& gradient);
+
 }  // namespace dpr

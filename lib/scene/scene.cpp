@@ -1,10 +1,12 @@
 // Validity of a scene.
 #include "dpr/scene.hpp"
 
+#include <array>
 #include <string>
 
 #include "base/checks.hpp"
-#include "scene/instance_check.hpp"
+#include "base/name_list.hpp"
+#include "scene/scene_parts.hpp"
 
 namespace dpr {
 namespace {
@@ -37,6 +39,11 @@ void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t
   if (fault.empty()) return;
   throw InvalidArgument(argument, std::to_string(source) + ", " + fault,
                         "the number of an earlier mesh, from 0 on, that is no instance");
+}
+
+Cull parse_cull(std::string_view word, std::string_view where) {
+  constexpr std::array<std::string_view, 3> k_names{"none", "back", "front"};  // in the order of Cull
+  return static_cast<Cull>(position_of(word, k_names, std::string(where)));
 }
 
 void validate(const Scene& scene) {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 
 namespace dpr {
 namespace {

@@ -27,4 +27,7 @@ std::vector<std::string_view> names_of_choices() {
   return names;
 }
 
+/// Throws InvalidArgument, which calls the argument `where`, for what is no preset's name.
+void require_preset(std::string_view name, std::string_view where);
+
 }  // namespace dpr

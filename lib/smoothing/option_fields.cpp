@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dpr/error.hpp"
-#include "smoothing/presets.hpp"
+#include "smoothing/choice_names.hpp"
 
 namespace dpr {
 namespace {

@@ -4,7 +4,6 @@
 
 #include "base/checks.hpp"
 #include "smoothing/choice_names.hpp"
-#include "smoothing/presets.hpp"
 #include "smoothing/priors.hpp"
 
 namespace dpr {

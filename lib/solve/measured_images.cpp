@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/checks.hpp"
-#include "image/image_file.hpp"
+#include "image/codec.hpp"
 
 namespace dpr {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 
 namespace dpr {
 namespace {

@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
 #include "scene/gradient_table.hpp"

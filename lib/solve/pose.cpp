@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_descent.hpp"

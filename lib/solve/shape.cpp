@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/multi_device.hpp"
 #include "loss/image_loss_impl.hpp"

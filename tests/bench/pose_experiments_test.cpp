@@ -11,6 +11,9 @@
 #include "experiments/pose/figures.hpp"
 #include "experiments/pose/problems.hpp"
 #include "experiments/pose/protocol.hpp"
+#include "mesh/bounding_box.hpp"
+#include "mesh/mesh_facts.hpp"
+#include "mesh/solid.hpp"
 #include "support/data.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
@@ -107,6 +110,19 @@ TEST_SUITE("unit") {
     }
     folder.write("broken.json", "{\"set\": {}}");
     CHECK_THROWS_AS(dpr::bench::read_pose_problems(folder / "broken.json", read_set), dpr::IoError);
+  }
+
+  TEST_CASE("mailbox and bag: parts that are closed and wound outwards, in the box of the cube") {
+    for (const char* const object : {"mailbox", "bag"}) {
+      const dpr::Mesh mesh = dpr::bench::make_object(object);
+      CHECK_NOTHROW(dpr::validate(mesh));
+      const auto edges = dpr::make_edges(mesh.faces, mesh.positions.size());
+      CHECK(dpr::Solid(edges, mesh.faces.size()).winding(mesh.positions, mesh.faces) == 1);
+      CHECK(dpr::mesh_facts(mesh).components == 8);
+      const auto [low, high] = dpr::bounding_box(mesh.positions);
+      CHECK(glm::all(glm::greaterThanEqual(low, glm::vec3(-1))));
+      CHECK(glm::all(glm::lessThanEqual(high, glm::vec3(1))));
+    }
   }
 
   TEST_CASE("solved parts: counted strictly below the threshold") {

@@ -110,8 +110,6 @@ TEST_SUITE("pipeline") {
     const Dataset train(folder.path(), Split::train, classes), test(folder.path(), Split::test, classes);
     CHECK(train.size() == 4);
     CHECK(test.size() == 2);
-    CHECK(train.class_of(1) == find_class("chair"));
-    CHECK(train.class_of(2) == find_class("lamp"));
     for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder.path())) {
       const std::string name = entry.path().filename().string();
       CHECK_MESSAGE(folder.read(name) == again.read(name), name);

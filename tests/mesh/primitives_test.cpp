@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "dpr/mesh.hpp"
-#include "mesh/bounding_box.hpp"
 #include "support/messages.hpp"
 
 using namespace dpr;
@@ -88,13 +87,6 @@ void check_parts(const Mesh& mesh, std::size_t count, int characteristic) {
   }
 }
 
-void check_fits_unit_box(const Mesh& mesh) {
-  const auto [low, high] = bounding_box(mesh.positions);
-  CHECK(glm::all(glm::greaterThanEqual(low, glm::vec3(-1))));
-  CHECK(glm::all(glm::lessThanEqual(high, glm::vec3(1))));
-  CHECK(high.y - low.y == doctest::Approx(2));
-}
-
 std::size_t color_count(const Mesh& mesh) {
   std::set<std::tuple<float, float, float>> colors;
   for (const glm::vec3& c : mesh.face_colors) colors.emplace(c.r, c.g, c.b);
@@ -147,16 +139,6 @@ TEST_SUITE("unit") {
     check_parts(torus, 1, 0);
     CHECK(parts_of(torus)[0].volume == doctest::Approx(1.2337).epsilon(0.02));  // 2 pi^2 R r^2
     for (const glm::vec3& p : torus.positions) CHECK(std::abs(p.y) <= 0.25F);   // about the y axis
-  }
-
-  TEST_CASE("mailbox and bag") {
-    const Mesh mailbox = make_mailbox(), bag = make_bag();
-    check_parts(mailbox, 8, 2);
-    check_parts(bag, 8, 2);
-    CHECK(color_count(mailbox) == 5);
-    CHECK(color_count(bag) == 5);
-    check_fits_unit_box(mailbox);
-    check_fits_unit_box(bag);
   }
 }
 

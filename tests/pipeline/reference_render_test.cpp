@@ -135,8 +135,6 @@ TEST_SUITE("pipeline") {
     if (reduced(1, 0) == 1) {
       scenes.emplace_back("icosphere", scene_of(make_icosphere(2, 1.4F), size, size));
       scenes.emplace_back("torus", scene_of(make_torus(1.1F, 0.45F, 17, 9), size, size));
-      scenes.emplace_back("mailbox", scene_of(make_mailbox(), size, size));
-      scenes.emplace_back("bag", scene_of(make_bag(), size, size));
       scenes.emplace_back("soup", scene_of(random_soup(60, 3), size, size));
       Scene two = scene_of(make_cube(), size, size);
       two.meshes[0].transform = placed(50.0F, 0.8F, {-0.4F, 0.2F, 0.1F});

@@ -4,7 +4,7 @@
 #include <exception>
 #include <filesystem>
 
-#include "cli/folder.hpp"
+#include "base/output_file.hpp"
 #include "cli/plot.hpp"
 #include "cli/process.hpp"
 #include "cli/text.hpp"
@@ -82,7 +82,7 @@ std::vector<PoseRun> runs_of(const Options& options) {
 }
 
 void run(const Options& options) {
-  cli::make_folder(options.folder);
+  make_folder(options.folder);
   const Device device = open_device(options.device);
   std::vector<cli::Curve> curves;
   for (const PoseRun& wanted : runs_of(options)) {
@@ -94,7 +94,7 @@ void run(const Options& options) {
 }
 
 void run_figure(const Options& options, const Figure& figure) {
-  cli::make_folder(options.folder);
+  make_folder(options.folder);
   make_figure(open_device(options.device), figure, common_of(options), count_of(options), options.folder);
 }
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "dpr/pose.hpp"
 #include "experiments/pose/score_estimator.hpp"

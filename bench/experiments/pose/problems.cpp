@@ -2,7 +2,6 @@
 #include "experiments/pose/problems.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <glm/gtc/constants.hpp>
@@ -12,7 +11,6 @@
 #include "base/uniform_number.hpp"
 #include "cli/json.hpp"
 #include "dpr/error.hpp"
-#include "mesh/bounding_box.hpp"
 
 namespace dpr::bench {
 namespace {
@@ -46,46 +44,6 @@ class Random {
  private:
   std::mt19937_64 generator_;
 };
-
-/// Colours a mesh without colours by position.
-void color_by_position(Mesh& mesh) {
-  for (const glm::vec3& p : mesh.positions)
-    mesh.vertex_colors.push_back(glm::clamp(0.5F + 0.4F * p, 0.0F, 1.0F));
-}
-
-/// Moves the bounding box's centre to the origin and makes the rim as far away as the cube's corners.
-void fit_to_cube(Mesh& mesh) {
-  const glm::vec3 middle = center(bounding_box(mesh.positions));
-  float radius = 0;
-  for (glm::vec3& p : mesh.positions) p -= middle, radius = std::max(radius, glm::length(p));
-  for (glm::vec3& p : mesh.positions) p *= glm::root_three<float>() / radius;
-}
-
-/// The published program's: eight shared vertices, whose normals are means of the sides', and a pure colour
-/// a side.
-Mesh make_published_cube() {
-  constexpr std::array<glm::vec3, 6> k_colors{
-      {{1, 0, 0}, {1, 1, 0}, {0, 0, 1}, {0, 1, 0}, {0, 1, 1}, {1, 0, 1}}};
-  Mesh mesh;
-  mesh.positions = {{-1, -1, 1}, {1, -1, 1}, {-1, 1, 1},   {1, 1, 1},
-                    {-1, 1, -1}, {1, 1, -1}, {-1, -1, -1}, {1, -1, -1}};
-  // In the order +z, +y, -z, -y, +x, -x.
-  mesh.faces = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}, {4, 3, 5}, {4, 5, 6}, {6, 5, 7},
-                {6, 7, 0}, {0, 7, 1}, {1, 7, 3}, {3, 7, 5}, {6, 0, 4}, {4, 0, 2}};
-  for (std::size_t i = 0; i < mesh.faces.size(); ++i) mesh.face_colors.push_back(k_colors[i / 2]);
-  return mesh;
-}
-
-Mesh make_object(const std::string& object) {
-  if (object == "cube") return make_cube();
-  if (object == "published_cube") return make_published_cube();
-  if (object == "mailbox") return make_mailbox();
-  if (object == "bag") return make_bag();
-  Mesh mesh = read_mesh(object);
-  fit_to_cube(mesh);
-  if (mesh.vertex_colors.empty() && mesh.face_colors.empty()) color_by_position(mesh);
-  return mesh;
-}
 
 /// Discs of random colours all over the image.
 void paint_clutter(Image& image, Random& random) {

@@ -33,9 +33,12 @@ struct PoseProblem {
 /// everywhere.
 std::vector<PoseProblem> make_pose_problems(const PoseProblemSet& set, std::size_t count);
 
-/// The scene of the paper's pose experiments (128x128, camera at distance 6.7, elevation 30, azimuth 120,
-/// field of view 60, point light at (0, 2, -2), black background) with an object as large as the cube. A mesh
+/// cube, published_cube, mailbox, bag, or a mesh file moved and scaled to reach as far as the cube. A mesh
 /// without colours is coloured by position. Throws IoError where a mesh file cannot be read.
+Mesh make_object(const std::string& object);
+
+/// The scene of the paper's pose experiments (128x128, camera at distance 6.7, elevation 30, azimuth 120,
+/// field of view 60, point light at (0, 2, -2), black background) with an object.
 Scene pose_scene(const std::string& object);
 inline constexpr double k_pose_camera_distance = 6.7;
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "base/require.hpp"
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "smoothing/choice_names.hpp"
 #include "smoothing/priors.hpp"

@@ -1,9 +1,10 @@
-// Check of the meshes that stand in a second place.
+// Parts of a scene that files, commands and the C interface read alike.
 #pragma once
 
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "dpr/scene.hpp"
 
@@ -13,5 +14,8 @@ namespace dpr {
 /// `source`; says what is wrong with it.
 void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t source,
                     const std::string& argument);
+
+/// Throws InvalidArgument that says `where` for another word than none, back or front.
+Cull parse_cull(std::string_view word, std::string_view where);
 
 }  // namespace dpr
