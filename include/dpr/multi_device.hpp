@@ -40,7 +40,7 @@ DPR_API std::vector<Device> open_devices(const std::string& selectors);
 /// device that neither answers nor fails is waited for.
 ///
 /// One thread a device, for the time of a call. Not thread-safe.
-class DPR_API MultiDeviceRenderer {
+class DPR_API MultiDeviceRenderer : public ArraySetters<MultiDeviceRenderer> {
  public:
   /// Throws InvalidArgument if there is no device, or the same Device twice: each needs a queue of its own.
   explicit MultiDeviceRenderer(std::vector<Device> devices);
@@ -52,12 +52,7 @@ class DPR_API MultiDeviceRenderer {
   void set_scene(const Scene& scene);
   void set_views(std::span<const View> views);
   void set_smoothing(const Smoothing& smoothing);
-  void set_positions(std::size_t mesh, std::span<const vec3> positions);
-  void set_colors(std::size_t mesh, std::span<const vec3> colors);
-  void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
-  void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
-  void set_normals(std::size_t mesh, std::span<const vec3> normals);
-  void set_materials(std::size_t mesh, std::span<const Material> materials);
+  void set_array(const ArrayRef& array, const ArrayValues& values);
   void set_lights(const std::optional<Lights>& lights);
 
   /// Views that a device renders together; 0, as at the beginning: a twelfth of them. Small chunks keep

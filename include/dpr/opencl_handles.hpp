@@ -62,26 +62,41 @@ struct Events {
 // closed mesh: until Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
 // Faces with vertices of their own are one surface where these coincide, found anew on the device.
 
+/// Renderer::set_array().
+DPR_API void set_array(Renderer& renderer, const ArrayRef& array, const BufferSpan& values,
+                       const Events& events = {});
 /// Positions of a mesh of the scene: [vertex] of three floats, object space.
-DPR_API void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
-                           const Events& events = {});
+inline void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions,
+                          const Events& events = {}) {
+  set_array(renderer, {ArrayId::positions, mesh}, positions, events);
+}
 /// [vertex] or [face], as the mesh has them, of three floats.
-DPR_API void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors,
-                        const Events& events = {});
+inline void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors,
+                       const Events& events = {}) {
+  set_array(renderer, {ArrayId::colors, mesh}, colors, events);
+}
 /// [height * width] of three floats, linear RGB.
-DPR_API void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
-                        const Events& events = {});
+inline void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
+                       const Events& events = {}) {
+  set_array(renderer, {ArrayId::texels, mesh, texture}, texels, events);
+}
 /// [texcoord] of two floats. Noise on the pixel goes on with the seams of the last coordinates that the host
 /// has given.
-DPR_API void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords,
-                           const Events& events = {});
+inline void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords,
+                          const Events& events = {}) {
+  set_array(renderer, {ArrayId::texcoords, mesh}, texcoords, events);
+}
 /// [normal] of three floats, object space, of any length. Noise on the pixel goes on with the edges at which
 /// the last normals that the host has given jump.
-DPR_API void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals,
-                         const Events& events = {});
+inline void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals,
+                        const Events& events = {}) {
+  set_array(renderer, {ArrayId::normals, mesh}, normals, events);
+}
 /// [material] of four floats: RGB of the specular coefficient, and the shininess; one below 1 is the lights'.
-DPR_API void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials,
-                           const Events& events = {});
+inline void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials,
+                          const Events& events = {}) {
+  set_array(renderer, {ArrayId::materials, mesh}, materials, events);
+}
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,

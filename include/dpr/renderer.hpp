@@ -3,10 +3,12 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <memory>
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "dpr/device.hpp"
@@ -94,6 +96,52 @@ struct RenderStatistics {
   std::size_t device_bytes = 0;  ///< held by this renderer
 };
 
+/// Arrays of meshes that setters replace and backward passes differentiate.
+enum class ArrayId { positions, colors, texels, texcoords, normals, materials };
+
+/// An array of a mesh of the scene, or the texels of one of its textures.
+struct ArrayRef {
+  ArrayId id;
+  std::size_t mesh = 0, texture = 0;
+
+  auto operator<=>(const ArrayRef&) const = default;
+};
+
+using ArrayValues = std::variant<std::span<const vec3>, std::span<const vec2>, std::span<const Material>>;
+
+/// Setters of the arrays of meshes, of a renderer on one device or several: its set_array() by name.
+template <class Owner>
+class ArraySetters {
+ public:
+  /// Object space, for a mesh and all its instances: [vertex].
+  void set_positions(std::size_t mesh, std::span<const vec3> positions) {
+    set({ArrayId::positions, mesh}, positions);
+  }
+  /// [vertex] or [face], as the mesh has them.
+  void set_colors(std::size_t mesh, std::span<const vec3> colors) { set({ArrayId::colors, mesh}, colors); }
+  /// Linear RGB, for a texture of a mesh: [height * width].
+  void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels) {
+    set({ArrayId::texels, mesh, texture}, texels);
+  }
+  /// For a mesh that has textures: [texcoord].
+  void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords) {
+    set({ArrayId::texcoords, mesh}, texcoords);
+  }
+  /// Object space, of any length, for a mesh that gives some: [normal].
+  void set_normals(std::size_t mesh, std::span<const vec3> normals) {
+    set({ArrayId::normals, mesh}, normals);
+  }
+  /// For a mesh that has some: [material].
+  void set_materials(std::size_t mesh, std::span<const Material> materials) {
+    set({ArrayId::materials, mesh}, materials);
+  }
+
+ private:
+  void set(const ArrayRef& array, const ArrayValues& values) {
+    static_cast<Owner&>(*this).set_array(array, values);
+  }
+};
+
 class ImageLoss;
 class MeshLoss;
 
@@ -101,7 +149,7 @@ class MeshLoss;
 /// Every setter but set_gradients() ends the last frame: what reads it (image(), read_pixels(), a loss,
 /// backward(), backward_pixels(), statistics(), auxiliary outputs) throws InvalidArgument until the next
 /// forward(), as it does before the first.
-class DPR_API Renderer {
+class DPR_API Renderer : public ArraySetters<Renderer> {
  public:
   explicit Renderer(Device device);
   ~Renderer();
@@ -115,21 +163,10 @@ class DPR_API Renderer {
   /// larger batch then.
   void set_views(std::span<const View> views, std::size_t first_view = 0);
   void set_smoothing(const Smoothing& smoothing);
-  /// New positions, object space, for a mesh of the scene and all its instances: [vertex], as many as it has.
-  /// This and what follows throw InvalidArgument for an entry of Scene::meshes that is an instance of
-  /// another.
-  void set_positions(std::size_t mesh, std::span<const vec3> positions);
-  /// New colours for a mesh of the scene: [vertex] or [face], as many as it has.
-  void set_colors(std::size_t mesh, std::span<const vec3> colors);
-  /// New texels, linear RGB, for a texture of a mesh of the scene: [height * width].
-  void set_texels(std::size_t mesh, std::size_t texture, std::span<const vec3> texels);
-  /// New texture coordinates for a mesh of the scene that has textures: [texcoord], as many as it has.
-  void set_texcoords(std::size_t mesh, std::span<const vec2> texcoords);
-  /// New normals, object space, of any length, for a mesh of the scene that gives some: [normal], as many as
-  /// it has.
-  void set_normals(std::size_t mesh, std::span<const vec3> normals);
-  /// New materials for a mesh of the scene that has some: [material], as many as it has.
-  void set_materials(std::size_t mesh, std::span<const Material> materials);
+  /// Replaces an array of a mesh: as many elements as it has, of its type. ArraySetters has a function for
+  /// each array. Throws InvalidArgument for an entry of Scene::meshes that is an instance of another, and for
+  /// a mesh that has no such array.
+  void set_array(const ArrayRef& array, const ArrayValues& values);
 
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after

@@ -1,6 +1,5 @@
 // Buffers that stay on the device, in the C interface.
 #include "c/buffers.hpp"
-#include "renderer/mesh_arrays.hpp"
 
 using namespace dpr::c;
 
@@ -36,46 +35,7 @@ void fill_history(std::size_t* emptied, dpr_frame_room* largest, const FrameHist
                        "largest");
 }
 
-namespace {
-
-dpr_status set_from(dpr_renderer* renderer, const ArrayRef& at, const dpr_buffer* values,
-                    const dpr_events* events) {
-  return guarded(
-      [&] { set_array(renderer_of(renderer), at, to_span(values, row_of(at.id).name), to_events(events)); });
-}
-
-}  // namespace
 }  // namespace dpr::c
-
-dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
-                                           const dpr_buffer* positions, const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::positions, mesh}, positions, events);
-}
-
-dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* colors,
-                                        const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::colors, mesh}, colors, events);
-}
-
-dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
-                                        const dpr_buffer* texels, const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::texels, mesh, texture}, texels, events);
-}
-
-dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, std::size_t mesh,
-                                           const dpr_buffer* texcoords, const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::texcoords, mesh}, texcoords, events);
-}
-
-dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* normals,
-                                         const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::normals, mesh}, normals, events);
-}
-
-dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t mesh,
-                                           const dpr_buffer* materials, const dpr_events* events) {
-  return set_from(renderer, {dpr::ArrayId::materials, mesh}, materials, events);
-}
 
 dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
                                         const dpr_buffer* colors, const dpr_events* events) {

@@ -1,6 +1,5 @@
 // Renderers of the C interface.
-#include "c/handles.hpp"
-#include "dpr/opencl_handles.hpp"
+#include "c/buffers.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/scene_parts.hpp"
 
@@ -40,10 +39,17 @@ dpr_status set_floats(dpr_renderer* renderer, const ArrayRef& at, const float* v
     const MeshArray& row = row_of(at.id);
     const std::span<const float> floats = numbers(values, count, row.components, row.name);
     if (row.components == 2) {
-      set_array(r, at, to_pairs(floats));
+      r.set_array(at, to_pairs(floats));
     } else {
-      set_array(r, at, to_vectors(floats));
+      r.set_array(at, to_vectors(floats));
     }
+  });
+}
+
+dpr_status set_from(dpr_renderer* renderer, const ArrayRef& at, const dpr_buffer* values,
+                    const dpr_events* events) {
+  return guarded([&] {
+    dpr::set_array(renderer_of(renderer), at, to_span(values, row_of(at.id).name), to_events(events));
   });
 }
 
@@ -106,6 +112,36 @@ dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, std::size_t mesh, 
     dpr::Renderer& r = renderer_of(renderer);
     r.set_materials(mesh, to_materials(materials, count, "materials"));
   });
+}
+
+dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* positions, const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::positions, mesh}, positions, events);
+}
+
+dpr_status dpr_renderer_set_colors_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* colors,
+                                        const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::colors, mesh}, colors, events);
+}
+
+dpr_status dpr_renderer_set_texels_from(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
+                                        const dpr_buffer* texels, const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::texels, mesh, texture}, texels, events);
+}
+
+dpr_status dpr_renderer_set_texcoords_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* texcoords, const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::texcoords, mesh}, texcoords, events);
+}
+
+dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mesh, const dpr_buffer* normals,
+                                         const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::normals, mesh}, normals, events);
+}
+
+dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* materials, const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::materials, mesh}, materials, events);
 }
 
 dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions, std::size_t position_count,

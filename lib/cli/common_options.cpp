@@ -9,8 +9,8 @@
 #include "dpr/error.hpp"
 #include "dpr/multi_device.hpp"
 #include "scene/scene_json.hpp"
-#include "smoothing/option_fields.hpp"
 #include "smoothing/choice_names.hpp"
+#include "smoothing/option_fields.hpp"
 
 namespace dpr::cli {
 namespace {

@@ -3,10 +3,10 @@
 #include <memory>
 #include <random>
 
+#include "base/output_file.hpp"
 #include "base/uniform_number.hpp"
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
-#include "base/output_file.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"
 #include "dpr/renderer.hpp"

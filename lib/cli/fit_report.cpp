@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "cli/difference.hpp"
 #include "base/output_file.hpp"
+#include "cli/difference.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/text.hpp"

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <memory>
 
-#include "cli/difference.hpp"
 #include "base/output_file.hpp"
+#include "cli/difference.hpp"
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"

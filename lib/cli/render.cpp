@@ -16,8 +16,8 @@
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
-#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
+#include "scene/scene_parts.hpp"
 #include "smoothing/option_fields.hpp"
 
 namespace dpr::cli {

@@ -56,29 +56,13 @@ void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
   ++impl_->now.smoothing;
 }
 
-void MultiDeviceRenderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  impl_->set({ArrayId::positions, mesh}, positions);
-}
-
-void MultiDeviceRenderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  impl_->set({ArrayId::colors, mesh}, colors);
-}
-
-void MultiDeviceRenderer::set_texels(std::size_t mesh, std::size_t texture,
-                                     std::span<const glm::vec3> texels) {
-  impl_->set({ArrayId::texels, mesh, texture}, texels);
-}
-
-void MultiDeviceRenderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  impl_->set({ArrayId::texcoords, mesh}, texcoords);
-}
-
-void MultiDeviceRenderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  impl_->set({ArrayId::normals, mesh}, normals);
-}
-
-void MultiDeviceRenderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
-  impl_->set({ArrayId::materials, mesh}, materials);
+void MultiDeviceRenderer::set_array(const ArrayRef& array, const ArrayValues& values) {
+  Impl& m = *impl_;
+  m.require_views(("MultiDeviceRenderer::" + setter_of(array)).c_str());
+  const HostArray held = require_array(m.scene, array, values);
+  std::uint64_t& version = m.now.arrays[array];
+  assign(held, values);
+  ++version;
 }
 
 void MultiDeviceRenderer::set_lights(const std::optional<Lights>& lights) {

@@ -86,16 +86,6 @@ void MultiDeviceRenderer::Impl::catch_up(Worker& worker, std::span<const View> i
   }
 }
 
-void MultiDeviceRenderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {
-  const char* const name = row_of(at.id).name;
-  require_views((std::string("MultiDeviceRenderer::set_") + name).c_str());
-  const HostArray array = require_array(scene, at);
-  check_values(name, values, count_of(array));
-  std::uint64_t& version = now.arrays[at];
-  assign(array, values);
-  ++version;
-}
-
 void MultiDeviceRenderer::Impl::require_views(const char* caller) const {
   if (views.empty()) throw InvalidArgument(caller, "no scene", "set_scene() first");
 }

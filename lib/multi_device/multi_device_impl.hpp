@@ -73,9 +73,6 @@ struct MultiDeviceRenderer::Impl {
   /// Brings a device's renderer up to what has been set, with those views, the first of that number.
   void catch_up(Worker& worker, std::span<const View> its_views, std::size_t first_view);
 
-  /// Common part of the arrays' setters.
-  void set(const ArrayRef& at, const ArrayValues& values);
-
   void require_views(const char* caller) const;
 
   /// Chunks of `count` views, the same for every list of devices. No chunk exceeds a frame's limit of views.

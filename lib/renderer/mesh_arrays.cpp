@@ -137,8 +137,6 @@ constexpr MeshArray k_materials{.name = "materials",
 /// In the order of ArrayId.
 constexpr std::array k_arrays{k_positions, k_colors, k_texels, k_texcoords, k_normals, k_materials};
 
-std::string setter_of(const ArrayRef& at) { return std::string("set_") + row_of(at.id).name; }
-
 [[noreturn]] void refuse_mesh(const ArrayRef& at) {
   throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row_of(at.id).what,
                         "one that has some");
@@ -146,7 +144,13 @@ std::string setter_of(const ArrayRef& at) { return std::string("set_") + row_of(
 
 }  // namespace
 
-const MeshArray& row_of(ArrayId id) { return k_arrays[static_cast<std::size_t>(id)]; }
+const MeshArray& row_of(ArrayId id) {
+  const auto row = static_cast<std::size_t>(id);
+  if (row >= k_arrays.size()) throw InvalidArgument("array (set_array)", std::to_string(row), "an ArrayId");
+  return k_arrays[row];
+}
+
+std::string setter_of(const ArrayRef& at) { return std::string("set_") + row_of(at.id).name; }
 
 ArrayId id_of(bool GradientRequest::*wanted) {
   return static_cast<ArrayId>(std::ranges::find(k_arrays, wanted, &MeshArray::wanted) - k_arrays.begin());
@@ -167,6 +171,15 @@ HostArray require_array(Scene& scene, const ArrayRef& at) {
                           "below " + std::to_string(mesh.textures.size()));
   if (!row.may_be_empty && !row.exists(mesh)) refuse_mesh(at);
   return row.host(mesh, at.texture);
+}
+
+HostArray require_array(Scene& scene, const ArrayRef& at, const ArrayValues& values) {
+  const HostArray array = require_array(scene, at);
+  const MeshArray& row = row_of(at.id);
+  if (array.index() != values.index())
+    throw InvalidArgument(row.name, "elements of another type", "the type that Mesh holds");
+  check_values(row.name, values, count_of(array));
+  return array;
 }
 
 std::size_t count_of(const HostArray& array) {
@@ -202,11 +215,10 @@ void check_values(const char* name, const ArrayValues& values, std::size_t expec
   std::visit(check, values);
 }
 
-void set_array(Renderer& renderer, const ArrayRef& at, const ArrayValues& values) {
-  Impl& m = impl_of(renderer);
-  m.require_scene(("Renderer::" + setter_of(at)).c_str());
-  check_values(row_of(at.id).name, values, count_of(require_array(m.scene, at)));
-  m.set(at, values);
+void Renderer::set_array(const ArrayRef& array, const ArrayValues& values) {
+  impl_->require_scene(("Renderer::" + setter_of(array)).c_str());
+  require_array(impl_->scene, array, values);
+  impl_->set(array, values);
 }
 
 void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events) {

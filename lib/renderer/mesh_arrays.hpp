@@ -3,10 +3,10 @@
 // the device walk this table.
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <span>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -19,22 +19,10 @@ namespace dpr {
 
 struct Geometry;
 
-enum class ArrayId { positions, colors, texels, texcoords, normals, materials };
-
-/// An array of a scene: a mesh's, or the texels of one of its textures.
-struct ArrayRef {
-  ArrayId id;
-  std::size_t mesh = 0, texture = 0;
-
-  auto operator<=>(const ArrayRef&) const = default;
-};
-
 inline glm::vec3 to_vec3(const glm::vec3& vector) { return vector; }
 inline glm::vec3 to_vec3(const glm::vec2& pair) { return {pair, 0}; }
 
-/// Elements on the host, and where a scene holds them.
-using ArrayValues =
-    std::variant<std::span<const glm::vec3>, std::span<const glm::vec2>, std::span<const Material>>;
+/// Place of an array's elements on the host.
 using HostArray = std::variant<std::vector<glm::vec3>*, std::vector<glm::vec2>*, std::vector<Material>*>;
 
 struct MeshArray {
@@ -54,16 +42,20 @@ struct MeshArray {
   void (*changed)(Renderer::Impl& renderer, std::size_t mesh, bool on_host) = [](auto&, auto, bool) {};
   bool (*exists)(const Mesh& mesh) = [](const Mesh&) { return true; };
   bool may_be_empty = false;  ///< a mesh without the array takes an empty list from the host
-  const char* what = "";  ///< that a mesh without the array lacks
+  const char* what = "";      ///< that a mesh without the array lacks
 };
 
 const MeshArray& row_of(ArrayId id);
+/// "set_positions"
+std::string setter_of(const ArrayRef& at);
 /// The array whose gradient the member asks for.
 ArrayId id_of(bool GradientRequest::*wanted);
 
 /// The scene's array. Throws InvalidArgument for a mesh or texture that is not there, an instance of another
 /// mesh, and a mesh that lacks an array which may not be empty.
 HostArray require_array(Scene& scene, const ArrayRef& at);
+/// The same, which the values can replace: throws InvalidArgument for those of another type, too.
+HostArray require_array(Scene& scene, const ArrayRef& at, const ArrayValues& values);
 std::size_t count_of(const HostArray& array);
 ArrayValues values_of(const HostArray& array);
 /// Copies as many elements as the array has.
@@ -71,9 +63,5 @@ void assign(const HostArray& array, const ArrayValues& values);
 
 /// Throws InvalidArgument unless there are as many values as expected, all valid; `name` says of what.
 void check_values(const char* name, const ArrayValues& values, std::size_t expected);
-
-/// The setters of dpr/renderer.hpp and dpr/opencl_handles.hpp.
-void set_array(Renderer& renderer, const ArrayRef& at, const ArrayValues& values);
-void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events);
 
 }  // namespace dpr

@@ -18,31 +18,6 @@ FloatVectors source(const Renderer::Impl& m, const BufferSpan& span, const Vecto
 
 }  // namespace
 
-void set_positions(Renderer& renderer, std::size_t mesh, const BufferSpan& positions, const Events& events) {
-  set_array(renderer, {ArrayId::positions, mesh}, positions, events);
-}
-
-void set_colors(Renderer& renderer, std::size_t mesh, const BufferSpan& colors, const Events& events) {
-  set_array(renderer, {ArrayId::colors, mesh}, colors, events);
-}
-
-void set_texels(Renderer& renderer, std::size_t mesh, std::size_t texture, const BufferSpan& texels,
-                const Events& events) {
-  set_array(renderer, {ArrayId::texels, mesh, texture}, texels, events);
-}
-
-void set_texcoords(Renderer& renderer, std::size_t mesh, const BufferSpan& texcoords, const Events& events) {
-  set_array(renderer, {ArrayId::texcoords, mesh}, texcoords, events);
-}
-
-void set_normals(Renderer& renderer, std::size_t mesh, const BufferSpan& normals, const Events& events) {
-  set_array(renderer, {ArrayId::normals, mesh}, normals, events);
-}
-
-void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan& materials, const Events& events) {
-  set_array(renderer, {ArrayId::materials, mesh}, materials, events);
-}
-
 void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,
                 const Events& events) {
   Renderer::Impl& m = impl_of(renderer);

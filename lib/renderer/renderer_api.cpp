@@ -35,30 +35,6 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
   impl_->set(impl_->prepare(smoothing));
 }
 
-void Renderer::set_positions(std::size_t mesh, std::span<const glm::vec3> positions) {
-  set_array(*this, {ArrayId::positions, mesh}, positions);
-}
-
-void Renderer::set_colors(std::size_t mesh, std::span<const glm::vec3> colors) {
-  set_array(*this, {ArrayId::colors, mesh}, colors);
-}
-
-void Renderer::set_texels(std::size_t mesh, std::size_t texture, std::span<const glm::vec3> texels) {
-  set_array(*this, {ArrayId::texels, mesh, texture}, texels);
-}
-
-void Renderer::set_texcoords(std::size_t mesh, std::span<const glm::vec2> texcoords) {
-  set_array(*this, {ArrayId::texcoords, mesh}, texcoords);
-}
-
-void Renderer::set_normals(std::size_t mesh, std::span<const glm::vec3> normals) {
-  set_array(*this, {ArrayId::normals, mesh}, normals);
-}
-
-void Renderer::set_materials(std::size_t mesh, std::span<const Material> materials) {
-  set_array(*this, {ArrayId::materials, mesh}, materials);
-}
-
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   Impl& m = *impl_;
   m.require_scene("Renderer::set_shapes");

@@ -10,11 +10,11 @@
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
 #include "image/texture_words.hpp"
-#include "scene/scene_parts.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
-#include "smoothing/option_fields.hpp"
+#include "scene/scene_parts.hpp"
 #include "smoothing/choice_names.hpp"
+#include "smoothing/option_fields.hpp"
 
 namespace dpr {
 namespace {

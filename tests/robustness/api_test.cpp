@@ -257,6 +257,10 @@ TEST_SUITE("robustness") {
     wrong = colors;
     wrong[2].x = k_nan;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_colors(0, wrong), "colors[2]");
+    const std::vector<glm::vec2> pairs(positions.size());
+    const std::span<const glm::vec2> of_two = pairs;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_array({ArrayId::positions}, of_two), "another type");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_array({static_cast<ArrayId>(6)}, of_two), "ArrayId");
 
     const Image grad(scene.width, scene.height, glm::vec4(1));
     const std::vector<Image> two(2, grad);
