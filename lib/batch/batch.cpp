@@ -1,4 +1,4 @@
-// Arrays in, the renderer's launches, arrays out.
+// Frames of named arrays in the C interface: arrays in, the renderer's launches, arrays out.
 #include "batch/batch.hpp"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "batch/inputs.hpp"
+#include "c/handles.hpp"
 #include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "renderer/renderer_impl.hpp"
@@ -57,24 +58,12 @@ std::vector<glm::vec3> repeated(std::span<const glm::vec3> vectors, bool is_own,
   return all;
 }
 
-bool is_number(std::string_view name) { return name == "sigma" || name == "gamma" || name == "alpha"; }
-
 /// Gradients that the renderer computes for these arrays.
 GradientRequest request_of(std::span<const std::string> names, bool with_affine_views) {
-  GradientRequest request{};
-  request.positions = request.colors = request.transform = request.camera = request.lights =
-      request.smoothing = request.background = false;
+  GradientRequest request = no_gradients();
   for (const std::string& name : names) {
-    request.positions |= name == "vertices" || (name == "views" && with_affine_views);
-    request.colors |= name == "colors" || name == "face_colors";
-    request.camera |= name == "intrinsics" || (name == "views" && !with_affine_views);
-    request.distortion |= name == "intrinsics";
-    request.background |= name == "background";
-    request.lights |= name.starts_with("lights.");
-    request.smoothing |= is_number(name);
-    request.texture |= name.starts_with("textures[");
-    request.texcoords |= name == "texcoords";
-    request.materials |= name.starts_with("materials.");
+    if (name == "views") (with_affine_views ? request.positions : request.camera) = true;
+    for (const GradientRow* const row : gradient_rows_of(name)) request.*row->wanted = true;
   }
   return request;
 }
@@ -239,4 +228,109 @@ bool Batch::is_empty() {
   return statistics.faces_dropped == statistics.faces;
 }
 
+namespace {
+
+constexpr int k_most_dimensions = 4;
+constexpr std::size_t k_most_words = 1U << 16U;
+
+std::vector<std::string> to_words(const char* const* words, std::size_t count, const char* argument) {
+  if (count > 0) c::deref(words, argument);
+  if (count > k_most_words)
+    throw InvalidArgument(argument, std::to_string(count), "at most " + std::to_string(k_most_words));
+  std::vector<std::string> copies;
+  for (const char* word : std::span(words, count)) copies.emplace_back(&c::deref(word, argument));
+  return copies;
+}
+
+}  // namespace
+
+std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, const char* argument) {
+  if (count > 0) c::deref(arrays, argument);
+  if (count > k_most_words)
+    throw InvalidArgument(argument, std::to_string(count), "at most " + std::to_string(k_most_words));
+  std::vector<NamedArray> named;
+  for (const dpr_array& array : std::span(arrays, count)) {
+    const std::string name = &c::deref(array.name, "name (array)");
+    if (array.element < DPR_FLOAT32 || array.element > DPR_INT64)
+      throw InvalidArgument("element (" + name + ")", std::to_string(array.element), "a dpr_element");
+    if (array.dimensions < 0 || array.dimensions > k_most_dimensions)
+      throw InvalidArgument("dimensions (" + name + ")", std::to_string(array.dimensions), "0 to 4");
+    named.push_back({name,
+                     array.data,
+                     static_cast<Element>(array.element),
+                     {array.shape, array.shape + array.dimensions}});
+    if (named.back().count() > 0 && !array.data) throw InvalidArgument(name, "NULL", "a pointer");
+  }
+  return named;
+}
+
+RenderSettings to_settings(const dpr_frame_options& options) {
+  return settings_from_texts(options.width, options.height,
+                             to_words(options.settings, options.setting_count, "settings"));
+}
+
+dpr_frame_options to_options(const dpr_frame_options* options) {
+  return c::versioned<dpr_frame_options>(options, DPR_FRAME_OPTIONS_INIT, "options");
+}
+
 }  // namespace dpr::batch
+
+using namespace dpr::c;
+
+struct dpr_frame {
+  static constexpr const char* k_handle = "dpr_frame";
+  std::unique_ptr<dpr::batch::Batch> batch;
+};
+
+const char* dpr_frame_settings() {
+  static const std::string names = [] {
+    std::string all;
+    for (const std::string_view name : dpr::batch::setting_names())
+      all.append(all.empty() ? "" : ", ").append(name);
+    return all;
+  }();
+  return names.c_str();
+}
+
+dpr_status dpr_frame_check(const dpr_frame_options* options) {
+  return guarded([&] { dpr::batch::to_settings(dpr::batch::to_options(options)); });
+}
+
+dpr_status dpr_frame_render(const dpr_frame_options* options, const dpr_array* arrays, std::size_t count,
+                            dpr_frame** frame) {
+  return guarded([&] {
+    deref(frame, "frame");
+    const dpr_frame_options given = dpr::batch::to_options(options);
+    const dpr::batch::RenderSettings settings = dpr::batch::to_settings(given);
+    const std::vector<dpr::batch::NamedArray> named = dpr::batch::to_arrays(arrays, count, "arrays");
+    const dpr::batch::BatchOptions how{
+        settings, given.is_lit != 0, given.first_view,
+        dpr::batch::to_words(given.gradients, given.gradient_count, "gradients")};
+    auto pool = dpr::batch::RendererPools::of_process().get(given.device ? given.device : "");
+    give(frame, std::make_unique<dpr::batch::Batch>(std::move(pool), named, how));
+  });
+}
+
+dpr_status dpr_frame_read(dpr_frame* frame, const dpr_array* outputs, std::size_t count) {
+  return guarded(
+      [&] { deref(frame, "frame").batch->read(dpr::batch::to_arrays(outputs, count, "outputs")); });
+}
+
+dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, std::size_t grad_count,
+                              const dpr_array* gradients, std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->backward(dpr::batch::to_arrays(grads, grad_count, "grads"),
+                         dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
+dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty) {
+  return guarded([&] { deref(is_empty, "is_empty") = deref(frame, "frame").batch->is_empty() ? 1 : 0; });
+}
+
+void dpr_frame_destroy(dpr_frame* frame) { destroy(frame); }
+
+dpr_status dpr_frames_release() {
+  return guarded([] { dpr::batch::RendererPools::of_process().clear(); });
+}

@@ -54,15 +54,4 @@ class Batch {
   std::vector<glm::vec3> vertices_;  ///< [view][vertex], where the gradients of views need them
 };
 
-/// Result of subdivide_for_lens() for one mesh.
-struct CutFaces {
-  Faces faces;                            ///< the pieces
-  std::vector<std::uint32_t> face_of;     ///< [piece] the face that each is a piece of
-  Faces vertices_of;                      ///< [new vertex] old vertices that each is a combination of
-  std::vector<glm::vec3> vertex_weights;  ///< [new vertex]
-};
-
-/// Takes the arrays vertices [V, 3], faces, views and intrinsics. Throws the library's errors.
-CutFaces cut_for_lens(NamedArrays arrays, const RenderSettings& settings, float tolerance);
-
 }  // namespace dpr::batch

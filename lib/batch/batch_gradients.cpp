@@ -1,38 +1,16 @@
-// Gradients of a batch's arrays from those of the renderer, and faces cut for the lenses of one.
-#include <numeric>
+// Gradients of a batch's arrays from those of the renderer.
+#include <algorithm>
 #include <span>
-#include <string_view>
-#include <utility>
+#include <string>
+#include <variant>
 #include <vector>
 
 #include "batch/batch.hpp"
 #include "batch/inputs.hpp"
 #include "dpr/error.hpp"
-#include "dpr/subdivision.hpp"
-#include "scene/light_table.hpp"
 
 namespace dpr::batch {
 namespace {
-
-/// Adds the vectors to an array of as many, or of as many as one of the views has: their sum over the views
-/// then.
-template <typename Vector>
-void add_to(const NamedArray& array, const std::vector<Vector>& vectors, std::size_t views = 1) {
-  if (vectors.empty()) return;
-  const std::span<Vector> sums = array.rows<Vector>();
-  if (sums.size() != vectors.size() && sums.size() * views != vectors.size())
-    throw InvalidArgument(argument(array), text_of(array.shape), std::to_string(vectors.size()) + " vectors");
-  for (std::size_t i = 0; i < vectors.size(); ++i) sums[i % sums.size()] += vectors[i];
-}
-
-/// Numbers of the library's gradients, which are double where they are sums; none of what was not asked for.
-void add_to(const NamedArray& array, const std::vector<double>& numbers) {
-  if (numbers.empty()) return;
-  const std::span<float> sums = array.rows<float>();
-  if (sums.size() != numbers.size())
-    throw InvalidArgument(argument(array), text_of(array.shape), std::to_string(numbers.size()) + " numbers");
-  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += static_cast<float>(numbers[i]);
-}
 
 /// d loss / d M of x_camera = A x_world + t, M = [A t; 0 1]: the sum over the vertices of g_camera x_world^T,
 /// where g_camera = A^-T g_world. [view][16]
@@ -73,38 +51,24 @@ std::vector<double> rigid_gradients(std::span<const View> views, const SceneGrad
   return all;
 }
 
-/// The gradients of what a view's projection was set from, [view][number].
-std::vector<double> projection_gradients(const Camera& model, const SceneGradient& gradient) {
-  std::vector<double> all;
-  for (const ViewGradient& view : gradient.views) {
-    const CameraGradient& camera = view.camera;
-    if (model.orthographic_height) {
-      all.push_back(camera.orthographic_height);
-      continue;
+/// visit(row, index, array) for the arrays whose numbers, one after the other, are an input's gradient: a light's
+/// or a view's together.
+template <class Visit>
+void for_each_array_of(const std::string& name, SceneGradient& gradient, const Visit& visit) {
+  const std::vector<const GradientRow*> rows = gradient_rows_of(name);
+  if (rows.empty()) return;
+  const GradientIndex count = count_arrays(*rows.front(), gradient);
+  for (GradientIndex i; i.view < count.view; ++i.view) {
+    for (i.item = 0; i.item < count.item; ++i.item) {
+      for (const GradientRow* const row : rows) {
+        const GradientArray array = row->array(gradient, i);
+        const auto* const textures = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array);
+        if (!textures) visit(*row, i, array);
+        for (std::size_t k = 0; textures && k < (*textures)->size(); ++k)
+          if (name == texture_name(k)) visit(*row, i, &(**textures)[k]);
+      }
     }
-    all.insert(all.end(), camera.intrinsics.begin(), camera.intrinsics.end());
-    if (model.distortion) all.insert(all.end(), camera.distortion.begin(), camera.distortion.end());
   }
-  return all;
-}
-
-/// Those of the lights of an array's kind, or of ambient light or harmonics.
-std::vector<double> light_gradients(SceneGradient& gradient, std::string_view key) {
-  std::vector<double> all;
-  const auto push = [&](std::string_view, auto number) { all.push_back(static_cast<double>(number)); };
-  if (key == "ambient") visit_numbers(key, gradient.ambient, push);
-  if (key == "harmonics") {
-    for (const glm::vec3& c : gradient.harmonics) visit_numbers(key, c, push);
-  }
-  for_each_light_kind([&](auto kind) {
-    if (kind.key != key) return;
-    for (auto& light : gradient.*kind.gradients) {
-      kind.for_each_member([&](std::string_view name, auto, auto member, auto...) {
-        visit_numbers(name, light.*member, push);
-      });
-    }
-  });
-  return all;
 }
 
 }  // namespace
@@ -116,57 +80,27 @@ void Batch::add_gradients(SceneGradient& found, bool is_affine, NamedArrays grad
 void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray& gradient) {
   const Renderer& renderer = frame_.renderer();
   const std::span<const View> views = renderer.views();
-  MeshGradient& mesh = found.meshes[0];
-  const std::string_view name = gradient.name;
-  const auto own_or_shared = [](const auto& own, const auto& shared) -> const auto& {
-    return own.empty() ? shared : own;
+  const std::span<float> sums = gradient.rows<float>();
+  std::size_t count = 0, next = 0;
+  const auto add = [&](double number) {
+    if (next == sums.size()) next = 0;
+    if (!sums.empty()) sums[next++] += static_cast<float>(number);
+    ++count;
+    return number;
   };
-  const auto& positions = own_or_shared(found.shapes.positions, mesh.positions);
-  if (name == "vertices") add_to(gradient, positions, views.size());
-  if (name == "colors" || name == "face_colors")
-    add_to(gradient, own_or_shared(found.shapes.colors, mesh.colors));
-  if (name == "views")
-    add_to(gradient,
-           is_affine ? affine_gradients(views, vertices_, positions) : rigid_gradients(views, found));
-  if (name == "intrinsics") add_to(gradient, projection_gradients(views.front().camera, found));
-  const glm::dvec3& background = found.background;
-  if (name == "background") add_to(gradient, std::vector{background.x, background.y, background.z});
-  if (name.starts_with("lights.")) add_to(gradient, light_gradients(found, name.substr(name.find('.') + 1)));
-  if (name == "sigma") add_to(gradient, std::vector{found.sigma});
-  if (name == "gamma") add_to(gradient, std::vector{found.gamma});
-  if (name == "alpha") add_to(gradient, std::vector{found.alpha});
-  if (name == "texcoords") add_to(gradient, mesh.texcoords);
-  if (name == "materials.specular") add_to(gradient, mesh.specular);
-  if (name == "materials.shininess") add_to(gradient, mesh.shininess);
-  for (std::size_t i = 0; i < mesh.textures.size(); ++i)
-    if (name == texture_name(i)) add_to(gradient, mesh.textures[i]);
-}
-
-CutFaces cut_for_lens(NamedArrays arrays, const RenderSettings& settings, float tolerance) {
-  check_sizes(arrays);
-  const NamedArray& vertices = require(arrays, "vertices");
-  require_floats(vertices, {k_any, 3}, "[V, 3], one mesh");
-  const auto positions = vertices.rows<const glm::vec3>();
-  const std::vector<View> views = make_views(arrays, settings);
-  Scene scene;
-  scene.width = settings.width();
-  scene.height = settings.height();
-  scene.camera = views.front().camera;
-  Mesh& mesh = scene.meshes.emplace_back().mesh;
-  mesh.positions.assign(positions.begin(), positions.end());
-  mesh.faces = read_triples(require(arrays, "faces"));
-  SubdividedScene cut = subdivide_for_lens(scene, {.tolerance = tolerance}, views);
-  MeshSubdivision& how = cut.meshes.front();
-  const bool is_cut = how.is_cut();
-  CutFaces pieces{std::move(cut.scene.meshes.front().mesh.faces), std::move(how.face_of),
-                  std::move(how.vertices.of), std::move(how.vertices.weights)};
-  if (!is_cut) {  // everything is a piece of itself
-    pieces.face_of.resize(pieces.faces.size());
-    std::iota(pieces.face_of.begin(), pieces.face_of.end(), 0U);
-    for (std::uint32_t i = 0; i < positions.size(); ++i) pieces.vertices_of.emplace_back(i);
-    pieces.vertex_weights.assign(positions.size(), glm::vec3(1.0F, 0.0F, 0.0F));
+  if (gradient.name == "views") {
+    const auto& own = found.shapes.positions;
+    const auto& positions = own.empty() ? found.meshes[0].positions : own;
+    std::ranges::for_each(
+        is_affine ? affine_gradients(views, vertices_, positions) : rigid_gradients(views, found), add);
   }
-  return pieces;
+  for_each_array_of(gradient.name, found, [&](const GradientRow& row, GradientIndex i, GradientArray array) {
+    if (exists(row, i, renderer.scene(), views)) transform_numbers(array, add);
+  });
+  // Vertices that the views share have the sum over the views.
+  if (count != 0 && count != sums.size() &&
+      (gradient.name != "vertices" || count != sums.size() * views.size()))
+    throw InvalidArgument(argument(gradient), text_of(gradient.shape), std::to_string(count) + " numbers");
 }
 
 }  // namespace dpr::batch

@@ -14,6 +14,7 @@ namespace dpr::batch {
 namespace {
 
 constexpr std::array<std::string_view, 3> k_numbers{"sigma", "gamma", "alpha"};
+constexpr std::string_view k_texture = "textures[";
 
 std::vector<std::string_view> light_names() {
   std::vector<std::string_view> names{"ambient", "harmonics"};
@@ -34,16 +35,13 @@ std::size_t count_numbers(Kind) {
 
 /// True for the name of an array; textures are counted.
 bool is_name(const std::string& name, std::size_t textures) {
-  static constexpr std::array<std::string_view, 11> k_names{
-      "vertices",   "faces",     "colors",         "face_colors",   "views",         "intrinsics",
-      "background", "texcoords", "face_texcoords", "face_textures", "face_materials"};
-  if (std::ranges::find(k_names, name) != k_names.end()) return true;
-  if (std::ranges::find(k_numbers, name) != k_numbers.end()) return true;
-  if (name == "materials.specular" || name == "materials.shininess") return true;
-  for (std::size_t i = 0; i < textures; ++i)
-    if (name == texture_name(i)) return true;
-  const std::vector<std::string_view> lights = light_names();
-  return name.starts_with("lights.") && std::ranges::find(lights, name.substr(7)) != lights.end();
+  static constexpr std::array<std::string_view, 5> k_without_gradients{"faces", "views", "face_texcoords",
+                                                                       "face_textures", "face_materials"};
+  if (std::ranges::find(k_without_gradients, name) != k_without_gradients.end()) return true;
+  if (!name.starts_with(k_texture)) return !gradient_rows_of(name).empty();
+  std::size_t i = 0;
+  while (i < textures && name != texture_name(i)) ++i;
+  return i < textures;
 }
 
 std::size_t count_textures(NamedArrays arrays) {
@@ -154,6 +152,36 @@ void require_batch(const NamedArray& array, std::size_t views, std::size_t count
 }  // namespace
 
 std::string texture_name(std::size_t index) { return checks::element("textures", index); }
+
+std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
+  using Path = std::pair<std::string_view, std::string_view>;  // an array's name, what paths begin with
+  static constexpr std::array k_paths{Path{"vertices", "meshes[].positions"},
+                                      Path{"vertices", "shapes.positions"},
+                                      Path{"colors", "meshes[].colors"},
+                                      Path{"colors", "shapes.colors"},
+                                      Path{"face_colors", "meshes[].colors"},
+                                      Path{"face_colors", "shapes.colors"},
+                                      Path{"texcoords", "meshes[].texcoords"},
+                                      Path{"materials.specular", "meshes[].specular"},
+                                      Path{"materials.shininess", "meshes[].shininess"},
+                                      Path{"intrinsics", "camera.intrinsics."},
+                                      Path{"intrinsics", "camera.distortion."},
+                                      Path{"intrinsics", "camera.orthographic_height"},
+                                      Path{"background", "background"},
+                                      Path{"sigma", "sigma"},
+                                      Path{"gamma", "gamma"},
+                                      Path{"alpha", "alpha"}};
+  std::vector<const GradientRow*> rows;
+  const bool is_light = name.starts_with("lights.");
+  for (const GradientRow& row : gradient_rows()) {
+    const std::string_view path = row.path, list = path.substr(0, path.find("[]"));
+    const auto has = [&](const Path& known) { return known.first == name && path.starts_with(known.second); };
+    if (std::ranges::any_of(k_paths, has) || (is_light && list == name) ||
+        (name.starts_with(k_texture) && path == "meshes[].textures"))
+      rows.push_back(&row);
+  }
+  return rows;
+}
 
 const NamedArray* find_colors(NamedArrays arrays) {
   const NamedArray* const colors = find(arrays, "colors");

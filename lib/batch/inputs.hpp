@@ -4,9 +4,12 @@
 
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "batch/batch.hpp"
+#include "dpr/dpr.h"
+#include "scene/gradient_table.hpp"
 
 namespace dpr::batch {
 
@@ -27,7 +30,15 @@ RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays);
 const NamedArray* find_colors(NamedArrays arrays);
 /// "textures[2]"
 std::string texture_name(std::size_t index);
+/// Rows of the gradients' table whose numbers are an array's gradient, but for those of views' matrices: of lights
+/// and views one after the other. None for other names.
+std::vector<const GradientRow*> gradient_rows_of(std::string_view name);
 /// To a renderer of their topology.
 void upload_surface(Renderer& renderer, NamedArrays arrays);
+
+/// From the C interface, which calls them `argument`.
+std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, const char* argument);
+dpr_frame_options to_options(const dpr_frame_options* options);
+RenderSettings to_settings(const dpr_frame_options& options);
 
 }  // namespace dpr::batch

@@ -12,8 +12,8 @@
 #include "dpr/error.hpp"
 #include "image/texture_words.hpp"
 #include "renderer/depth_range.hpp"
-#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
+#include "scene/scene_parts.hpp"
 
 namespace dpr::batch {
 namespace {

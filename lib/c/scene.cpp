@@ -1,11 +1,12 @@
 // Scenes of the C interface.
+#include <bit>
 #include <cmath>
 
 #include "base/checks.hpp"
 #include "c/handles.hpp"
 #include "scene/gradient_table.hpp"
-#include "scene/scene_parts.hpp"
 #include "scene/light_table.hpp"
+#include "scene/scene_parts.hpp"
 #include "smoothing/option_fields.hpp"
 
 using dpr::InvalidArgument;
@@ -76,6 +77,14 @@ std::span<const Item> span_of(const Item* items, std::size_t count, const char* 
     throw InvalidArgument("count (" + std::string(argument) + ")", std::to_string(count),
                           "at most " + std::to_string(k_most));
   return {items, count};
+}
+
+/// Lights of a kind, whose structs have the same members in both interfaces.
+template <class Light, class Given>
+std::vector<Light> to_list(const Given* given, std::size_t count, const char* argument) {
+  std::vector<Light> list;
+  for (const Given& light : span_of(given, count, argument)) list.push_back(std::bit_cast<Light>(light));
+  return list;
 }
 
 /// Indices of a face's three corners.
@@ -182,20 +191,10 @@ std::optional<Lights> to_lights(const dpr_lights* given) {
   converted.ambient = to_vector(lights.ambient);
   converted.shininess = lights.shininess;
   converted.shading = static_cast<Shading>(shading);
-  for (const dpr_point_light& light : span_of(lights.point, lights.point_count, "lights.point")) {
-    converted.point.push_back(
-        {to_vector(light.position), to_vector(light.diffuse), to_vector(light.specular)});
-  }
-  for (const dpr_directional_light& light :
-       span_of(lights.directional, lights.directional_count, "lights.directional")) {
-    converted.directional.push_back(
-        {to_vector(light.direction), to_vector(light.diffuse), to_vector(light.specular)});
-  }
-  for (const dpr_spot_light& light : span_of(lights.spot, lights.spot_count, "lights.spot")) {
-    converted.spot.push_back({to_vector(light.position), to_vector(light.direction), light.angle_degrees,
-                              light.inner_angle_degrees, to_vector(light.diffuse),
-                              to_vector(light.specular)});
-  }
+  converted.point = to_list<PointLight>(lights.point, lights.point_count, "lights.point");
+  converted.directional =
+      to_list<DirectionalLight>(lights.directional, lights.directional_count, "lights.directional");
+  converted.spot = to_list<SpotLight>(lights.spot, lights.spot_count, "lights.spot");
   if (lights.harmonics) converted.harmonics = triples(lights.harmonics, k_harmonics);
   validate(converted);
   return converted;

@@ -386,4 +386,6 @@ std::size_t Renderer::Impl::bytes() const {
          all_views_.starts.capacity_bytes() + (corner_texcoords ? corner_texcoords->bytes() : 0);
 }
 
+void Renderer::forward() { impl_->forward(); }
+
 }  // namespace dpr

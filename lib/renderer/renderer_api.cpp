@@ -72,8 +72,6 @@ const Scene& Renderer::scene() const { return impl_->scene; }
 std::span<const View> Renderer::views() const { return impl_->views; }
 const Device& Renderer::device() const { return impl_->device; }
 
-void Renderer::forward() { impl_->forward(); }
-
 namespace {
 
 /// The pixels of a frame from `first` on. Blocks.

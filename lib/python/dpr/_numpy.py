@@ -1,15 +1,5 @@
-"""The front of arrays that have no gradients of their own."""
+"""Gradients of arrays that have none of their own."""
 from . import _arrays, _frames
-
-
-def _converted(leaves):
-    return [_arrays.to_numpy(leaf) for leaf in leaves]
-
-
-def render(spec, leaves):
-    """(outputs in the library of the first array, whether a frame is empty)"""
-    rendered = _frames.Rendered(spec, _converted(leaves), ())
-    return [_arrays.like(leaves[0], output) for output in rendered.outputs], rendered.is_empty()
 
 
 def _nested(paths, found):
@@ -42,7 +32,7 @@ def vjp(spec, plan, wrt):
             _arrays.fail(ValueError, "wrt", repr(name), "names of arrays that are given: " + ", ".join(sorted(names)))
     wanted = tuple(i for i, (leaf, path) in enumerate(zip(leaves, paths))
                    if _arrays.type_of(leaf) == "float32" and (wrt is None or path[0] in wrt))
-    rendered = _frames.Rendered(spec, _converted(leaves), wanted)
+    rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
 
     def pullback(image=None, **outputs):
         for name in outputs:

@@ -134,7 +134,8 @@ class Renderer:
             from . import _jax
             found, is_empty = _jax.render(spec, plan.leaves), False
         else:
-            found, is_empty = _numpy.render(spec, plan.leaves)
+            rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in plan.leaves], ())
+            found, is_empty = [_arrays.like(plan.leaves[0], array) for array in rendered.outputs], rendered.is_empty()
         if is_empty:
             warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
         return (found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]
