@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "c/handles.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
@@ -216,22 +217,7 @@ void set_smoothing(dpr_scene* scene, const char* key, const OptionValue& value) 
   SmoothingOptions& options = deref(scene, "scene").smoothing;
   const std::string name = &deref(key, "key");
   if (set_option(options, name, value, name)) return;
-  std::string known;
-  for (const std::string_view option : option_keys()) known.append(known.empty() ? "" : ", ").append(option);
-  throw InvalidArgument("key (smoothing)", "\"" + name + "\"", "one of " + known);
-}
-
-/// Turns on the gradient that the word names.
-void ask_for(GradientRequest& request, std::string_view word) {
-  std::string known;
-  for (const GradientName& name : gradient_names()) {
-    if (name.word == word) {
-      request.*name.wanted = true;
-      return;
-    }
-    known.append(known.empty() ? "" : ", ").append(name.word);
-  }
-  throw InvalidArgument("names", "\"" + std::string(word) + "\"", "one of " + known);
+  throw InvalidArgument("key (smoothing)", "\"" + name + "\"", one_of(option_keys()));
 }
 
 }  // namespace
@@ -243,7 +229,8 @@ GradientRequest to_request(const char* const* names, std::size_t count) {
                           "at most " + std::to_string(gradient_names().size()));
   }
   GradientRequest request = no_gradients();
-  for (const char* name : std::span(names, count)) ask_for(request, &deref(name, "names"));
+  for (const char* name : std::span(names, count))
+    request.*parse_gradient(&deref(name, "names"), "names") = true;
   return request;
 }
 

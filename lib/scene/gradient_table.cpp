@@ -1,11 +1,13 @@
 #include "scene/gradient_table.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <utility>
 
 #include "base/checks.hpp"
+#include "base/name_list.hpp"
 #include "scene/light_table.hpp"
 
 namespace dpr {
@@ -120,6 +122,12 @@ std::vector<GradientRow> make_rows() {
 }  // namespace
 
 std::span<const GradientName> gradient_names() { return k_names; }
+
+bool GradientRequest::*parse_gradient(std::string_view word, const std::string& argument) {
+  std::array<std::string_view, k_names.size()> words;
+  std::ranges::transform(k_names, words.begin(), &GradientName::word);
+  return k_names[position_of(word, words, argument)].wanted;
+}
 
 std::span<const GradientRow> gradient_rows() {
   static const std::vector<GradientRow> rows = make_rows();

@@ -22,6 +22,8 @@ struct GradientName {
   bool GradientRequest::*wanted;
 };
 std::span<const GradientName> gradient_names();
+/// By its name. Throws InvalidArgument for another word, which it calls `argument`.
+bool GradientRequest::*parse_gradient(std::string_view word, const std::string& argument);
 /// Asks for none.
 GradientRequest no_gradients();
 

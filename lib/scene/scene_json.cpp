@@ -204,17 +204,10 @@ Lights parse_lights(const JsonNode& node) {
 
 GradientRequest parse_gradients(const JsonNode& node) {
   GradientRequest request = no_gradients();
-  const std::span<const GradientName> names = gradient_names();
   for (const JsonNode& element : node.elements()) {
-    const std::string word = element.string();
-    const auto found = std::ranges::find(names, word, &GradientName::word);
-    if (found == names.end()) {
-      std::vector<std::string_view> words;
-      for (const GradientName& name : names) words.push_back(name.word);
-      element.fail("\"" + word + "\"", one_of(words));
-    }
-    if (request.*found->wanted) element.fail("\"" + word + "\" twice", "it once");
-    request.*found->wanted = true;
+    bool& wanted = request.*parse_gradient(element.string(), element.name());
+    if (wanted) element.fail("\"" + element.string() + "\" twice", "it once");
+    wanted = true;
   }
   return request;
 }

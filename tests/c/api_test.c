@@ -1286,7 +1286,7 @@ static void test_wrong_scenes(void) {
   REFUSED(dpr_scene_set_smoothing_word(scene, "sigma", "wide"), "a number");
   REFUSED(dpr_scene_set_smoothing_word(scene, NULL, "wide"), "key");
   REFUSED(dpr_scene_set_smoothing_word(scene, "preset", NULL), "word");
-  REFUSED(dpr_scene_set_smoothing_number(scene, "sgima", 1), "one of preset");
+  REFUSED(dpr_scene_set_smoothing_number(scene, "sgima", 1), "preset, ");
   REFUSED(dpr_scene_set_smoothing_number(scene, "sigma", NAN), "finite");
   REFUSED(dpr_scene_set_smoothing_number(scene, "samples", 2.5), "whole");
   REFUSED(dpr_scene_set_gradients(scene, names, 2), "\"position\"");
