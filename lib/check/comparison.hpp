@@ -198,10 +198,6 @@ struct Block {
   std::vector<double> expected;
 };
 
-inline bool is_sensitivity(const Block& block) {
-  return block.name == "sigma" || block.name == "gamma" || block.name == "alpha";
-}
-
 /// Gradients of lights: a block for what has one name of one light.
 inline std::vector<Block> blocks_of(const reference::Lights& grad) {
   std::vector<Block> blocks;

@@ -82,11 +82,4 @@ void join_open(std::span<const glm::vec3> positions, std::span<const glm::uvec3>
   }
 }
 
-std::vector<WeldedEdge> make_welded_edges(std::span<const glm::vec3> positions,
-                                          std::span<const glm::uvec3> faces) {
-  std::vector<WeldedEdge> edges = make_edges(faces, positions.size());
-  join_open(positions, faces, edges);
-  return edges;
-}
-
 }  // namespace dpr

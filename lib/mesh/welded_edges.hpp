@@ -32,8 +32,4 @@ std::vector<WeldedEdge> make_edges(std::span<const glm::uvec3> faces, std::size_
 void join_open(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces,
                std::span<WeldedEdge> edges);
 
-/// Both.
-std::vector<WeldedEdge> make_welded_edges(std::span<const glm::vec3> positions,
-                                          std::span<const glm::uvec3> faces);
-
 }  // namespace dpr

@@ -135,16 +135,6 @@ inline bool is_perspective_correct(const Scene& scene) {
   return scene.perspective_correct && !scene.camera.orthographic_height;
 }
 
-/// A normal as a transform turns the plane that it is normal to, of length one.
-inline Vec3d transformed_normal(const Mat4d& m, const Vec3d& normal) {
-  const Mat3d linear = linear_part(m);
-  const bool is_along_x = std::fabs(normal.x) >= 0.5 * length(normal);
-  const Vec3d other = is_along_x ? Vec3d{0.0, 1.0, 0.0} : Vec3d{1.0, 0.0, 0.0};
-  const Vec3d u = cross(normal, other), v = cross(normal, u);
-  const Vec3d turned = cross(linear * u, linear * v);
-  return unit(dot(turned, linear * normal) < 0.0 ? -turned : turned);
-}
-
 /// Empty where no mesh has materials or normals of its own.
 inline std::vector<FaceLook> face_looks(const Scene& scene) {
   std::vector<FaceLook> looks;

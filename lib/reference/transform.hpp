@@ -254,4 +254,14 @@ inline ViewGradient camera_center_backward(const Camera& camera, const Vec3d& gr
   return {cross(center_translation(camera), h), camera.orthographic_height ? Vec3d{} : -h};
 }
 
+/// A normal as a transform turns the plane that it is normal to, of length one.
+inline Vec3d transformed_normal(const Mat4d& m, const Vec3d& normal) {
+  const Mat3d linear = linear_part(m);
+  const bool is_along_x = std::fabs(normal.x) >= 0.5 * length(normal);
+  const Vec3d other = is_along_x ? Vec3d{0.0, 1.0, 0.0} : Vec3d{1.0, 0.0, 0.0};
+  const Vec3d u = cross(normal, other), v = cross(normal, u);
+  const Vec3d turned = cross(linear * u, linear * v);
+  return unit(dot(turned, linear * normal) < 0.0 ? -turned : turned);
+}
+
 }  // namespace dpr::reference

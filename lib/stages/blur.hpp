@@ -26,7 +26,6 @@ class Blur {
   /// Everything about setting the kernel that can fail.
   Setting prepare(BlurKernel kernel) const;
   void set(Setting&& prepared) noexcept { std::swap(now_, prepared); }
-  void set_kernel(BlurKernel kernel) { set(prepare(std::move(kernel))); }
   const BlurKernel& kernel() const { return now_.kernel; }
 
   /// Finds the covered part of the rasters that follow, which need not be all alike: the tiles that have

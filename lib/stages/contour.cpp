@@ -37,8 +37,6 @@ void Contour::forward_within(const ContourInputs& in, std::size_t capacity, std:
   list(in, capacity, likely);
 }
 
-std::size_t Contour::read_count() const { return read_total(pair_starts, pair_starts.size() - 1, k_pairs); }
-
 void Contour::settle(std::size_t known_pairs) {
   pairs = known_pairs;
   for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})

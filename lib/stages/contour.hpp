@@ -38,8 +38,6 @@ class Contour {
   /// Does not wait to learn how many pairs there are. If they exceed the capacity, all are left out.
   /// Kernels are launched for as many as are likely.
   void forward_within(const ContourInputs& in, std::size_t capacity, std::size_t likely);
-  /// How many there are, after forward_within(). Blocks.
-  std::size_t read_count() const;
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
   /// Adds the gradients of the pairs' ends to those of the vertices; where faces are clipped, those of ends

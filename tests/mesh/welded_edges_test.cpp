@@ -7,13 +7,16 @@
 
 #include "dpr/mesh.hpp"
 
-using dpr::make_welded_edges;
 using dpr::Mesh;
 using dpr::WeldedEdge;
 
 namespace {
 
-std::vector<WeldedEdge> edges_of(const Mesh& mesh) { return make_welded_edges(mesh.positions, mesh.faces); }
+std::vector<WeldedEdge> edges_of(const Mesh& mesh) {
+  std::vector<WeldedEdge> edges = dpr::make_edges(mesh.faces, mesh.positions.size());
+  dpr::join_open(mesh.positions, mesh.faces, edges);
+  return edges;
+}
 
 std::size_t count(const std::vector<WeldedEdge>& edges, bool (*matches)(const WeldedEdge&)) {
   return static_cast<std::size_t>(std::ranges::count_if(edges, matches));
@@ -83,6 +86,6 @@ TEST_SUITE("unit") {
     CHECK(count(edges_of(mesh), is_alone) == 9);
     mesh.faces = {{0, 0, 1}, {2, 2, 2}};
     CHECK(edges_of(mesh).empty());
-    CHECK(make_welded_edges({}, {}).empty());
+    CHECK(edges_of({}).empty());
   }
 }

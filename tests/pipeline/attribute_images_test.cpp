@@ -169,7 +169,7 @@ void check_against_reference(Attribute attribute, const Scene& scene) {
     const std::vector<Change> list = changes(exact, block.name);
     for (const Change& change : list) {
       reference::Scene more = exact, less = exact;
-      const double step = is_sensitivity(block) ? 0.1 * k_step : k_step;
+      const double step = is_sensitivity(block.name) ? 0.1 * k_step : k_step;
       change(more, step);
       change(less, -step);
       block.expected.push_back(
@@ -179,7 +179,7 @@ void check_against_reference(Attribute attribute, const Scene& scene) {
     if (list.empty()) continue;
     ++compared;
     const double error = block_error(block, k_tolerance);
-    CHECK_MESSAGE(error < (is_sensitivity(block) ? 10 : 1) * k_tolerance, block.name << ": " << error);
+    CHECK_MESSAGE(error < (is_sensitivity(block.name) ? 10 : 1) * k_tolerance, block.name << ": " << error);
     if (block.name == "positions") CHECK(norm(block.expected) > 1e-2);
   }
   CHECK(compared >= 8);
@@ -303,7 +303,7 @@ void check_by_differences(Attribute attribute, const Scene& scene, float step, d
     if (list.empty()) continue;
     CHECK(norm(block.expected) > 0);
     const double error = block_error(block, tolerance);
-    CHECK_MESSAGE(error < (is_sensitivity(block) ? 10 : 1) * tolerance, block.name << ": " << error);
+    CHECK_MESSAGE(error < (is_sensitivity(block.name) ? 10 : 1) * tolerance, block.name << ": " << error);
   }
 }
 

@@ -30,7 +30,7 @@ double slack_of(const Smoothing& s) {
 }
 
 double tolerance_of(const Block& block, const Smoothing& smoothing) {
-  return (is_sensitivity(block) ? k_sensitivity : k_block) * slack_of(smoothing);
+  return (is_sensitivity(block.name) ? k_sensitivity : k_block) * slack_of(smoothing);
 }
 
 /// The worst figures of many scenes: by block, in units of the tolerance too.

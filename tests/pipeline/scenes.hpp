@@ -1,6 +1,7 @@
 // The scenes that the tests of the whole pipeline share, beside those of the self-test.
 #pragma once
 
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,11 @@ inline Image rendered(const Scene& scene) {
   renderer.set_scene(scene);
   renderer.forward();
   return renderer.image();
+}
+
+/// True for the name of a gradient by the smoothing.
+inline bool is_sensitivity(std::string_view block) {
+  return block == "sigma" || block == "gamma" || block == "alpha";
 }
 
 /// From within: faces at the camera's sides reach behind it.

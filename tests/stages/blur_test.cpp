@@ -11,7 +11,6 @@
 #include <random>
 #include <vector>
 
-#include "reference/blur.hpp"
 #include "support/blur_matrix.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
@@ -69,7 +68,7 @@ struct Run {
       : device(device_),
         blur(device_),
         size{views, static_cast<std::size_t>(c.width), static_cast<std::size_t>(c.height)} {
-    blur.set_kernel(dpr::blur_kernel(c.prior, c.scale, c.supersampling));
+    blur.set(blur.prepare(dpr::blur_kernel(c.prior, c.scale, c.supersampling)));
     raster =
         random_pixels(views * raster_side(c.width, blur.kernel()) * raster_side(c.height, blur.kernel()), 1);
     grad_image = random_pixels(views * size.width * size.height, 2);
@@ -340,7 +339,7 @@ TEST_SUITE("unit") {
     other.forward();
     other.backward();
     other.backward_scale();
-    other.blur.set_kernel(run.blur.kernel());
+    other.blur.set(other.blur.prepare(run.blur.kernel()));
     other.size = run.size;
     other.raster = run.raster;
     other.grad_image = run.grad_image;
