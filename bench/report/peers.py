@@ -6,7 +6,8 @@
 
 A step sets new positions and colours of the vertices, renders the image, and leaves the gradients of a mean squared error
 by positions and colours in the caller's arrays. Every program is a process that waits while another one runs. The file has
-the fastest step of each, which other work on the machine disturbed least, and the median.
+the fastest step of each, which other work on the machine disturbed least, and the median; it keeps its rows of
+workloads and programs that are not measured.
 
 Needs `dpr` and `dpr-bench` in the PATH and the package dpr. Takes DEODR and Mitsuba from the interpreter PEERS, since their
 NumPy is newer than the one of Debian's PyTorch; programs that are not installed are left out. peers.sh does all this.
@@ -33,6 +34,8 @@ except ImportError:  # which --check does not need
 FIELD_OF_VIEW, BACKGROUND, TARGET = 60.0, 0.0, 0.3
 WORKLOADS = {"cube128": (0, 128, 6.7), "sphere256": (3, 256, 2.7), "sphere20k": (5, 256, 2.7),
              "sphere80k": (6, 512, 2.7), "million": (8, 1024, 2.7)}  # subdivisions, pixels, distance
+# Memory that a step frees stays with the process; else DEODR spends half of a small step on pages from the system.
+ALLOCATION = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(4 << 30)}
 STEPS = {"million": 2, "sphere80k": 4}  # of a turn; of the others 8
 
 
@@ -273,7 +276,7 @@ def measure(programs, python, workloads, rounds):
         _, package, variables = PROGRAMS[program]
         command = [sys.executable if package == "dpr" else python, __file__, "--serve", program]
         workers[program] = subprocess.Popen(command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                            env={**os.environ, **variables})
+                                            env={**os.environ, **ALLOCATION, **variables})
     rows = []
     for name in workloads:
         times = {program: [] for program in programs}
@@ -302,10 +305,13 @@ def measure(programs, python, workloads, rounds):
     return rows
 
 
+def rows_of(results):
+    return list(csv.DictReader(line for line in results.read_text().splitlines() if not line.startswith("#")))
+
+
 def readme_with(results, text):
     """The document with the results' steps of two workloads in the last column of its table of programs."""
-    rows = csv.DictReader(line for line in results.read_text().splitlines() if not line.startswith("#"))
-    steps = {(row["program"], row["workload"]): float(row["step_ms"]) for row in rows}
+    steps = {(row["program"], row["workload"]): float(row["step_ms"]) for row in rows_of(results)}
 
     def cells(match):
         name = {"dpr": "dpr NumPy"}.get(match[2], match[2])
@@ -346,12 +352,19 @@ def main():
     if options.output:
         processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if "model name" in line),
                          platform.processor())
-        text = [f"# {datetime.date.today()}, {processor}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}: the fastest "
-                f"step, and the median, of {options.rounds} rounds in which the programs took turns.",
-                "program,version,workload,forward_ms,backward_ms,step_ms,median_ms,steps"]
-        text += [f"{program},{versions[program]},{name},{','.join(f'{ms:.4g}' for ms in times)},{steps}"
+        columns = "program,version,workload,forward_ms,backward_ms,step_ms,median_ms,steps,date,load"
+        made = f"{datetime.date.today()},{os.getloadavg()[0]:.1f}"
+        lines = [f"{program},{versions[program]},{name},{','.join(f'{ms:.4g}' for ms in times)},{steps},{made}"
                  for program, name, *times, steps in rows]
-        options.output.write_text("\n".join(text) + "\n")
+        if options.output.exists():
+            measured = {row[:2] for row in rows}
+            lines += [",".join(row.values()) for row in rows_of(options.output)
+                      if (row["program"], row["workload"]) not in measured]
+        place = {(program, name): (i, k) for i, name in enumerate(WORKLOADS) for k, program in enumerate(PROGRAMS)}
+        lines.sort(key=lambda line: place[line.split(",")[0], line.split(",")[2]])
+        machine = (f"# {processor}, {os.cpu_count()} cores. The fastest of the steps, between which the other programs took "
+                   "their turns, and the median.")
+        options.output.write_text("\n".join([machine, columns, *lines]) + "\n")
 
 
 if __name__ == "__main__":
