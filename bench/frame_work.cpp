@@ -51,9 +51,9 @@ struct Fragments {
   explicit Fragments(const FrameFragments& f)
       : starts(f.pixel_starts.download()),
         list(f.list.download()),
-        depth(f.depth.download()),
-        log_occupancy(f.log_occupancy.download()),
-        occupancy(f.occupancy.download()) {}
+        depth(f.depth),
+        log_occupancy(f.log_occupancy),
+        occupancy(f.occupancy) {}
 
   std::span<const cl_uint> pixel(std::size_t i) const {
     return std::span(list).subspan(starts[i], starts[i + 1] - starts[i]);

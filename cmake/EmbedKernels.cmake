@@ -81,10 +81,16 @@ function(dpr_write_arguments file folder)
     set(${kernel}_members "${members}")
     list(LENGTH members_names count)
     list(JOIN members_names ", " list)
+    list(TRANSFORM members_names PREPEND "all.")
+    list(JOIN members_names ", " from)
     string(APPEND structs "
 struct ${kernel} {
   static constexpr KernelSource k_source{\"${source}\", \"${kernel}\"};
-${members}  std::array<Argument, ${count}> arguments() const { return {{${list}}}; }
+${members}  template <class Arguments>
+  static ${kernel} pick(const Arguments& all) {
+    return {${from}};
+  }
+  std::array<Argument, ${count}> arguments() const { return {{${list}}}; }
 };
 ")
   endforeach()

@@ -161,18 +161,15 @@ static inline float slot_log(const Slot s, const Fragments f) {
 /// in   views   ViewParams[view]
 /// in   starts  uint[pixel + 1]  runs of `list`
 /// in   list    uint[...]        fragments, by pixel
-/// in   depth, log_occupancy, occupancy, red, green, blue  float[fragment]
+/// in   fragments  float[plane][fragment]  DEPTH, LOG_OCCUPANCY, OCCUPANCY, COLOR
 /// out  slots       Slot[length of list + pixels]  for the backward pass; a pixel's begin at
 ///                                                 starts[pixel] + pixel
 /// out  slot_counts uint[pixel]
 /// out  image       float4[pixel]    colour, and alpha = 1 - prod (1 - p)
 kernel void aggregate_forward(const AggregateParams p, global const ViewParams* restrict views,
                               global const uint* restrict starts, global const uint* restrict list,
-                              global const float* restrict depth, global const float* restrict log_occupancy,
-                              global const float* restrict occupancy, global const float* restrict red,
-                              global const float* restrict green, global const float* restrict blue,
-                              global Slot* restrict slots, global uint* restrict slot_counts,
-                              global float4* restrict image) {
+                              global const float* restrict fragments, global Slot* restrict slots,
+                              global uint* restrict slot_counts, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   const float3 background = p.background.xyz;
@@ -180,7 +177,7 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
     image[pixel] = (float4)(background, 0.0f);
     return;
   }
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  const Fragments f = make_fragments(p, list, fragments);
   float transparency;
   Slots run;
   gather_slots(p, pixel, views, starts, f, slots, &run, &transparency);
@@ -195,14 +192,12 @@ kernel void aggregate_forward(const AggregateParams p, global const ViewParams* 
 
 /// Clears a pixel's gradients, but for what alpha adds to those of ln p.
 static inline void clear_gradients(const Fragments f, uint first, uint last, float grad_alpha_channel,
-                                   global float* grad_depth, global float* grad_log_occupancy,
-                                   global float* grad_red, global float* grad_green,
-                                   global float* grad_blue) {
+                                   const FragmentGradients g) {
   const float transparency = run_transparency(f, first, last);
   for (uint i = first; i < last; ++i) {
     const uint k = f.list[i];
-    grad_depth[k] = grad_red[k] = grad_green[k] = grad_blue[k] = 0.0f;
-    grad_log_occupancy[k] = grad_alpha_channel * alpha_sensitivity(f, k, transparency);
+    g.depth[k] = g.red[k] = g.green[k] = g.blue[k] = 0.0f;
+    g.log_occupancy[k] = grad_alpha_channel * alpha_sensitivity(f, k, transparency);
   }
 }
 
@@ -210,18 +205,14 @@ static inline void clear_gradients(const Fragments f, uint first, uint last, flo
 /// Deterministic.
 /// in   slots, slot_counts   as aggregate_forward left them; changed. The other inputs as there
 /// in   grad_image  float4[pixel]
-/// out  grad_depth, grad_log_occupancy, grad_red, grad_green, grad_blue  float[fragment]
+/// out  grads       float[plane][fragment]  of DEPTH, LOG_OCCUPANCY, COLOR
 /// out  channels    float[DPR_PIXEL_CHANNELS][pixel]  what the pixel adds to gamma, alpha and the background
 ///                                                    colour
 kernel void aggregate_backward(const AggregateParams p, global const ViewParams* restrict views,
                                global const uint* restrict starts, global const uint* restrict list,
-                               global const float* restrict depth, global const float* restrict log_occupancy,
-                               global const float* restrict occupancy, global const float* restrict red,
-                               global const float* restrict green, global const float* restrict blue,
-                               global Slot* restrict slots, global const uint* restrict slot_counts,
-                               global const float4* restrict grad_image, global float* restrict grad_depth,
-                               global float* restrict grad_log_occupancy, global float* restrict grad_red,
-                               global float* restrict grad_green, global float* restrict grad_blue,
+                               global const float* restrict fragments, global Slot* restrict slots,
+                               global const uint* restrict slot_counts,
+                               global const float4* restrict grad_image, global float* restrict grads,
                                global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
@@ -229,10 +220,11 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
   float grad_gamma = 0.0f, grad_alpha = 0.0f, background_weight = 1.0f;
   const uint first = starts[pixel], last = starts[pixel + 1];
   if (first != last) {
-    const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
-    clear_gradients(f, first, last, grad.w, grad_depth, grad_log_occupancy, grad_red, grad_green, grad_blue);
+    const Fragments f = make_fragments(p, list, fragments);
+    const FragmentGradients g = make_gradients(p, grads);
+    clear_gradients(f, first, last, grad.w, g);
     const Slots run = {slots + first + pixel, slot_counts[pixel], 0.0f};
-    SlotGradients sums = {grad_red, grad_depth, 0, 0.0f, 0.0f};
+    SlotGradients sums = {g.red, g.depth, 0, 0.0f, 0.0f};
     // A common shift of all g changes nothing: relative to the background's they keep their digits.
     for (uint i = 0; i < run.count; ++i) {
       run.slot[i].grad = dot(grad.xyz, slot_color(run.slot[i], f, p.background.xyz) - p.background.xyz);
@@ -249,19 +241,17 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
       const Slot s = run.slot[i];
       const uint k = s.fragment;
       const int is_background = k == DPR_BACKGROUND_SLOT;
-      const float grad_beta = scale * (is_background ? sums.background_beta : grad_depth[k]);
+      const float grad_beta = scale * (is_background ? sums.background_beta : g.depth[k]);
       // d beta / d gamma = -(beta by depth) / gamma; d beta / d alpha = -ln p / alpha^2. Shifting all betas
       // changes nothing, so both count from the largest slot, where the gradients are: from elsewhere their
       // errors would be multiplied by the distance.
       grad_gamma += grad_beta * (slot_depth(s, f, background_depth) - depth_origin) * depth_scale / p.gamma;
       grad_alpha -= grad_beta * (slot_log(s, f) - log_origin) * inverse_alpha * inverse_alpha;
       if (is_background) continue;
-      const float weight = scale * grad_red[k];
-      grad_red[k] = weight * grad.x;
-      grad_green[k] = weight * grad.y;
-      grad_blue[k] = weight * grad.z;
-      grad_depth[k] = -grad_beta * depth_scale;
-      grad_log_occupancy[k] += grad_beta * inverse_alpha;
+      const float weight = scale * g.red[k];
+      store_color(g, k, weight, grad);
+      g.depth[k] = -grad_beta * depth_scale;
+      g.log_occupancy[k] += grad_beta * inverse_alpha;
     }
   }
   write_channels(p, pixel, grad_gamma, grad_alpha, background_weight, grad, channels);

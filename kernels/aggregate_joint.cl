@@ -154,12 +154,8 @@ static inline float3 cluster_color(const Cluster c, const Fragments f) {
 /// seen of. A fragment alone has no slot.
 kernel void aggregate_joint_forward(const AggregateParams p, global const ViewParams* restrict views,
                                     global const uint* restrict starts, global const uint* restrict list,
-                                    global const float* restrict depth,
-                                    global const float* restrict log_occupancy,
-                                    global const float* restrict occupancy, global const float* restrict red,
-                                    global const float* restrict green, global const float* restrict blue,
-                                    global Slot* restrict slots, global uint* restrict slot_counts,
-                                    global float4* restrict image) {
+                                    global const float* restrict fragments, global Slot* restrict slots,
+                                    global uint* restrict slot_counts, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
@@ -167,13 +163,13 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
     image[pixel] = (float4)(p.background.xyz, 0.0f);
     return;
   }
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  const Fragments f = make_fragments(p, list, fragments);
   if (starts[pixel] + 1 == starts[pixel + 1]) {  // most pixels of a sharp image: no cluster to look for
     const uint k = list[starts[pixel]];
     const float transparency = fragment_transparency(f, k);
-    slot_counts[pixel] = occupancy[k] > 0.0f ? 1 : 0;
-    image[pixel] =
-        (float4)(occupancy[k] * fragment_color(f, k) + transparency * p.background.xyz, 1.0f - transparency);
+    slot_counts[pixel] = f.occupancy[k] > 0.0f ? 1 : 0;
+    image[pixel] = (float4)(f.occupancy[k] * fragment_color(f, k) + transparency * p.background.xyz,
+                            1.0f - transparency);
     return;
   }
   const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
@@ -225,15 +221,12 @@ static inline float cluster_gradients(Slots run, const Fragments f, float3 grad,
 
 /// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
 /// Deterministic. Arguments as aggregate_backward, with the slots that aggregate_joint_forward left.
-kernel void aggregate_joint_backward(
-    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
-    global const uint* restrict list, global const float* restrict depth,
-    global const float* restrict log_occupancy, global const float* restrict occupancy,
-    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
-    global Slot* restrict slots, global const uint* restrict slot_counts,
-    global const float4* restrict grad_image, global float* restrict grad_depth,
-    global float* restrict grad_log_occupancy, global float* restrict grad_red,
-    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict channels) {
+kernel void aggregate_joint_backward(const AggregateParams p, global const ViewParams* restrict views,
+                                     global const uint* restrict starts, global const uint* restrict list,
+                                     global const float* restrict fragments, global Slot* restrict slots,
+                                     global const uint* restrict slot_counts,
+                                     global const float4* restrict grad_image, global float* restrict grads,
+                                     global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   const float4 grad = grad_image[pixel];
@@ -241,15 +234,14 @@ kernel void aggregate_joint_backward(
     write_channels(p, pixel, 0.0f, 0.0f, 1.0f, grad, channels);
     return;
   }
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  const Fragments f = make_fragments(p, list, fragments);
+  const FragmentGradients g = make_gradients(p, grads);
   if (starts[pixel] + 1 == starts[pixel + 1]) {  // most pixels of a sharp image: no cluster to look for
     const uint k = list[starts[pixel]];
-    const float weight = occupancy[k], jump = dot(grad.xyz, fragment_color(f, k) - p.background.xyz);
-    grad_depth[k] = 0.0f;
-    grad_log_occupancy[k] = weight * (jump + grad.w);
-    grad_red[k] = weight * grad.x;
-    grad_green[k] = weight * grad.y;
-    grad_blue[k] = weight * grad.z;
+    const float weight = f.occupancy[k], jump = dot(grad.xyz, fragment_color(f, k) - p.background.xyz);
+    g.depth[k] = 0.0f;
+    g.log_occupancy[k] = weight * (jump + grad.w);
+    store_color(g, k, weight, grad);
     write_channels(p, pixel, 0.0f, 0.0f, fragment_transparency(f, k), grad, channels);
     return;
   }
@@ -258,7 +250,7 @@ kernel void aggregate_joint_backward(
   const uint seen = slot_counts[pixel];
   for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
     const uint k = list[i];
-    grad_depth[k] = grad_log_occupancy[k] = grad_red[k] = grad_green[k] = grad_blue[k] = 0.0f;
+    g.depth[k] = g.log_occupancy[k] = g.red[k] = g.green[k] = g.blue[k] = 0.0f;
   }
   float transparency = 1.0f;
   for (uint i = 0; i < seen; ++i) transparency *= slot_transparency(pixel_slots[i]);
@@ -266,7 +258,7 @@ kernel void aggregate_joint_backward(
   // Back to front: what lies behind each cluster, as one background.
   float grad_gamma = 0.0f;
   float behind = dot(grad.xyz, p.background.xyz);
-  SlotGradients sums = {grad_red, grad_depth, grad_log_occupancy, 0.0f, 0.0f};
+  SlotGradients sums = {g.red, g.depth, g.log_occupancy, 0.0f, 0.0f};
   for (uint last = seen; last > 0;) {
     float in_front;
     const Slots run = cluster_before(pixel_slots, last, &in_front);
@@ -274,16 +266,14 @@ kernel void aggregate_joint_backward(
     for (uint i = 0; i < run.count; ++i) {
       const Slot s = run.slot[i];
       const uint k = s.fragment;
-      const float weight = grad_red[k] * s.occupancy * in_front, grad_beta = grad_depth[k] * in_front;
+      const float weight = g.red[k] * s.occupancy * in_front, grad_beta = g.depth[k] * in_front;
       // d beta / d gamma = -beta / gamma; shifting a whole cluster changes nothing, so betas count from its
       // first.
       grad_gamma -= grad_beta * s.beta / p.gamma;
-      grad_depth[k] = -grad_beta * depth_scale;
-      grad_log_occupancy[k] *= s.occupancy * in_front;
-      grad_log_occupancy[k] += grad.w * s.occupancy * transparency / slot_transparency(s);
-      grad_red[k] = weight * grad.x;
-      grad_green[k] = weight * grad.y;
-      grad_blue[k] = weight * grad.z;
+      g.depth[k] = -grad_beta * depth_scale;
+      g.log_occupancy[k] *= s.occupancy * in_front;
+      g.log_occupancy[k] += grad.w * s.occupancy * transparency / slot_transparency(s);
+      store_color(g, k, weight, grad);
       run.slot[i].grad = i == 0 ? in_front : -1.0f;  // as it was: the next backward pass reads it again
     }
     last -= run.count;

@@ -36,13 +36,12 @@ typedef struct {
   float depth_scale;  // d beta / d (nearest - depth)
 } Pixel;
 
-static inline Layers make_layers(global const uint* list, global const float* distance,
-                                 global const float* depth, global const float* red,
-                                 global const float* green, global const float* blue,
-                                 global const uint* fragment_pair, global const uint* pair_face) {
+static inline Layers make_layers(const AggregateParams p, global const uint* list,
+                                 global const float* fragments, global const uint* fragment_pair,
+                                 global const uint* pair_face) {
   Layers f;
-  f.fragments = make_fragments(list, depth, 0, 0, red, green, blue);
-  f.distance = distance;
+  f.fragments = make_fragments(p, list, fragments);
+  f.distance = fragments + DPR_PLANE(p, DISTANCE);
   f.face.fragment_pair = fragment_pair;
   f.face.pair_face = pair_face;
   return f;
@@ -147,22 +146,23 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const La
 }
 
 /// One work-item per pixel. Deterministic. Arguments as aggregate_forward, and
-/// in   distance       float[fragment]  signed, positive inside, in the unit of sigma
+/// in   fragments      float[plane][fragment]  DEPTH, COLOR, DISTANCE
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 /// out  image          float4[pixel]    means over the samples; alpha: the share in which any fragment covers
-kernel void aggregate_joint_sampled_forward(
-    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
-    global const uint* restrict list, global const float* restrict distance,
-    global const float* restrict depth, global const float* restrict red, global const float* restrict green,
-    global const float* restrict blue, global const uint* restrict fragment_pair,
-    global const uint* restrict pair_face, global float4* restrict image) {
+kernel void aggregate_joint_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
+                                            global const uint* restrict starts,
+                                            global const uint* restrict list,
+                                            global const float* restrict fragments,
+                                            global const uint* restrict fragment_pair,
+                                            global const uint* restrict pair_face,
+                                            global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   if (starts[pixel] == starts[pixel + 1]) {
     image[pixel] = (float4)(p.background.xyz, 0.0f);
     return;
   }
-  const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);
+  const Layers f = make_layers(p, list, fragments, fragment_pair, pair_face);
   const Pixel q = load_pixel(p, pixel, views, starts, f);
   float4 sum = 0.0f;
   for (uint block = 0; DPR_WIDTH * block < p.sampling.samples; ++block) {
@@ -238,40 +238,37 @@ static inline PixelSums add_samples(const AggregateParams p, const Pixel q, cons
 /// One work-item per pixel; every fragment belongs to one pixel, so no two write the same place.
 /// Deterministic. Inputs as aggregate_joint_sampled_forward, and
 /// in   grad_image  float4[pixel]
-/// out  grad_distance, grad_depth, grad_red, grad_green, grad_blue  float[fragment]
+/// out  grads       float[plane][fragment]  of DEPTH, COLOR, DISTANCE
 /// out  grad_sigma  float[pixel]                      what the pixel adds to dL/dsigma
 /// out  channels    float[p.channels][pixel]  what the pixel adds to gamma and the background colour
 kernel void aggregate_joint_sampled_backward(
     const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
-    global const uint* restrict list, global const float* restrict distance,
-    global const float* restrict depth, global const float* restrict red, global const float* restrict green,
-    global const float* restrict blue, global const uint* restrict fragment_pair,
-    global const uint* restrict pair_face, global const float4* restrict grad_image,
-    global float* restrict grad_distance, global float* restrict grad_depth, global float* restrict grad_red,
-    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict grad_sigma,
+    global const uint* restrict list, global const float* restrict fragments,
+    global const uint* restrict fragment_pair, global const uint* restrict pair_face,
+    global const float4* restrict grad_image, global float* restrict grads, global float* restrict grad_sigma,
     global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
-  const Layers f = make_layers(list, distance, depth, red, green, blue, fragment_pair, pair_face);
+  const Layers f = make_layers(p, list, fragments, fragment_pair, pair_face);
   const float4 grad = grad_image[pixel];
   float by_sigma = 0.0f, by_gamma = 0.0f, background_weight = 1.0f;
   if (starts[pixel] != starts[pixel + 1]) {
     const Pixel q = load_pixel(p, pixel, views, starts, f);
     // The colours' gradients are written last; until then their places hold sums.
-    const FragmentSums collected = {grad_red, grad_distance, grad_green, grad_depth, grad_blue};
+    const FragmentGradients g = make_gradients(p, grads);
+    global float* const grad_distance = grads + DPR_GRAD_PLANE(p, DISTANCE);
+    const FragmentSums collected = {g.red, grad_distance, g.green, g.depth, g.blue};
     const PixelSums sums = add_samples(p, q, f, grad, collected);
     by_sigma = in_sigmas(p, scale_estimate(p.sampling, sums.sigma, sums.y), 0.0f);
     by_gamma = scale_estimate(p.sampling, sums.gamma, sums.y) / p.gamma;
     for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];
-      const float weight = grad_red[k] / (float)p.sampling.samples;
+      const float weight = g.red[k] / (float)p.sampling.samples;
       background_weight -= weight;
-      const float by_distance = score_estimate(p.sampling, grad_distance[k], grad_green[k], sums.y);
+      const float by_distance = score_estimate(p.sampling, grad_distance[k], g.green[k], sums.y);
       grad_distance[k] = in_sigmas(p, by_distance, 0.0f);
-      grad_depth[k] = -score_estimate(p.sampling, grad_depth[k], grad_blue[k], sums.y) * q.depth_scale;
-      grad_red[k] = weight * grad.x;
-      grad_green[k] = weight * grad.y;
-      grad_blue[k] = weight * grad.z;
+      g.depth[k] = -score_estimate(p.sampling, g.depth[k], g.blue[k], sums.y) * q.depth_scale;
+      store_color(g, k, weight, grad);
     }
   }
   grad_sigma[pixel] = by_sigma;

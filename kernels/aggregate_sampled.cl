@@ -82,11 +82,7 @@ static inline Lead find_winners(const AggregateParams p, const Pixel q, const Fr
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]   name the noise of a fragment
 kernel void aggregate_sampled_forward(const AggregateParams p, global const ViewParams* restrict views,
                                       global const uint* restrict starts, global const uint* restrict list,
-                                      global const float* restrict depth,
-                                      global const float* restrict log_occupancy,
-                                      global const float* restrict occupancy,
-                                      global const float* restrict red, global const float* restrict green,
-                                      global const float* restrict blue,
+                                      global const float* restrict fragments,
                                       global const uint* restrict fragment_pair,
                                       global const uint* restrict pair_face, global float4* restrict image) {
   const uint pixel = (uint)get_global_id(0);
@@ -95,7 +91,7 @@ kernel void aggregate_sampled_forward(const AggregateParams p, global const View
     image[pixel] = (float4)(p.background.xyz, 0.0f);
     return;
   }
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  const Fragments f = make_fragments(p, list, fragments);
   const FaceOf face = {fragment_pair, pair_face};
   const Pixel q = load_pixel(p, pixel, views, starts, f);
   float4 sum = 0.0f;
@@ -140,44 +136,41 @@ static inline float add_samples(const AggregateParams p, const Pixel q, const Fr
 
 /// One work-item per pixel. Deterministic. Inputs as aggregate_sampled_forward, gradients as
 /// aggregate_backward.
-kernel void aggregate_sampled_backward(
-    const AggregateParams p, global const ViewParams* restrict views, global const uint* restrict starts,
-    global const uint* restrict list, global const float* restrict depth,
-    global const float* restrict log_occupancy, global const float* restrict occupancy,
-    global const float* restrict red, global const float* restrict green, global const float* restrict blue,
-    global const uint* restrict fragment_pair, global const uint* restrict pair_face,
-    global const float4* restrict grad_image, global float* restrict grad_depth,
-    global float* restrict grad_log_occupancy, global float* restrict grad_red,
-    global float* restrict grad_green, global float* restrict grad_blue, global float* restrict channels) {
+kernel void aggregate_sampled_backward(const AggregateParams p, global const ViewParams* restrict views,
+                                       global const uint* restrict starts, global const uint* restrict list,
+                                       global const float* restrict fragments,
+                                       global const uint* restrict fragment_pair,
+                                       global const uint* restrict pair_face,
+                                       global const float4* restrict grad_image, global float* restrict grads,
+                                       global float* restrict channels) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
-  const Fragments f = make_fragments(list, depth, log_occupancy, occupancy, red, green, blue);
+  const Fragments f = make_fragments(p, list, fragments);
   const FaceOf face = {fragment_pair, pair_face};
   const float4 grad = grad_image[pixel];
   float grad_gamma = 0.0f, grad_alpha = 0.0f, background_weight = 1.0f;
   if (starts[pixel] != starts[pixel + 1]) {
     const Pixel q = load_pixel(p, pixel, views, starts, f);
+    const FragmentGradients g = make_gradients(p, grads);
     ScaleSums gamma = {(realn)(0.0f), (realn)(0.0f)};
     // The alpha is not sampled: y is of the colour alone.
     const float4 grad_color = (float4)(grad.xyz, 0.0f);
-    const float y_sum =
-        add_samples(p, q, f, face, grad_color, grad_red, grad_depth, grad_log_occupancy, &gamma);
+    const float y_sum = add_samples(p, q, f, face, grad_color, g.red, g.depth, g.log_occupancy, &gamma);
     grad_gamma = scale_estimate(p.sampling, gamma, y_sum) / p.gamma;
     for (uint i = q.run.first; i < q.run.last; ++i) {
       const uint k = list[i];
-      const float weight = grad_red[k] / (float)p.sampling.samples;
-      const float grad_beta = score_estimate(p.sampling, grad_depth[k], grad_log_occupancy[k], y_sum);
+      const float weight = g.red[k] / (float)p.sampling.samples;
+      const float grad_beta = score_estimate(p.sampling, g.depth[k], g.log_occupancy[k], y_sum);
       background_weight -= weight;
-      grad_red[k] = weight * grad.x;
-      grad_green[k] = weight * grad.y;
-      grad_blue[k] = weight * grad.z;
-      grad_depth[k] = -grad_beta * q.barrier.depth_scale;
-      grad_log_occupancy[k] =
+      store_color(g, k, weight, grad);
+      g.depth[k] = -grad_beta * q.barrier.depth_scale;
+      g.log_occupancy[k] =
           grad_beta * q.barrier.inverse_alpha + grad.w * alpha_sensitivity(f, k, q.barrier.transparency);
-      if (log_occupancy[k] <= DPR_LOG_ZERO) continue;
+      const float log_p = f.log_occupancy[k];
+      if (log_p <= DPR_LOG_ZERO) continue;
       // b = zeta + (gamma / alpha) ln p depends on gamma and alpha by itself.
-      grad_gamma += grad_beta * log_occupancy[k] * q.barrier.inverse_alpha / p.gamma;
-      grad_alpha -= grad_beta * log_occupancy[k] * q.barrier.inverse_alpha * q.barrier.inverse_alpha;
+      grad_gamma += grad_beta * log_p * q.barrier.inverse_alpha / p.gamma;
+      grad_alpha -= grad_beta * log_p * q.barrier.inverse_alpha * q.barrier.inverse_alpha;
     }
   }
   write_channels(p, pixel, grad_gamma, grad_alpha, background_weight, grad, channels);

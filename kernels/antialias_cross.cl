@@ -85,7 +85,6 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, const T
 /// Deterministic.
 /// in   edges         uint2[edge]           of the scene; see DPR_EDGE_FLAG
 /// in   faces         uint4[face]           vertex indices
-/// in   facing        uchar[view][face]
 /// in   ndc           float4[view][vertex]
 /// in   clipped       ClippedFace[view][face]  read where p.clips is set
 /// in   tile_starts   uint[view * tile + 1] runs of pairs
@@ -97,9 +96,8 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, const T
 /// out  cut           Cut[2][pixel]         what it cuts. Not written where nothing crosses
 /// out  crowded       uchar[tile][DPR_TILE_BYTES]  steps that several contours cross. Not written where the
 ///                                          winners are not
-kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
-                            global const ViewParams* restrict views, global const uint2* restrict edges,
-                            global const uint4* restrict faces, global const uchar* restrict facing,
+kernel void antialias_cross(const FrameParams p, global const ViewParams* restrict views,
+                            global const uint2* restrict edges, global const uint4* restrict faces,
                             global const float4* restrict ndc, global const ClippedFace* restrict clipped,
                             global const uint* restrict tile_starts, global const uint* restrict pair_contour,
                             global const float* restrict front, global uint* restrict winner,
@@ -110,11 +108,11 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
   const uint first_pixel = view * p.width * p.height;
   const TileSamples s = tile_samples(p, tile);
   clear_steps(p, s, own, first_pixel, winner);
-  const CrossingScene v = {faces, ndc, front + first_pixel, a.depth_reach / views[view].inverse_range};
+  const CrossingScene v = {faces, ndc, front + first_pixel, p.depth_reach / views[view].inverse_range};
   ulong several_right = 0, several_down = 0;  // steps, a bit each
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
-    const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
+    const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
       const int only_passes = weight_of_slope(e.slope * e.slope) == 0.0f;
@@ -127,7 +125,7 @@ kernel void antialias_cross(const FrameParams p, const AntialiasParams a,
         const float depth = mix_depths(p, c.depths, x.along);
         int loses = is_contour(before);
         if (loses && !only_passes) {
-          const TileContour other = load_contour(p, a, before, edges, faces, facing, ndc, clipped);
+          const TileContour other = load_contour(p, before, edges, faces, ndc, clipped);
           loses = !goes_before(before, depth_on_line(p, other, by_rows, line), contour, depth);
         }
         if (loses && ((by_rows ? several_right : several_down) & bit)) continue;
@@ -172,7 +170,7 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint list, global con
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps
 /// that it won, or crosses as a second. One work-item per pair. Deterministic.
-/// in   edges, faces, facing, ndc, clipped, winner  as antialias_cross
+/// in   edges, faces, ndc, clipped, winner  as antialias_cross
 /// in   pairs          uint[1]          how many there are
 /// in   pair_contour   uint[pair]
 /// in   pair_tile      uint[pair]       view * tiles + tile
@@ -180,9 +178,8 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint list, global con
 /// in   second_counts, seconds, grad_seconds  as antialias_second.cl leaves them
 /// out  grad_ends      float4[pair]     of x, y of the first end, x, y of the second, NDC
 kernel void antialias_cross_backward(
-    const FrameParams p, const AntialiasParams a, global const uint* restrict pairs,
-    global const uint2* restrict edges, global const uint4* restrict faces,
-    global const uchar* restrict facing, global const float4* restrict ndc,
+    const FrameParams p, global const uint* restrict pairs, global const uint2* restrict edges,
+    global const uint4* restrict faces, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,
     global const float2* restrict grad_cut, global const uint* restrict second_counts,
@@ -191,7 +188,7 @@ kernel void antialias_cross_backward(
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs[0]) return;
   const uint contour = pair_contour[pair];
-  const TileContour c = load_contour(p, a, contour, edges, faces, facing, ndc, clipped);
+  const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
   const TileSamples s = tile_samples(p, pair_tile[pair]);
   float2 grad_a = 0.0f, grad_b = 0.0f;
   for (int by_rows = 0; by_rows < 2; ++by_rows) {

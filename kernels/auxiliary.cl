@@ -12,20 +12,19 @@ static inline float3 normalized(float3 v) {
 /// One work-item per pixel, up to `last_pixel`. Deterministic.
 /// in   starts         uint[pixel + 1]        runs of `list`
 /// in   list           uint[...]              fragments, by pixel
-/// in   weight         float[fragment]        in the pixel's colour
-/// in   channels       float[channel][pixel]  of aggregation's backward pass for a gradient of 1
-///                                                       in red: the background's weight is in that of the
-///                                                       background colour
-/// in   depth, bary1, bary2  float[fragment]
+/// in   grads          float[plane][fragment]  of aggregation's backward pass for a gradient of 1 in red:
+///                                            COLOR is the weight in the pixel's colour
+/// in   channels       float[channel][pixel]  of the same: the background's weight is in that of the
+///                                            background colour
+/// in   fragments      float[plane][fragment]  DEPTH, BARY
 /// in   fragment_pair  uint[fragment],  pair_face  uint[pair]
 /// in   faces          uint4[face]            vertex indices
 /// in   world          float4[view][vertex]
 /// out  outputs        float[DPR_AUXILIARY_CHANNELS][pixel]
 /// out  face_id        uint[pixel]            face of the scene, DPR_NO_FACE for the background
 kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global const uint* restrict starts,
-                              global const uint* restrict list, global const float* restrict weight,
-                              global const float* restrict channels, global const float* restrict depth,
-                              global const float* restrict bary1, global const float* restrict bary2,
+                              global const uint* restrict list, global const float* restrict grads,
+                              global const float* restrict channels, global const float* restrict fragments,
                               global const uint* restrict fragment_pair,
                               global const uint* restrict pair_face, global const uint4* restrict faces,
                               global const float4* restrict world, global float* restrict outputs,
@@ -33,6 +32,9 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
   const uint pixel = (uint)get_global_id(0);
   const uint pixels_per_view = p.width * p.height, pixels = p.views * pixels_per_view;
   if (pixel >= last_pixel) return;
+  global const float *const weight = grads + DPR_GRAD_PLANE(p, COLOR),
+                            *const depth = fragments + DPR_PLANE(p, DEPTH),
+                            *const bary = fragments + DPR_PLANE(p, BARY);
   global const float4* vertices = world + pixel / pixels_per_view * p.vertices;
   float sum = 0.0f, squares = 0.0f, depth_sum = 0.0f,
         largest = channels[DPR_CHANNEL_BACKGROUND * pixels + pixel];
@@ -50,7 +52,7 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
     if (w <= largest) continue;
     largest = w;
     seen = face;
-    barycentrics = (float2)(bary1[k], bary2[k]);
+    barycentrics = (float2)(bary[k], bary[p.fragments + k]);
   }
   normal = normalized(normal);
   outputs[DPR_AUXILIARY_DEPTH * pixels + pixel] = sum > 0.0f ? depth_sum / sum : 0.0f;

@@ -8,7 +8,7 @@
 
 /// Lists of the pairs of tiles and triangles.
 typedef struct {
-  global uint *face, *tile, *self;
+  global uint *face, *tile;
 } Places;
 
 /// Lists a triangle's tiles in rows [x, y], all of its bounds' or those that it overlaps, from `place` on.
@@ -21,7 +21,6 @@ static inline void list_tiles(const FrameParams p, const Triangle t, uint face, 
       if (!are_all && !is_listed(p, t, x, y)) continue;
       out.face[place] = face;
       out.tile[place] = first_tile + y * p.tiles_x + x;
-      out.self[place] = place;
       ++place;
     }
   }
@@ -35,14 +34,12 @@ static inline void list_tiles(const FrameParams p, const Triangle t, uint face, 
 /// out  pairs       uint[1]               how many there are; 0 where they do not fit
 /// out  place_face  uint[place]           view * faces + face
 /// out  place_tile  uint[place]           view * tiles + tile
-/// out  places      uint[place]           the place itself: what sorting permutes
 DPR_SHARING_KERNEL kernel void bin_fill(const FrameParams p, const uint capacity,
                                         global const Triangle* restrict triangles,
                                         global const uint* restrict offsets, global uint* restrict pairs,
-                                        global uint* restrict place_face, global uint* restrict place_tile,
-                                        global uint* restrict places) {
+                                        global uint* restrict place_face, global uint* restrict place_tile) {
   const uint i = (uint)get_global_id(0), total = offsets[p.views * p.faces];
-  const Places out = {place_face, place_tile, places};
+  const Places out = {place_face, place_tile};
   if (i == 0) pairs[0] = total > capacity ? 0 : total;
   const int has_places = i < p.views * p.faces && total <= capacity && offsets[i + 1] > offsets[i];
 #if DPR_LANES == 1

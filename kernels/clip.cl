@@ -5,10 +5,7 @@
 //
 // These kernels follow those that treat every face as whole, and replace what they left of clipped ones.
 // Gradients go by way of the cuts to the corners on both sides of the plane (clip.h).
-#include "clip.h"
-
-#include "affine.h"
-#include "rasterize.h"
+#include "clipped_view.h"
 #include "setup.h"
 
 /// A cut between a corner that is kept and one that is not. The same for all faces that share the two. Not
@@ -135,28 +132,6 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   triangles[i] = triangle_of(o, 1, c.orientation, columns.x | rows.x << 16, columns.y | rows.y << 16);
 }
 
-/// The two triangles of what is left of a face; of a triangle the first alone.
-typedef struct {
-  Triangle triangle[2];
-  int has_second;
-} ClippedTriangles;
-
-static inline ClippedTriangles load_clipped(const Triangle first, const ClippedFace c) {
-  ClippedTriangles t;
-  t.triangle[0] = first;
-  t.has_second = c.corners == 4;
-  t.triangle[1] = first;
-  if (t.has_second) {
-    t.triangle[1].x1 = first.x2;
-    t.triangle[1].y1 = first.y2;
-    t.triangle[1].z1 = first.z2;
-    t.triangle[1].x2 = c.cut[1].x;
-    t.triangle[1].y2 = c.cut[1].y;
-    t.triangle[1].z2 = c.cut[1].z;
-  }
-  return t;
-}
-
 /// Adds what the second triangles of clipped faces cover to what the first do. One work-item for every pair
 /// within the capacity.
 /// in      pairs      uint[1]      how many there are
@@ -177,99 +152,18 @@ kernel void clip_cover(const FrameParams p, const uint capacity, global const ui
   counts[pair] = popcount(mask.x) + popcount(mask.y);
 }
 
-/// The edge of each of a quadrilateral's triangles that is its diagonal.
-#define DPR_FIRST_DIAGONAL 1
-#define DPR_SECOND_DIAGONAL 2
-
-/// The squared distance to the edges of a triangle, but for one.
-static inline realn outline_distance2(const View3 v, int left_out) {
-  realn least = INFINITY;
-#pragma unroll
-  for (int k = 0; k < 3; ++k) least = lesser(least, k == left_out ? INFINITY : edge_distance2(v.edge[k]));
-  return least;
-}
-
-/// Negative at the samples whose barycentrics are those of the second triangle: on its side of the diagonal.
-/// A sliver has no barycentrics, and the other triangle reaches where it would.
-static inline realn side_of_diagonal(const ClippedTriangles t, const Edge diagonal) {
-  if (!t.has_second) return 1.0f;
-  const realn side = diagonal.side * t.triangle[0].orientation;
-  return is_sliver(t.triangle[0]) ? (realn)(-1.0f) : is_sliver(t.triangle[1]) ? (realn)(1.0f) : side;
-}
-
-/// A clipped face seen from samples.
-typedef struct {
-  View3 first, second;
-  realn distance2;     // to the outline
-  intn nearer_second;  // by an edge of the second triangle
-} ViewedClip;
-
-static inline ViewedClip view_clipped(const ClippedTriangles t, realn x, realn y) {
-  ViewedClip v;
-  v.first = v.second = view_triangle(t.triangle[0], x, y);
-  v.distance2 = triangle_distance2(v.first);
-  v.nearer_second = 0;
-  if (!t.has_second) return v;
-  v.second = view_triangle(t.triangle[1], x, y);
-  const realn to_first = outline_distance2(v.first, DPR_FIRST_DIAGONAL);
-  const realn to_second = outline_distance2(v.second, DPR_SECOND_DIAGONAL);
-  v.nearer_second = to_second < to_first;
-  v.distance2 = lesser(to_first, to_second);
-  return v;
-}
-
-/// The barycentrics of an outline's corners in the whole face.
-typedef struct {
-  float of[4][3];
-} OutlineWeights;
-
-/// Weight of a face's corner in corner `k` of the outline, which is a kept corner or a cut.
-static inline float weight_of(const ClippedFace c, uint k, uint corner) {
-  const uint kept = c.corners - 2;
-  if (k < kept) return corner == (c.first + k) % 3 ? 1.0f : 0.0f;
-  if (k == c.corners) return 0.0f;
-  const float part = clipped_cut(c, k - kept).w;
-  return corner == lost_corner(c, k - kept) ? part : corner == kept_corner(c, k - kept) ? 1.0f - part : 0.0f;
-}
-
-static inline OutlineWeights weights_of(const ClippedFace c) {
-  OutlineWeights w;
-#pragma unroll
-  for (uint k = 0; k < 4; ++k) {
-#pragma unroll
-    for (uint corner = 0; corner < 3; ++corner) w.of[k][corner] = weight_of(c, k, corner);
-  }
-  return w;
-}
-
-/// The clipped barycentrics of a sample in its triangle, by the outline's corners.
-static inline void outline_barycentrics(const ViewedClip v, intn in_second, const BarycentricScale first,
-                                        const BarycentricScale second, realn u[4]) {
-  realn n[3], m[3];
-  raw_barycentrics(v.first, first, n);
-  raw_barycentrics(v.second, second, m);
-  const realn of_first = inverse_of_clipped(n), of_second = inverse_of_clipped(m);
-  const realn n1 = greater(n[1], 0.0f) * of_first, n2 = greater(n[2], 0.0f) * of_first;
-  const realn m1 = greater(m[1], 0.0f) * of_second, m2 = greater(m[2], 0.0f) * of_second;
-  u[0] = choose(in_second, 1.0f - m1 - m2, 1.0f - n1 - n2);
-  u[1] = choose(in_second, (realn)(0.0f), n1);
-  u[2] = choose(in_second, m1, n2);
-  u[3] = choose(in_second, m2, (realn)(0.0f));
-}
-
 /// Distances, depths and barycentrics of the fragments of clipped faces. One work-item per pair, up to
 /// `last_pair`. Deterministic.
 /// in   clipped  as clip_cover
 /// in   triangles, pair_face, fragment_starts  as rasterize_forward
 /// in   pixels   uint[fragment]  x | y << 16
-/// out  distance, depth  float[fragment]  as rasterize_forward; not written for other faces
-/// out  bary1, bary2     float[fragment]  of the whole face
+/// out  fragments  float[plane][fragment]  DISTANCE, DEPTH, BARY as rasterize_forward, of the whole face; not
+///                 written for other faces
 kernel void clip_fragments(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
                            global const ClippedFace* restrict clipped,
                            global const Triangle* restrict triangles, global const uint* restrict pair_face,
                            global const uint* restrict fragment_starts, global const uint* restrict pixels,
-                           global float* restrict distance, global float* restrict depth,
-                           global float* restrict bary1, global float* restrict bary2) {
+                           global float* restrict fragments) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(last_pair, pairs[0])) return;
   const uint face = pair_face[pair], last = fragment_starts[pair + 1];
@@ -288,7 +182,7 @@ kernel void clip_fragments(const FrameParams p, const uint last_pair, global con
     if (!p.sharp) {
       intn inside = is_inside(p, t.triangle[0], v.first, error[0], packed);
       if (t.has_second) inside = inside || is_inside(p, t.triangle[1], v.second, error[1], packed);
-      store_run(with_sign(p, v.distance2, inside), i, last, distance);
+      store_run(with_sign(p, v.distance2, inside), i, last, fragments + DPR_PLANE(p, DISTANCE));
     }
     realn u[4], b1 = 0.0f, b2 = 0.0f, d = z[0];
     const intn in_second = side_of_diagonal(t, v.first.edge[DPR_FIRST_DIAGONAL]) < 0.0f;
@@ -298,9 +192,10 @@ kernel void clip_fragments(const FrameParams p, const uint last_pair, global con
       b2 += w.of[k][2] * u[k];
       d += u[k] * (z[k] - z[0]);
     }
-    store_run(b1, i, last, bary1);
-    store_run(b2, i, last, bary2);
-    store_run(d, i, last, depth);
+    global float* const bary = fragments + DPR_PLANE(p, BARY);
+    store_run(b1, i, last, bary);
+    store_run(b2, i, last, bary + p.fragments);
+    store_run(d, i, last, fragments + DPR_PLANE(p, DEPTH));
   }
 }
 
@@ -386,9 +281,8 @@ static inline realn between_corners(const ClippedFace c, uint cut, realn grad_ba
 /// corners 0, 1 and 2 of the outline, or the second, of 0, 2 and 3.
 static inline void add_outline_barycentrics(const FrameParams p, const ClippedFace c,
                                             const ClippedTriangles t, int is_second, const ClippedRun run,
-                                            global const float* grad_depth, global const float* grad_bary1,
-                                            global const float* grad_bary2, CornerGradients* g,
-                                            realn part[2]) {
+                                            global const float* grads, CornerGradients* g, realn part[2]) {
+  global const float* const grad_bary = grads + DPR_GRAD_PLANE(p, BARY);
   const Triangle triangle = t.triangle[is_second];
   const BarycentricScale scale = barycentric_scale(triangle, p.perspective_correct);
   const uint k = is_second ? 2 : 1;
@@ -404,8 +298,8 @@ static inline void add_outline_barycentrics(const FrameParams p, const ClippedFa
     const intn is_in = in_run && (is_second ? side < 0.0f : !(side < 0.0f));
     if (!any_lane(is_in)) continue;
     const View3 v = view_triangle(triangle, x, y);
-    const realn b1 = load_run(is_in, i, grad_bary1), b2 = load_run(is_in, i, grad_bary2);
-    add_barycentric_gradient(v, triangle, scale, load_run(is_in, i, grad_depth),
+    const realn b1 = load_run(is_in, i, grad_bary), b2 = load_run(is_in, i, grad_bary + p.grad_fragments);
+    add_barycentric_gradient(v, triangle, scale, load_run(is_in, i, grads + DPR_GRAD_PLANE(p, DEPTH)),
                              weight1.x * b1 + weight2.x * b2, weight1.y * b1 + weight2.y * b2, g);
     realn n[3];
     raw_barycentrics(v, scale, n);
@@ -417,23 +311,20 @@ static inline void add_outline_barycentrics(const FrameParams p, const ClippedFa
 }
 
 /// Gradients of the corners of clipped faces, summed over a pair's fragments. One work-item per pair, up to
-/// `last_pair`. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward, and
-/// in      capacity      of the pairs' buffers
+/// p.last_pair. Deterministic. Inputs as clip_forward, clip_fragments and rasterize_backward.
 /// in out  grad_corners  float[pair][9]   as rasterize_backward leaves it; of clipped faces replaced
 /// out     grad_clip     float[pair][9]   of the corners' homogeneous coordinates, by way of the cuts
-/// out     grad_cuts     float[2][2][capacity]  x and y of where the two cuts of a clipped face are seen,
+/// out     grad_cuts     float[2][2][p.pairs]  x and y of where the two cuts of a clipped face are seen,
 ///                       where some view distorts
-kernel void clip_backward(const FrameParams p, const uint capacity, const uint last_pair,
-                          global const uint* restrict pairs, global const ViewParams* restrict views,
-                          global const ClippedFace* restrict clipped,
+kernel void clip_backward(const FrameParams p, global const uint* restrict pairs,
+                          global const ViewParams* restrict views, global const ClippedFace* restrict clipped,
                           global const Triangle* restrict triangles, global const uint* restrict pair_face,
                           global const uint* restrict fragment_starts, global const uint* restrict pixels,
-                          global const float* restrict distance, global const float* restrict grad_distance,
-                          global const float* restrict grad_depth, global const float* restrict grad_bary1,
-                          global const float* restrict grad_bary2, global float* restrict grad_corners,
-                          global float* restrict grad_clip, global float* restrict grad_cuts) {
+                          global const float* restrict fragments, global const float* restrict grads,
+                          global float* restrict grad_corners, global float* restrict grad_clip,
+                          global float* restrict grad_cuts) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
+  if (pair >= min(p.last_pair, pairs[0])) return;
   const uint face = pair_face[pair], last = fragment_starts[pair + 1];
   for (uint k = 0; k < 9; ++k) grad_clip[9 * pair + k] = 0.0f;
   if (clipped[face].corners == 0 || fragment_starts[pair] == last) return;
@@ -444,10 +335,11 @@ kernel void clip_backward(const FrameParams p, const uint capacity, const uint l
   for (int k = 0; k < 3; ++k) g[0].x[k] = g[0].y[k] = g[0].z[k] = g[1].x[k] = g[1].y[k] = g[1].z[k] = 0.0f;
   part[0] = part[1] = 0.0f;
   const ClippedRun run = {fragment_starts[pair], last, pixels};
-  if (!p.sharp) add_outline_distances(p, t, run, distance, grad_distance, g);
-  add_outline_barycentrics(p, c, t, 0, run, grad_depth, grad_bary1, grad_bary2, &g[0], part);
-  if (t.has_second)
-    add_outline_barycentrics(p, c, t, 1, run, grad_depth, grad_bary1, grad_bary2, &g[1], part);
+  if (!p.sharp)
+    add_outline_distances(p, t, run, fragments + DPR_PLANE(p, DISTANCE), grads + DPR_GRAD_PLANE(p, DISTANCE),
+                          g);
+  add_outline_barycentrics(p, c, t, 0, run, grads, &g[0], part);
+  if (t.has_second) add_outline_barycentrics(p, c, t, 1, run, grads, &g[1], part);
   float3 sum[2][3];
   for (int k = 0; k < 2; ++k) {
     for (int j = 0; j < 3; ++j)
@@ -460,23 +352,23 @@ kernel void clip_backward(const FrameParams p, const uint capacity, const uint l
 #pragma unroll
   for (uint cut = 0; cut < 2; ++cut) {
     const float2 grad = gradient_of_cut(c, of_outline, cut);
-    grad_cuts[(size_t)(2 * cut) * capacity + pair] = grad.x;
-    grad_cuts[(size_t)(2 * cut + 1) * capacity + pair] = grad.y;
+    grad_cuts[(size_t)(2 * cut) * p.pairs + pair] = grad.x;
+    grad_cuts[(size_t)(2 * cut + 1) * p.pairs + pair] = grad.y;
   }
 }
 
 /// From the gradients of where cuts are seen to what they give to projections and lenses, in place, where
-/// some view distorts: a kernel of its own, for want of registers. One work-item per pair, up to `last_pair`.
+/// some view distorts: a kernel of its own, for want of registers. One work-item per pair, up to p.last_pair.
 /// Deterministic. Inputs as clip_backward, and
-/// in out  grad_cuts  float[DPR_CUT_CHANNELS][capacity]  of which clip_backward has written the first four
-kernel void clip_backward_lens(const FrameParams p, const uint capacity, const uint last_pair,
-                               global const uint* restrict pairs, global const ViewParams* restrict views,
+/// in out  grad_cuts  float[DPR_CUT_CHANNELS][p.pairs]  of which clip_backward has written the first four
+kernel void clip_backward_lens(const FrameParams p, global const uint* restrict pairs,
+                               global const ViewParams* restrict views,
                                global const ClippedFace* restrict clipped,
                                global const uint* restrict pair_face,
                                global const uint* restrict fragment_starts,
                                global float* restrict grad_cuts) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
+  if (pair >= min(p.last_pair, pairs[0])) return;
   const uint face = pair_face[pair];
   global const ViewParams* view = views + face / p.faces;
   CutChannels sum = {0.0f, 0.0f};
@@ -484,10 +376,10 @@ kernel void clip_backward_lens(const FrameParams p, const uint capacity, const u
     const ClippedFace c = clipped[face];
 #pragma unroll
     for (uint cut = 0; cut < 2; ++cut) {
-      const float2 grad = (float2)(grad_cuts[(size_t)(2 * cut) * capacity + pair],
-                                   grad_cuts[(size_t)(2 * cut + 1) * capacity + pair]);
+      const float2 grad = (float2)(grad_cuts[(size_t)(2 * cut) * p.pairs + pair],
+                                   grad_cuts[(size_t)(2 * cut + 1) * p.pairs + pair]);
       add_cut_channels(p, view, c, cut, grad, &sum);
     }
   }
-  store_cut_channels(sum, capacity, pair, grad_cuts);
+  store_cut_channels(sum, p.pairs, pair, grad_cuts);
 }

@@ -96,19 +96,18 @@ static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shad
   return color_jumps(s, edge) ? DPR_CREASE : DPR_NO_CONTOUR;
 }
 
-static inline ContourScene scene_of_view(const FrameParams p, const ContourParams c, uint view,
-                                         global const uint2* edges, global const uchar* facing,
-                                         global const float4* ndc, global const float4* world,
-                                         global const uint4* faces, global const ClippedFace* clipped,
-                                         global const uint4* face_colors, global const float4* colors) {
+static inline ContourScene scene_of_view(const FrameParams p, uint view, global const uint2* edges,
+                                         global const uchar* facing, global const float4* ndc,
+                                         global const float4* world, global const uint4* faces,
+                                         global const ClippedFace* clipped, global const float4* colors) {
   ContourScene s;
   s.facing = facing + view * p.faces;
   s.ndc = ndc + view * p.vertices;
   s.world = world + view * p.vertices;
   s.faces = faces;
-  s.face_colors = face_colors;
+  s.face_colors = faces + p.color_faces;
   s.colors = colors + view * p.color_stride;
-  s.edges = edges_of_view(p, view, c.mesh_edges, edges, faces, ndc, clipped);
+  s.edges = edges_of_view(p, view, edges, faces, ndc, clipped);
   return s;
 }
 
@@ -141,26 +140,28 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 /// in   edges        uint2[edge]           of the scene, or of every view; see DPR_EDGE_FLAG
 /// in   facing       uchar[view][face]     as setup and clipping leave it
 /// in   ndc, world   float4[view][vertex]
-/// in   faces, face_colors  uint4[face]    vertices and colours of the corners
+/// in   faces        uint4[...][face]      vertices and, from p.color_faces on, colours of the corners
 /// in   clipped      ClippedFace[view][face]  read where p.clips is set
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// out  counts       uint[view][edge]
-kernel void contour_count(const FrameParams p, const ContourParams c, global const uint2* restrict edges,
+/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, DPR_CONTOUR_LEFT. Not written of others
+kernel void contour_count(const FrameParams p, global const uint2* restrict edges,
                           global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
-                          global const ClippedFace* restrict clipped,
-                          global const uint4* restrict face_colors, global const float4* restrict colors,
-                          global uint* restrict counts) {
+                          global const ClippedFace* restrict clipped, global const float4* restrict colors,
+                          global uint* restrict counts, global uchar* restrict kinds) {
   const uint i = (uint)get_global_id(0);
-  if (i >= p.views * c.edges) return;
-  const uint view = i / c.edges;
-  const ContourScene s =
-      scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);
+  if (i >= p.views * p.edges) return;
+  const uint view = i / p.edges;
+  const ContourScene s = scene_of_view(p, view, edges, facing, ndc, world, faces, clipped, colors);
   counts[i] = 0;
-  if (is_within_surface(s, i - view * c.edges, c.shading)) return;
-  const ViewEdge edge = view_edge(s.edges, i - view * c.edges);
+  if (is_within_surface(s, i - view * p.edges, p.shading)) return;
+  const ViewEdge edge = view_edge(s.edges, i - view * p.edges);
   uint count = 0;
-  if (contour_kind(s, edge, c.shading) != DPR_NO_CONTOUR) {
+  const int kind = contour_kind(s, edge, p.shading);
+  if (kind != DPR_NO_CONTOUR) {
+    const int is_left = inner_side(edge_sides(edge.record, s.facing)) > 0;
+    kinds[i] = (uchar)((kind == DPR_CREASE ? DPR_CONTOUR_CREASE : 0) | (is_left ? DPR_CONTOUR_LEFT : 0));
     const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
     for (uint row = t.rows.x; row <= t.rows.y; ++row) {
       for (uint column = t.columns.x; column <= t.columns.y; ++column)
@@ -238,31 +239,27 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
 /// in   face_edges  uint[face]             see DPR_FACE_SIDES
 /// in   corner_starts  uint[vertex + 1]    runs of `corners`
 /// in   corners     uint[corner]           face * 3 + corner, by vertex
+/// in   kinds       uchar[view][edge]      as contour_count leaves them
 /// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
 /// out  pairs       uint[1]      how many there are; 0 where they do not fit
 /// out  place_contour  uint[place]  see DPR_CONTOUR_FLAGS
 /// out  place_tile     uint[place]  view * tiles + tile
-/// out  places         uint[place]  the place itself: what sorting permutes
-kernel void contour_fill(const FrameParams p, const ContourParams c, const uint capacity,
-                         global const uint2* restrict edges, global const uint* restrict face_edges,
-                         global const uint* restrict corner_starts, global const uint* restrict corners,
-                         global const uchar* restrict facing, global const float4* restrict ndc,
-                         global const float4* restrict world, global const uint4* restrict faces,
-                         global const ClippedFace* restrict clipped, global const uint4* restrict face_colors,
-                         global const float4* restrict colors, global const uint* restrict offsets,
+kernel void contour_fill(const FrameParams p, const uint capacity, global const uint2* restrict edges,
+                         global const uint* restrict face_edges, global const uint* restrict corner_starts,
+                         global const uint* restrict corners, global const float4* restrict ndc,
+                         global const uint4* restrict faces, global const ClippedFace* restrict clipped,
+                         global const uchar* restrict kinds, global const uint* restrict offsets,
                          global uint* restrict pairs, global uint* restrict place_contour,
-                         global uint* restrict place_tile, global uint* restrict places) {
-  const uint i = (uint)get_global_id(0), total = offsets[p.views * c.edges];
+                         global uint* restrict place_tile) {
+  const uint i = (uint)get_global_id(0), total = offsets[p.views * p.edges];
   if (i == 0) pairs[0] = total > capacity ? 0 : total;
-  if (i >= p.views * c.edges || total > capacity || offsets[i] == offsets[i + 1]) return;
-  const uint view = i / c.edges;
-  const ContourScene s =
-      scene_of_view(p, c, view, edges, facing, ndc, world, faces, clipped, face_colors, colors);
-  const uint first_edge = view * c.edges;
-  const ViewEdge edge = view_edge(s.edges, i - first_edge);
-  uint contour = DPR_CONTOUR_FLAGS * i;
-  if (contour_kind(s, edge, c.shading) == DPR_CREASE) contour |= DPR_CONTOUR_CREASE;
-  const Contours contours = {s.edges, face_edges, corner_starts, corners, offsets + first_edge};
+  if (i >= p.views * p.edges || total > capacity || offsets[i] == offsets[i + 1]) return;
+  const uint view = i / p.edges;
+  const EdgeScene s = edges_of_view(p, view, edges, faces, ndc, clipped);
+  const uint first_edge = view * p.edges;
+  const ViewEdge edge = view_edge(s, i - first_edge);
+  uint contour = DPR_CONTOUR_FLAGS * i + kinds[i];
+  const Contours contours = {s, face_edges, corner_starts, corners, offsets + first_edge};
   if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
   if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
@@ -273,16 +270,14 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
       if (!line_meets_tile(t, column, row)) continue;
       place_contour[place] = contour;
       place_tile[place] = first_tile + row * p.tiles_x + column;
-      places[place] = place;
       ++place;
     }
   }
 }
 
 /// Adds the gradients of contours' ends to those of the vertices: each vertex the contours at its corners in
-/// order, each contour its pairs. Any number of work-items, by end of a pair: vertices are many,
-/// and few have a contour.
-/// That of the first pair of the first contour of a vertex sums for the vertex. Deterministic.
+/// order, each contour its pairs. Any number of work-items, by end of a pair: vertices are many, and few have
+/// a contour. That of the first pair of the first contour of a vertex sums for the vertex. Deterministic.
 /// in      pairs         uint[1]                how many there are
 /// in      pair_contour  uint[pair]             see DPR_CONTOUR_FLAGS
 /// in      pair_starts   uint[view * edge + 1]  runs of `edge_pairs`
@@ -294,7 +289,7 @@ kernel void contour_fill(const FrameParams p, const ContourParams c, const uint 
 /// in      corners       uint[corner]           face * 3 + corner, by vertex
 /// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
 /// in out  grad_ndc      float4[view][vertex]
-kernel void contour_gather(const FrameParams p, const ContourParams c, global const uint* restrict pairs,
+kernel void contour_gather(const FrameParams p, global const uint* restrict pairs,
                            global const uint* restrict pair_contour, global const uint* restrict pair_starts,
                            global const uint* restrict edge_pairs, global const uint2* restrict edges,
                            global const uint4* restrict faces, global const uint* restrict face_edges,
@@ -302,12 +297,12 @@ kernel void contour_gather(const FrameParams p, const ContourParams c, global co
                            global const float4* restrict grad_ends, global float4* restrict grad_ndc) {
   for (uint i = (uint)get_global_id(0); i < 2 * pairs[0]; i += (uint)get_global_size(0)) {
     const uint pair = i / 2;
-    const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / c.edges;
-    const uint own = contour - view * c.edges;
-    if (own >= c.mesh_edges || edge_pairs[pair_starts[contour]] != pair) continue;
-    const uint4 record = record_of(edges_of_shape(p, view, c.mesh_edges, edges)[own], faces);
+    const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / p.edges;
+    const uint own = contour - view * p.edges;
+    if (own >= p.mesh_edges || edge_pairs[pair_starts[contour]] != pair) continue;
+    const uint4 record = record_of(edges_of_shape(p, view, edges)[own], faces);
     const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
-    global const uint* starts = pair_starts + view * c.edges;
+    global const uint* starts = pair_starts + view * p.edges;
     uint first = DPR_NO_MESH_EDGE;
     float2 sum = 0.0f;
     for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
@@ -339,41 +334,53 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
   return (to_lost ? part : 1.0f - part) * cut_gradient(p, view, c, cut, grad, 0.0f);
 }
 
-/// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between, and
-/// takes those of edges away that contour_gather() has given to corners nearer than the plane. One work-item
-/// per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
+/// Takes the gradients of edges away that contour_gather() has given to corners nearer than the near plane.
+/// One work-item per (view, vertex). Inputs as contour_count and contour_gather, and
+/// in out  grad_ndc  float4[view][vertex]
+kernel void contour_drop_near(const FrameParams p, global const ClippedFace* restrict clipped,
+                              global const uint* restrict corner_starts, global const uint* restrict corners,
+                              global float4* restrict grad_ndc) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.vertices) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
+    global const ClippedFace* face = clipped + view * p.faces + corners[k] / 3;
+    if (face->corners != 0 && is_lost(*face, corners[k] % 3)) grad_ndc[i] = 0.0f;
+  }
+}
+
+/// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between. One
+/// work-item per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
 /// in      views          ViewParams[view]
-/// in out  grad_ndc       float4[view][vertex]
 /// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates
 /// out     grad_cuts      float[DPR_CUT_CHANNELS][view][vertex]  where some view distorts; cuts count at the
 ///                        corner that is kept
-kernel void contour_gather_cuts(
-    const FrameParams p, const ContourParams c, global const ViewParams* restrict views,
-    global const uint2* restrict edges, global const uint4* restrict faces, global const float4* restrict ndc,
-    global const ClippedFace* restrict clipped, global const uint* restrict pair_starts,
-    global const uint* restrict edge_pairs, global const uint* restrict face_edges,
-    global const uint* restrict corner_starts, global const uint* restrict corners,
-    global const float4* restrict grad_ends, global float4* restrict grad_ndc,
-    global float4* restrict grad_clip, global float* restrict grad_cuts) {
+kernel void contour_gather_cuts(const FrameParams p, global const ViewParams* restrict views,
+                                global const uint2* restrict edges, global const uint4* restrict faces,
+                                global const float4* restrict ndc, global const ClippedFace* restrict clipped,
+                                global const uint* restrict pair_starts,
+                                global const uint* restrict edge_pairs,
+                                global const uint* restrict face_edges,
+                                global const uint* restrict corner_starts,
+                                global const uint* restrict corners, global const float4* restrict grad_ends,
+                                global float4* restrict grad_clip, global float* restrict grad_cuts) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
-  const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * c.edges;
-  const EdgeScene s = edges_of_view(p, view, c.mesh_edges, edges, faces, ndc, clipped);
+  const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * p.edges;
+  const EdgeScene s = edges_of_view(p, view, edges, faces, ndc, clipped);
   float3 sum = 0.0f;
   CutChannels of_cuts = {0.0f, 0.0f};
-  int is_near = 0;
   for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
     const uint face = corners[k] / 3, corner = corners[k] % 3;
     if (s.clipped[face].corners == 0) continue;
     const ClippedFace of = s.clipped[face];
-    const float4 grad = sum_of_pairs(first_edge + c.mesh_edges + face, pair_starts, edge_pairs, grad_ends);
+    const float4 grad = sum_of_pairs(first_edge + p.mesh_edges + face, pair_starts, edge_pairs, grad_ends);
     for (uint cut = 0; cut < 2; ++cut) {
       const float2 at_cut = cut == 0 ? grad.xy : grad.zw;
       const int to_lost = lost_corner(of, cut) == corner, to_kept = kept_corner(of, cut) == corner;
       if (to_lost || to_kept) sum += share_of_cut(p, views + view, of, cut, to_lost, at_cut);
       if (to_kept && views[view].distorts) add_cut_channels(p, views + view, of, cut, at_cut, &of_cuts);
     }
-    is_near = is_near || is_lost(of, corner);
   }
   const uint last = 2 * corner_starts[vertex + 1];
   for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
@@ -388,7 +395,6 @@ kernel void contour_gather_cuts(
     sum += share_of_cut(p, views + view, of, cut, own_end == end, at_cut);
     if (own_end != end && views[view].distorts) add_cut_channels(p, views + view, of, cut, at_cut, &of_cuts);
   }
-  if (is_near) grad_ndc[i] = 0.0f;
   if (p.distorts) store_cut_channels(of_cuts, p.views * p.vertices, i, grad_cuts);
   grad_clip[i] += (float4)(sum, 0.0f);
 }

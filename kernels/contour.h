@@ -81,20 +81,15 @@ typedef struct {
 } EdgeScene;
 
 /// The scene's edges where a view has the vertices: it may have a shape of its own.
-static inline global const uint2* edges_of_shape(const FrameParams p, uint view, uint mesh_edges,
-                                                 global const uint2* edges) {
-  return edges + (p.position_stride != 0 ? view * mesh_edges : 0);
+static inline global const uint2* edges_of_shape(const FrameParams p, uint view, global const uint2* edges) {
+  return edges + (p.position_stride != 0 ? view * p.mesh_edges : 0);
 }
 
-static inline EdgeScene edges_of_view(const FrameParams p, uint view, uint mesh_edges,
-                                      global const uint2* edges, global const uint4* faces,
-                                      global const float4* ndc, global const ClippedFace* clipped) {
-  const EdgeScene s = {edges_of_shape(p, view, mesh_edges, edges),
-                       faces,
-                       ndc + view * p.vertices,
-                       clipped + (p.clips ? view * p.faces : 0),
-                       mesh_edges,
-                       p.clips};
+static inline EdgeScene edges_of_view(const FrameParams p, uint view, global const uint2* edges,
+                                      global const uint4* faces, global const float4* ndc,
+                                      global const ClippedFace* clipped) {
+  const EdgeScene s = {edges_of_shape(p, view, edges),           faces,        ndc + view * p.vertices,
+                       clipped + (p.clips ? view * p.faces : 0), p.mesh_edges, p.clips};
   return s;
 }
 

@@ -14,14 +14,15 @@
 kernel void gather_chunks(const uint slots, const uint channels, const uint faces,
                           global const uint* restrict pairs, global const uint* restrict place_face,
                           global const uint* restrict pair_starts, global const uint* restrict face_pairs,
-                          global const float* restrict partial, global float* restrict chunks) {
+                          global const float* restrict partial, const ulong first,
+                          global float* restrict chunks) {
   const uint i = (uint)get_global_id(0), channel = i % channels;
   if (i >= slots * channels) return;
   const uint2 chunk = chunk_of_slot(i / channels, pairs[0], place_face, faces, pair_starts);
   float sum = 0.0f;
   for (uint place = chunk.x; place < chunk.y; ++place) {
     const uint pair = face_pairs[place];
-    if (pair != DPR_NO_PAIR) sum += partial[(size_t)pair * channels + channel];
+    if (pair != DPR_NO_PAIR) sum += partial[first + (size_t)pair * channels + channel];
   }
   if (chunk.x < chunk.y) chunks[i] = sum;
 }
@@ -38,8 +39,8 @@ kernel void gather_chunks(const uint slots, const uint channels, const uint face
 kernel void gather_corners(const FrameParams p, const uint targets, const uint sum_views,
                            global const uint* restrict pair_starts, global const uint* restrict face_pairs,
                            global const uint* restrict corner_starts, global const uint* restrict corners,
-                           global const float* restrict partial, global const float* restrict chunks,
-                           global float4* restrict grad) {
+                           global const float* restrict partial, const ulong first,
+                           global const float* restrict chunks, global float4* restrict grad) {
   const uint i = (uint)get_global_id(0);
   if (i >= (sum_views ? targets : p.views * targets)) return;
   const uint target = i % targets;
@@ -56,7 +57,7 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
       }
       for (uint place = run.x; place < run.y; ++place) {
         const uint pair = face_pairs[place];
-        if (pair != DPR_NO_PAIR) sum += vload3(0, partial + 9 * pair + 3 * corner);
+        if (pair != DPR_NO_PAIR) sum += vload3(0, partial + first + 9 * pair + 3 * corner);
       }
     }
   }
@@ -72,8 +73,8 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
 /// out  channels  float[DPR_MATERIAL_CHANNELS][face]  in that order
 kernel void gather_faces(const FrameParams p, global const uint* restrict pair_starts,
                          global const uint* restrict face_pairs, global const uint* restrict ordered,
-                         global const float* restrict partial, global const float* restrict chunks,
-                         global float* restrict channels) {
+                         global const float* restrict partial, const ulong first,
+                         global const float* restrict chunks, global float* restrict channels) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.faces) return;
   float4 sum = (float4)(0.0f);
@@ -87,7 +88,7 @@ kernel void gather_faces(const FrameParams p, global const uint* restrict pair_s
     }
     for (uint place = run.x; place < run.y; ++place) {
       const uint pair = face_pairs[place];
-      if (pair != DPR_NO_PAIR) sum += vload4(pair, partial);
+      if (pair != DPR_NO_PAIR) sum += vload4(pair, partial + first);
     }
   }
   channels[i] = sum.x;

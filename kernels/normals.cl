@@ -14,16 +14,21 @@ static inline float4 unit_normal(float3 sum) {
   return has_direction ? (float4)(sum * inverse, inverse) : (float4)(0.0f);
 }
 
+/// Place of a normal behind the vertices in world space.
+static inline uint normal_at(const FrameParams p, uint view, uint normal) {
+  return p.views * p.vertices + view * p.normals + normal;
+}
+
 /// One work-item per (view, vertex).
 /// in   faces          uint4[face]           vertex indices
 /// in   corner_starts  uint[vertex + 1]      runs of `corners`
 /// in   corners        uint[corner]          the faces around a vertex, as face * 3 + corner
 /// in   world          float4[view][vertex]  world space
-/// out  normals        float4[view][normal]  those of vertices: unit, or zero; w = 1 / length of the sum, or
-///      zero
+/// out  world          float4[view][normal]  behind the vertices, those of vertices: unit, or zero; w = 1 / length
+///      of the sum, or zero
 kernel void normals_forward(const FrameParams p, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
-                            global const float4* restrict world, global float4* restrict normals) {
+                            global float4* restrict world) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
@@ -31,7 +36,7 @@ kernel void normals_forward(const FrameParams p, global const uint4* restrict fa
   for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
     sum += face_normal(world + view * p.vertices, faces[corners[k] / 3]);
   }
-  normals[view * p.normals + vertex] = unit_normal(sum);
+  world[normal_at(p, view, vertex)] = unit_normal(sum);
 }
 
 /// The transposed inverse of a model's linear part, but for a factor above 0, by rows: it takes normals to
@@ -56,29 +61,30 @@ static inline NormalMap normal_map(global const float4* model) {
 /// in   values       float4[value]          object space; any length
 /// in   given_mesh   uint[given]
 /// in   places       MeshPlace[mesh]
-/// out  normals      float4[view][normal]   those given: as normals_forward
+/// out  world        float4[view][normal]   those given: as normals_forward
 kernel void normals_given_forward(const FrameParams p, global const float4* restrict models,
                                   global const float4* restrict values,
                                   global const uint* restrict given_mesh,
-                                  global const MeshPlace* restrict places, global float4* restrict normals) {
+                                  global const MeshPlace* restrict places, global float4* restrict world) {
   const uint i = (uint)get_global_id(0), count = p.normals - p.vertices;
   if (i >= p.views * count) return;
   const uint view = i / count, g = i - view * count, mesh = given_mesh[g];
   const NormalMap m = normal_map(models + 3 * (view * p.meshes + mesh));
   const float3 n = values[g - places[mesh].normal_shift].xyz;
-  normals[view * p.normals + p.vertices + g] =
+  world[normal_at(p, view, p.vertices + g)] =
       unit_normal((float3)(dot(m.row[0], n), dot(m.row[1], n), dot(m.row[2], n)));
 }
 
 /// From the unit normals' gradients to those of the sums. One work-item per (view, normal).
-/// in      normals       as the forward kernels left them
+/// in      world         as the forward kernels left it
 /// in out  grad_normals  float4[view][normal]
-kernel void normals_backward_normalize(const FrameParams p, global const float4* restrict normals,
+kernel void normals_backward_normalize(const FrameParams p, global const float4* restrict world,
                                        global float4* restrict grad_normals) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.normals) return;
-  const float3 n = normals[i].xyz, g = grad_normals[i].xyz;
-  grad_normals[i] = (float4)((g - n * dot(n, g)) * normals[i].w, 0.0f);
+  const float4 n = world[normal_at(p, 0, i)];
+  const float3 g = grad_normals[i].xyz;
+  grad_normals[i] = (float4)((g - n.xyz * dot(n.xyz, g)) * n.w, 0.0f);
 }
 
 /// From the sums' gradients to the world positions': a face's normal belongs to its three vertices' sums.

@@ -71,32 +71,26 @@ static inline Perturbed perturb(realn distance, float sigma) {
 
 /// Any number of work-items, by vector of fragments. Deterministic.
 /// in   fragment_starts  uint[pair + 1]   up to `last_pair`: its last is the number of fragments
-/// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
-/// out  log_occupancy    float[fragment]  ln p, DPR_LOG_ZERO for p = 0
-/// out  occupancy        float[fragment]  p, in [0, 1]
+/// in out  fragments     float[plane][fragment]  LOG_OCCUPANCY and OCCUPANCY by DISTANCE
 kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
-                              global const uint* restrict fragment_starts,
-                              global const float* restrict distance, global float* restrict log_occupancy,
-                              global float* restrict occupancy) {
+                              global const uint* restrict fragment_starts, global float* restrict fragments) {
   const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
   for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
-    const Perturbed v = perturb(load_n(i, distance), p.sigma);
-    store_n(greater(v.log_p, DPR_LOG_ZERO), i, log_occupancy);
-    store_n(v.p, i, occupancy);
+    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+    store_n(greater(v.log_p, DPR_LOG_ZERO), i, fragments + DPR_PLANE(p, LOG_OCCUPANCY));
+    store_n(v.p, i, fragments + DPR_PLANE(p, OCCUPANCY));
   }
 }
 
 /// dL/ds = dL/dln p * d ln p / ds, and dL/dsigma, which with x = s / sigma is -sum x dL/ds. One work-item per
 /// group of pairs in `range`.
-/// in   fragment_starts, distance  as occupancy_forward
-/// in   grad_log_occupancy  float[fragment]
-/// out  grad_distance       float[fragment]
-/// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
+/// in   fragment_starts, fragments  as occupancy_forward
+/// in out  grads       float[plane][fragment]  of DISTANCE by that of LOG_OCCUPANCY
+/// out     grad_sigma  float[pair]             what the pair adds to dL/dsigma
 kernel void occupancy_backward(const OccupancyParams p, const uint2 range, global const uint* restrict pairs,
                                global const uint* restrict fragment_starts,
-                               global const float* restrict distance,
-                               global const float* restrict grad_log_occupancy,
-                               global float* restrict grad_distance, global float* restrict grad_sigma) {
+                               global const float* restrict fragments, global float* restrict grads,
+                               global float* restrict grad_sigma) {
   const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
@@ -105,9 +99,9 @@ kernel void occupancy_backward(const OccupancyParams p, const uint2 range, globa
     realn sum = 0.0f;
     for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
       const intn in_run = lanes_before(last, i);
-      const Perturbed v = perturb(load_run(in_run, i, distance), p.sigma);
-      const realn grad = load_run(in_run, i, grad_log_occupancy) * v.slope;
-      store_run(grad, i, end, grad_distance);
+      const Perturbed v = perturb(load_run(in_run, i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+      const realn grad = load_run(in_run, i, grads + DPR_GRAD_PLANE(p, LOG_OCCUPANCY)) * v.slope;
+      store_run(grad, i, end, grads + DPR_GRAD_PLANE(p, DISTANCE));
       sum -= v.ratio * grad;
     }
     grad_sigma[pair] = sum_lanes(sum);

@@ -43,14 +43,14 @@ static inline void write_logarithms(uint first, uint last, global const float* o
 /// in   pair_face        uint[pair]       view * faces + face
 /// in   fragment_starts  uint[pair + 1]   runs of fragments
 /// in   pixels           uint[fragment]   x | y << 16
-/// in   distance         float[fragment]  signed, positive inside, in the unit of sigma
-/// out  log_occupancy    float[fragment]  ln of the mean, DPR_LOG_ZERO where no sample covers
-/// out  occupancy        float[fragment]  the mean
-kernel void occupancy_sampled_forward(
-    const OccupancyParams p, const uint last_pair, global const uint* restrict pairs,
-    global const uint* restrict pair_face, global const uint* restrict fragment_starts,
-    global const uint* restrict pixels, global const float* restrict distance,
-    global float* restrict log_occupancy, global float* restrict occupancy) {
+/// in out  fragments     float[plane][fragment]  OCCUPANCY, the mean, and LOG_OCCUPANCY by DISTANCE
+kernel void occupancy_sampled_forward(const OccupancyParams p, const uint last_pair,
+                                      global const uint* restrict pairs,
+                                      global const uint* restrict pair_face,
+                                      global const uint* restrict fragment_starts,
+                                      global const uint* restrict pixels, global float* restrict fragments) {
+  global const float* const distance = fragments + DPR_PLANE(p, DISTANCE);
+  global float* const occupancy = fragments + DPR_PLANE(p, OCCUPANCY);
   const uint end = min(last_pair, pairs[0]);
   for (uint pair = (uint)get_global_id(0); pair < end; pair += (uint)get_global_size(0)) {
     const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
@@ -66,7 +66,7 @@ kernel void occupancy_sampled_forward(
       }
       occupancy[i] = sum_lanes(sum) / (float)p.sampling.samples;
     }
-    write_logarithms(first, last, occupancy, log_occupancy);
+    write_logarithms(first, last, occupancy, fragments + DPR_PLANE(p, LOG_OCCUPANCY));
   }
 }
 
@@ -89,15 +89,19 @@ static inline float2 score_estimates(const OccupancyParams p, const NoiseName na
 
 /// One work-item per pair, up to `last_pair`. Deterministic. Inputs, and the occupancy, as in
 /// occupancy_sampled_forward.
-/// in   grad_log_occupancy  float[fragment]
-/// out  grad_distance       float[fragment]
-/// out  grad_sigma          float[pair]      what the pair adds to dL/dsigma
-kernel void occupancy_sampled_backward(
-    const OccupancyParams p, const uint last_pair, global const uint* restrict pairs,
-    global const uint* restrict pair_face, global const uint* restrict fragment_starts,
-    global const uint* restrict pixels, global const float* restrict distance,
-    global const float* restrict occupancy, global const float* restrict grad_log_occupancy,
-    global float* restrict grad_distance, global float* restrict grad_sigma) {
+/// in out  grads       float[plane][fragment]  of DISTANCE by that of LOG_OCCUPANCY
+/// out     grad_sigma  float[pair]             what the pair adds to dL/dsigma
+kernel void occupancy_sampled_backward(const OccupancyParams p, const uint last_pair,
+                                       global const uint* restrict pairs,
+                                       global const uint* restrict pair_face,
+                                       global const uint* restrict fragment_starts,
+                                       global const uint* restrict pixels,
+                                       global const float* restrict fragments, global float* restrict grads,
+                                       global float* restrict grad_sigma) {
+  global const float *const distance = fragments + DPR_PLANE(p, DISTANCE), *const occupancy =
+                                                                               fragments +
+                                                                               DPR_PLANE(p, OCCUPANCY);
+  global float* const grad_distance = grads + DPR_GRAD_PLANE(p, DISTANCE);
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(last_pair, pairs[0])) return;
   const uint view = pair_face[pair] / p.faces, face = pair_face[pair] % p.faces;
@@ -112,7 +116,7 @@ kernel void occupancy_sampled_backward(
     if (occupancy[i] <= 0.0f || agrees) continue;
     const float2 estimates = score_estimates(p, fragment_noise(p, view, face, pixels[i]), x);
     // d ln p = dp / p
-    const float chain = grad_log_occupancy[i] / (occupancy[i] * p.sigma);
+    const float chain = grads[DPR_GRAD_PLANE(p, LOG_OCCUPANCY) + i] / (occupancy[i] * p.sigma);
     grad_distance[i] = chain * estimates.x;
     total += chain * estimates.y;
   }

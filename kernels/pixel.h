@@ -18,19 +18,39 @@ typedef struct {
   global const float *depth, *log_occupancy, *occupancy, *red, *green, *blue;  // float[fragment]
 } Fragments;
 
-static inline Fragments make_fragments(global const uint* list, global const float* depth,
-                                       global const float* log_occupancy, global const float* occupancy,
-                                       global const float* red, global const float* green,
-                                       global const float* blue) {
+static inline Fragments make_fragments(const AggregateParams p, global const uint* list,
+                                       global const float* fragments) {
   Fragments f;
   f.list = list;
-  f.depth = depth;
-  f.log_occupancy = log_occupancy;
-  f.occupancy = occupancy;
-  f.red = red;
-  f.green = green;
-  f.blue = blue;
+  f.depth = fragments + DPR_PLANE(p, DEPTH);
+  f.log_occupancy = fragments + DPR_PLANE(p, LOG_OCCUPANCY);
+  f.occupancy = fragments + DPR_PLANE(p, OCCUPANCY);
+  f.red = fragments + DPR_PLANE(p, COLOR);
+  f.green = f.red + p.fragments;
+  f.blue = f.green + p.fragments;
   return f;
+}
+
+/// Their gradients.
+typedef struct {
+  global float *depth, *log_occupancy, *red, *green, *blue;  // float[fragment]
+} FragmentGradients;
+
+static inline FragmentGradients make_gradients(const AggregateParams p, global float* grads) {
+  FragmentGradients g;
+  g.depth = grads + DPR_GRAD_PLANE(p, DEPTH);
+  g.log_occupancy = grads + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
+  g.red = grads + DPR_GRAD_PLANE(p, COLOR);
+  g.green = g.red + p.grad_fragments;
+  g.blue = g.green + p.grad_fragments;
+  return g;
+}
+
+/// Stores the gradient of a fragment's colour, which has that weight in its pixel.
+static inline void store_color(const FragmentGradients to, uint fragment, float weight, float4 grad) {
+  to.red[fragment] = weight * grad.x;
+  to.green[fragment] = weight * grad.y;
+  to.blue[fragment] = weight * grad.z;
 }
 
 static inline float3 fragment_color(const Fragments f, uint fragment) {

@@ -207,17 +207,15 @@ static inline uintn take_pixels(ulong* mask, uint corner) {
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// out  fragment_pair  uint[fragment]
 /// out  pixels    uint[fragment]   x | y << 16
-/// out  distance  float[fragment]  NDC^2, or NDC if the metric is Euclidean; its sign bit is clear where the
-///                                 triangle owns the sample, at distance 0 too. 0 where p.sharp is set
-/// out  depth     float[fragment]  view depth by the clipped barycentrics
-/// out  bary1, bary2  float[fragment]  clipped barycentrics of vertices 1 and 2: negatives to zero, sum 1
+/// out  fragments  float[plane][fragment]  DISTANCE, NDC^2, or NDC if the metric is Euclidean; its sign bit is
+///                                 clear where the triangle owns the sample, at distance 0 too. 0 where
+///                                 p.sharp is set. BARY: negatives to zero, sum 1. DEPTH
 kernel void rasterize_forward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
                               global const Triangle* restrict triangles,
                               global const uint* restrict pair_face, global const uint* restrict pair_tile,
                               global const uint2* restrict masks, global const uint* restrict fragment_starts,
                               global uint* restrict fragment_pair, global uint* restrict pixels,
-                              global float* restrict distance, global float* restrict depth,
-                              global float* restrict bary1, global float* restrict bary2) {
+                              global float* restrict fragments) {
   const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
@@ -239,16 +237,17 @@ kernel void rasterize_forward(const FrameParams p, const uint2 range, global con
       const View3 v = view_triangle(t, x, y);
       store_run(
           p.sharp ? (realn)(0.0f) : with_sign(p, triangle_distance2(v), is_inside(p, t, v, error, packed)), i,
-          end, distance);
+          end, fragments + DPR_PLANE(p, DISTANCE));
 
       realn n[3];
       raw_barycentrics(v, scale, n);
       const realn inverse_sum = inverse_of_clipped(n);
       const realn c1 = greater(n[1], 0.0f) * inverse_sum, c2 = greater(n[2], 0.0f) * inverse_sum;
-      store_run(c1, i, end, bary1);
-      store_run(c2, i, end, bary2);
+      global float* const bary = fragments + DPR_PLANE(p, BARY);
+      store_run(c1, i, end, bary);
+      store_run(c2, i, end, bary + p.fragments);
       // Around z0, so that the difference of the depths keeps its digits.
-      store_run(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, end, depth);
+      store_run(t.z0 + c1 * (t.z1 - t.z0) + c2 * (t.z2 - t.z0), i, end, fragments + DPR_PLANE(p, DEPTH));
     }
   }
 }
@@ -256,18 +255,15 @@ kernel void rasterize_forward(const FrameParams p, const uint2 range, global con
 /// Gradients of the triangle's corners, summed over a pair's fragments, of pairs up to `last_pair`. Any number
 /// of work-items.
 /// in   triangles, pair_face, fragment_starts, pixels  as rasterize_forward
-/// in   distance       float[fragment]  whose sign says on which side the sample lies
-/// in   grad_distance, grad_depth, grad_bary1, grad_bary2  float[fragment]
+/// in   fragments      float[plane][fragment]  DISTANCE, whose sign says on which side the sample lies
+/// in   grads          float[plane][fragment]  of DISTANCE, DEPTH, BARY
 /// out  grad_corners   float[pair][9]   x, y (NDC) and view depth of vertices 0, 1, 2
 kernel void rasterize_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
                                global const Triangle* restrict triangles,
                                global const uint* restrict pair_face,
                                global const uint* restrict fragment_starts,
-                               global const uint* restrict pixels, global const float* restrict distance,
-                               global const float* restrict grad_distance,
-                               global const float* restrict grad_depth,
-                               global const float* restrict grad_bary1,
-                               global const float* restrict grad_bary2, global float* restrict grad_corners) {
+                               global const uint* restrict pixels, global const float* restrict fragments,
+                               global const float* restrict grads, global float* restrict grad_corners) {
   const uint end = min(last_pair, pairs[0]);
   for (uint pair = (uint)get_global_id(0); pair < end; pair += (uint)get_global_size(0)) {
     const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
@@ -287,11 +283,14 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
                   y = pixel_y(p, convert_realn(packed >> 16));
       const View3 v = view_triangle(t, x, y);
       if (!p.sharp) {
-        add_distance_gradient(v, DPR_NO_EDGE, as_intn(load_run(in_run, i, distance)) >= 0, p.euclidean,
-                              load_run(in_run, i, grad_distance), &g);
+        const intn inside = as_intn(load_run(in_run, i, fragments + DPR_PLANE(p, DISTANCE))) >= 0;
+        add_distance_gradient(v, DPR_NO_EDGE, inside, p.euclidean,
+                              load_run(in_run, i, grads + DPR_GRAD_PLANE(p, DISTANCE)), &g);
       }
-      add_barycentric_gradient(v, t, scale, load_run(in_run, i, grad_depth), load_run(in_run, i, grad_bary1),
-                               load_run(in_run, i, grad_bary2), &g);
+      global const float* const grad_bary = grads + DPR_GRAD_PLANE(p, BARY);
+      add_barycentric_gradient(v, t, scale, load_run(in_run, i, grads + DPR_GRAD_PLANE(p, DEPTH)),
+                               load_run(in_run, i, grad_bary),
+                               load_run(in_run, i, grad_bary + p.grad_fragments), &g);
     }
 #pragma unroll
     for (int k = 0; k < 3; ++k) {

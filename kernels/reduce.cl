@@ -18,11 +18,12 @@ static inline realn load_until(uint first, uint last, global const float* values
 /// at k, k + slots, k + 2 slots ...; a vector of slots those of a run of its own, which a CPU's caches
 /// follow. One work-item per (channel, segment, vector of slots); `slots` is a multiple of the widest vector.
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
-/// in   values   float[channel][count], of so many `channels` and `segments`
+/// in   values   float[channel][count], of so many `channels` from `first_channel` on, and `segments`
 /// out  partial  float[channel][segment][2][slot]  sums, and their compensations
-kernel void reduce_partial(const uint count, const uint channels, const uint segments, const uint stride,
-                           const uint slots, global const uint* restrict starts,
-                           global const float* restrict values, global float* restrict partial) {
+kernel void reduce_partial(const uint count, const uint first_channel, const uint channels,
+                           const uint segments, const uint stride, const uint slots,
+                           global const uint* restrict starts, global const float* restrict values,
+                           global float* restrict partial) {
   const uint i = (uint)get_global_id(0);
   const uint vectors = slots / DPR_WIDTH;
   if (i >= channels * segments * vectors) return;
@@ -35,7 +36,7 @@ kernel void reduce_partial(const uint count, const uint channels, const uint seg
   const uint run = (end - begin + slots - 1) / slots;  // vectors
   const uint first = begin + slot * run, last = min(end, first + DPR_WIDTH * run), step = DPR_WIDTH;
 #endif
-  global const float* of_channel = values + (size_t)channel * count;
+  global const float* of_channel = values + (size_t)(first_channel + channel) * count;
   realn sum = 0.0f, error = 0.0f;
   for (uint k = first; k < last; k += step) compensated_add(&sum, &error, load_until(k, last, of_channel));
   global float* out = partial + (size_t)2 * slots * (channel * segments + segment) + slot;

@@ -8,10 +8,10 @@ typedef struct {
 } CornerColors;
 
 static inline CornerColors load_colors(const FrameParams p, uint view_face,
-                                       global const uint4* restrict face_colors,
+                                       global const uint4* restrict faces,
                                        global const float4* restrict colors) {
   const uint view = view_face / p.faces;
-  const uint4 corners = face_colors[view_face - view * p.faces] + view * p.color_stride;
+  const uint4 corners = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
   CornerColors c;
   c.base = colors[corners.x];
   c.along1 = colors[corners.y] - c.base;
@@ -22,44 +22,42 @@ static inline CornerColors load_colors(const FrameParams p, uint view_face,
 /// One work-item per group of pairs in `range`. Deterministic.
 /// in   pair_face        uint[pair]      view * faces + face
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
-/// in   face_colors  uint4[face]         indices into colors, by corner
+/// in   faces        uint4[...][face]    from p.color_faces on indices into colors, by corner
 /// in   colors       float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
-/// in   bary1, bary2 float[fragment]     barycentrics of corners 1 and 2
-/// out  red, green, blue  float[fragment]
+/// in out  fragments  float[plane][fragment]  COLOR by BARY
 kernel void shade_forward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
                           global const uint* restrict pair_face, global const uint* restrict fragment_starts,
-                          global const uint4* restrict face_colors, global const float4* restrict colors,
-                          global const float* restrict bary1, global const float* restrict bary2,
-                          global float* restrict red, global float* restrict green,
-                          global float* restrict blue) {
+                          global const uint4* restrict faces, global const float4* restrict colors,
+                          global float* restrict fragments) {
+  const uint bary = DPR_PLANE(p, BARY);
   const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
   for (uint pair = group.x; pair < group.y; ++pair) {
     const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
     if (first == last) continue;
-    const CornerColors c = load_colors(p, pair_face[pair], face_colors, colors);
+    const CornerColors c = load_colors(p, pair_face[pair], faces, colors);
     for (uint i = first; i < last; i += DPR_WIDTH) {
-      const realn c1 = load_n(i, bary1), c2 = load_n(i, bary2);
-      store_run(c.base.x + c1 * c.along1.x + c2 * c.along2.x, i, end, red);
-      store_run(c.base.y + c1 * c.along1.y + c2 * c.along2.y, i, end, green);
-      store_run(c.base.z + c1 * c.along1.z + c2 * c.along2.z, i, end, blue);
+      const realn c1 = load_n(i + bary, fragments), c2 = load_n(i + bary + p.fragments, fragments);
+      store_run3(c.base.x + c1 * c.along1.x + c2 * c.along2.x, c.base.y + c1 * c.along1.y + c2 * c.along2.y,
+                 c.base.z + c1 * c.along1.z + c2 * c.along2.z, i, end, DPR_PLANE(p, COLOR), p.fragments,
+                 fragments);
     }
   }
 }
 
 /// One work-item per group of pairs in `range`. Deterministic. Inputs as shade_forward, and
-/// in   grad_red, grad_green, grad_blue  float[fragment]
-/// out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
-/// out  grad_colors             float[pair][9]   RGB of the corners' colours, summed over the pair's
-///      fragments
+/// in out  grads        float[plane][fragment]  of BARY by those of COLOR
+/// out     grad_colors  float[pair][9]          RGB of the corners' colours, summed over the pair's fragments
 kernel void shade_backward(const FrameParams p, const uint2 range, global const uint* restrict pairs,
                            global const uint* restrict pair_face, global const uint* restrict fragment_starts,
-                           global const uint4* restrict face_colors, global const float4* restrict colors,
-                           global const float* restrict bary1, global const float* restrict bary2,
-                           global const float* restrict grad_red, global const float* restrict grad_green,
-                           global const float* restrict grad_blue, global float* restrict grad_bary1,
-                           global float* restrict grad_bary2, global float* restrict grad_colors) {
+                           global const uint4* restrict faces, global const float4* restrict colors,
+                           global const float* restrict fragments, global float* restrict grads,
+                           global float* restrict grad_colors) {
+  global const float *const bary = fragments + DPR_PLANE(p, BARY),
+                            *const grad_red = grads + DPR_GRAD_PLANE(p, COLOR),
+                            *const grad_green = grad_red + p.grad_fragments;
+  global float* const grad_bary = grads + DPR_GRAD_PLANE(p, BARY);
   const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
   const uint end = fragment_starts[group.y];
@@ -69,17 +67,18 @@ kernel void shade_backward(const FrameParams p, const uint2 range, global const 
       for (int k = 0; k < 9; ++k) grad_colors[9 * pair + k] = 0.0f;
       continue;
     }
-    const CornerColors c = load_colors(p, pair_face[pair], face_colors, colors);
+    const CornerColors c = load_colors(p, pair_face[pair], faces, colors);
     realn sum[9];
 #pragma unroll
     for (int k = 0; k < 9; ++k) sum[k] = 0.0f;
     for (uint i = first; i < last; i += DPR_WIDTH) {
       const intn in_run = lanes_before(last, i);
       const realn r = load_run(in_run, i, grad_red), g = load_run(in_run, i, grad_green);
-      const realn b = load_run(in_run, i, grad_blue);
-      const realn c1 = load_run(in_run, i, bary1), c2 = load_run(in_run, i, bary2), c0 = 1.0f - c1 - c2;
-      store_run(r * c.along1.x + g * c.along1.y + b * c.along1.z, i, end, grad_bary1);
-      store_run(r * c.along2.x + g * c.along2.y + b * c.along2.z, i, end, grad_bary2);
+      const realn b = load_run(in_run, i, grad_green + p.grad_fragments);
+      const realn c1 = load_run(in_run, i, bary), c2 = load_run(in_run, i, bary + p.fragments);
+      const realn c0 = 1.0f - c1 - c2;
+      store_run(r * c.along1.x + g * c.along1.y + b * c.along1.z, i, end, grad_bary);
+      store_run(r * c.along2.x + g * c.along2.y + b * c.along2.z, i, end, grad_bary + p.grad_fragments);
       sum[0] += c0 * r;
       sum[1] += c0 * g;
       sum[2] += c0 * b;

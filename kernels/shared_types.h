@@ -91,6 +91,19 @@ using float4 = cl_float4;
 #define DPR_CHANNEL_COS_INNER 12
 #define DPR_CHANNEL_COS_OUTER 13
 
+/// Planes of fragments, FrameParams.fragments elements each, and of their gradients, grad_fragments each; all
+/// indexed by 32 bits. Base colours have planes of their own where light falls on textures.
+#define DPR_PLANE_DEPTH 0 /* view depth by the clipped barycentrics */
+#define DPR_PLANE_BARY 1  /* clipped barycentrics of corners 1 and 2; gradients: relative to corner 0's */
+#define DPR_PLANE_COLOR 3 /* linear RGB: 3 */
+#define DPR_PLANE_LOG_OCCUPANCY 6 /* ln p, DPR_LOG_ZERO for p = 0 */
+#define DPR_PLANE_DISTANCE 7      /* signed, positive inside, in the unit of sigma */
+#define DPR_PLANE_OCCUPANCY 8     /* p, in [0, 1]; has no gradient */
+#define DPR_PLANE_BASE 9          /* linear RGB: 3 */
+#define DPR_GRAD_PLANE_BASE 8
+#define DPR_PLANE(p, name) (DPR_PLANE_##name * (p).fragments)
+#define DPR_GRAD_PLANE(p, name) (DPR_PLANE_##name * (p).grad_fragments)
+
 /// Place of a fragment's base colour for the light: its triangle's corners, or planes of fragments.
 #define DPR_BASE_OF_CORNERS 0
 #define DPR_BASE_OF_FRAGMENTS 1
@@ -149,12 +162,14 @@ using float4 = cl_float4;
 #define DPR_FACE_SIDES 8
 #define DPR_NO_MESH_EDGE 0xffffffffu
 
-/// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease, and which of
-/// its ends have corners that count (CornerArea in crossing.h).
+/// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease; which of its
+/// ends have corners that count (CornerArea in crossing.h); whether the surface that it bounds, or its own
+/// face of a crease, lies to the left of first -> second end.
 #define DPR_CONTOUR_CREASE 1u
 #define DPR_CONTOUR_FIRST_END 2u
 #define DPR_CONTOUR_SECOND_END 4u
-#define DPR_CONTOUR_FLAGS 8u
+#define DPR_CONTOUR_LEFT 8u
+#define DPR_CONTOUR_FLAGS 16u
 
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu
@@ -184,6 +199,15 @@ typedef struct FrameParams {
   uint orthographic; /* the views are; then perspective_correct is 0 */
   uint distorts;     /* some view does */
   uint normals;      /* of a view: those of the vertices, then those that meshes give */
+  /* Where corners' indices of these begin among those of their vertices, which come first; 0: the same. */
+  uint color_faces, normal_faces, texcoord_faces;
+  uint texels, levels;            /* of all textures; of a pyramid, how many a fragment sees: 1 or 2 */
+  uint has_base;                  /* fragments have base colours: the light falls on textures */
+  uint fragments, grad_fragments; /* from one of their planes to the next */
+  uint pairs, last_pair;          /* of the frame, or their capacity; where the band's end */
+  uint mesh_edges, edges;         /* of the scene; of a view: cuts of clipped faces are edges too */
+  uint shading;                   /* DPR_UNLIT, DPR_FLAT, ...: whose creases are contours */
+  float depth_reach; /* normalised depth: surfaces that much behind the nearest may still be seen */
 } FrameParams;
 
 /// A mesh or an instance of it in the frame. Each has vertices and given normals of its own in the
@@ -226,16 +250,15 @@ typedef struct ClippedFace {
   float4 cut[2];     /* x, y in NDC; depth, which is znear; the part of the way to the corner that is lost */
   float orientation; /* +1 counter-clockwise, -1 clockwise */
   uint corners;      /* 3 or 4; 0: the face is not clipped, and the rest not written */
-  uint first;
-  uint unused;
+  uint first, unused;
 } ClippedFace;
 
 /// The light that all shading models share.
 typedef struct LightingParams {
   float4 ambient;
-  uint lights;
+  uint lights, light; /* how many there are; whose gradient is asked for */
   float shininess;
-  uint unused0, unused1;
+  uint unused;
   float4 harmonics[DPR_HARMONICS]; /* RGB, times the constants of the basis and of the cosine lobe */
 } LightingParams;
 
@@ -249,17 +272,34 @@ typedef struct Light {
   uint unused0, unused1;
 } Light;
 
-/// Channels that shading's backward pass leaves per pair of its material.
+/// Gradients that shading's backward pass leaves per pair of its corners' colours, and, in scenes with
+/// textures, of their texture coordinates and what levels of detail depend on: [pair][9] each; then, in lit
+/// scenes, those of DPR_PAIR_LIT. They follow each other in one buffer, by this many elements a pair.
+#define DPR_PAIR_COLORS 0
+#define DPR_PAIR_TEXCOORDS 9
+#define DPR_PAIR_STEPS 18
+#define DPR_PAIR_LIT(is_textured) ((is_textured) ? 27 : 9)
+#define DPR_PAIR_POSITIONS 0    /* [pair][9] in world space */
+#define DPR_PAIR_NORMALS 9      /* [pair][9] */
+#define DPR_PAIR_MATERIAL 18    /* [pair][DPR_MATERIAL_CHANNELS] */
 #define DPR_MATERIAL_CHANNELS 4 /* RGB of the specular coefficient, shininess */
+#define DPR_PAIR_EYE 22         /* [3][pair] of the camera centre */
+#define DPR_PAIR_LIT_END 25
 
 /// A texture, and where its texels lie among those of all.
 typedef struct Texture {
   uint first;         /* texel of its largest level; the smaller ones follow */
   uint width, height; /* of that level */
   uint levels;        /* 1 unless the filter is trilinear */
-  uint wrap, filter;
-  uint unused0, unused1;
+  uint wrap, filter, unused0, unused1;
 } Texture;
+
+/// What a fragment sees of a level of its texture.
+typedef struct SeenTexels {
+  float red, green, blue; /* gradient of the mixture of four texels */
+  uint tile;              /* view * tiles + tile */
+  float right, below;     /* parts of the neighbours */
+} SeenTexels;
 
 /// Sampling of the Monte Carlo estimators; part of the structs below.
 typedef struct Sampling {
@@ -274,9 +314,10 @@ typedef struct Sampling {
 typedef struct OccupancyParams {
   float sigma;
   Sampling sampling;
-  uint width;      /* pixels, to name a pixel's noise */
-  uint faces;      /* of one view */
-  uint first_view; /* of the batch that names the noise */
+  uint width;                     /* pixels, to name a pixel's noise */
+  uint faces;                     /* of one view */
+  uint first_view;                /* of the batch that names the noise */
+  uint fragments, grad_fragments; /* as in FrameParams */
 } OccupancyParams;
 
 /// The perturbation of depths, and what a pixel's colour is made of.
@@ -285,11 +326,13 @@ typedef struct AggregateParams {
   float sigma, gamma, alpha, background_depth;
   Sampling sampling;
   uint pixels_per_view;
-  uint pixels;     /* of all views */
-  uint faces;      /* of one view */
-  uint first_view; /* of the batch that names the noise */
-  uint last_pixel; /* where those of the launch end */
-  uint channels;   /* DPR_PIXEL_CHANNELS, or those before alpha's */
+  uint pixels;                    /* of all views */
+  uint faces;                     /* of one view */
+  uint first_view;                /* of the batch that names the noise */
+  uint last_pixel;                /* where those of the launch end */
+  uint channels;                  /* DPR_PIXEL_CHANNELS, or those before alpha's */
+  uint fragments, grad_fragments; /* as in FrameParams */
+  uint unused0, unused1;
 } AggregateParams;
 
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward
@@ -310,21 +353,6 @@ typedef struct OpenEdge {
   uint is_periodic; /* places a whole number apart are one */
   float4 places;    /* of its two ends in the texture, in periods */
 } OpenEdge;
-
-/// Parameters of the search for contours.
-typedef struct ContourParams {
-  uint edges;      /* of a view: those of the scene, then, where faces are clipped, the cut of every face */
-  uint mesh_edges; /* of the scene */
-  uint shading;    /* DPR_UNLIT, DPR_FLAT, ...: whose creases count */
-  uint unused0;
-} ContourParams;
-
-/// Parameters of the search for crossings.
-typedef struct AntialiasParams {
-  uint edges, mesh_edges; /* as in ContourParams */
-  float depth_reach;      /* normalised depth: surfaces that much behind the nearest may still be seen */
-  uint unused0;
-} AntialiasParams;
 
 /// A crossing of a step that another contour has won. Planes of steps as antialias_cross.cl has them.
 typedef struct SecondCrossing {

@@ -94,7 +94,7 @@ DPR_GROUP_KERNEL kernel void sort_histogram(const uint shift, const uint bits,
 
 /// Moves every element to its place. One work-group per block: it sorts the block in local memory, so that
 /// neighbours are written by neighbours. Inputs as sort_histogram, and
-/// in   values   uint[count]              move with their keys
+/// in   values   uint[count]              move with their keys; the elements' numbers in the first pass
 /// in   offsets  uint[1 << bits][block]   exclusive scan of the histogram
 /// out  sorted_keys, sorted_values  uint[count]
 DPR_GROUP_KERNEL kernel void sort_scatter(const uint shift, const uint bits,
@@ -119,7 +119,8 @@ DPR_GROUP_KERNEL kernel void sort_scatter(const uint shift, const uint bits,
     const uint key = sort.keys[list + i], digit = sort_digit(key, shift, bits);
     const uint target = offsets[digit * blocks + block] + i - firsts[digit];
     sorted_keys[target] = key;
-    sorted_values[target] = values[first + sort.order[list + i]];
+    const uint from = first + sort.order[list + i];
+    sorted_values[target] = shift == 0 ? from : values[from];
   }
 }
 
@@ -127,13 +128,11 @@ DPR_GROUP_KERNEL kernel void sort_scatter(const uint shift, const uint bits,
 /// in   last_key  the number of keys, from 0 on
 /// in   count     uint[1]       the number of elements, at most DPR_SORT_BLOCK
 /// in   keys      uint[count]
-/// in   values    uint[count]   move with their keys
-/// out  sorted_keys, sorted_values  uint[count]
+/// out  sorted_keys, sorted_values  uint[count]  the values are the elements' numbers
 /// out  starts    uint[last_key + 1]  where each key's run begins in the sorted list
 DPR_GROUP_KERNEL kernel void sort_few(const uint last_key, global const uint* restrict count,
-                                      global const uint* restrict keys, global const uint* restrict values,
-                                      global uint* restrict sorted_keys, global uint* restrict sorted_values,
-                                      global uint* restrict starts) {
+                                      global const uint* restrict keys, global uint* restrict sorted_keys,
+                                      global uint* restrict sorted_values, global uint* restrict starts) {
   DPR_GROUP_SORT(sort);
   const uint item = (uint)get_local_id(0), here = min(count[0], (uint)DPR_SORT_BLOCK);
   for (uint i = item; i < here; i += DPR_GROUP) sort.keys[i] = keys[i];
@@ -141,7 +140,7 @@ DPR_GROUP_KERNEL kernel void sort_few(const uint last_key, global const uint* re
   const uint list = sort_group(sort, here, 0, last_key > 1 ? 32 - clz(last_key - 1) : 0);
   for (uint i = item; i < here; i += DPR_GROUP) {
     sorted_keys[i] = sort.keys[list + i];
-    sorted_values[i] = values[sort.order[list + i]];
+    sorted_values[i] = sort.order[list + i];
   }
   for (uint key = item; key <= last_key; key += DPR_GROUP) {
     uint low = 0, high = here;
@@ -188,14 +187,14 @@ kernel void sort_scatter(const uint shift, const uint bits, global const uint* r
   for (uint i = block * DPR_SORT_BLOCK; i < last; ++i) {
     const uint target = next[sort_digit(keys[i], shift, bits)]++;
     sorted_keys[target] = keys[i];
-    sorted_values[target] = values[i];
+    sorted_values[target] = shift == 0 ? i : values[i];
   }
 }
 
 /// As above, by counting. One work-item.
 kernel void sort_few(const uint last_key, global const uint* restrict count, global const uint* restrict keys,
-                     global const uint* restrict values, global uint* restrict sorted_keys,
-                     global uint* restrict sorted_values, global uint* restrict starts) {
+                     global uint* restrict sorted_keys, global uint* restrict sorted_values,
+                     global uint* restrict starts) {
   if (get_global_id(0) != 0) return;
   const uint elements = count[0];
   for (uint key = 0; key <= last_key; ++key) starts[key] = 0;
@@ -205,7 +204,7 @@ kernel void sort_few(const uint last_key, global const uint* restrict count, glo
   for (uint i = 0; i < elements; ++i) {
     const uint target = starts[keys[i]]++;
     sorted_keys[target] = keys[i];
-    sorted_values[target] = values[i];
+    sorted_values[target] = i;
   }
   // Every start has become its run's end, the next run's start.
   for (uint key = last_key; key > 0; --key) starts[key] = starts[key - 1];

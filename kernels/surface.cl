@@ -2,58 +2,39 @@
 // Shading interpolates the colours itself where no mesh has a texture.
 #include "texture.h"
 
-static inline SurfaceScene make_scene(global const uint4* face_colors, global const float4* colors,
-                                      global const uint4* face_texcoords, global const float4* texcoords,
-                                      global const Texture* textures, global const Triangle* triangles,
-                                      global const ClippedFace* clipped) {
-  SurfaceScene s;
-  s.face_colors = face_colors;
-  s.colors = colors;
-  s.face_texcoords = face_texcoords;
-  s.texcoords = texcoords;
-  s.textures = textures;
-  s.triangles = triangles;
-  s.clipped = clipped;
-  return s;
-}
-
-/// One work-item per pair, up to `last_pair`. Deterministic.
+/// One work-item per pair, up to p.last_pair. Deterministic.
+/// in   pairs            uint[1]         how many there are
 /// in   pair_face        uint[pair]      view * faces + face
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
-/// in   face_colors      uint4[face]     indices into colors, by corner
+/// in   faces            uint4[...][face]  of SurfaceScene
 /// in   colors           float4[color] or, with a stride, float4[view][color]  linear RGB; w unused
-/// in   face_texcoords   uint4[face]     indices into texcoords, by corner; w = texture or DPR_NO_TEXTURE
 /// in   texcoords        float4[texcoord]  u, v
 /// in   textures         Texture[texture]
 /// in   texels           float4[texel]   linear RGB, every level; w unused
 /// in   triangles        Triangle[view][face]
 /// in   clipped          ClippedFace[view][face]  read where p.clips is set
-/// in   bary1, bary2     float[fragment]  barycentrics of corners 1 and 2
-/// out  red, green, blue  float[fragment]
-kernel void surface_forward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
+/// in out  fragments     float[plane][fragment]  BASE by BARY where p.has_base is set, else COLOR
+kernel void surface_forward(const FrameParams p, global const uint* restrict pairs,
                             global const uint* restrict pair_face,
-                            global const uint* restrict fragment_starts,
-                            global const uint4* restrict face_colors, global const float4* restrict colors,
-                            global const uint4* restrict face_texcoords,
-                            global const float4* restrict texcoords, global const Texture* restrict textures,
-                            global const float4* restrict texels, global const Triangle* restrict triangles,
-                            global const ClippedFace* restrict clipped, global const float* restrict bary1,
-                            global const float* restrict bary2, global float* restrict red,
-                            global float* restrict green, global float* restrict blue) {
+                            global const uint* restrict fragment_starts, global const uint4* restrict faces,
+                            global const float4* restrict colors, global const float4* restrict texcoords,
+                            global const Texture* restrict textures, global const float4* restrict texels,
+                            global const Triangle* restrict triangles,
+                            global const ClippedFace* restrict clipped, global float* restrict fragments) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
+  if (pair >= min(p.last_pair, pairs[0])) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
-  const SurfaceScene scene =
-      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
+  const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
+  const uint red = p.has_base ? DPR_PLANE(p, BASE) : DPR_PLANE(p, COLOR);
   for (uint i = first; i < last; ++i) {
-    const float c1 = bary1[i], c2 = bary2[i];
+    const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
     const float4 base = base_of_corners(&face, c1, c2) *
                         sample_face(&face, find_detail(p, &face, c1, c2), c1, c2, texels).color;
-    red[i] = base.x;
-    green[i] = base.y;
-    blue[i] = base.z;
+    fragments[i + red] = base.x;
+    fragments[i + red + p.fragments] = base.y;
+    fragments[i + red + 2 * p.fragments] = base.z;
   }
 }
 
@@ -92,40 +73,44 @@ static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float
   return -(grad_x * f->steps.q_x + grad_y * f->steps.q_y) / f->steps.depth;
 }
 
-/// One work-item per pair, up to `last_pair`. Deterministic. Inputs as surface_forward, and
-/// in   adds         whether grad_bary1, grad_bary2 hold the light's part already
-/// in   grad_red, grad_green, grad_blue  float[fragment]  of the base colours
-/// in out  grad_bary1, grad_bary2  float[fragment]  relative to corner 0's
-/// out  grad_colors     float[pair][9]  RGB of the corners' colours, summed over the pair's fragments
-/// out  grad_texcoords  float[pair][9]  u, v of the corners, and 0
-/// out  grad_steps      float[pair][9]  of the levels of detail's q_k along x, along y, and depths; not
-///                                      written for faces whose texture has one level
-kernel void surface_backward(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
-                             const uint adds, global const uint* restrict pair_face,
-                             global const uint* restrict fragment_starts,
-                             global const uint4* restrict face_colors, global const float4* restrict colors,
-                             global const uint4* restrict face_texcoords,
-                             global const float4* restrict texcoords, global const Texture* restrict textures,
-                             global const float4* restrict texels, global const Triangle* restrict triangles,
-                             global const ClippedFace* restrict clipped, global const float* restrict bary1,
-                             global const float* restrict bary2, global const float* restrict grad_red,
-                             global const float* restrict grad_green, global const float* restrict grad_blue,
-                             global float* restrict grad_bary1, global float* restrict grad_bary2,
-                             global float* restrict grad_colors, global float* restrict grad_texcoords,
-                             global float* restrict grad_steps) {
+/// The gradients of base colours, which are those of colours where no light falls on them.
+static inline uint base_plane(const FrameParams p) {
+  return (p.has_base ? DPR_GRAD_PLANE_BASE : DPR_PLANE_COLOR) * p.grad_fragments;
+}
+
+/// A fragment's values of three planes: the first is at `i`.
+static inline float3 load_plane3(uint i, uint plane, global const float* values) {
+  return (float3)(values[i], values[i + plane], values[i + 2 * plane]);
+}
+
+/// One work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
+/// in out  grads  float[plane][fragment]  of BARY by that of the base colours; where p.has_base is set, added
+///                to what the light has left
+/// out  grad_pairs  DPR_PAIR_COLORS: RGB of the corners' colours, summed over the pair's fragments;
+///                  DPR_PAIR_TEXCOORDS: u, v of the corners, and 0; DPR_PAIR_STEPS: of the levels of detail's
+///                  q_k along x, along y, and depths; not written for faces whose texture has one level
+kernel void surface_backward(const FrameParams p, global const uint* restrict pairs,
+                             global const uint* restrict pair_face,
+                             global const uint* restrict fragment_starts, global const uint4* restrict faces,
+                             global const float4* restrict colors, global const float4* restrict texcoords,
+                             global const Texture* restrict textures, global const float4* restrict texels,
+                             global const Triangle* restrict triangles,
+                             global const ClippedFace* restrict clipped,
+                             global const float* restrict fragments, global float* restrict grads,
+                             global float* restrict grad_pairs) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
-  const SurfaceScene scene =
-      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
+  if (pair >= min(p.last_pair, pairs[0])) return;
+  const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   float3 color[3] = {0.0f, 0.0f, 0.0f};
   float2 place[3] = {0.0f, 0.0f, 0.0f};
   float3 steps[3] = {0.0f, 0.0f, 0.0f};
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
-    const float c1 = bary1[i], c2 = bary2[i], c0 = 1.0f - c1 - c2;
+    const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments],
+                c0 = 1.0f - c1 - c2;
     const Detail detail = find_detail(p, &face, c1, c2);
     const Sample sample = sample_face(&face, detail, c1, c2, texels);
-    const float3 grad = (float3)(grad_red[i], grad_green[i], grad_blue[i]);
+    const float3 grad = load_plane3(i + base_plane(p), p.grad_fragments, grads);
     const float3 grad_color = grad * sample.color.xyz,
                  grad_sample = grad * base_of_corners(&face, c1, c2).xyz;
     const float2 grad_place = (float2)(dot(grad_sample, sample.by_x.xyz), dot(grad_sample, sample.by_y.xyz));
@@ -143,8 +128,9 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, global c
       steps[1] += detail.along_y ? g.q : (float3)(0.0f);
       steps[2] += g.depth;
     }
-    grad_bary1[i] = adds ? grad_bary1[i] + along1 : along1;
-    grad_bary2[i] = adds ? grad_bary2[i] + along2 : along2;
+    const uint at1 = i + DPR_GRAD_PLANE(p, BARY), at2 = at1 + p.grad_fragments;
+    grads[at1] = p.has_base ? grads[at1] + along1 : along1;
+    grads[at2] = p.has_base ? grads[at2] + along2 : along2;
     color[0] += c0 * grad_color;
     color[1] += c1 * grad_color;
     color[2] += c2 * grad_color;
@@ -153,10 +139,12 @@ kernel void surface_backward(const FrameParams p, const uint last_pair, global c
     place[2] += c2 * grad_place;
   }
   if (face.texture.levels > 1) steps[2] += depths_by_steps(&face, steps[0], steps[1]);
-  for (int k = 0; k < 3; ++k) {
-    vstore3(color[k], 0, grad_colors + 9 * pair + 3 * k);
-    vstore3((float3)(place[k].x, -place[k].y, 0.0f), 0, grad_texcoords + 9 * pair + 3 * k);
-    if (face.texture.levels > 1) vstore3(steps[k], 0, grad_steps + 9 * pair + 3 * k);
+  for (size_t k = 0; k < 3; ++k) {
+    vstore3(color[k], k, grad_pairs + DPR_PAIR_COLORS * (size_t)p.pairs + 9 * pair);
+    vstore3((float3)(place[k].x, -place[k].y, 0.0f), k,
+            grad_pairs + DPR_PAIR_TEXCOORDS * (size_t)p.pairs + 9 * pair);
+    if (face.texture.levels > 1)
+      vstore3(steps[k], k, grad_pairs + DPR_PAIR_STEPS * (size_t)p.pairs + 9 * pair);
   }
 }
 
@@ -194,24 +182,24 @@ static inline void add_to_clipped_corners(const ClippedFace c, int along_y, floa
 }
 
 /// From the levels of detail to the corners on the screen: what a triangle that turns or goes away does to
-/// the texture's sharpness. One work-item per pair, up to `last_pair`. Deterministic.
-/// in   pair_face, face_texcoords, textures, triangles, clipped  as surface_forward has them
-/// in   grad_steps     as surface_backward leaves them
+/// the texture's sharpness. One work-item per pair, up to p.last_pair. Deterministic.
+/// in   pairs, pair_face, faces, textures, triangles, clipped  as surface_forward has them
+/// in   grad_pairs     as surface_backward leaves them
 /// in out  grad_corners  float[pair][9]  x, y (NDC) and view depth of the corners
 /// in out  grad_clip     float[pair][9]  of the homogeneous corners of clipped faces, if p.clips is set
-kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
-                                    global const uint* restrict pairs, global const uint* restrict pair_face,
-                                    global const uint4* restrict face_texcoords,
+kernel void surface_detail_backward(const FrameParams p, global const uint* restrict pairs,
+                                    global const uint* restrict pair_face, global const uint4* restrict faces,
                                     global const Texture* restrict textures,
                                     global const Triangle* restrict triangles,
                                     global const ClippedFace* restrict clipped,
-                                    global const float* restrict grad_steps,
+                                    global const float* restrict grad_pairs,
                                     global float* restrict grad_corners, global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(last_pair, pairs[0])) return;
-  const uint view_face = pair_face[pair], texture = face_texcoords[view_face % p.faces].w;
+  if (pair >= min(p.last_pair, pairs[0])) return;
+  const uint view_face = pair_face[pair], texture = faces[p.texcoord_faces + view_face % p.faces].w;
+  global const float* const grad_steps = grad_pairs + DPR_PAIR_STEPS * (size_t)p.pairs + 9 * pair;
   if (texture == DPR_NO_TEXTURE || textures[texture].levels == 1) return;
-  const float3 depth = vload3(2, grad_steps + 9 * pair);
+  const float3 depth = vload3(2, grad_steps);
   const int is_clipped = p.clips && clipped[view_face].corners != 0;
   float3 corner[3] = {0.0f, 0.0f, 0.0f};
   if (is_clipped || p.perspective_correct) {
@@ -220,7 +208,7 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
     corner[2].z = depth.z;
   }
   for (int along_y = 0; along_y < 2; ++along_y) {
-    const float3 grad_q = vload3((size_t)along_y, grad_steps + 9 * pair);
+    const float3 grad_q = vload3((size_t)along_y, grad_steps);
     if (is_clipped) {
       add_to_clipped_corners(clipped[view_face], along_y, grad_q, corner);
     } else {
@@ -236,48 +224,53 @@ kernel void surface_detail_backward(const FrameParams p, const uint last_pair,
 
 /// Lists each fragment's texels: a cell, which is a texel and its neighbours to the right and
 /// below, and the parts of these. Sorted by cell, fragments are added up without atomics. One work-item per
-/// pair, up to `last_pair`. Inputs as surface_backward, and
-/// in   pair_tile   uint[pair]  view * tiles + tile
-/// in   no_cell     what stands for the cell of a fragment without texture; no texel has that number
-/// in   levels      how many of a pyramid a fragment sees at most, 1 or 2
-/// out  places      uint[1]                   how many there are: fragments times levels
-/// out  cells       uint[fragment][levels]    the first of the cell's texels
-/// out  numbers     uint[fragment][levels]    the place's own: what sorting permutes
-/// out  parts       float2[fragment][levels]  of the neighbours to the right and below
-/// out  grad_seen   float4[fragment][levels]  RGB of what is seen of the level; w has the bits of the tile
-kernel void surface_list(const FrameParams p, const uint last_pair, global const uint* restrict pairs,
-                         const uint no_cell, const uint levels, global const uint* restrict pair_face,
-                         global const uint* restrict pair_tile, global const uint* restrict fragment_starts,
-                         global const uint4* restrict face_colors, global const float4* restrict colors,
-                         global const uint4* restrict face_texcoords, global const float4* restrict texcoords,
-                         global const Texture* restrict textures, global const Triangle* restrict triangles,
-                         global const ClippedFace* restrict clipped, global const float* restrict bary1,
-                         global const float* restrict bary2, global const float* restrict grad_red,
-                         global const float* restrict grad_green, global const float* restrict grad_blue,
-                         global uint* restrict places, global uint* restrict cells,
-                         global uint* restrict numbers, global float2* restrict parts,
-                         global float4* restrict grad_seen) {
+/// pair, up to p.last_pair. Inputs as surface_backward, and
+/// out  cells  uint[fragment][p.levels]        the first of the cell's texels; p.texels without texture
+/// out  seen   SeenTexels[fragment][p.levels]  without the tile
+kernel void surface_list(const FrameParams p, global const uint* restrict pairs,
+                         global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+                         global const uint4* restrict faces, global const float4* restrict colors,
+                         global const float4* restrict texcoords, global const Texture* restrict textures,
+                         global const Triangle* restrict triangles,
+                         global const ClippedFace* restrict clipped, global const float* restrict fragments,
+                         global const float* restrict grads, global uint* restrict cells,
+                         global SeenTexels* restrict seen) {
   const uint pair = (uint)get_global_id(0);
-  if (get_group_id(0) == 0 && get_local_id(0) == 0) places[0] = levels * fragment_starts[last_pair];
-  if (pair >= min(last_pair, pairs[0])) return;
-  const SurfaceScene scene =
-      make_scene(face_colors, colors, face_texcoords, texcoords, textures, triangles, clipped);
+  if (pair >= min(p.last_pair, pairs[0])) return;
+  const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
-    const float c1 = bary1[i], c2 = bary2[i];
+    const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
     const Detail detail = find_detail(p, &face, c1, c2);
-    const float4 grad =
-        (float4)(grad_red[i], grad_green[i], grad_blue[i], 0.0f) * base_of_corners(&face, c1, c2);
+    const float3 grad =
+        load_plane3(i + base_plane(p), p.grad_fragments, grads) * base_of_corners(&face, c1, c2).xyz;
     const Footprint footprint = find_footprint(face.texture, (uint)detail.level, place_at(&face, c1, c2));
     const uint2 cell = footprint_cells(footprint);
-    for (uint k = 0; k < levels; ++k) {
-      const uint place = levels * i + k;
+    for (uint k = 0; k < p.levels; ++k) {
+      const uint place = p.levels * i + k;
       const int is_seen = face.is_textured && k < face.texture.levels;
-      numbers[place] = place;
-      cells[place] = !is_seen ? no_cell : k == 0 ? cell.x : cell.y;
-      parts[place] = k == 0 ? footprint.part.xy : footprint.part.zw;
-      grad_seen[place] =
-          (float4)((k == 0 ? 1.0f - detail.part : detail.part) * grad.xyz, as_float(pair_tile[pair]));
+      const float3 of_level = (k == 0 ? 1.0f - detail.part : detail.part) * grad;
+      const float2 part = k == 0 ? footprint.part.xy : footprint.part.zw;
+      cells[place] = !is_seen ? p.texels : k == 0 ? cell.x : cell.y;
+      seen[place].red = of_level.x;
+      seen[place].green = of_level.y;
+      seen[place].blue = of_level.z;
+      seen[place].right = part.x;
+      seen[place].below = part.y;
     }
   }
+}
+
+/// Says where what surface_list leaves lies. One work-item per place: a fragment's, of a level.
+/// in   fragment_starts  uint[pair + 1]   up to p.last_pair: its last is the number of fragments
+/// in   fragment_pair    uint[fragment]
+/// in   pair_tile        uint[pair]       view * tiles + tile
+/// out  places           uint[1]          how many there are
+/// out  seen             SeenTexels[place]  the tile
+kernel void surface_place(const FrameParams p, global const uint* restrict fragment_starts,
+                          global const uint* restrict fragment_pair, global const uint* restrict pair_tile,
+                          global uint* restrict places, global SeenTexels* restrict seen) {
+  const uint i = (uint)get_global_id(0), last = p.levels * fragment_starts[p.last_pair];
+  if (i == 0) places[0] = last;
+  if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
 }

@@ -4,16 +4,13 @@
 #include "group.h"
 #include "pyramid.h"
 
-/// Places of fragments, sorted by cell, as surface_list leaves them.
+/// Places of fragments, sorted by cell, as surface_list and surface_place leave them.
 typedef struct {
   global const uint* numbers;
-  global const float2* parts;
-  global const float4* grad_seen;
+  global const SeenTexels* at;
 } SeenList;
 
-static inline uint tile_at(const SeenList seen, uint place) {
-  return as_uint(seen.grad_seen[seen.numbers[place]].w);
-}
+static inline uint tile_at(const SeenList seen, uint place) { return seen.at[seen.numbers[place]].tile; }
 
 /// What is left to add to a texel: runs of places in its four cells, in which it is the cell's own texel, the
 /// one to the right, the one below, and the one below that.
@@ -54,12 +51,10 @@ static inline float3 take_tile(const SeenList seen, uint tile, TexelRuns* r) {
     uint place = r->first[k];
     float3 sum = 0.0f;
     for (; place < last; ++place) {
-      const uint i = seen.numbers[place];
-      const float4 grad = seen.grad_seen[i];
-      if (as_uint(grad.w) != tile) break;
-      const float3 lower = seen.parts[i].y * grad.xyz;
-      const float right = seen.parts[i].x;
-      sum += (k % 2 ? right : 1.0f - right) * (k / 2 ? lower : grad.xyz - lower);
+      const SeenTexels at = seen.at[seen.numbers[place]];
+      if (at.tile != tile) break;
+      const float3 grad = (float3)(at.red, at.green, at.blue), lower = at.below * grad;
+      sum += (k % 2 ? at.right : 1.0f - at.right) * (k / 2 ? lower : grad - lower);
     }
     r->first[k] = place;
     total += sum;
@@ -103,18 +98,17 @@ static inline int is_long(const TexelRuns r) {
 /// in   textures  Texture[texture]
 /// in   starts    uint[cell + 1]    runs of `numbers`; a cell for every texel of all textures
 /// in   numbers   uint[...]         places of fragments, by cell
-/// in   parts, grad_seen  as surface_list leaves them
+/// in   places    SeenTexels[...]   as surface_list and surface_place leave them
 /// in out  grad   float4[texel]     of all textures; w stays
 DPR_SHARING_KERNEL kernel void texels_sum(const uint number, const uint level,
                                           global const Texture* restrict textures,
                                           global const uint* restrict starts,
                                           global const uint* restrict numbers,
-                                          global const float2* restrict parts,
-                                          global const float4* restrict grad_seen,
+                                          global const SeenTexels* restrict places,
                                           global float4* restrict grad) {
   const uint i = (uint)get_global_id(0);
   const Level l = find_level(textures[number], level);
-  const SeenList seen = {numbers, parts, grad_seen};
+  const SeenList seen = {numbers, places};
   TexelRuns r = {{0}, {0}};
   if (i < l.width * l.height) r = texel_runs(l, i, starts);
 #if DPR_LANES == 1

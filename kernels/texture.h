@@ -10,10 +10,10 @@
 
 /// Everything of a scene that base colours are made of.
 typedef struct {
-  global const uint4* face_colors;  // [face] indices into colors, by corner
-  global const float4* colors;      // linear RGB
-  global const uint4*
-      face_texcoords;              // [face] indices into texcoords, by corner; w = texture or DPR_NO_TEXTURE
+  // [face] of FrameParams.color_faces: indices into colors, by corner; of FrameParams.texcoord_faces: into
+  // texcoords; w = texture or DPR_NO_TEXTURE
+  global const uint4* faces;
+  global const float4* colors;     // linear RGB
   global const float4* texcoords;  // u, v
   global const Texture* textures;
   global const Triangle* triangles;   // [view][face]
@@ -73,7 +73,8 @@ static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0
 
 static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, uint view_face) {
   const uint view = view_face / p.faces, face = view_face - view * p.faces;
-  const uint4 c = s.face_colors[face] + view * p.color_stride, corner = s.face_texcoords[face];
+  const uint4 c = s.faces[p.color_faces + face] + view * p.color_stride,
+              corner = s.faces[p.texcoord_faces + face];
   TexturedFace f;
   f.color = s.colors[c.x];
   f.color1 = s.colors[c.y] - f.color;

@@ -78,6 +78,15 @@ static inline void store_run(realn v, uint first, uint last, global float* value
   if (count & 1) *values = rest2.x;
 #endif
 }
+/// Each to a plane of its own, of which the first begins at `first_plane`.
+static inline void store_run3(realn x, realn y, realn z, uint first, uint last, uint first_plane, uint plane,
+                              global float* values) {
+  first += first_plane;
+  last += first_plane;
+  store_run(x, first, last, values);
+  store_run(y, first + plane, last + plane, values);
+  store_run(z, first + 2 * plane, last + 2 * plane, values);
+}
 static inline void store_run_uint(uintn v, uint first, uint last, global uint* values) {
   store_run(as_realn(v), first, last, (global float*)values);
 }

@@ -17,24 +17,21 @@ typedef struct {
   float2 depths;  // of its ends
   uint4 record;
   uint view, flags;
-  int inner;  // on which side of a -> b its surface lies: inner_side()
 } TileContour;
 
-static inline TileContour load_contour(const FrameParams p, const AntialiasParams a, uint contour,
-                                       global const uint2* restrict edges, global const uint4* restrict faces,
-                                       global const uchar* restrict facing, global const float4* restrict ndc,
+static inline TileContour load_contour(const FrameParams p, uint contour, global const uint2* restrict edges,
+                                       global const uint4* restrict faces, global const float4* restrict ndc,
                                        global const ClippedFace* restrict clipped) {
   TileContour c;
   const uint numbered = contour / DPR_CONTOUR_FLAGS;
   c.flags = contour % DPR_CONTOUR_FLAGS;
-  c.view = numbered / a.edges;
-  const ViewEdge e = view_edge(edges_of_view(p, c.view, a.mesh_edges, edges, faces, ndc, clipped),
-                               numbered - c.view * a.edges);
+  c.view = numbered / p.edges;
+  const ViewEdge e =
+      view_edge(edges_of_view(p, c.view, edges, faces, ndc, clipped), numbered - c.view * p.edges);
   c.record = e.record;
   c.a = e.end[0].xy;
   c.b = e.end[1].xy;
   c.depths = (float2)(e.end[0].z, e.end[1].z);
-  c.inner = inner_side(edge_sides(c.record, facing + c.view * p.faces));
   return c;
 }
 
@@ -57,7 +54,7 @@ static inline Cut cut_of(const FrameParams p, const TileContour c, const RasterE
 
 /// True if the first sample of a step is on the contour's inner side.
 static inline int first_is_inner(const TileContour c, const RasterEdge e) {
-  return (c.inner > 0) == e.ascends;
+  return ((c.flags & DPR_CONTOUR_LEFT) != 0) == e.ascends;
 }
 
 static inline float mix_depths(const FrameParams p, float2 depths, float along) {

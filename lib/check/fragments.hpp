@@ -26,23 +26,22 @@ using Pixel = std::vector<Fragment>;
 inline std::vector<Pixel> pixels_of(const Renderer& renderer) {
   const Renderer::Impl& m = impl_of(renderer);
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download();
-  const std::vector<float> distance = m.rasterize.distance.download(), depth = m.rasterize.depth.download(),
-                           red = m.shade.color.red.download(), green = m.shade.color.green.download(),
-                           blue = m.shade.color.blue.download(), bary1 = m.rasterize.bary1.download(),
-                           bary2 = m.rasterize.bary2.download(), occupancy = m.occupancy.occupancy.download();
-  const auto number = [](const std::vector<float>& values, cl_uint k) {
-    return k < values.size() ? static_cast<double>(values[k]) : 0.0;
+  const std::vector<float> values = m.rasterize.values.download();
+  const bool has_occupancies = !m.aggregate.perturbs_distances();
+  const auto number = [&](std::size_t plane, cl_uint k) {
+    return static_cast<double>(values[plane * m.frame.fragments + k]);
   };
   std::vector<Pixel> pixels(starts.size() - 1);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     for (cl_uint at = starts[i]; at < starts[i + 1]; ++at) {
       const cl_uint k = list.at(at);
-      pixels[i].push_back({k,
-                           number(distance, k),
-                           number(depth, k),
-                           {number(red, k), number(green, k), number(blue, k)},
-                           {number(bary1, k), number(bary2, k)},
-                           number(occupancy, k)});
+      pixels[i].push_back(
+          {k,
+           number(DPR_PLANE_DISTANCE, k),
+           number(DPR_PLANE_DEPTH, k),
+           {number(DPR_PLANE_COLOR, k), number(DPR_PLANE_COLOR + 1, k), number(DPR_PLANE_COLOR + 2, k)},
+           {number(DPR_PLANE_BARY, k), number(DPR_PLANE_BARY + 1, k)},
+           has_occupancies ? number(DPR_PLANE_OCCUPANCY, k) : 0.0});
     }
   }
   return pixels;

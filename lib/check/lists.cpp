@@ -51,7 +51,7 @@ void check_sort(Device::Impl& device, CheckLog& log) {
   const std::vector<cl_uint> keys = random_numbers(k_keys);
   std::vector<cl_uint> places(keys.size());
   std::iota(places.begin(), places.end(), 0U);
-  Buffer<cl_uint> sorted_keys = uploaded(device, keys), sorted_places = uploaded(device, places), starts;
+  Buffer<cl_uint> sorted_keys = uploaded(device, keys), sorted_places, starts;
   Sort sort(device);
   sort(keys.size(), uploaded(device, {static_cast<cl_uint>(keys.size())}), k_keys, sorted_keys, sorted_places,
        starts);

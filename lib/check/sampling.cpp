@@ -34,8 +34,10 @@ void log_sampled_occupancy(const Device& device, CheckLog& log) {
   sampled.forward();
   exact.image();  // both frames are known to be complete
   sampled.image();
-  const std::vector<float> expected = impl_of(exact).occupancy.occupancy.download(),
-                           found = impl_of(sampled).occupancy.occupancy.download();
+  const auto occupancy = [](const Renderer& renderer) {
+    return impl_of(renderer).rasterize.plane(impl_of(renderer).frame, DPR_PLANE_OCCUPANCY);
+  };
+  const std::vector<float> expected = occupancy(exact), found = occupancy(sampled);
   Largest worst;
   if (found.size() != expected.size() || found.empty()) worst.add(INFINITY);
   for (std::size_t i = 0; i < std::min(found.size(), expected.size()); ++i)

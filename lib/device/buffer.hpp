@@ -22,6 +22,9 @@ inline cl_uint to_uint(std::size_t value) {
   return static_cast<cl_uint>(value);
 }
 
+/// Elements of the widest vector of lanes.
+inline constexpr std::size_t k_widest_vector = 16;
+
 /// Number of a buffer's elements, or an upper bound where so far only the device knows the number; and
 /// whether it is likely to be another one in the next frame, by a little.
 struct Length {
@@ -127,7 +130,7 @@ class Buffer {
   Device::Impl* device() const { return device_; }  ///< null while nothing is allocated
 
  private:
-  static constexpr std::size_t k_padding = 16;  // the widest vector
+  static constexpr std::size_t k_padding = k_widest_vector;
 
   void check_read(std::size_t count, std::size_t first) const {
     if (first > size() || count > size() - first)

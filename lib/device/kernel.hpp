@@ -22,7 +22,8 @@ struct Argument {
 };
 
 /// Members of the structs that the build makes of the kernels (cmake/EmbedKernels.cmake), for `const T`,
-/// `const global T*` and `global T*`. None has a default, and each takes its own type alone.
+/// `const global T*` and `global T*`. None has a default, and each takes its own type alone. K::pick() takes
+/// them by name from an object that has those of several kernels.
 template <class T>
 class Value {
  public:

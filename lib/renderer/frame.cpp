@@ -20,8 +20,14 @@ FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
     throw InvalidArgument(std::string("bands (") + caller + ")", std::to_string(r.bands.size()),
                           "a frame in one");
   }
-  return {r.bin.pairs,       r.rasterize.fragments,     r.rasterize.pixel_starts, r.rasterize.list,
-          r.rasterize.depth, r.occupancy.log_occupancy, r.occupancy.occupancy};
+  const auto plane = [&](cl_uint number) { return r.rasterize.plane(r.frame, number); };
+  return {r.bin.pairs,
+          r.rasterize.fragments,
+          r.rasterize.pixel_starts,
+          r.rasterize.list,
+          plane(DPR_PLANE_DEPTH),
+          plane(DPR_PLANE_LOG_OCCUPANCY),
+          plane(DPR_PLANE_OCCUPANCY)};
 }
 
 void require_same_device(const Device& device, const Device& other, const char* what) {

@@ -35,9 +35,9 @@ Frame last_frame(const Renderer& renderer, const char* caller);
 /// The fragments of a frame in one band, after its forward pass.
 struct FrameFragments {
   std::size_t pairs, fragments;
-  const Buffer<cl_uint>& pixel_starts;  ///< [view * height * width + 1] runs of `list`
-  const Buffer<cl_uint>& list;          ///< [fragments] places in the buffers below, by pixel
-  const Buffer<float>&depth, &log_occupancy, &occupancy;
+  const Buffer<cl_uint>& pixel_starts;                 ///< [view * height * width + 1] runs of `list`
+  const Buffer<cl_uint>& list;                         ///< [fragments] places in the buffers below, by pixel
+  std::vector<float> depth, log_occupancy, occupancy;  ///< [fragments]
 };
 
 /// Throws InvalidArgument where the memory budget made several bands of the frame: then none has all of them.

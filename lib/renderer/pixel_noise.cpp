@@ -38,9 +38,9 @@ PixelNoise::PixelNoise(Device::Impl& device)
     : contour(device), antialias(device), blur(device), device_(device) {}
 
 void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                         const Buffer<cl_uint>& tile_starts, float reach) {
+                         const Buffer<cl_uint>& tile_starts) {
   if (!sampled) blur.find_extents(in.p, tile_starts);
-  antialias.cross(in, contour, reach);
+  antialias.cross(in, contour);
   antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;
   if (sampled) sampled->draw(size, in.p.first_view);

@@ -42,7 +42,7 @@ class PixelNoise {
   /// From samples, which are blended in place, to the image; after the antialiasing's find_front() of all
   /// bands. `tile_starts` are the runs of the frame's pairs.
   void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-               const Buffer<cl_uint>& tile_starts, float reach);
+               const Buffer<cl_uint>& tile_starts);
   /// The raster holds samples as they were before forward(): bands have been rendered again.
   void unblend() { is_blended_ = raster_is_gradient_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale. `is_whole`: the raster is not

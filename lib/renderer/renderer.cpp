@@ -19,9 +19,8 @@ bool is_geometric(const GradientRequest& wanted) {
 
 /// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
 std::size_t fragment_bytes(const Geometry& geometry) {
-  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Shade::k_fragment_bytes +
-                                   Occupancy::k_fragment_bytes + Aggregate::k_fragment_bytes;
-  return k_always + (geometry.textures.empty() ? 0 : Shade::k_textured_fragment_bytes);
+  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
+  return k_always + (geometry.textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
 }
 
 }  // namespace
@@ -62,7 +61,7 @@ void Renderer::Impl::forward(FrameSizes sizes) {
   require_scene("Renderer::forward");
   rendered = false;
   build_pyramids();
-  transform.forward(frame, device_views, *geometry);
+  transform.forward(frame, device_views, *geometry, shade.lit());
   if (geometry_colors) geometry_colors->forward(frame, *geometry, transform, geometry->view_colors);
   find_edges();
   hide_back_faces();
@@ -118,7 +117,12 @@ void Renderer::Impl::hide_back_faces() {
 }
 
 void Renderer::Impl::set_up() {
+  frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
   frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
+  if (pixel_noise) {
+    set_edges(frame, *pixel_noise->edges, scene.lights ? std::optional(scene.lights->shading) : std::nullopt,
+              depth_reach(scene.smoothing));
+  }
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
   if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
@@ -127,14 +131,18 @@ void Renderer::Impl::set_up() {
   bin.start();
 }
 
+/// Memory for fragments: no more of them than kernels can index.
+std::size_t Renderer::Impl::fragment_budget() const {
+  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes(*geometry));
+}
+
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts && !reserved) return std::nullopt;
   const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
   const FrameCounts expected{std::min(with_headroom(counts.pairs), k_most_pairs),
                              with_headroom(counts.fragments), with_headroom(counts.contours)};
-  if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= device.memory_budget())
-    return std::nullopt;
+  if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= fragment_budget()) return std::nullopt;
   return expected;
 }
 
@@ -150,10 +158,7 @@ FrameCounts Renderer::Impl::likely_counts(const FrameCounts& room) const {
 }
 
 ContourInputs Renderer::Impl::contour_inputs() const {
-  return {frame,      device_views,
-          *geometry,  *pixel_noise->edges,
-          transform,  setup.facing,
-          clip.faces, scene.lights ? std::optional(scene.lights->shading) : std::nullopt};
+  return {frame, device_views, *geometry, *pixel_noise->edges, transform, setup.facing, clip.faces};
 }
 
 Blur::Size Renderer::Impl::image_size() const {
@@ -174,8 +179,7 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 /// From samples to pixels, once all bands are rendered.
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
-  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts,
-                       depth_reach(scene.smoothing));
+  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {
@@ -199,7 +203,7 @@ void Renderer::Impl::forward_measured() {
   find_contours(std::nullopt);
   bin.forward(frame, setup);
   rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, bin, device.memory_budget(), fragment_bytes(*geometry));
+  bands = rasterize.cut(frame, bin, fragment_budget(), fragment_bytes(*geometry));
   for (const Band& band : bands) render(band);
   finish_image();
   if (bands.size() > 1) return;
@@ -242,8 +246,6 @@ void Renderer::Impl::settle() {
   if (fits) {
     bin.settle(found.pairs);
     bands = {rasterize.settle(frame, found)};
-    shade.settle(found.fragments);
-    occupancy.settle(found.fragments);
     known_counts = last_counts = found;
     if (pixel_noise) pixel_noise->contour.settle(found.contours);
     return;
@@ -323,8 +325,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (shade.lit()) shade.backward_world(shade_inputs(), gather, grad_lit);
     if (shade.lit()) shade.backward_given_normals(shade_inputs());
     if (geometry_colors) {
-      gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
-                      grad_colors);
+      gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_pairs, grad_colors);
       // The depth of vertices that may lie behind the camera goes the way of homogeneous coordinates.
       geometry_colors->backward(frame, *geometry, transform, grad_colors,
                                 frame.clips != 0 ? clip.grad : grad_vertices, grad_lit);
@@ -341,32 +342,25 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images);
-  const bool sampled_jointly = aggregate.perturbs_distances();
   // Distances without noise have no gradient, and rasterization does not read one.
-  if ((geometric || wanted.smoothing) && !sampled_jointly && !pixel_noise) {
-    occupancy.backward(frame, bin, rasterize, aggregate.grad_log_occupancy);
+  if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise) {
+    occupancy.backward(frame, bin, rasterize);
   }
   const bool textured = !geometry->textures.empty();
   if (geometric || wanted.colors || wanted.materials || (textured && (wanted.texture || wanted.texcoords))) {
-    shade.backward(shade_inputs(), aggregate.grad_color);
+    shade.backward(shade_inputs());
   }
   if (textured && wanted.texture) {
-    shade.surface->list(shade_inputs().surface(), shade.grad_base(aggregate.grad_color));
+    shade.list_texels(shade_inputs());
     texels->add(geometry->textures, *shade.surface);
   }
   if (geometric) {
-    rasterize.backward(frame, setup.triangles, bin,
-                       pixel_noise       ? aggregate.grad_depth
-                       : sampled_jointly ? aggregate.grad_distance
-                                         : occupancy.grad_distance,
-                       aggregate.grad_depth, shade.grad_bary1, shade.grad_bary2);
-    if (textured) {
-      shade.surface->backward_detail(shade_inputs().surface(), rasterize.grad_corners, clip.grad_corners);
-    }
+    rasterize.backward(frame, setup.triangles, bin);
+    if (textured) shade.backward_detail(shade_inputs(), rasterize.grad_corners, clip.grad_corners);
   }
   if (wanted.lights && shade.lit()) {
     for (std::size_t light = 0; light < shade.light_launches(); ++light) {
-      shade.backward_light(shade_inputs(), aggregate.grad_color, light);
+      shade.backward_light(shade_inputs(), light);
     }
   }
 }

@@ -60,18 +60,18 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
   if (scene.gradients.positions) transform.backward_positions(frame, device_views, *geometry, grad_vertices);
   if (add_to_positions) add_to_positions(geometry->positions, transform.grad_positions);
   if (wants(ArrayId::colors) && frame.color_stride != 0) {
-    gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
-                    grad_colors);
+    gather.per_view(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_pairs, grad_colors);
   } else if (wants(ArrayId::colors)) {
-    gather.over_views(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_corner_colors,
-                      grad_colors);
+    gather.over_views(frame, geometry->colors, bin, geometry->color_corners(), shade.grad_pairs, grad_colors);
   }
   if (wants(ArrayId::texcoords)) {
     gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
-                      shade.surface->grad_corner_texcoords, grad_texcoords);
+                      {shade.grad_pairs, DPR_PAIR_TEXCOORDS * bin.pairs}, grad_texcoords);
   }
   if (wants(ArrayId::materials))
-    gather.over_views(frame, bin, geometry->materials, shade.grad_materials, material_channels);
+    gather.over_views(frame, bin, geometry->materials,
+                      {shade.grad_pairs, (shade.first_lit_channel() + DPR_PAIR_MATERIAL) * bin.pairs},
+                      material_channels);
 }
 
 SceneGradient Renderer::Impl::read_gradient() {
@@ -253,13 +253,14 @@ void Renderer::Impl::sum_gradients() {
       {SumOf::sigma, sigma},
       {SumOf::poses,
        {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),
-        views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0,
+        views.size() * scene.meshes.size(), 1, device_views.vertex_starts, transform.partial_sums, 0, 0,
         transform.slots}},
       {SumOf::cuts,
        {bin.pairs, channels(cuts, DPR_CUT_CHANNELS), views.size(), frame.faces, bin.pair_starts,
         clip.grad_cuts, pairs}},
       {SumOf::eye,
-       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_eye, pairs}},
+       {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_pairs, pairs,
+        shade.first_lit_channel() + DPR_PAIR_EYE}},
       {SumOf::lights,
        {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
         shade.light_channels, pairs}},

@@ -203,17 +203,18 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const Element> elements);
   Buffer<cl_float4>& spare_for(const Buffer<cl_float4>& buffer);
 
-  ShadeInputs shade_inputs() const {
+  ShadeInputs shade_inputs() {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};
   }
   ContourInputs contour_inputs() const;
   Blur::Size image_size() const;
-  AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize, occupancy, shade}; }
+  AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize}; }
 
   void build_pyramids();
   void find_edges();
   void hide_back_faces();
   void set_up();
+  std::size_t fragment_budget() const;
   std::optional<FrameCounts> expected_capacity() const;
   FrameCounts likely_counts(const FrameCounts& room) const;
   FrameNote learn();

@@ -99,6 +99,11 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.sharp = is_sharp(scene.smoothing) ? 1 : 0;
   p.culled = culled_orientation(scene.cull);
   p.normals = static_cast<cl_uint>(geometry.normals());
+  p.color_faces = to_uint(geometry.color_faces);
+  p.normal_faces = to_uint(geometry.normal_faces);
+  p.texcoord_faces = to_uint(geometry.texcoord_faces);
+  p.texels = to_uint(geometry.textures.texels);
+  p.levels = geometry.textures.has_pyramids() ? 2 : 1;
   return p;
 }
 

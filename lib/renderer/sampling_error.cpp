@@ -73,10 +73,8 @@ class Replicates {
   }
 
   void add_fragments() {
-    const std::vector<float> by_depth = m_.aggregate.grad_depth.download();
-    const Buffer<float>& grad_distance =
-        m_.aggregate.perturbs_distances() ? m_.aggregate.grad_distance : m_.occupancy.grad_distance;
-    const std::vector<float> by_distance = grad_distance.download();
+    const std::vector<float> by_depth = m_.rasterize.grad_plane(m_.frame, DPR_PLANE_DEPTH),
+                             by_distance = m_.rasterize.grad_plane(m_.frame, DPR_PLANE_DISTANCE);
     for (std::size_t k = 0; k < by_depth.size(); ++k) {
       depth_.add(k, static_cast<double>(by_depth[k]));
       distance_.add(k, static_cast<double>(by_distance[k]));

@@ -43,181 +43,78 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   a.faces = p.faces;
   a.first_view = p.first_view;
   a.channels = to_uint(channel_count());
+  a.fragments = p.fragments;
+  a.grad_fragments = p.grad_fragments;
   return a;
 }
 
+/// What the kernels take, by the names of their arguments.
+struct AggregateArguments {
+  shared::AggregateParams p;
+  const Buffer<shared::ViewParams>& views;
+  const Buffer<cl_uint>&starts, &list, &fragment_pair, &pair_face;
+  const Buffer<float>& fragments;
+  Buffer<shared::Slot>& slots;
+  Buffer<cl_uint>& slot_counts;
+  Buffer<cl_float4>& image;
+  BufferRef<cl_float4> grad_image;
+  Buffer<float>&grads, &grad_sigma, &channels;
+};
+
+/// Launches the kernels in force by runs of the band's pixels.
+template <class Barrier, class Joint, class Sampled, class JointSampled>
+void Aggregate::launch(const AggregateInputs& in, const glm::vec3& background,
+                       const BufferRef<cl_float4>& grad_image) {
+  Rasterize& r = in.rasterize;
+  AggregateArguments all{.p = params(in.p, background),
+                         .views = in.views.cameras,
+                         .starts = r.pixel_starts,
+                         .list = r.list,
+                         .fragment_pair = r.fragment_pair,
+                         .pair_face = in.bin.pair_face,
+                         .fragments = r.values,
+                         .slots = slots_,
+                         .slot_counts = slot_counts_,
+                         .image = image,
+                         .grad_image = grad_image,
+                         .grads = r.grads,
+                         .grad_sigma = grad_sigma,
+                         .channels = channels};
+  AggregateKernels& kernels = *now_.kernels;
+  for (const Range& pixels : r.pixels(in.p)) {
+    all.p.last_pixel = pixels.last();
+    if (kernels.barrier) (*kernels.barrier)(pixels, Barrier::pick(all));
+    if (kernels.joint) (*kernels.joint)(pixels, Joint::pick(all));
+    if (kernels.sampled) (*kernels.sampled)(pixels, Sampled::pick(all));
+    if (kernels.joint_sampled) (*kernels.joint_sampled)(pixels, JointSampled::pick(all));
+  }
+}
+
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
-  shared::AggregateParams a = params(in.p, background);
-  image.resize(device_, a.pixels);
+  const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
+  image.resize(device_, pixels);
   if (now_.kernels->barrier || now_.kernels->joint) {
     const bool has_background_slots = now_.kernels->barrier.has_value();
-    slots_.resize(device_, in.rasterize.fragments + (has_background_slots ? a.pixels : 0));
-    slot_counts_.resize(device_, a.pixels);
+    slots_.resize(device_, in.rasterize.fragments + (has_background_slots ? pixels : 0));
+    slot_counts_.resize(device_, pixels);
   }
-  for (const Range& pixels : in.rasterize.pixels(in.p)) {
-    a.last_pixel = pixels.last();
-    forward(in, a, pixels);
-  }
-}
-
-template <class Arguments>
-Arguments Aggregate::exact_forward(const AggregateInputs& in, const shared::AggregateParams& a) {
-  const Rasterize& r = in.rasterize;
-  return {.p = a,
-          .views = in.views.cameras,
-          .starts = r.pixel_starts,
-          .list = r.list,
-          .depth = r.depth,
-          .log_occupancy = in.occupancy.log_occupancy,
-          .occupancy = in.occupancy.occupancy,
-          .red = in.shade.color.red,
-          .green = in.shade.color.green,
-          .blue = in.shade.color.blue,
-          .slots = slots_,
-          .slot_counts = slot_counts_,
-          .image = image};
-}
-
-void Aggregate::forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels) {
-  const Rasterize& r = in.rasterize;
-  if (now_.kernels->barrier) {
-    (*now_.kernels->barrier)(pixels, exact_forward<kernel::aggregate_forward>(in, a));
-  } else if (now_.kernels->joint) {
-    (*now_.kernels->joint)(pixels, exact_forward<kernel::aggregate_joint_forward>(in, a));
-  } else if (now_.kernels->joint_sampled) {
-    (*now_.kernels->joint_sampled)(pixels,
-                                   kernel::aggregate_joint_sampled_forward{.p = a,
-                                                                           .views = in.views.cameras,
-                                                                           .starts = r.pixel_starts,
-                                                                           .list = r.list,
-                                                                           .distance = r.distance,
-                                                                           .depth = r.depth,
-                                                                           .red = in.shade.color.red,
-                                                                           .green = in.shade.color.green,
-                                                                           .blue = in.shade.color.blue,
-                                                                           .fragment_pair = r.fragment_pair,
-                                                                           .pair_face = in.bin.pair_face,
-                                                                           .image = image});
-  } else {
-    (*now_.kernels->sampled)(pixels,
-                             kernel::aggregate_sampled_forward{.p = a,
-                                                               .views = in.views.cameras,
-                                                               .starts = r.pixel_starts,
-                                                               .list = r.list,
-                                                               .depth = r.depth,
-                                                               .log_occupancy = in.occupancy.log_occupancy,
-                                                               .occupancy = in.occupancy.occupancy,
-                                                               .red = in.shade.color.red,
-                                                               .green = in.shade.color.green,
-                                                               .blue = in.shade.color.blue,
-                                                               .fragment_pair = r.fragment_pair,
-                                                               .pair_face = in.bin.pair_face,
-                                                               .image = image});
-  }
+  launch<kernel::aggregate_forward, kernel::aggregate_joint_forward, kernel::aggregate_sampled_forward,
+         kernel::aggregate_joint_sampled_forward>(in, background, BufferRef<cl_float4>(nullptr));
 }
 
 void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
                          const BufferRef<cl_float4>& grad_image) {
-  shared::AggregateParams a = params(in.p, background);
-  for (Buffer<float>* buffer :
-       {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green, &grad_color.blue}) {
-    buffer->resize(device_, in.rasterize.fragments);
-  }
-  channels.resize(device_, channel_count() * a.pixels);
-  if (now_.kernels->joint_sampled) {
-    grad_distance.resize(device_, in.rasterize.fragments);
-    grad_sigma.resize(device_, a.pixels);
-  }
-  for (const Range& pixels : in.rasterize.pixels(in.p)) {
-    a.last_pixel = pixels.last();
-    backward(in, a, pixels, grad_image);
-  }
-}
-
-template <class Arguments>
-Arguments Aggregate::exact_backward(const AggregateInputs& in, const shared::AggregateParams& a,
-                                    const BufferRef<cl_float4>& grad_image) {
-  const Rasterize& r = in.rasterize;
-  return {.p = a,
-          .views = in.views.cameras,
-          .starts = r.pixel_starts,
-          .list = r.list,
-          .depth = r.depth,
-          .log_occupancy = in.occupancy.log_occupancy,
-          .occupancy = in.occupancy.occupancy,
-          .red = in.shade.color.red,
-          .green = in.shade.color.green,
-          .blue = in.shade.color.blue,
-          .slots = slots_,
-          .slot_counts = slot_counts_,
-          .grad_image = grad_image,
-          .grad_depth = grad_depth,
-          .grad_log_occupancy = grad_log_occupancy,
-          .grad_red = grad_color.red,
-          .grad_green = grad_color.green,
-          .grad_blue = grad_color.blue,
-          .channels = channels};
-}
-
-void Aggregate::backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
-                         const BufferRef<cl_float4>& grad_image) {
-  const Rasterize& r = in.rasterize;
-  if (now_.kernels->barrier) {
-    (*now_.kernels->barrier)(pixels, exact_backward<kernel::aggregate_backward>(in, a, grad_image));
-  } else if (now_.kernels->joint) {
-    (*now_.kernels->joint)(pixels, exact_backward<kernel::aggregate_joint_backward>(in, a, grad_image));
-  } else if (now_.kernels->joint_sampled) {
-    (*now_.kernels->joint_sampled)(pixels,
-                                   kernel::aggregate_joint_sampled_backward{.p = a,
-                                                                            .views = in.views.cameras,
-                                                                            .starts = r.pixel_starts,
-                                                                            .list = r.list,
-                                                                            .distance = r.distance,
-                                                                            .depth = r.depth,
-                                                                            .red = in.shade.color.red,
-                                                                            .green = in.shade.color.green,
-                                                                            .blue = in.shade.color.blue,
-                                                                            .fragment_pair = r.fragment_pair,
-                                                                            .pair_face = in.bin.pair_face,
-                                                                            .grad_image = grad_image,
-                                                                            .grad_distance = grad_distance,
-                                                                            .grad_depth = grad_depth,
-                                                                            .grad_red = grad_color.red,
-                                                                            .grad_green = grad_color.green,
-                                                                            .grad_blue = grad_color.blue,
-                                                                            .grad_sigma = grad_sigma,
-                                                                            .channels = channels});
-  } else {
-    (*now_.kernels->sampled)(pixels,
-                             kernel::aggregate_sampled_backward{.p = a,
-                                                                .views = in.views.cameras,
-                                                                .starts = r.pixel_starts,
-                                                                .list = r.list,
-                                                                .depth = r.depth,
-                                                                .log_occupancy = in.occupancy.log_occupancy,
-                                                                .occupancy = in.occupancy.occupancy,
-                                                                .red = in.shade.color.red,
-                                                                .green = in.shade.color.green,
-                                                                .blue = in.shade.color.blue,
-                                                                .fragment_pair = r.fragment_pair,
-                                                                .pair_face = in.bin.pair_face,
-                                                                .grad_image = grad_image,
-                                                                .grad_depth = grad_depth,
-                                                                .grad_log_occupancy = grad_log_occupancy,
-                                                                .grad_red = grad_color.red,
-                                                                .grad_green = grad_color.green,
-                                                                .grad_blue = grad_color.blue,
-                                                                .channels = channels});
-  }
+  const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
+  in.rasterize.start_gradients(in.p);
+  channels.resize(device_, channel_count() * pixels);
+  if (perturbs_distances()) grad_sigma.resize(device_, pixels);
+  launch<kernel::aggregate_backward, kernel::aggregate_joint_backward, kernel::aggregate_sampled_backward,
+         kernel::aggregate_joint_sampled_backward>(in, background, grad_image);
 }
 
 std::size_t Aggregate::bytes() const {
-  std::size_t bytes = image.capacity_bytes() + slots_.capacity_bytes() + slot_counts_.capacity_bytes();
-  for (const Buffer<float>* buffer : {&grad_depth, &grad_log_occupancy, &grad_color.red, &grad_color.green,
-                                      &grad_color.blue, &channels, &grad_distance, &grad_sigma}) {
-    bytes += buffer->capacity_bytes();
-  }
-  return bytes;
+  return image.capacity_bytes() + slots_.capacity_bytes() + slot_counts_.capacity_bytes() +
+         channels.capacity_bytes() + grad_sigma.capacity_bytes();
 }
 
 }  // namespace dpr

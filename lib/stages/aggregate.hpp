@@ -22,9 +22,7 @@ struct AggregateInputs {
   const shared::FrameParams& p;
   const DeviceViews& views;
   const Bin& bin;
-  const Rasterize& rasterize;
-  const Occupancy& occupancy;
-  const Shade& shade;
+  Rasterize& rasterize;
 };
 
 /// Kernels of one composition, estimator and prior; `built` names them.
@@ -50,7 +48,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
   void forward(const AggregateInputs& in, const glm::vec3& background);
-  /// `grad_image` is [view][height][width].
+  /// `grad_image` is [view][height][width]. The gradients of fragments that no pixel lists are not written.
   void backward(const AggregateInputs& in, const glm::vec3& background,
                 const BufferRef<cl_float4>& grad_image);
 
@@ -60,33 +58,22 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   }
 
   /// Bytes a fragment of the buffers below and the slots.
-  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float) + sizeof(shared::Slot);
+  static constexpr std::size_t k_fragment_bytes = sizeof(shared::Slot);
 
-  Buffer<cl_float4> image;                       ///< [view][height][width] RGBA
-  Buffer<float> grad_depth, grad_log_occupancy;  ///< [fragment]; what pixels do not list is not written
-  ColorPlanes grad_color;                        ///< [fragment]
-  Buffer<float> channels;                        ///< [channel_count()][view][height][width]
+  Buffer<cl_float4> image;  ///< [view][height][width] RGBA
+  Buffer<float> channels;   ///< [channel_count()][view][height][width]
 
-  /// True if distances are perturbed here, in the sampled joint composition. Then `grad_log_occupancy` is not
-  /// written, but these are.
+  /// True if distances are perturbed here, in the sampled joint composition. Then the gradients of distances
+  /// take the place of those of occupancies, and this one is written.
   bool perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
-  Buffer<float> grad_distance;  ///< [fragment]; what pixels do not list is not written
-  Buffer<float> grad_sigma;     ///< [view][height][width]
+  Buffer<float> grad_sigma;  ///< [view][height][width]
 
   std::size_t bytes() const;
 
  private:
-  /// Aggregates a run of pixels.
-  void forward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels);
-  void backward(const AggregateInputs& in, const shared::AggregateParams& a, const Range& pixels,
-                const BufferRef<cl_float4>& grad_image);
+  template <class Barrier, class Joint, class Sampled, class JointSampled>
+  void launch(const AggregateInputs& in, const glm::vec3& background, const BufferRef<cl_float4>& grad_image);
   shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
-  /// Arguments of the exact kernels of either composition.
-  template <class Arguments>
-  Arguments exact_forward(const AggregateInputs& in, const shared::AggregateParams& a);
-  template <class Arguments>
-  Arguments exact_backward(const AggregateInputs& in, const shared::AggregateParams& a,
-                           const BufferRef<cl_float4>& grad_image);
 
   Buffer<shared::Slot> slots_;   // [fragment], and in the barrier composition [pixel] more
   Buffer<cl_uint> slot_counts_;  // [pixel]

@@ -12,14 +12,6 @@ std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views}
 /// Work-items of a tile, as kernels/tile_rows.h has them.
 std::size_t row_items(const Device::Impl& device) { return device.info.lanes == 1 ? DPR_TILE : 1; }
 
-shared::AntialiasParams params(const ContourInputs& in, float depth_reach) {
-  shared::AntialiasParams a{};
-  a.edges = static_cast<cl_uint>(edges_of_view(in));
-  a.mesh_edges = static_cast<cl_uint>(in.edges.count);
-  a.depth_reach = depth_reach;
-  return a;
-}
-
 }  // namespace
 
 void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
@@ -34,14 +26,14 @@ void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const R
                                   .tile_starts = contour.tile_starts,
                                   .starts = rasterize.pixel_starts,
                                   .list = rasterize.list,
-                                  .depth = rasterize.depth,
+                                  .depth = rasterize.values,
                                   .fragment_pair = rasterize.fragment_pair,
                                   .pair_face = bin.pair_face,
                                   .front = front,
                                   .front_face = front_face});
 }
 
-void Antialias::cross(const ContourInputs& in, const Contour& contour, float depth_reach) {
+void Antialias::cross(const ContourInputs& in, const Contour& contour) {
   winner.resize(device_, 2 * samples_of(in.p));
   cut.resize(device_, 2 * samples_of(in.p));
   const std::size_t tiles = tiles_of(in.p), items = tiles * row_items(device_);
@@ -49,11 +41,9 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
   second_counts.resize(device_, items);
   seconds.resize(device_, DPR_SECOND_CROSSINGS * DPR_TILE / 2 * tiles);
   launch_(items, kernel::antialias_cross{.p = in.p,
-                                         .a = params(in, depth_reach),
                                          .views = in.views.cameras,
                                          .edges = in.edges.edges,
                                          .faces = in.geometry.face_vertices,
-                                         .facing = in.facing,
                                          .ndc = in.transform.ndc,
                                          .clipped = in.clipped,
                                          .tile_starts = contour.tile_starts,
@@ -63,11 +53,9 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, float dep
                                          .cut = cut,
                                          .crowded = crowded_});
   launch_(items, kernel::antialias_second_find{.p = in.p,
-                                               .a = params(in, depth_reach),
                                                .views = in.views.cameras,
                                                .edges = in.edges.edges,
                                                .faces = in.geometry.face_vertices,
-                                               .facing = in.facing,
                                                .ndc = in.transform.ndc,
                                                .clipped = in.clipped,
                                                .tile_starts = contour.tile_starts,
@@ -150,11 +138,9 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                                                 .grad_cut = grad_cut_,
                                                 .grad_raster = grad});
   launch_(contour.pairs, kernel::antialias_cross_backward{.p = in.p,
-                                                          .a = params(in, 0.0F),
                                                           .pairs = contour.pair_count,
                                                           .edges = in.edges.edges,
                                                           .faces = in.geometry.face_vertices,
-                                                          .facing = in.facing,
                                                           .ndc = in.transform.ndc,
                                                           .clipped = in.clipped,
                                                           .pair_contour = contour.pair_contour,

@@ -28,9 +28,9 @@ class Antialias {
   /// The front-most depths of the samples near contours of the rasterizer's band.
   void find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                   const Contour& contour);
-  /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces `depth_reach`
+  /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces p.depth_reach
   /// (normalised depth) behind the nearest count as seen.
-  void cross(const ContourInputs& in, const Contour& contour, float depth_reach);
+  void cross(const ContourInputs& in, const Contour& contour);
   /// Blends the samples of [view][height][width] in place.
   void forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
                KeptSamples& kept);

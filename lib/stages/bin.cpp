@@ -29,7 +29,7 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
   pairs = capacity;
   launched = std::min(capacity, likely);
   pair_count.resize(device_, 1);
-  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face, &places})
+  for (Buffer<cl_uint>* buffer : {&pair_face, &pair_tile, &face_pairs, &place_face})
     buffer->resize(device_, Length::at_most(pairs));
   const auto n = static_cast<cl_uint>(pairs);
   launch_(pair_starts.size() - 1, kernel::bin_fill{.p = p,
@@ -38,8 +38,7 @@ void Bin::list(const shared::FrameParams& p, const Setup& setup, std::size_t cap
                                                    .offsets = pair_starts,
                                                    .pairs = pair_count,
                                                    .place_face = place_face,
-                                                   .place_tile = pair_tile,
-                                                   .places = places});
+                                                   .place_tile = pair_tile});
   sort_(pairs, pair_count, std::size_t{p.views} * p.tiles_x * p.tiles_y, pair_tile, places, tile_starts);
   launch_(launched, kernel::bin_link{.pairs = pair_count,
                                      .places = places,

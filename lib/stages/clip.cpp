@@ -46,21 +46,15 @@ void Clip::fragments(const shared::FrameParams& p, const Buffer<shared::Triangle
                                            .pair_face = bin.pair_face,
                                            .fragment_starts = rasterize.fragment_starts,
                                            .pixels = rasterize.fragment_pixel,
-                                           .distance = rasterize.distance,
-                                           .depth = rasterize.depth,
-                                           .bary1 = rasterize.bary1,
-                                           .bary2 = rasterize.bary2});
+                                           .fragments = rasterize.values});
 }
 
 void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
-                    Rasterize& rasterize, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
-                    const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
+                    Rasterize& rasterize) {
   const Range pairs = rasterize.pairs(bin);
   grad_corners.resize(device_, std::size_t{9} * bin.pairs);
   grad_cuts.resize(device_, p.distorts != 0 ? DPR_CUT_CHANNELS * bin.pairs : 1);
   (*launch_)(pairs, kernel::clip_backward{.p = p,
-                                          .capacity = static_cast<cl_uint>(bin.pairs),
-                                          .last_pair = pairs.last(),
                                           .pairs = bin.pair_count,
                                           .views = views_->cameras,
                                           .clipped = faces,
@@ -68,18 +62,13 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                                           .pair_face = bin.pair_face,
                                           .fragment_starts = rasterize.fragment_starts,
                                           .pixels = rasterize.fragment_pixel,
-                                          .distance = rasterize.distance,
-                                          .grad_distance = grad_distance,
-                                          .grad_depth = grad_depth,
-                                          .grad_bary1 = grad_bary1,
-                                          .grad_bary2 = grad_bary2,
+                                          .fragments = rasterize.values,
+                                          .grads = rasterize.grads,
                                           .grad_corners = rasterize.grad_corners,
                                           .grad_clip = grad_corners,
                                           .grad_cuts = grad_cuts});
   if (p.distorts == 0) return;
   (*launch_)(pairs, kernel::clip_backward_lens{.p = p,
-                                               .capacity = static_cast<cl_uint>(bin.pairs),
-                                               .last_pair = pairs.last(),
                                                .pairs = bin.pair_count,
                                                .views = views_->cameras,
                                                .clipped = faces,

@@ -29,10 +29,9 @@ class Clip {
   void fragments(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                  Rasterize& rasterize);
   /// Replaces the gradients of their corners, and adds those that go by way of the near plane, with what these
-  /// give to projections and lenses. The gradients of fragments are those that Rasterize::backward() was given.
+  /// give to projections and lenses.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
-                Rasterize& rasterize, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
-                const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
+                Rasterize& rasterize);
 
   Buffer<shared::ClippedFace> faces;  ///< [view][face] which of them are clipped, and to what
   Buffer<float> grad_corners;         ///< [pair][9] of the corners' x times depth, y times depth, depth

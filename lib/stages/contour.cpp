@@ -5,21 +5,17 @@
 
 namespace dpr {
 
-std::size_t edges_of_view(const ContourInputs& in) {
-  return in.edges.count + (in.p.clips != 0 ? in.p.faces : 0);
+void set_edges(shared::FrameParams& p, const Edges& edges, const std::optional<Shading>& shading,
+               float depth_reach) {
+  p.mesh_edges = to_uint(edges.count);
+  p.edges = to_uint(edges.count + (p.clips != 0 ? p.faces : 0));
+  p.shading = shading ? static_cast<cl_uint>(*shading) + DPR_FLAT : DPR_UNLIT;
+  p.depth_reach = depth_reach;
 }
 
 namespace {
 
-std::size_t view_edges(const ContourInputs& in) { return in.p.views * edges_of_view(in); }
-
-shared::ContourParams params(const ContourInputs& in) {
-  shared::ContourParams c{};
-  c.edges = to_uint(edges_of_view(in));
-  c.mesh_edges = to_uint(in.edges.count);
-  c.shading = in.shading ? static_cast<cl_uint>(*in.shading) + DPR_FLAT : DPR_UNLIT;
-  return c;
-}
+std::size_t view_edges(const ContourInputs& in) { return std::size_t{in.p.views} * in.p.edges; }
 
 constexpr const char* k_pairs = "pairs of tiles and contours (frame)";
 
@@ -49,17 +45,17 @@ void Contour::count(const ContourInputs& in) {
                           "fewer, so that they can be counted");
   }
   pair_starts.resize(device_, view_edges(in) + 1);
+  kinds_.resize(device_, view_edges(in));
   launch_(view_edges(in), kernel::contour_count{.p = in.p,
-                                                .c = params(in),
                                                 .edges = in.edges.edges,
                                                 .facing = in.facing,
                                                 .ndc = in.transform.ndc,
                                                 .world = in.transform.world,
                                                 .faces = in.geometry.face_vertices,
                                                 .clipped = in.clipped,
-                                                .face_colors = in.geometry.face_colors(),
                                                 .colors = in.geometry.colors_of(in.p),
-                                                .counts = pair_starts});
+                                                .counts = pair_starts,
+                                                .kinds = kinds_});
   scan_(view_edges(in), pair_starts);
 }
 
@@ -67,30 +63,24 @@ void Contour::list(const ContourInputs& in, std::size_t capacity, std::size_t li
   pairs = capacity;
   launched = std::min(capacity, likely);
   pair_count.resize(device_, 1);
-  for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_, &places_})
+  for (Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &edge_pairs_, &place_contour_})
     buffer->resize(device_, Length::at_most(pairs));
   const Incidence& corners = in.geometry.vertex_corners;
   // Without edges one work-item still writes the count.
-  launch_(std::max<std::size_t>(view_edges(in), 1),
-          kernel::contour_fill{.p = in.p,
-                               .c = params(in),
-                               .capacity = to_uint(capacity),
-                               .edges = in.edges.edges,
-                               .face_edges = in.edges.face_edges,
-                               .corner_starts = corners.starts,
-                               .corners = corners.corners,
-                               .facing = in.facing,
-                               .ndc = in.transform.ndc,
-                               .world = in.transform.world,
-                               .faces = in.geometry.face_vertices,
-                               .clipped = in.clipped,
-                               .face_colors = in.geometry.face_colors(),
-                               .colors = in.geometry.colors_of(in.p),
-                               .offsets = pair_starts,
-                               .pairs = pair_count,
-                               .place_contour = place_contour_,
-                               .place_tile = pair_tile,
-                               .places = places_});
+  launch_(std::max<std::size_t>(view_edges(in), 1), kernel::contour_fill{.p = in.p,
+                                                                         .capacity = to_uint(capacity),
+                                                                         .edges = in.edges.edges,
+                                                                         .face_edges = in.edges.face_edges,
+                                                                         .corner_starts = corners.starts,
+                                                                         .corners = corners.corners,
+                                                                         .ndc = in.transform.ndc,
+                                                                         .faces = in.geometry.face_vertices,
+                                                                         .clipped = in.clipped,
+                                                                         .kinds = kinds_,
+                                                                         .offsets = pair_starts,
+                                                                         .pairs = pair_count,
+                                                                         .place_contour = place_contour_,
+                                                                         .place_tile = pair_tile});
   sort_(pairs, pair_count, std::size_t{in.p.views} * in.p.tiles_x * in.p.tiles_y, pair_tile, places_,
         tile_starts);
   launch_(launched, kernel::bin_link{.pairs = pair_count,
@@ -104,7 +94,6 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
                      Buffer<cl_float4>& grad_clip) {
   const Incidence& corners = in.geometry.vertex_corners;
   launch_(2 * launched, kernel::contour_gather{.p = in.p,
-                                               .c = params(in),
                                                .pairs = pair_count,
                                                .pair_contour = pair_contour,
                                                .pair_starts = pair_starts,
@@ -117,29 +106,31 @@ void Contour::gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends
                                                .grad_ends = grad_ends,
                                                .grad_ndc = grad_ndc});
   if (in.p.clips == 0) return;
-  grad_cuts.resize(device_,
-                   in.p.distorts != 0 ? std::size_t{DPR_CUT_CHANNELS} * in.p.views * in.p.vertices : 1);
-  launch_(std::size_t{in.p.views} * in.p.vertices,
-          kernel::contour_gather_cuts{.p = in.p,
-                                      .c = params(in),
-                                      .views = in.views.cameras,
-                                      .edges = in.edges.edges,
-                                      .faces = in.geometry.face_vertices,
-                                      .ndc = in.transform.ndc,
-                                      .clipped = in.clipped,
-                                      .pair_starts = pair_starts,
-                                      .edge_pairs = edge_pairs_,
-                                      .face_edges = in.edges.face_edges,
-                                      .corner_starts = corners.starts,
-                                      .corners = corners.corners,
-                                      .grad_ends = grad_ends,
-                                      .grad_ndc = grad_ndc,
-                                      .grad_clip = grad_clip,
-                                      .grad_cuts = grad_cuts});
+  const std::size_t vertices = std::size_t{in.p.views} * in.p.vertices;
+  grad_cuts.resize(device_, in.p.distorts != 0 ? DPR_CUT_CHANNELS * vertices : 1);
+  launch_(vertices, kernel::contour_drop_near{.p = in.p,
+                                              .clipped = in.clipped,
+                                              .corner_starts = corners.starts,
+                                              .corners = corners.corners,
+                                              .grad_ndc = grad_ndc});
+  launch_(vertices, kernel::contour_gather_cuts{.p = in.p,
+                                                .views = in.views.cameras,
+                                                .edges = in.edges.edges,
+                                                .faces = in.geometry.face_vertices,
+                                                .ndc = in.transform.ndc,
+                                                .clipped = in.clipped,
+                                                .pair_starts = pair_starts,
+                                                .edge_pairs = edge_pairs_,
+                                                .face_edges = in.edges.face_edges,
+                                                .corner_starts = corners.starts,
+                                                .corners = corners.corners,
+                                                .grad_ends = grad_ends,
+                                                .grad_clip = grad_clip,
+                                                .grad_cuts = grad_cuts});
 }
 
 std::size_t Contour::bytes() const {
-  std::size_t bytes = scan_.bytes() + sort_.bytes() + grad_cuts.capacity_bytes();
+  std::size_t bytes = scan_.bytes() + sort_.bytes() + kinds_.capacity_bytes() + grad_cuts.capacity_bytes();
   for (const Buffer<cl_uint>* buffer : {&pair_contour, &pair_tile, &tile_starts, &pair_count, &pair_starts,
                                         &edge_pairs_, &place_contour_, &places_}) {
     bytes += buffer->capacity_bytes();

@@ -23,11 +23,11 @@ struct ContourInputs {
   const Transform& transform;
   const Buffer<cl_uchar>& facing;              ///< [view][face] Setup::facing
   const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set
-  std::optional<Shading> shading;              ///< of a lit scene
 };
 
-/// The edges of a view: the scene's, then, where faces are clipped, the cut of every face.
-std::size_t edges_of_view(const ContourInputs& in);
+/// Tells a frame of its contours, once it is known whether faces are clipped. `shading` of a lit scene.
+void set_edges(shared::FrameParams& p, const Edges& edges, const std::optional<Shading>& shading,
+               float depth_reach);
 
 class Contour {
  public:
@@ -62,10 +62,11 @@ class Contour {
 
   Device::Impl& device_;
   Launcher<kernel::contour_count, kernel::contour_fill, kernel::bin_link, kernel::contour_gather,
-           kernel::contour_gather_cuts>
+           kernel::contour_drop_near, kernel::contour_gather_cuts>
       launch_;
   Scan scan_;
   Sort sort_;
+  Buffer<cl_uchar> kinds_;                  // [view][edge] of contours: see contour_count
   Buffer<cl_uint> edge_pairs_;              // the pairs of every edge
   Buffer<cl_uint> place_contour_, places_;  // [pair] before sorting
 };

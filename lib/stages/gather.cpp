@@ -8,7 +8,7 @@ constexpr cl_uint k_corner_channels = 9;
 }  // namespace
 
 void Gather::per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
-                      const Incidence& incidence, const Buffer<float>& partial, Buffer<cl_float4>& grad) {
+                      const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
   grad.resize(device_, p.views * targets);
   sum_chunks(p, bin, k_corner_channels, partial);
   launch_(p.views * targets, kernel::gather_corners{.p = p,
@@ -18,13 +18,14 @@ void Gather::per_view(const shared::FrameParams& p, std::size_t targets, const B
                                                     .face_pairs = bin.face_pairs,
                                                     .corner_starts = incidence.starts,
                                                     .corners = incidence.corners,
-                                                    .partial = partial,
+                                                    .partial = partial.values,
+                                                    .first = partial.first,
                                                     .chunks = chunks_,
                                                     .grad = grad});
 }
 
 void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
-                        const Incidence& incidence, const Buffer<float>& partial, Buffer<cl_float4>& grad) {
+                        const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
   grad.resize(device_, targets);
   sum_chunks(p, bin, k_corner_channels, partial);
   launch_(targets, kernel::gather_corners{.p = p,
@@ -34,26 +35,28 @@ void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const
                                           .face_pairs = bin.face_pairs,
                                           .corner_starts = incidence.starts,
                                           .corners = incidence.corners,
-                                          .partial = partial,
+                                          .partial = partial.values,
+                                          .first = partial.first,
                                           .chunks = chunks_,
                                           .grad = grad});
 }
 
 void Gather::over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
-                        const Buffer<float>& partial, Buffer<float>& channels) {
+                        const PairSums& partial, Buffer<float>& channels) {
   channels.resize(device_, std::size_t{DPR_MATERIAL_CHANNELS} * p.faces);
   sum_chunks(p, bin, DPR_MATERIAL_CHANNELS, partial);
   launch_(p.faces, kernel::gather_faces{.p = p,
                                         .pair_starts = bin.pair_starts,
                                         .face_pairs = bin.face_pairs,
                                         .ordered = materials.faces,
-                                        .partial = partial,
+                                        .partial = partial.values,
+                                        .first = partial.first,
                                         .chunks = chunks_,
                                         .channels = channels});
 }
 
 void Gather::sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels,
-                        const Buffer<float>& partial) {
+                        const PairSums& partial) {
   // A face has a pair a tile at most.
   if (std::size_t{p.tiles_x} * p.tiles_y <= DPR_RUN_CHUNK) return;
   const std::size_t slots = DPR_RUN_SLOTS(bin.pairs);
@@ -65,7 +68,8 @@ void Gather::sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint ch
                                                   .place_face = bin.place_face,
                                                   .pair_starts = bin.pair_starts,
                                                   .face_pairs = bin.face_pairs,
-                                                  .partial = partial,
+                                                  .partial = partial.values,
+                                                  .first = partial.first,
                                                   .chunks = chunks_});
 }
 

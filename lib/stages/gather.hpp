@@ -7,27 +7,34 @@
 
 namespace dpr {
 
+/// Partial sums of pairs, in a buffer that has others before: so many elements.
+struct PairSums {
+  PairSums(const Buffer<float>& values_, std::size_t first_ = 0) : values(values_), first(first_) {}
+
+  const Buffer<float>& values;
+  cl_ulong first;
+};
+
 class Gather {
  public:
   explicit Gather(Device::Impl& device) : device_(device), launch_(device) {}
 
   /// grad[view][target] from partial[pair][9].
   void per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin, const Incidence& incidence,
-                const Buffer<float>& partial, Buffer<cl_float4>& grad);
+                const PairSums& partial, Buffer<cl_float4>& grad);
   /// grad[target], the views added up.
   void over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
-                  const Incidence& incidence, const Buffer<float>& partial, Buffer<cl_float4>& grad);
+                  const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad);
   /// channels[DPR_MATERIAL_CHANNELS][face], the faces in the order of `materials`, from
   /// partial[pair][channel].
   void over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
-                  const Buffer<float>& partial, Buffer<float>& channels);
+                  const PairSums& partial, Buffer<float>& channels);
 
   std::size_t bytes() const { return chunks_.capacity_bytes(); }
 
  private:
   /// Sums chunks of faces that may have more pairs than one work-item is to add.
-  void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels,
-                  const Buffer<float>& partial);
+  void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels, const PairSums& partial);
 
   Device::Impl& device_;
   Launcher<kernel::gather_chunks, kernel::gather_corners, kernel::gather_faces> launch_;

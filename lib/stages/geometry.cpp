@@ -8,7 +8,7 @@
 namespace dpr {
 namespace {
 
-Incidence make_incidence(Device::Impl& device, const std::vector<cl_uint4>& faces, std::size_t targets) {
+Incidence make_incidence(Device::Impl& device, std::span<const cl_uint4> faces, std::size_t targets) {
   std::vector<cl_uint> starts(targets + 1, 0), corners(faces.size() * 3);
   for (const cl_uint4& face : faces) {
     for (int corner = 0; corner < 3; ++corner) ++starts[face.s[corner] + 1];
@@ -145,11 +145,11 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   }
   positions.upload(device, all_positions);
   vertex_mesh.upload(device, all_mesh);
-  face_vertices.upload(device, all_faces);
   vertex_corners = make_incidence(device, all_faces, vertices);
-  add_colors(device, scene);
-  if (is_textured(scene)) add_textures(device, scene);
-  if (gives_normals(scene)) add_normals(device, scene);
+  add_colors(device, scene, all_faces);
+  if (is_textured(scene)) add_textures(device, scene, all_faces);
+  if (gives_normals(scene)) add_normals(device, scene, all_faces);
+  face_vertices.upload(device, all_faces);
   add_materials(device, scene);
   add_places(device, scene);
 }
@@ -175,11 +175,10 @@ void Geometry::add_places(Device::Impl& device, const Scene& scene) {
   places.upload(device, all);
 }
 
-void Geometry::add_colors(Device::Impl& device, const Scene& scene) {
+void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces) {
   std::vector<cl_float4> all_colors;
-  std::vector<cl_uint4> all_faces;
   // With a material a mesh, the number of the mesh is that of its material. Instances have no colours.
-  colors_by_vertex_ = std::ranges::all_of(scene.meshes, [](const Instance& i) {
+  const bool by_vertex = std::ranges::all_of(scene.meshes, [](const Instance& i) {
     return !i.mesh.vertex_colors.empty() && material_count(i.mesh) == 1;
   });
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
@@ -190,20 +189,20 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene) {
       for (const glm::vec3& color : mesh_colors(mesh)) all_colors.push_back(to_cl(color));
       meshes[m].colors = all_colors.size() - meshes[m].first_color;
     }
-    for (std::size_t face = 0; face < mesh.faces.size() && !colors_by_vertex_; ++face)
+    for (std::size_t face = 0; face < mesh.faces.size() && !by_vertex; ++face)
       all_faces.push_back(corner_colors(mesh, face, source.first_color, source.first_material));
   }
   colors = all_colors.size();
   color_values.upload(device, all_colors);
-  if (colors_by_vertex_) return;
-  face_colors_.upload(device, all_faces);
-  color_corners_ = make_incidence(device, all_faces, colors);
+  if (by_vertex) return;
+  color_faces = all_faces.size() - faces;
+  color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors);
 }
 
 /// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.
-void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
+void Geometry::add_textures(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces) {
   std::vector<cl_float4> all_texcoords, all_texels;
-  std::vector<cl_uint4> all_faces;
+  texcoord_faces = all_faces.size();
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
     const bool adds = !mesh.textures.empty() && !scene.meshes[m].instance_of;
@@ -230,18 +229,18 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene) {
   }
   textures.texcoords = all_texcoords.size();
   textures.texels = all_texels.size();
-  textures.face_texcoords.upload(device, all_faces);
   textures.texcoord_values.upload(device, all_texcoords);
   textures.textures.upload(device, textures.list);
   textures.texel_values.upload(device, all_texels);
-  textures.texcoord_corners = make_incidence(device, all_faces, textures.texcoords);
+  textures.texcoord_corners =
+      make_incidence(device, std::span(all_faces).subspan(texcoord_faces), textures.texcoords);
 }
 
 /// Vertices of meshes that give normals have some of their own all the same, which no corner looks at.
-void Geometry::add_normals(Device::Impl& device, const Scene& scene) {
+void Geometry::add_normals(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces) {
   std::vector<cl_float4> all_normals;
   std::vector<cl_uint> all_mesh;
-  std::vector<cl_uint4> all_faces;
+  normal_faces = all_faces.size();
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
     const bool gives = !mesh.face_normals.empty();
@@ -257,8 +256,7 @@ void Geometry::add_normals(Device::Impl& device, const Scene& scene) {
   given_normals.count = all_mesh.size();
   given_normals.values.upload(device, all_normals);
   given_normals.mesh.upload(device, all_mesh);
-  given_normals.face_normals.upload(device, all_faces);
-  given_normals.corners = make_incidence(device, all_faces, normals());
+  given_normals.corners = make_incidence(device, std::span(all_faces).subspan(normal_faces), normals());
 }
 
 void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
@@ -285,8 +283,8 @@ void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
 }
 
 std::size_t GivenNormals::bytes() const {
-  return values.capacity_bytes() + mesh.capacity_bytes() + face_normals.capacity_bytes() +
-         corners.starts.capacity_bytes() + corners.corners.capacity_bytes();
+  return values.capacity_bytes() + mesh.capacity_bytes() + corners.starts.capacity_bytes() +
+         corners.corners.capacity_bytes();
 }
 
 std::size_t SurfaceMaterials::bytes() const {
@@ -294,17 +292,15 @@ std::size_t SurfaceMaterials::bytes() const {
 }
 
 std::size_t Textures::bytes() const {
-  return face_texcoords.capacity_bytes() + texcoord_values.capacity_bytes() + textures.capacity_bytes() +
-         texel_values.capacity_bytes() + texcoord_corners.starts.capacity_bytes() +
-         texcoord_corners.corners.capacity_bytes();
+  return texcoord_values.capacity_bytes() + textures.capacity_bytes() + texel_values.capacity_bytes() +
+         texcoord_corners.starts.capacity_bytes() + texcoord_corners.corners.capacity_bytes();
 }
 
 std::size_t Geometry::bytes() const {
   std::size_t bytes = positions.capacity_bytes() + places.capacity_bytes() + vertex_mesh.capacity_bytes() +
-                      face_vertices.capacity_bytes() + face_colors_.capacity_bytes() +
-                      color_values.capacity_bytes() + view_positions.capacity_bytes() +
-                      view_colors.capacity_bytes() + textures.bytes() + given_normals.bytes() +
-                      materials.bytes();
+                      face_vertices.capacity_bytes() + color_values.capacity_bytes() +
+                      view_positions.capacity_bytes() + view_colors.capacity_bytes() + textures.bytes() +
+                      given_normals.bytes() + materials.bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

@@ -34,7 +34,6 @@ struct Textures {
   std::size_t texcoords = 0, texels = 0;
   std::vector<shared::Texture> list;  ///< [texture]
 
-  Buffer<cl_uint4> face_texcoords;    ///< [face] coordinates of each corner; w = texture or DPR_NO_TEXTURE
   Buffer<cl_float4> texcoord_values;  ///< [texcoord] u, v
   Buffer<shared::Texture> textures;   ///< `list`
   Buffer<cl_float4> texel_values;     ///< [texel] of every level
@@ -55,9 +54,7 @@ struct GivenNormals {
   std::size_t count = 0;
   Buffer<cl_float4> values;  ///< [value] object space
   Buffer<cl_uint> mesh;      ///< [given]
-  Buffer<cl_uint4>
-      face_normals;   ///< [face] of each corner: a vertex, or the number of vertices + a given one
-  Incidence corners;  ///< by vertex, then by given normal
+  Incidence corners;         ///< by vertex, then by given normal
 
   bool empty() const { return count == 0; }
   std::size_t bytes() const;
@@ -79,10 +76,14 @@ struct Geometry {
   std::size_t vertices = 0, position_count = 0, faces = 0, colors = 0;
   std::vector<MeshRange> meshes;  ///< instances among them
 
-  Buffer<cl_float4> positions;                    ///< [position] object space
-  Buffer<shared::MeshPlace> places;               ///< [mesh]
-  Buffer<cl_uint> vertex_mesh;                    ///< [vertex]
-  Buffer<cl_uint4> face_vertices;                 ///< [face] vertex indices; w = mesh
+  Buffer<cl_float4> positions;       ///< [position] object space
+  Buffer<shared::MeshPlace> places;  ///< [mesh]
+  Buffer<cl_uint> vertex_mesh;       ///< [vertex]
+  /// [face] vertex indices; w = mesh. Then, where they are others, and each from its place on: indices of the
+  /// corners' colours, w = material; of their texture coordinates, w = texture or DPR_NO_TEXTURE; of their
+  /// normals: a vertex, or the number of vertices + a given one.
+  Buffer<cl_uint4> face_vertices;
+  std::size_t color_faces = 0, texcoord_faces = 0, normal_faces = 0;
   Buffer<cl_float4> color_values;                 ///< [color]
   Buffer<cl_float4> view_positions, view_colors;  ///< [view][position], [view][color]: of views' own
   Incidence vertex_corners;
@@ -90,10 +91,6 @@ struct Geometry {
   GivenNormals given_normals;
   SurfaceMaterials materials;
 
-  /// Indices of the corners' normals, those of vertices among them.
-  const Buffer<cl_uint4>& face_normals() const {
-    return given_normals.empty() ? face_vertices : given_normals.face_normals;
-  }
   const Incidence& normal_corners() const {
     return given_normals.empty() ? vertex_corners : given_normals.corners;
   }
@@ -106,23 +103,21 @@ struct Geometry {
     return p.color_stride != 0 ? view_colors : color_values;
   }
 
-  /// [face] colour of each corner, and the corners of every colour. Where all meshes have colours of
-  /// vertices, those are numbered as the vertices are.
-  const Buffer<cl_uint4>& face_colors() const { return colors_by_vertex_ ? face_vertices : face_colors_; }
-  const Incidence& color_corners() const { return colors_by_vertex_ ? vertex_corners : color_corners_; }
+  /// The corners of every colour. Where all meshes have colours of vertices, those are numbered as the
+  /// vertices are.
+  const Incidence& color_corners() const { return color_faces == 0 ? vertex_corners : color_corners_; }
 
   std::size_t bytes() const;
 
  private:
   void add_places(Device::Impl& device, const Scene& scene);
-  void add_colors(Device::Impl& device, const Scene& scene);
-  void add_textures(Device::Impl& device, const Scene& scene);
-  void add_normals(Device::Impl& device, const Scene& scene);
+  /// These add to `all_faces`, which becomes `face_vertices`.
+  void add_colors(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
+  void add_textures(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
+  void add_normals(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
   void add_materials(Device::Impl& device, const Scene& scene);
 
-  bool colors_by_vertex_ = false;
-  Buffer<cl_uint4> face_colors_;  // where they are not
-  Incidence color_corners_;
+  Incidence color_corners_;  // where colours are not numbered as the vertices are
 };
 
 /// True if a mesh of the scene has textures.

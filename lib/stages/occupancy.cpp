@@ -37,10 +37,6 @@ Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
                                 });
 }
 
-void Occupancy::settle(std::size_t fragments) {
-  for (Buffer<float>* buffer : {&log_occupancy, &occupancy}) buffer->settle(fragments);
-}
-
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   shared::OccupancyParams o{};
   o.sigma = now_.smoothing.sigma;
@@ -48,40 +44,33 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   o.width = p.width;
   o.faces = p.faces;
   o.first_view = p.first_view;
+  o.fragments = p.fragments;
+  o.grad_fragments = p.grad_fragments;
   return o;
 }
 
-void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize) {
-  log_occupancy.resize(device_, rasterize.fragment_length());
-  occupancy.resize(device_, rasterize.fragment_length());
-  const Range pairs = rasterize.pairs(bin);
+void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize) {
   if (now_.kernels->exact) {
     const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
     (*now_.kernels->exact)((rasterize.launched_fragments() + width - 1) / width,
                            kernel::occupancy_forward{.p = params(p),
-                                                     .last_pair = pairs.last(),
+                                                     .last_pair = p.last_pair,
                                                      .fragment_starts = rasterize.fragment_starts,
-                                                     .distance = rasterize.distance,
-                                                     .log_occupancy = log_occupancy,
-                                                     .occupancy = occupancy});
+                                                     .fragments = rasterize.values});
   } else {
+    const Range pairs = rasterize.pairs(bin);
     (*now_.kernels->sampled)(Range(pairs.first, std::min(pairs.count, bin.launched)),
                              kernel::occupancy_sampled_forward{.p = params(p),
-                                                               .last_pair = pairs.last(),
+                                                               .last_pair = p.last_pair,
                                                                .pairs = bin.pair_count,
                                                                .pair_face = bin.pair_face,
                                                                .fragment_starts = rasterize.fragment_starts,
                                                                .pixels = rasterize.fragment_pixel,
-                                                               .distance = rasterize.distance,
-                                                               .log_occupancy = log_occupancy,
-                                                               .occupancy = occupancy});
+                                                               .fragments = rasterize.values});
   }
 }
 
-void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                         const Buffer<float>& grad_log_occupancy) {
-  const Range pairs = rasterize.pairs(bin);
-  grad_distance.resize(device_, rasterize.fragments);
+void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize) {
   grad_sigma.resize(device_, bin.pairs);
   if (now_.kernels->exact) {
     const PairGroups groups = rasterize.pair_groups(bin);
@@ -90,29 +79,21 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, const Ras
                                                       .range = groups.pairs,
                                                       .pairs = bin.pair_count,
                                                       .fragment_starts = rasterize.fragment_starts,
-                                                      .distance = rasterize.distance,
-                                                      .grad_log_occupancy = grad_log_occupancy,
-                                                      .grad_distance = grad_distance,
+                                                      .fragments = rasterize.values,
+                                                      .grads = rasterize.grads,
                                                       .grad_sigma = grad_sigma});
   } else {
-    (*now_.kernels->sampled)(pairs,
+    (*now_.kernels->sampled)(rasterize.pairs(bin),
                              kernel::occupancy_sampled_backward{.p = params(p),
-                                                                .last_pair = pairs.last(),
+                                                                .last_pair = p.last_pair,
                                                                 .pairs = bin.pair_count,
                                                                 .pair_face = bin.pair_face,
                                                                 .fragment_starts = rasterize.fragment_starts,
                                                                 .pixels = rasterize.fragment_pixel,
-                                                                .distance = rasterize.distance,
-                                                                .occupancy = occupancy,
-                                                                .grad_log_occupancy = grad_log_occupancy,
-                                                                .grad_distance = grad_distance,
+                                                                .fragments = rasterize.values,
+                                                                .grads = rasterize.grads,
                                                                 .grad_sigma = grad_sigma});
   }
-}
-
-std::size_t Occupancy::bytes() const {
-  return log_occupancy.capacity_bytes() + occupancy.capacity_bytes() + grad_distance.capacity_bytes() +
-         grad_sigma.capacity_bytes();
 }
 
 }  // namespace dpr

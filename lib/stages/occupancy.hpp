@@ -30,19 +30,12 @@ class Occupancy : public SmoothedStage<OccupancyKernels> {
   Setting prepare(const Smoothing& smoothing) const;
   void set_smoothing(const Smoothing& smoothing) { set(prepare(smoothing)); }
 
-  void forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize);
-  void backward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                const Buffer<float>& grad_log_occupancy);
-  /// Says how many fragments there are, where forward() could not know.
-  void settle(std::size_t fragments);
+  void forward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize);
+  void backward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize);
 
-  static constexpr std::size_t k_fragment_bytes = 3 * sizeof(float);  ///< of those below
+  Buffer<float> grad_sigma;  ///< [pair]
 
-  Buffer<float> log_occupancy, occupancy;  ///< [fragment]
-  Buffer<float> grad_distance;             ///< [fragment]
-  Buffer<float> grad_sigma;                ///< [pair]
-
-  std::size_t bytes() const;
+  std::size_t bytes() const { return grad_sigma.capacity_bytes(); }
 
  private:
   shared::OccupancyParams params(const shared::FrameParams& p) const;

@@ -35,6 +35,15 @@ PixelBlock pixel_block(const shared::FrameParams& p, const Range& tiles) {
 /// The first of the starts of any list is 0.
 ContourCount no_contours(Bin& bin) { return {0, bin.pair_starts}; }
 
+/// From a plane to the next: what is loaded behind the last fragment belongs to none.
+cl_uint plane_size(std::size_t fragments) { return to_uint(fragments + k_widest_vector); }
+
+std::vector<float> read_plane(const Buffer<float>& planes, std::size_t first, std::size_t fragments) {
+  std::vector<float> values(fragments);
+  planes.download(values, first);
+  return values;
+}
+
 template <class Start>
 Band make_band(const shared::FrameParams& p, const Start& first, const Start& last) {
   const auto between = [](std::size_t begin, std::size_t end) { return Range(begin, end - begin); };
@@ -124,7 +133,9 @@ std::vector<Rasterize::TileStart> Rasterize::tile_starts(const shared::FramePara
 
 std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
                                  std::size_t fragment_bytes) const {
-  const auto bytes_of = [&](std::size_t number) { return with_headroom(number) * fragment_bytes; };
+  const auto bytes_of = [&](std::size_t number) {
+    return with_headroom(number + k_widest_vector) * fragment_bytes;
+  };
   std::vector<TileStart> cuts;
   for (std::size_t row = 0; row + 1 < row_starts_.size(); ++row) {
     const bool fits = bytes_of(row_starts_[row + 1].fragment - row_starts_[row].fragment) <= budget;
@@ -192,15 +203,17 @@ void Rasterize::rebase(const Band& next) {
   rebase(next.pixels, frame_pixel_starts_, pixel_starts);
 }
 
-void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                        const Bin& bin, const Band& next) {
+void Rasterize::forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+                        const Band& next) {
   if (next.tiles.count < tiles_of(p)) rebase(next);
   band = next;
   fragments = next.fragments.count;
+  p.fragments = p.grad_fragments = plane_size(fragments);
+  p.pairs = to_uint(bin.pairs);
+  p.last_pair = next.pairs.last();
   for (Buffer<cl_uint>* buffer : {&list, &fragment_pair, &fragment_pixel})
     buffer->resize(device_, fragment_length());
-  for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2})
-    buffer->resize(device_, fragment_length());
+  values.resize(device_, length((DPR_PLANE_BASE + 3 * std::size_t{p.has_base}) * p.fragments));
   const std::size_t shares = shares_of_tile(device_);
   const Range listing(next.tiles.first * shares, next.tiles.count * shares);
   launch_(listing, kernel::rasterize_list{.p = p,
@@ -221,21 +234,18 @@ void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Trian
                                                   .fragment_starts = fragment_starts,
                                                   .fragment_pair = fragment_pair,
                                                   .pixels = fragment_pixel,
-                                                  .distance = distance,
-                                                  .depth = depth,
-                                                  .bary1 = bary1,
-                                                  .bary2 = bary2});
+                                                  .fragments = values});
   if (clip != nullptr) clip->fragments(p, triangles, bin, *this);
 }
 
-void Rasterize::forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
+void Rasterize::forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
   cover(p, triangles, bin);
   forward(p, triangles, bin, whole_frame(p, counted()));
 }
 
 void Rasterize::forward_within(const FrameCounts& capacity, std::size_t likely_fragments,
-                               const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                               Bin& bin, const std::optional<ContourCount>& contours, bool reads) {
+                               shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
+                               const std::optional<ContourCount>& contours, bool reads) {
   const ContourCount contour_count = contours ? *contours : no_contours(bin);
   counted_ = false;
   likely_fragments_ = likely_fragments;
@@ -309,20 +319,33 @@ FrameNote Rasterize::poll_notes() {
   return note;
 }
 
-Band Rasterize::settle(const shared::FrameParams& p, const FrameCounts& counts) {
+Band Rasterize::settle(shared::FrameParams& p, const FrameCounts& counts) {
   band = whole_frame(p, counts);
+  p.grad_fragments = plane_size(counts.fragments);
+  p.pairs = p.last_pair = to_uint(counts.pairs);
   fragments = frame_fragments = counts.fragments;
   counted_ = true;
   masks.settle(counts.pairs);
   fragment_starts.settle(counts.pairs + 1);
   for (Buffer<cl_uint>* buffer : {&list, &fragment_pair, &fragment_pixel}) buffer->settle(fragments);
-  for (Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2}) buffer->settle(fragments);
+  values.settle(values.length().count);
   return *band;
 }
 
+void Rasterize::start_gradients(const shared::FrameParams& p) {
+  grads.resize(device_, (DPR_GRAD_PLANE_BASE + 3 * std::size_t{p.has_base}) * p.grad_fragments);
+}
+
+std::vector<float> Rasterize::plane(const shared::FrameParams& p, cl_uint number) const {
+  return read_plane(values, std::size_t{number} * p.fragments, fragments);
+}
+
+std::vector<float> Rasterize::grad_plane(const shared::FrameParams& p, cl_uint number) const {
+  return read_plane(grads, std::size_t{number} * p.grad_fragments, fragments);
+}
+
 void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                         const Bin& bin, const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
-                         const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2) {
+                         const Bin& bin) {
   const Range range = pairs(bin);
   grad_corners.resize(device_, Length::varying(std::size_t{9} * bin.pairs));
   const Range launched(range.first, std::min(range.count, bin.launched));
@@ -333,14 +356,10 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
                                                .pair_face = bin.pair_face,
                                                .fragment_starts = fragment_starts,
                                                .pixels = fragment_pixel,
-                                               .distance = distance,
-                                               .grad_distance = grad_distance,
-                                               .grad_depth = grad_depth,
-                                               .grad_bary1 = grad_bary1,
-                                               .grad_bary2 = grad_bary2,
+                                               .fragments = values,
+                                               .grads = grads,
                                                .grad_corners = grad_corners});
-  if (clip != nullptr)
-    clip->backward(p, triangles, bin, *this, grad_distance, grad_depth, grad_bary1, grad_bary2);
+  if (clip != nullptr) clip->backward(p, triangles, bin, *this);
 }
 
 std::size_t Rasterize::bytes() const {
@@ -350,7 +369,7 @@ std::size_t Rasterize::bytes() const {
                                         &fragment_pixel, &frame_fragment_starts_, &frame_pixel_starts_}) {
     bytes += buffer->capacity_bytes();
   }
-  for (const Buffer<float>* buffer : {&distance, &depth, &bary1, &bary2, &grad_corners}) {
+  for (const Buffer<float>* buffer : {&values, &grads, &grad_corners}) {
     bytes += buffer->capacity_bytes();
   }
   return bytes;

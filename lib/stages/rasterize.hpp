@@ -84,7 +84,7 @@ class Rasterize {
   /// read_counts() returns the true counts, so that the caller can retry. `reads`: they are on their way to
   /// the host at once; else only history() takes part.
   /// Kernels are launched for `likely_fragments`.
-  void forward_within(const FrameCounts& capacity, std::size_t likely_fragments, const shared::FrameParams& p,
+  void forward_within(const FrameCounts& capacity, std::size_t likely_fragments, shared::FrameParams& p,
                       const Buffer<shared::Triangle>& triangles, Bin& bin,
                       const std::optional<ContourCount>& contours, bool reads);
   /// Counts of forward_within(). Blocks until the device has counted and, where it did not read, rendered.
@@ -100,22 +100,26 @@ class Rasterize {
   void disown_notes() { disowned_notes_ = notes_under_way_; }
   /// Says what the counts are, after a forward_within() whose capacity was enough. Returns the whole frame as
   /// the band whose fragments these are.
-  Band settle(const shared::FrameParams& p, const FrameCounts& counts);
+  Band settle(shared::FrameParams& p, const FrameCounts& counts);
   /// Counts of a frame that cover() counted.
   FrameCounts counted() const;
   /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
   /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
   std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
                         std::size_t fragment_bytes) const;
-  /// The fragments of a band; their numbers count from the band's first.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+  /// The fragments of a band; their numbers count from the band's first. `p` gets what it says of them, and of
+  /// the pairs.
+  void forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                const Band& band);
   /// All of it: cover() and forward() of the whole frame.
-  void forward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin);
+  void forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin);
+  /// Makes room for `grads`.
+  void start_gradients(const shared::FrameParams& p);
   /// From the gradients of distance, depth and barycentrics to `grad_corners` of the band's pairs.
-  void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
-                const Buffer<float>& grad_distance, const Buffer<float>& grad_depth,
-                const Buffer<float>& grad_bary1, const Buffer<float>& grad_bary2);
+  void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  /// The band's fragments' DPR_PLANE_..., or the gradients.
+  std::vector<float> plane(const shared::FrameParams& p, cl_uint number) const;
+  std::vector<float> grad_plane(const shared::FrameParams& p, cl_uint number) const;
 
   /// Pairs that the stages behind this one work on: the band's, or all where none was cut.
   Range pairs(const Bin& bin) const { return band ? band->pairs : Range(bin.pairs); }
@@ -130,22 +134,28 @@ class Rasterize {
   /// Length of the buffers that later stages hold of every fragment.
   Length fragment_length() const { return length(fragments); }
 
+  /// Bytes a fragment of the buffers below, and of base colours.
   static constexpr std::size_t k_fragment_bytes =
-      3 * sizeof(cl_uint) + 4 * sizeof(float);  ///< of those below
+      3 * sizeof(cl_uint) + (DPR_PLANE_BASE + DPR_GRAD_PLANE_BASE) * sizeof(float);
+  static constexpr std::size_t k_base_bytes = 6 * sizeof(float);
+  /// Fragments of a band whose planes kernels index by 32 bits.
+  static constexpr std::size_t k_most_fragments =
+      std::numeric_limits<cl_uint>::max() / (DPR_PLANE_BASE + 3) - k_widest_vector;
 
-  Clip* clip = nullptr;                         ///< of frames with faces that cross the near plane
-  std::optional<Hiding> hiding;                 ///< none: everything may be seen
-  std::optional<Band> band;                     ///< whose fragments these are
-  std::size_t fragments = 0;                    ///< of the band; or the capacity
-  std::size_t frame_fragments = 0;              ///< of all bands
-  Buffer<cl_uint2> masks;                       ///< [pair] pixels of its tile that a pair covers
-  Buffer<cl_uint> fragment_starts;              ///< [pair + 1]
-  Buffer<cl_uint> pixel_starts;                 ///< [view * height * width + 1] runs of `list`
-  Buffer<cl_uint> list;                         ///< [fragment] fragments by pixel
-  Buffer<cl_uint> fragment_pair;                ///< [fragment]
-  Buffer<cl_uint> fragment_pixel;               ///< [fragment] x | y << 16
-  Buffer<float> distance, depth, bary1, bary2;  ///< [fragment]
-  Buffer<float> grad_corners;                   ///< [pair][9] x, y (NDC) and view depth of the corners
+  Clip* clip = nullptr;             ///< of frames with faces that cross the near plane
+  std::optional<Hiding> hiding;     ///< none: everything may be seen
+  std::optional<Band> band;         ///< whose fragments these are
+  std::size_t fragments = 0;        ///< of the band; or the capacity
+  std::size_t frame_fragments = 0;  ///< of all bands
+  Buffer<cl_uint2> masks;           ///< [pair] pixels of its tile that a pair covers
+  Buffer<cl_uint> fragment_starts;  ///< [pair + 1]
+  Buffer<cl_uint> pixel_starts;     ///< [view * height * width + 1] runs of `list`
+  Buffer<cl_uint> list;             ///< [fragment] fragments by pixel
+  Buffer<cl_uint> fragment_pair;    ///< [fragment]
+  Buffer<cl_uint> fragment_pixel;   ///< [fragment] x | y << 16
+  Buffer<float> values;             ///< [DPR_PLANE_...][p.fragments]
+  Buffer<float> grads;              ///< [DPR_PLANE_...][p.grad_fragments]
+  Buffer<float> grad_corners;       ///< [pair][9] x, y (NDC) and view depth of the corners
 
   std::size_t bytes() const;
 

@@ -25,6 +25,7 @@ void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_s
   partial_.resize(device_, 2 * count * slots);
   const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
   launch_(count * slots / width, kernel::reduce_partial{.count = static_cast<cl_uint>(what.count),
+                                                        .first_channel = to_uint(what.first_channel),
                                                         .channels = static_cast<cl_uint>(what.channels),
                                                         .segments = static_cast<cl_uint>(what.segments),
                                                         .stride = static_cast<cl_uint>(what.stride),

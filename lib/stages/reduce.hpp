@@ -16,6 +16,7 @@ struct Summation {
   const Buffer<cl_uint>& starts;
   const Buffer<float>& values;
   std::size_t expected = count;
+  std::size_t first_channel = 0;
   std::size_t slots = 0;  ///< not 0: values are [channel][segment][2][slot], sums already and what they lost
 };
 

@@ -39,17 +39,37 @@ std::size_t Shade::light_channel_count() const {
   return DPR_ENVIRONMENT_CHANNELS(needs) + lights() * DPR_LIGHT_CHANNELS(needs);
 }
 
-void Shade::settle(std::size_t fragments) {
-  color.settle(fragments);
-  base_.settle(fragments);
+SurfaceArguments Shade::arguments(const ShadeInputs& in) {
+  const Geometry& g = in.geometry;
+  return {.p = in.p,
+          .lp = now_.params,
+          .pairs = in.bin.pair_count,
+          .pair_face = in.bin.pair_face,
+          .fragment_starts = in.rasterize.fragment_starts,
+          .views = in.views.cameras,
+          .lights = now_.lights,
+          .faces = g.face_vertices,
+          .colors = g.colors_of(in.p),
+          .world = in.transform.world,
+          .materials = g.materials.values,
+          .texcoords = g.textures.texcoord_values,
+          .texels = g.textures.texel_values,
+          .textures = g.textures.textures,
+          .triangles = in.triangles,
+          .clipped = in.clipped,
+          .fragments = in.rasterize.values,
+          .grads = in.rasterize.grads,
+          .grad_pairs = grad_pairs,
+          .channels = light_channels};
 }
 
 void Shade::forward(const ShadeInputs& in) {
   const bool is_textured = !in.geometry.textures.empty();
-  color.resize(device_, in.rasterize.fragment_length());
-  if (is_textured) surface->forward(in.surface(), lit() ? base_ : color);
+  const Range pairs = in.rasterize.pairs(in.bin);
+  if (is_textured) surface->forward(arguments(in), pairs);
   if (lit()) {
-    light(in);
+    find_normals(in);
+    now_.kernels->shade(pairs, kernel::shade_lit_forward::pick(arguments(in)));
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_forward{.p = in.p,
@@ -57,71 +77,38 @@ void Shade::forward(const ShadeInputs& in) {
                                                 .pairs = in.bin.pair_count,
                                                 .pair_face = in.bin.pair_face,
                                                 .fragment_starts = in.rasterize.fragment_starts,
-                                                .face_colors = in.geometry.face_colors(),
+                                                .faces = in.geometry.face_vertices,
                                                 .colors = in.geometry.colors_of(in.p),
-                                                .bary1 = in.rasterize.bary1,
-                                                .bary2 = in.rasterize.bary2,
-                                                .red = color.red,
-                                                .green = color.green,
-                                                .blue = color.blue});
+                                                .fragments = in.rasterize.values});
   }
 }
 
 void Shade::find_normals(const ShadeInputs& in) {
   const GivenNormals& given = in.geometry.given_normals;
-  normals_.resize(device_, std::size_t{in.p.views} * in.p.normals);
   if (is_flat()) return;
   now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
                         kernel::normals_forward{.p = in.p,
                                                 .faces = in.geometry.face_vertices,
                                                 .corner_starts = in.geometry.vertex_corners.starts,
                                                 .corners = in.geometry.vertex_corners.corners,
-                                                .world = in.transform.world,
-                                                .normals = normals_});
+                                                .world = in.transform.world});
   if (given.empty()) return;
   now_.kernels->normals(in.p.views * given.count, kernel::normals_given_forward{.p = in.p,
                                                                                 .models = in.views.models,
                                                                                 .values = given.values,
                                                                                 .given_mesh = given.mesh,
                                                                                 .places = in.geometry.places,
-                                                                                .normals = normals_});
+                                                                                .world = in.transform.world});
 }
 
-void Shade::light(const ShadeInputs& in) {
-  const Range pairs = in.rasterize.pairs(in.bin);
-  find_normals(in);
-  now_.kernels->shade(pairs, kernel::shade_lit_forward{.p = in.p,
-                                                       .lp = now_.params,
-                                                       .last_pair = pairs.last(),
-                                                       .pair_count = in.bin.pair_count,
-                                                       .views = in.views.cameras,
-                                                       .lights = now_.lights,
-                                                       .faces = in.geometry.face_vertices,
-                                                       .face_colors = in.geometry.face_colors(),
-                                                       .colors = in.geometry.colors_of(in.p),
-                                                       .world = in.transform.world,
-                                                       .face_normals = in.geometry.face_normals(),
-                                                       .normals = normals_,
-                                                       .materials = in.geometry.materials.values,
-                                                       .pair_face = in.bin.pair_face,
-                                                       .fragment_starts = in.rasterize.fragment_starts,
-                                                       .bary1 = in.rasterize.bary1,
-                                                       .bary2 = in.rasterize.bary2,
-                                                       .base_red = base_.red,
-                                                       .base_green = base_.green,
-                                                       .base_blue = base_.blue,
-                                                       .red = color.red,
-                                                       .green = color.green,
-                                                       .blue = color.blue});
-}
-
-void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
+void Shade::backward(const ShadeInputs& in) {
   const bool is_textured = !in.geometry.textures.empty();
-  for (Buffer<float>* buffer : {&grad_bary1, &grad_bary2}) buffer->resize(device_, in.rasterize.fragments);
-  grad_corner_colors.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
-  if (lit()) light_backward(in, grad);
+  const Range pairs = in.rasterize.pairs(in.bin);
+  const std::size_t unlit = DPR_PAIR_LIT(is_textured), channels = lit() ? unlit + DPR_PAIR_LIT_END : unlit;
+  grad_pairs.resize(device_, Length::varying(channels * in.bin.pairs));
+  if (lit()) now_.kernels->shade(pairs, kernel::shade_lit_backward::pick(arguments(in)));
   if (is_textured) {
-    surface->backward(in.surface(), grad_base(grad), lit(), grad_bary1, grad_bary2, grad_corner_colors);
+    surface->backward(arguments(in), pairs);
   } else if (!lit()) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_backward{.p = in.p,
@@ -129,71 +116,24 @@ void Shade::backward(const ShadeInputs& in, const ColorPlanes& grad) {
                                                  .pairs = in.bin.pair_count,
                                                  .pair_face = in.bin.pair_face,
                                                  .fragment_starts = in.rasterize.fragment_starts,
-                                                 .face_colors = in.geometry.face_colors(),
+                                                 .faces = in.geometry.face_vertices,
                                                  .colors = in.geometry.colors_of(in.p),
-                                                 .bary1 = in.rasterize.bary1,
-                                                 .bary2 = in.rasterize.bary2,
-                                                 .grad_red = grad.red,
-                                                 .grad_green = grad.green,
-                                                 .grad_blue = grad.blue,
-                                                 .grad_bary1 = grad_bary1,
-                                                 .grad_bary2 = grad_bary2,
-                                                 .grad_colors = grad_corner_colors});
+                                                 .fragments = in.rasterize.values,
+                                                 .grads = in.rasterize.grads,
+                                                 .grad_colors = grad_pairs});
   }
 }
 
-void Shade::light_backward(const ShadeInputs& in, const ColorPlanes& grad) {
-  const Range pairs = in.rasterize.pairs(in.bin);
-  if (now_.kernels->model.is_textured) grad_base_.resize(device_, in.rasterize.fragments);
-  grad_corner_positions_.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
-  grad_corner_normals_.resize(device_, Length::varying(std::size_t{9} * in.bin.pairs));
-  grad_materials.resize(device_, Length::varying(std::size_t{DPR_MATERIAL_CHANNELS} * in.bin.pairs));
-  grad_eye.resize(device_, Length::varying(std::size_t{3} * in.bin.pairs));
-  now_.kernels->shade(pairs, kernel::shade_lit_backward{.p = in.p,
-                                                        .lp = now_.params,
-                                                        .pairs = static_cast<cl_uint>(in.bin.pairs),
-                                                        .last_pair = pairs.last(),
-                                                        .pair_count = in.bin.pair_count,
-                                                        .views = in.views.cameras,
-                                                        .lights = now_.lights,
-                                                        .faces = in.geometry.face_vertices,
-                                                        .face_colors = in.geometry.face_colors(),
-                                                        .colors = in.geometry.colors_of(in.p),
-                                                        .world = in.transform.world,
-                                                        .face_normals = in.geometry.face_normals(),
-                                                        .normals = normals_,
-                                                        .materials = in.geometry.materials.values,
-                                                        .pair_face = in.bin.pair_face,
-                                                        .fragment_starts = in.rasterize.fragment_starts,
-                                                        .bary1 = in.rasterize.bary1,
-                                                        .bary2 = in.rasterize.bary2,
-                                                        .base_red = base_.red,
-                                                        .base_green = base_.green,
-                                                        .base_blue = base_.blue,
-                                                        .grad_red = grad.red,
-                                                        .grad_green = grad.green,
-                                                        .grad_blue = grad.blue,
-                                                        .grad_bary1 = grad_bary1,
-                                                        .grad_bary2 = grad_bary2,
-                                                        .grad_base_red = grad_base_.red,
-                                                        .grad_base_green = grad_base_.green,
-                                                        .grad_base_blue = grad_base_.blue,
-                                                        .grad_colors = grad_corner_colors,
-                                                        .grad_positions = grad_corner_positions_,
-                                                        .grad_normals = grad_corner_normals_,
-                                                        .grad_materials = grad_materials,
-                                                        .grad_eye = grad_eye});
-}
-
 void Shade::backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world) {
-  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners, grad_corner_positions_,
-                  grad_world);
+  const std::size_t lit = first_lit_channel();
+  gather.per_view(in.p, in.p.vertices, in.bin, in.geometry.vertex_corners,
+                  {grad_pairs, (lit + DPR_PAIR_POSITIONS) * in.p.pairs}, grad_world);
   if (is_flat()) return;
-  gather.per_view(in.p, in.p.normals, in.bin, in.geometry.normal_corners(), grad_corner_normals_,
-                  grad_normals_);
-  now_.kernels->normals(
-      std::size_t{in.p.views} * in.p.normals,
-      kernel::normals_backward_normalize{.p = in.p, .normals = normals_, .grad_normals = grad_normals_});
+  gather.per_view(in.p, in.p.normals, in.bin, in.geometry.normal_corners(),
+                  {grad_pairs, (lit + DPR_PAIR_NORMALS) * in.p.pairs}, grad_normals_);
+  now_.kernels->normals(std::size_t{in.p.views} * in.p.normals,
+                        kernel::normals_backward_normalize{
+                            .p = in.p, .world = in.transform.world, .grad_normals = grad_normals_});
   now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
                         kernel::normals_backward{.p = in.p,
                                                  .faces = in.geometry.face_vertices,
@@ -224,48 +164,16 @@ void Shade::backward_given_normals(const ShadeInputs& in) {
                                                                     .channels = normal_channels});
 }
 
-void Shade::backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light) {
-  const Range pairs = in.rasterize.pairs(in.bin);
+void Shade::backward_light(const ShadeInputs& in, std::size_t light) {
+  now_.params.light = to_uint(light);
   light_channels.resize(device_, light_channel_count() * in.bin.pairs);
-  now_.kernels->shade(pairs,
-                      kernel::shade_lit_backward_lights{.p = in.p,
-                                                        .lp = now_.params,
-                                                        .pairs = static_cast<cl_uint>(in.bin.pairs),
-                                                        .last_pair = pairs.last(),
-                                                        .pair_count = in.bin.pair_count,
-                                                        .light = static_cast<cl_uint>(light),
-                                                        .views = in.views.cameras,
-                                                        .lights = now_.lights,
-                                                        .faces = in.geometry.face_vertices,
-                                                        .face_colors = in.geometry.face_colors(),
-                                                        .colors = in.geometry.colors_of(in.p),
-                                                        .world = in.transform.world,
-                                                        .face_normals = in.geometry.face_normals(),
-                                                        .normals = normals_,
-                                                        .materials = in.geometry.materials.values,
-                                                        .pair_face = in.bin.pair_face,
-                                                        .fragment_starts = in.rasterize.fragment_starts,
-                                                        .bary1 = in.rasterize.bary1,
-                                                        .bary2 = in.rasterize.bary2,
-                                                        .base_red = base_.red,
-                                                        .base_green = base_.green,
-                                                        .base_blue = base_.blue,
-                                                        .grad_red = grad.red,
-                                                        .grad_green = grad.green,
-                                                        .grad_blue = grad.blue,
-                                                        .channels = light_channels});
+  now_.kernels->shade(in.rasterize.pairs(in.bin), kernel::shade_lit_backward_lights::pick(arguments(in)));
 }
 
 std::size_t Shade::bytes() const {
-  std::size_t bytes = now_.lights.capacity_bytes() + normals_.capacity_bytes() +
-                      grad_normals_.capacity_bytes() + grad_given_normals.capacity_bytes() +
-                      (surface ? surface->bytes() : 0) + color.bytes() + base_.bytes() + grad_base_.bytes();
-  for (const Buffer<float>* buffer :
-       {&grad_bary1, &grad_bary2, &grad_corner_colors, &grad_materials, &normal_channels, &grad_eye,
-        &light_channels, &grad_corner_positions_, &grad_corner_normals_}) {
-    bytes += buffer->capacity_bytes();
-  }
-  return bytes;
+  return now_.lights.capacity_bytes() + grad_normals_.capacity_bytes() + grad_given_normals.capacity_bytes() +
+         (surface ? surface->bytes() : 0) + grad_pairs.capacity_bytes() + normal_channels.capacity_bytes() +
+         light_channels.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -43,13 +43,11 @@ struct ShadeInputs {
   const shared::FrameParams& p;
   const DeviceViews& views;
   const Geometry& geometry;
-  const Transform& transform;
+  Transform& transform;
   const Buffer<shared::Triangle>& triangles;
   const Buffer<shared::ClippedFace>& clipped;  // where p.clips is set
   const Bin& bin;
-  const Rasterize& rasterize;
-
-  SurfaceInputs surface() const { return {p, geometry, triangles, clipped, bin, rasterize}; }
+  Rasterize& rasterize;
 };
 
 class Shade {
@@ -72,17 +70,26 @@ class Shade {
   std::size_t lights() const { return now_.params.lights; }
   /// Launches that find the lights' gradients: without lights one still finds the environment's.
   std::size_t light_launches() const { return std::max<std::size_t>(lights(), 1); }
+  /// The first of the channels of `grad_pairs` that lit scenes have.
+  std::size_t first_lit_channel() const {
+    return DPR_PAIR_LIT(now_.kernels && now_.kernels->model.is_textured);
+  }
   /// Number of `light_channels`.
   std::size_t light_channel_count() const;
 
   void forward(const ShadeInputs& in);
-  /// Says how many fragments there are, where forward() could not know.
-  void settle(std::size_t fragments);
   /// Fills the gradients of barycentrics and corner colours, if textured of texture coordinates, and, if lit,
   /// of corner positions, normals, materials and the eye.
-  void backward(const ShadeInputs& in, const ColorPlanes& grad);
-  /// The base colours' gradients after backward(), of a textured scene.
-  const ColorPlanes& grad_base(const ColorPlanes& grad) const { return lit() ? grad_base_ : grad; }
+  void backward(const ShadeInputs& in);
+  /// Lists the texels that the band's fragments see, of a textured scene. After backward().
+  void list_texels(const ShadeInputs& in) {
+    surface->list(arguments(in), in.rasterize.pairs(in.bin), in.bin, in.rasterize);
+  }
+  /// Adds what goes by way of a textured scene's levels of detail to the gradients of the corners on the
+  /// screen, [pair][9] as Rasterize has them, and of clipped faces as Clip has them. After backward().
+  void backward_detail(const ShadeInputs& in, Buffer<float>& grad_corners, Buffer<float>& grad_clip) {
+    surface->backward_detail(arguments(in), in.rasterize.pairs(in.bin), grad_corners, grad_clip);
+  }
   /// Adds the gradient by way of positions and normals to d loss / d world position: [view][vertex]. Only if
   /// lit.
   void backward_world(const ShadeInputs& in, Gather& gather, Buffer<cl_float4>& grad_world);
@@ -90,20 +97,12 @@ class Shade {
   /// backward_world(). Only if lit.
   void backward_given_normals(const ShadeInputs& in);
   /// The gradients of one light, with the first those of the environment, per pair.
-  void backward_light(const ShadeInputs& in, const ColorPlanes& grad, std::size_t light);
-
-  static constexpr std::size_t k_fragment_bytes = 5 * sizeof(float);  ///< of those below
-  /// Bytes a fragment of a textured scene's base colours, their gradients, and the surface's buffers.
-  static constexpr std::size_t k_textured_fragment_bytes = 6 * sizeof(float) + Surface::k_fragment_bytes;
+  void backward_light(const ShadeInputs& in, std::size_t light);
 
   std::optional<Surface> surface;        ///< of textured scenes: made for the first of them
-  ColorPlanes color;                     ///< [fragment]
-  Buffer<float> grad_bary1, grad_bary2;  ///< [fragment] relative to corner 0's
-  Buffer<float> grad_corner_colors;      ///< [pair][9]
-  Buffer<float> grad_materials;          ///< [pair][DPR_MATERIAL_CHANNELS]
+  Buffer<float> grad_pairs;              ///< [p.pairs] of each DPR_PAIR_...
   Buffer<cl_float4> grad_given_normals;  ///< [value] of given normals
   Buffer<float> normal_channels;         ///< [3][view][given] of models' rotation vectors
-  Buffer<float> grad_eye;                ///< [3][pair]
   Buffer<float> light_channels;          ///< [light_channel_count()][pair], of the environment, then by light
 
   std::size_t bytes() const;
@@ -113,14 +112,11 @@ class Shade {
   Launcher<kernel::shade_forward, kernel::shade_backward> launch_;
   bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
   void find_normals(const ShadeInputs& in);
-  void light(const ShadeInputs& in);
-  void light_backward(const ShadeInputs& in, const ColorPlanes& grad);
+  /// Of what a scene has not the kernels get null pointers, which they do not read.
+  SurfaceArguments arguments(const ShadeInputs& in);
 
   Lighting now_;
-  // [fragment] of lit textured scenes; in others the kernels get null pointers, which they do not read.
-  ColorPlanes base_, grad_base_;
-  Buffer<cl_float4> normals_, grad_normals_;                   // [view][normal]
-  Buffer<float> grad_corner_positions_, grad_corner_normals_;  // [pair][9]
+  Buffer<cl_float4> grad_normals_;  // [view][normal]
 };
 
 }  // namespace dpr

@@ -30,7 +30,7 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
                       Buffer<cl_uint>& keys, Buffer<cl_uint>& values, Buffer<cl_uint>& starts) {
   const auto last_key = static_cast<cl_uint>(key_count);
   other_keys_.resize(device_, keys.length());
-  other_values_.resize(device_, values.length());
+  for (Buffer<cl_uint>* numbers : {&values, &other_values_}) numbers->resize(device_, keys.length());
   starts.resize(device_, key_count + 1);
   const auto exchange = [&] {
     std::swap(keys, other_keys_);
@@ -40,14 +40,14 @@ void Sort::operator()(std::size_t capacity, const Buffer<cl_uint>& count, std::s
     launch_.in_groups(1, kernel::sort_few{.last_key = last_key,
                                           .count = count,
                                           .keys = keys,
-                                          .values = values,
                                           .sorted_keys = other_keys_,
                                           .sorted_values = other_values_,
                                           .starts = starts});
     exchange();
     return;
   }
-  const unsigned all_bits = key_bits(key_count), passes = capacity > 0 ? sort_passes(key_count) : 0;
+  const unsigned all_bits = key_bits(key_count),
+                 passes = capacity > 0 ? std::max(sort_passes(key_count), 1U) : 0;
   for (unsigned k = 0, shift = 0; k < passes; ++k) {  // of bits as equal as may be: fewer digits to count
     const unsigned bits = (all_bits - shift + passes - k - 1) / (passes - k);
     pass(capacity, shift, bits, count, keys, values);

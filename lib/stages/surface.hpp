@@ -8,58 +8,57 @@
 
 namespace dpr {
 
-/// Planes of [fragment].
-struct ColorPlanes {
-  Buffer<float> red, green, blue;
-
-  void resize(Device::Impl& device, Length length);
-  void settle(std::size_t fragments);
-  std::size_t bytes() const;
-};
-
-/// Everything of a frame that base colours are made of.
-struct SurfaceInputs {
+/// What the kernels of surfaces and of light take, by the names of their arguments.
+struct SurfaceArguments {
   const shared::FrameParams& p;
-  const Geometry& geometry;
+  const shared::LightingParams& lp;
+  const Buffer<cl_uint>&pairs, &pair_face, &fragment_starts;
+  const Buffer<shared::ViewParams>& views;
+  const Buffer<shared::Light>& lights;
+  const Buffer<cl_uint4>& faces;
+  const Buffer<cl_float4>&colors, &world, &materials, &texcoords, &texels;
+  const Buffer<shared::Texture>& textures;
   const Buffer<shared::Triangle>& triangles;
   const Buffer<shared::ClippedFace>& clipped;  // where p.clips is set
-  const Bin& bin;
-  const Rasterize& rasterize;
+  Buffer<float>&fragments, &grads, &grad_pairs, &channels;
 };
 
 class Surface {
  public:
   explicit Surface(Device::Impl& device) : device_(device), launch_(device) {}
 
-  /// The base colours of the band's fragments.
-  void forward(const SurfaceInputs& in, ColorPlanes& base);
+  /// The base colours of the band's pairs of fragments.
+  void forward(const SurfaceArguments& in, const Range& pairs) {
+    launch_(pairs, kernel::surface_forward::pick(in));
+  }
   /// From the gradients of the base colours to those of the corners' colours and texture coordinates, and of
   /// barycentrics, to which they are added where the light has left its own there.
-  void backward(const SurfaceInputs& in, const ColorPlanes& grad_base, bool adds, Buffer<float>& grad_bary1,
-                Buffer<float>& grad_bary2, Buffer<float>& grad_corner_colors);
+  void backward(const SurfaceArguments& in, const Range& pairs) {
+    launch_(pairs, kernel::surface_backward::pick(in));
+  }
   /// Adds what goes by way of the levels of detail, as backward() found it, to the gradients of the corners
   /// on the screen, [pair][9] as Rasterize has them, and of clipped faces as Clip has them.
-  void backward_detail(const SurfaceInputs& in, Buffer<float>& grad_corners, Buffer<float>& grad_clip);
+  void backward_detail(const SurfaceArguments& in, const Range& pairs, Buffer<float>& grad_corners,
+                       Buffer<float>& grad_clip);
   /// Lists the texels that the band's fragments see, by fragment and level, for the stage that gathers.
-  void list(const SurfaceInputs& in, const ColorPlanes& grad_base);
+  void list(const SurfaceArguments& in, const Range& pairs, const Bin& bin, const Rasterize& rasterize);
 
   /// Bytes a fragment of the buffers below, of two levels, and of those that sorting needs.
-  static constexpr std::size_t k_fragment_bytes =
-      2 * (4 * sizeof(cl_uint) + sizeof(cl_float2) + sizeof(cl_float4));
+  static constexpr std::size_t k_fragment_bytes = 2 * (4 * sizeof(cl_uint) + sizeof(shared::SeenTexels));
 
-  Buffer<float> grad_corner_texcoords;  ///< [pair][9] u, v and 0
-  Buffer<cl_uint> place_count;          ///< [1] of those below
-  Buffer<cl_uint> cells, numbers;  ///< [fragment][level] the first texel that is seen; the place's number
-  Buffer<cl_float2> parts;         ///< [fragment][level] of its neighbours
-  Buffer<cl_float4> grad_seen;     ///< [fragment][level] RGB of what is seen of the level; its tile
+  Buffer<cl_uint> place_count;      ///< [1] of those below
+  Buffer<cl_uint> cells, numbers;   ///< [fragment][level] the first texel that is seen; what sorting permutes
+  Buffer<shared::SeenTexels> seen;  ///< [fragment][level]
 
-  std::size_t bytes() const;
+  std::size_t bytes() const {
+    return place_count.capacity_bytes() + cells.capacity_bytes() + numbers.capacity_bytes() +
+           seen.capacity_bytes();
+  }
 
  private:
   Device::Impl& device_;
-  Buffer<float> grad_steps_;  // [pair][9] of the levels of detail: from backward() to backward_detail()
   Launcher<kernel::surface_forward, kernel::surface_backward, kernel::surface_detail_backward,
-           kernel::surface_list>
+           kernel::surface_list, kernel::surface_place>
       launch_;
 };
 

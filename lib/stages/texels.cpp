@@ -41,8 +41,7 @@ void Texels::add(const Textures& textures, Surface& surface) {
                                                             .textures = textures.textures,
                                                             .starts = starts_,
                                                             .numbers = surface.numbers,
-                                                            .parts = surface.parts,
-                                                            .grad_seen = surface.grad_seen,
+                                                            .places = surface.seen,
                                                             .grad = grad});
   }
 }

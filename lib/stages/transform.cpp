@@ -4,9 +4,10 @@
 
 namespace dpr {
 
-void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry) {
+void Transform::forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                        bool has_normals) {
   const std::size_t count = std::size_t{p.views} * p.vertices;
-  world.resize(device_, count);
+  world.resize(device_, count + (has_normals ? std::size_t{p.views} * p.normals : 0));
   ndc.resize(device_, count);
   launch_(count, kernel::transform_forward{.p = p,
                                            .views = views.cameras,

@@ -18,7 +18,9 @@ class Transform {
  public:
   explicit Transform(Device::Impl& device) : device_(device), launch_(device) {}
 
-  void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry);
+  /// Makes room for the normals that shading finds, if it is to.
+  void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+               bool has_normals);
   /// From the gradients of `ndc` to those of `world`, in place. `grad_clip` is what clipped faces add where
   /// p.clips is set, [view][vertex] of x times depth, y times depth and depth; `grad_lit` what shading adds
   /// to that of `world`, if the scene is lit. Fills `partial_sums`.
@@ -28,7 +30,7 @@ class Transform {
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                           const Buffer<cl_float4>& grad_world);
 
-  Buffer<cl_float4> world;  ///< [view][vertex]
+  Buffer<cl_float4> world;  ///< [view][vertex], then [view][normal]
   Buffer<cl_float4> ndc;    ///< [view][vertex] x, y, view depth
   /// [DPR_POSE_CHANNELS or, distorted, DPR_LENS_CHANNELS][view][mesh][2][slot]: see Summation.
   Buffer<float> partial_sums;

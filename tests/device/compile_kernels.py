@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Compiles every kernel with every set of options that a stage builds it with, at 1, 8 and 16 lanes.
 
-compile_kernels.py lint CLANG KERNELS [MORE...]            as strict OpenCL C 1.2; warnings are errors
+compile_kernels.py lint CLANG KERNELS [MORE...]            as strict OpenCL C 1.2; warnings are errors, and so are
+                                                           kernels of more than 14 arguments
 compile_kernels.py driver KERNELS [MORE...] [--lanes N...] to machine code, by the driver of the first OpenCL device
 
 KERNELS is the folder with the headers, MORE other folders or files: with files the folder's own are left out.
@@ -14,10 +15,12 @@ import ctypes
 import itertools
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
 LANES = [1, 8, 16]
+MOST_ARGUMENTS = 14
 WIDTHS = [f"-DDPR_OCCUPANCY_WIDTH={width}" for width in range(3)]
 # Unlit surfaces are shade.cl's. One kind of light a time, none, and all.
 SHADING = [[f"-DDPR_SHADING={shading}", f"-DDPR_LIGHTS={lights}", f"-DDPR_BASE={base}"]
@@ -76,6 +79,15 @@ def build_with_driver(file, options):
         sys.exit("no binary")
 
 
+def long_lists(files):
+    """Kernels of more arguments than are allowed."""
+    for file in files:
+        for name, arguments in re.findall(r"\bkernel void (\w+)\(([^)]*)\)", file.read_text()):
+            count = arguments.count(",") + 1
+            if count > MOST_ARGUMENTS:
+                yield f"{file.name}: {name} has {count} arguments, more than {MOST_ARGUMENTS}\n"
+
+
 def lint_command(clang):
     return [clang, "-x", "cl", "-cl-std=CL1.2", "-Xclang", "-finclude-default-header", "-fsyntax-only",
             "-Wall", "-Wextra", "-Wdouble-promotion", "-Werror"]
@@ -93,6 +105,8 @@ def main():
     command = [sys.executable, __file__, "build"]
     if arguments.compiler == "lint":
         command = lint_command(words.pop(0))
+        if lists := list(long_lists(file for folder in words for file in sorted(pathlib.Path(folder).glob("*.cl")))):
+            sys.exit("".join(lists))
         if not pathlib.Path(command[0]).exists():
             return print("skipped: no clang")
 

@@ -52,6 +52,20 @@ std::vector<Entry> entries() {
           DPR_FIELD(FrameParams, orthographic),
           DPR_FIELD(FrameParams, distorts),
           DPR_FIELD(FrameParams, normals),
+          DPR_FIELD(FrameParams, color_faces),
+          DPR_FIELD(FrameParams, normal_faces),
+          DPR_FIELD(FrameParams, texcoord_faces),
+          DPR_FIELD(FrameParams, texels),
+          DPR_FIELD(FrameParams, levels),
+          DPR_FIELD(FrameParams, has_base),
+          DPR_FIELD(FrameParams, fragments),
+          DPR_FIELD(FrameParams, grad_fragments),
+          DPR_FIELD(FrameParams, pairs),
+          DPR_FIELD(FrameParams, last_pair),
+          DPR_FIELD(FrameParams, mesh_edges),
+          DPR_FIELD(FrameParams, edges),
+          DPR_FIELD(FrameParams, shading),
+          DPR_FIELD(FrameParams, depth_reach),
           DPR_SIZE(MeshPlace),
           DPR_FIELD(MeshPlace, vertex_shift),
           DPR_FIELD(MeshPlace, normal_shift),
@@ -90,6 +104,7 @@ std::vector<Entry> entries() {
           DPR_SIZE(LightingParams),
           DPR_FIELD(LightingParams, ambient),
           DPR_FIELD(LightingParams, lights),
+          DPR_FIELD(LightingParams, light),
           DPR_FIELD(LightingParams, shininess),
           DPR_FIELD(LightingParams, harmonics),
           DPR_SIZE(Light),
@@ -119,6 +134,8 @@ std::vector<Entry> entries() {
           DPR_FIELD(OccupancyParams, width),
           DPR_FIELD(OccupancyParams, faces),
           DPR_FIELD(OccupancyParams, first_view),
+          DPR_FIELD(OccupancyParams, fragments),
+          DPR_FIELD(OccupancyParams, grad_fragments),
           DPR_SIZE(AggregateParams),
           DPR_FIELD(AggregateParams, background),
           DPR_FIELD(AggregateParams, sigma),
@@ -131,6 +148,8 @@ std::vector<Entry> entries() {
           DPR_FIELD(AggregateParams, last_pixel),
           DPR_FIELD(AggregateParams, faces),
           DPR_FIELD(AggregateParams, first_view),
+          DPR_FIELD(AggregateParams, fragments),
+          DPR_FIELD(AggregateParams, grad_fragments),
           DPR_SIZE(Slot),
           DPR_FIELD(Slot, beta),
           DPR_FIELD(Slot, occupancy),
@@ -145,14 +164,6 @@ std::vector<Entry> entries() {
           DPR_FIELD(MeshLossParams, first_vertex),
           DPR_FIELD(MeshLossParams, vertices),
           DPR_FIELD(MeshLossParams, hinges),
-          DPR_SIZE(ContourParams),
-          DPR_FIELD(ContourParams, edges),
-          DPR_FIELD(ContourParams, mesh_edges),
-          DPR_FIELD(ContourParams, shading),
-          DPR_SIZE(AntialiasParams),
-          DPR_FIELD(AntialiasParams, edges),
-          DPR_FIELD(AntialiasParams, mesh_edges),
-          DPR_FIELD(AntialiasParams, depth_reach),
           DPR_SIZE(BlurPass),
           DPR_FIELD(BlurPass, lines),
           DPR_FIELD(BlurPass, width),
@@ -229,15 +240,16 @@ TEST_SUITE("unit") {
 
   TEST_CASE("a field that only the device has is noticed") {
     std::string header = dpr::test::header_text("shared_types.h");
-    const std::string field = "  uint lights;\n";
+    const std::string field = "  uint lights, light;";
     const std::size_t at = header.find(field);
     REQUIRE(at != std::string::npos);
     header.insert(at, "  uint surplus;\n");
     const std::vector<std::string> wrong = differences(header);
-    REQUIRE(wrong.size() == 4);
+    REQUIRE(wrong.size() == 5);
     CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 192");
     CHECK(wrong[1] == "offset_of(LightingParams, lights) is 20");
-    CHECK(wrong[2] == "offset_of(LightingParams, shininess) is 24");
-    CHECK(wrong[3] == "offset_of(LightingParams, harmonics) is 48");
+    CHECK(wrong[2] == "offset_of(LightingParams, light) is 24");
+    CHECK(wrong[3] == "offset_of(LightingParams, shininess) is 28");
+    CHECK(wrong[4] == "offset_of(LightingParams, harmonics) is 48");
   }
 }

@@ -338,15 +338,22 @@ class Planted : public Profile {
   Scale scale_;
 };
 
+/// Elements from `first` on, or all.
 template <class Element>
-void scale_by_tenth(const Buffer<Element>& buffer) {
+void scale_by_tenth(const Buffer<Element>& buffer, std::size_t first = 0,
+                    std::optional<std::size_t> count = std::nullopt) {
   constexpr float k_wrong = 1.1F;
   if (buffer.device() == nullptr || buffer.size() == 0) return;
-  std::vector<Element> values = buffer.download();
+  std::vector<Element> values(count.value_or(buffer.size()));
+  buffer.download(values, first);
   const std::span<float> numbers(reinterpret_cast<float*>(values.data()),
                                  values.size() * sizeof(Element) / sizeof(float));
   for (float& number : numbers) number *= k_wrong;
-  buffer.device()->write(buffer.cl_buffer(), 0, std::as_bytes(std::span(values)));
+  buffer.device()->write(buffer.cl_buffer(), first * sizeof(Element), std::as_bytes(std::span(values)));
+}
+
+void scale_plane(const Renderer::Impl& r, std::size_t plane) {
+  scale_by_tenth(r.rasterize.grads, plane * r.frame.grad_fragments, r.rasterize.fragments);
 }
 
 struct Plant {
@@ -375,19 +382,19 @@ std::vector<Plant> plants() {
        {"aggregate_joint_backward"},
        "colours",
        [](Impl& r) {
-         for (const auto* plane : {&r.aggregate.grad_color.red, &r.aggregate.grad_color.green})
-           scale_by_tenth(*plane);
+         scale_plane(r, DPR_PLANE_COLOR);
+         scale_plane(r, DPR_PLANE_COLOR + 1);
        },
        {"joint"}},
       {"aggregate, occupancy",
        {"aggregate_joint_backward"},
        "positions",
-       [](Impl& r) { scale_by_tenth(r.aggregate.grad_log_occupancy); },
+       [](Impl& r) { scale_plane(r, DPR_PLANE_LOG_OCCUPANCY); },
        {"joint", "noise of triangles", "affine"}},
       {"aggregate, depths",
        {"aggregate_backward"},
        "mesh translation",
-       [](Impl& r) { scale_by_tenth(r.aggregate.grad_depth); },
+       [](Impl& r) { scale_plane(r, DPR_PLANE_DEPTH); },
        {"barrier", "noise of triangles", "affine", "two meshes"}},
       {"aggregate, channels",
        {"aggregate_backward"},
@@ -397,7 +404,7 @@ std::vector<Plant> plants() {
       {"occupancy",
        {"occupancy_backward"},
        "positions",
-       [](Impl& r) { scale_by_tenth(r.occupancy.grad_distance); },
+       [](Impl& r) { scale_plane(r, DPR_PLANE_DISTANCE); },
        triangles},
       {"occupancy, by sigma",
        {"occupancy_backward"},
@@ -407,12 +414,12 @@ std::vector<Plant> plants() {
       {"shade",
        {"shade_backward"},
        "colours",
-       [](Impl& r) { scale_by_tenth(r.shade.grad_corner_colors); },
+       [](Impl& r) { scale_by_tenth(r.shade.grad_pairs); },
        {"vertex colours"}},
       {"surface",
        {"surface_backward"},
        "texture coordinates",
-       [](Impl& r) { scale_by_tenth(r.shade.surface->grad_corner_texcoords); },
+       [](Impl& r) { scale_by_tenth(r.shade.grad_pairs, DPR_PAIR_TEXCOORDS * r.bin.pairs, 9 * r.bin.pairs); },
        {"texture"}},
       {"texels", {"texels_sum"}, "texels", [](Impl& r) { scale_by_tenth(r.texels->grad); }, {"texture"}},
       {"shade, lights",

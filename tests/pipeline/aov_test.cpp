@@ -82,8 +82,9 @@ std::vector<Weighted> reference_weights(const Renderer& renderer) {
   const std::vector<cl_uint> starts = m.rasterize.pixel_starts.download(), list = m.rasterize.list.download(),
                              pair = m.rasterize.fragment_pair.download(),
                              pair_face = m.bin.pair_face.download();
-  const std::vector<float> depth = m.rasterize.depth.download(), p = m.occupancy.occupancy.download(),
-                           log_p = m.occupancy.log_occupancy.download();
+  const auto plane = [&](cl_uint number) { return m.rasterize.plane(m.frame, number); };
+  const std::vector<float> depth = plane(DPR_PLANE_DEPTH), p = plane(DPR_PLANE_OCCUPANCY),
+                           log_p = plane(DPR_PLANE_LOG_OCCUPANCY);
   const Smoothing& s = m.scene.smoothing;
   reference::AggregateParameters parameters;
   parameters.composition =

@@ -33,7 +33,7 @@ std::vector<glm::dvec2> pixels_of(const Camera& camera, const std::vector<glm::v
   Renderer renderer(test::test_device());
   renderer.set_scene(scene);
   Renderer::Impl& m = impl_of(renderer);
-  m.transform.forward(m.frame, m.device_views, *m.geometry);
+  m.transform.forward(m.frame, m.device_views, *m.geometry, false);
   std::vector<glm::dvec2> pixels;
   for (const cl_float4& ndc : m.transform.ndc.download()) {
     const glm::dvec2 from_centre(ndc.s[0], -ndc.s[1]);

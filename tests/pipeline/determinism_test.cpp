@@ -36,14 +36,8 @@ std::size_t fragment_memory(const Renderer::Impl& m) {
        {&m.rasterize.list, &m.rasterize.fragment_pair, &m.rasterize.fragment_pixel}) {
     bytes += buffer->capacity_bytes() - k_padding;
   }
-  for (const Buffer<float>* buffer :
-       {&m.rasterize.distance, &m.rasterize.depth, &m.rasterize.bary1, &m.rasterize.bary2, &m.shade.color.red,
-        &m.shade.color.green, &m.shade.color.blue, &m.shade.grad_bary1, &m.shade.grad_bary2,
-        &m.occupancy.log_occupancy, &m.occupancy.occupancy, &m.occupancy.grad_distance,
-        &m.aggregate.grad_depth, &m.aggregate.grad_log_occupancy, &m.aggregate.grad_color.red,
-        &m.aggregate.grad_color.green, &m.aggregate.grad_color.blue}) {
+  for (const Buffer<float>* buffer : {&m.rasterize.values, &m.rasterize.grads})
     bytes += buffer->capacity_bytes() - k_padding;
-  }
   return bytes;
 }
 

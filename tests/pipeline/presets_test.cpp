@@ -149,7 +149,8 @@ TEST_SUITE("pipeline") {
     renderer.forward();
     const Image grad = constant_gradient(scene);
     renderer.backward(std::span(&grad, 1));
-    const std::vector<float> found = impl_of(renderer).occupancy.grad_distance.download();
+    const std::vector<float> found =
+        impl_of(renderer).rasterize.grad_plane(impl_of(renderer).frame, DPR_PLANE_DISTANCE);
     int edge = 0;
     for (const Pixel& pixel : pixels_of(renderer)) {
       for (const Fragment& f : pixel) {
@@ -178,7 +179,8 @@ TEST_SUITE("pipeline") {
     const Image grad = constant_gradient(scene);
     const SceneGradient gradient = renderer.backward(std::span(&grad, 1));
     CHECK(gradient.sigma == 0);  // which the image does not depend on
-    const std::vector<float> found = impl_of(renderer).occupancy.grad_distance.download();
+    const std::vector<float> found =
+        impl_of(renderer).rasterize.grad_plane(impl_of(renderer).frame, DPR_PLANE_DISTANCE);
     const glm::dvec4 g(grad.pixels[0]);
     double worst = 0, worst_of_half = 0;
     int outside = 0, hidden = 0;

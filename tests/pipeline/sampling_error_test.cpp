@@ -46,8 +46,8 @@ std::vector<double> numbers(const std::vector<glm::vec3>& list) {
 /// Gradients of a pixel's fragments: dL/dz and dL/ds in scales of their noise, one after the other.
 std::vector<double> scaled_fragment_gradients(const Renderer& renderer) {
   const Renderer::Impl& m = impl_of(renderer);
-  const std::vector<float> depth = m.aggregate.grad_depth.download(),
-                           distance = m.occupancy.grad_distance.download();
+  const std::vector<float> depth = m.rasterize.grad_plane(m.frame, DPR_PLANE_DEPTH),
+                           distance = m.rasterize.grad_plane(m.frame, DPR_PLANE_DISTANCE);
   const Smoothing& s = m.scene.smoothing;
   const float range = m.scene.camera.zfar - m.scene.camera.znear;
   std::vector<double> values;

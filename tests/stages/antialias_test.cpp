@@ -68,7 +68,7 @@ Blended blend_and_keep(ContourFrame& frame, const Samples& samples, cl_uint unkn
   frame.antialias.front.upload(device_impl(), samples.front);
   frame.antialias.front_face.upload(device_impl(), samples.face);
   test::poison(frame.antialias.winner, 2 * frame.samples(), unknown);
-  frame.antialias.cross(frame.inputs(), frame.contour, 0.0F);
+  frame.antialias.cross(frame.inputs(), frame.contour);
   Buffer<cl_float4> raster(device_impl(), samples.colors);
   KeptSamples kept;
   for (Buffer<cl_float4>* buffer : {&kept.samples, &kept.faded})
@@ -329,9 +329,11 @@ TEST_SUITE("unit") {
     ContourFrame frame(mesh, 32, 32);
     static_cast<void>(blend(frame, rigid_samples(frame, mesh)));
     const std::vector<cl_uint> before = frame.antialias.winner.download();
-    frame.antialias.cross(frame.inputs(), frame.contour, 1.1F / 99);
+    frame.depth_reach = 1.1F / 99;
+    frame.antialias.cross(frame.inputs(), frame.contour);
     CHECK(frame.antialias.winner.download() != before);
-    frame.antialias.cross(frame.inputs(), frame.contour, 0.9F / 99);
+    frame.depth_reach = 0.9F / 99;
+    frame.antialias.cross(frame.inputs(), frame.contour);
     CHECK(frame.antialias.winner.download() == before);
   }
 

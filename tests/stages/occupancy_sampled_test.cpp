@@ -58,23 +58,22 @@ class OccupancySamples {
     rasterize_.masks.upload(device_impl(), masks);
     rasterize_.fragment_starts.upload(device_impl(), starts);
     rasterize_.fragment_pixel.upload(device_impl(), pixels);
-    rasterize_.distance.upload(device_impl(), distance);
+    frame_.last_pair = static_cast<cl_uint>(faces.size());
+    frame_.fragments = frame_.grad_fragments = static_cast<cl_uint>(pixels.size() + dpr::k_widest_vector);
+    dpr::test::set_planes(rasterize_.values, frame_.fragments, {{DPR_PLANE_DISTANCE, distance}});
   }
 
   void run(const Smoothing& smoothing) {
     occupancy_.set_smoothing(smoothing);
-    poison(occupancy_.log_occupancy, rasterize_.fragments);
-    poison(occupancy_.occupancy, rasterize_.fragments);
     occupancy_.forward(frame_, bin_, rasterize_);
-    p = occupancy_.occupancy.download();
-    log_p = occupancy_.log_occupancy.download();
+    p = rasterize_.plane(frame_, DPR_PLANE_OCCUPANCY);
+    log_p = rasterize_.plane(frame_, DPR_PLANE_LOG_OCCUPANCY);
     // The stage divides by its own estimate of p, because it gives the gradient of ln p: with p as the
     // incoming gradient what comes out is the gradient of p, and unbiased.
-    const dpr::Buffer<float> grad(device_impl(), std::span<const float>(p));
-    poison(occupancy_.grad_distance, rasterize_.fragments);
+    dpr::test::set_planes(rasterize_.grads, frame_.grad_fragments, {{DPR_PLANE_LOG_OCCUPANCY, p}});
     poison(occupancy_.grad_sigma, bin_.pairs);
-    occupancy_.backward(frame_, bin_, rasterize_, grad);
-    grad_distance = occupancy_.grad_distance.download();
+    occupancy_.backward(frame_, bin_, rasterize_);
+    grad_distance = rasterize_.grad_plane(frame_, DPR_PLANE_DISTANCE);
     grad_sigma = occupancy_.grad_sigma.download();
   }
 

@@ -125,7 +125,9 @@ class Distances {
     dpr::test::make_pairs(bin_, std::vector<cl_uint>(starts.size() - 1));
     rasterize_.fragments = values.size();
     rasterize_.fragment_starts.upload(device_impl(), starts);
-    rasterize_.distance.upload(device_impl(), values);
+    frame_.last_pair = static_cast<cl_uint>(starts.size() - 1);
+    frame_.fragments = frame_.grad_fragments = static_cast<cl_uint>(values.size() + dpr::k_widest_vector);
+    dpr::test::set_planes(rasterize_.values, frame_.fragments, {{DPR_PLANE_DISTANCE, values}});
   }
 
   void forward(Prior prior, float sigma) {
@@ -133,20 +135,17 @@ class Distances {
     smoothing.occupancy_prior = prior;
     smoothing.sigma = sigma;
     occupancy_.set_smoothing(smoothing);
-    poison(occupancy_.log_occupancy, rasterize_.fragments);
-    poison(occupancy_.occupancy, rasterize_.fragments);
-    occupancy_.forward({}, bin_, rasterize_);
-    log_p = occupancy_.log_occupancy.download();
-    p = occupancy_.occupancy.download();
+    occupancy_.forward(frame_, bin_, rasterize_);
+    log_p = rasterize_.plane(frame_, DPR_PLANE_LOG_OCCUPANCY);
+    p = rasterize_.plane(frame_, DPR_PLANE_OCCUPANCY);
   }
 
   /// `grads` one for each distance.
   void backward(const std::vector<float>& grads) {
-    const Buffer<float> grad(device_impl(), std::span<const float>(grads));
-    poison(occupancy_.grad_distance, rasterize_.fragments);
+    dpr::test::set_planes(rasterize_.grads, frame_.grad_fragments, {{DPR_PLANE_LOG_OCCUPANCY, grads}});
     poison(occupancy_.grad_sigma, bin_.pairs);
-    occupancy_.backward({}, bin_, rasterize_, grad);
-    grad_distance = occupancy_.grad_distance.download();
+    occupancy_.backward(frame_, bin_, rasterize_);
+    grad_distance = rasterize_.grad_plane(frame_, DPR_PLANE_DISTANCE);
     grad_sigma = occupancy_.grad_sigma.download();
   }
 
@@ -156,6 +155,7 @@ class Distances {
   std::vector<float> grad_sigma;               // by pair
 
  private:
+  dpr::shared::FrameParams frame_{};
   dpr::Bin bin_;
   dpr::Rasterize rasterize_;
   dpr::Occupancy occupancy_;

@@ -143,12 +143,13 @@ Gradients random_gradients(const NdcStages& s, const FoundFragments& found, unsi
 }
 
 std::vector<float> corner_gradients(NdcStages& s, const Gradients& g) {
-  const auto upload = [](const std::vector<float>& values) {
-    return dpr::Buffer<float>(dpr::test::device_impl(), std::span<const float>(values));
-  };
   dpr::test::poison(s.rasterize.grad_corners, 9 * s.bin.pairs);
-  s.rasterize.backward(s.params, s.setup.triangles, s.bin, upload(g.distance), upload(g.depth),
-                       upload(g.bary1), upload(g.bary2));
+  dpr::test::set_planes(s.rasterize.grads, s.params.grad_fragments,
+                        {{DPR_PLANE_DISTANCE, g.distance},
+                         {DPR_PLANE_DEPTH, g.depth},
+                         {DPR_PLANE_BARY, g.bary1},
+                         {DPR_PLANE_BARY + 1, g.bary2}});
+  s.rasterize.backward(s.params, s.setup.triangles, s.bin);
   return s.rasterize.grad_corners.download();
 }
 

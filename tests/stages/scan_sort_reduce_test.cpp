@@ -72,9 +72,7 @@ struct Sorted {
 /// With so much more room than there are keys.
 Sorted sort(const std::vector<cl_uint>& keys, std::size_t key_count, std::size_t spare = 0) {
   dpr::Sort operation(device_impl());
-  std::vector<cl_uint> places(keys.size());
-  std::iota(places.begin(), places.end(), 0U);
-  Buffer<cl_uint> key_buffer = on_device(keys), value_buffer = on_device(places), starts;
+  Buffer<cl_uint> key_buffer = on_device(keys), value_buffer, starts;
   if (!dpr::test::is_reduced())
     poison(starts, key_count + 1, k_poison);  // oclgrind takes it for uninitialised
   const Buffer<cl_uint> count = on_device({static_cast<cl_uint>(keys.size())});

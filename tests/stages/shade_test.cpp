@@ -103,9 +103,10 @@ class Shaded {
     renderer_.set_views(views);
     renderer_.forward();
     dpr::Renderer::Impl& m = impl();
-    for (Buffer<float>* buffer : {&m.shade.color.red, &m.shade.color.green, &m.shade.color.blue}) {
-      poison(*buffer, m.rasterize.fragments);
-    }
+    bary1 = m.rasterize.plane(m.frame, DPR_PLANE_BARY);
+    bary2 = m.rasterize.plane(m.frame, DPR_PLANE_BARY + 1);
+    dpr::test::set_planes(m.rasterize.values, m.frame.fragments,
+                          {{DPR_PLANE_BARY, bary1}, {DPR_PLANE_BARY + 1, bary2}});
     m.shade.forward(inputs());
     read();
   }
@@ -144,15 +145,14 @@ class Shaded {
     list = m.rasterize.list.download();
     fragment_pair = m.rasterize.fragment_pair.download();
     pair_face = m.bin.pair_face.download();
-    bary1 = m.rasterize.bary1.download();
-    bary2 = m.rasterize.bary2.download();
-    face_colors = m.geometry->face_colors().download();
+    std::vector<cl_uint4> all_faces = m.geometry->face_vertices.download();
+    face_colors.assign(all_faces.begin() + m.frame.color_faces, all_faces.end());
+    all_faces.resize(faces);
     colors = m.geometry->color_values.download();
     const std::vector<cl_float4> world = m.transform.world.download();
     const std::vector<dpr::shared::ViewParams> cameras = m.device_views.cameras.download();
     std::vector<ref::Face> reference_faces;
-    for (const cl_uint4& f : m.geometry->face_vertices.download())
-      reference_faces.push_back({f.s[0], f.s[1], f.s[2]});
+    for (const cl_uint4& f : all_faces) reference_faces.push_back({f.s[0], f.s[1], f.s[2]});
     for (std::size_t v = 0; v < cameras.size(); ++v) {
       std::vector<ref::Vec3d> positions;
       for (std::size_t i = 0; i < vertices; ++i) positions.push_back(to_reference(world[v * vertices + i]));
@@ -201,44 +201,46 @@ struct ShadeErrors {
   std::map<std::string, Kind> lights;  // by key
 };
 
+/// Three planes of the fragments, from one on.
+std::array<std::vector<float>, 3> planes_of(const dpr::Renderer::Impl& m, cl_uint first) {
+  return {m.rasterize.plane(m.frame, first), m.rasterize.plane(m.frame, first + 1),
+          m.rasterize.plane(m.frame, first + 2)};
+}
+
 ShadeErrors all_errors(const Model& model) {
   Shaded s(model);
   dpr::Renderer::Impl& m = s.impl();
   ShadeErrors errors;
-  const std::vector<float> red = m.shade.color.red.download(), green = m.shade.color.green.download(),
-                           blue = m.shade.color.blue.download();
+  const auto color = [&, red = planes_of(m, DPR_PLANE_COLOR)](std::size_t i) {
+    return ref::Vec3d{number(red[0][i]), number(red[1][i]), number(red[2][i])};
+  };
   const std::size_t fragments = m.rasterize.fragments, views = s.reference.size();
 
   RandomFloat random(9);
   std::array<std::vector<float>, 3> grad;
   for (auto& plane : grad) plane.assign(fragments, dpr::test::k_poison);
-  dpr::ColorPlanes device_grad;
   for (const cl_uint fragment : s.list) {
     for (auto& plane : grad) plane[fragment] = random(-1, 1);
   }
-  device_grad.red.upload(impl_of(m.device), grad[0]);
-  device_grad.green.upload(impl_of(m.device), grad[1]);
-  device_grad.blue.upload(impl_of(m.device), grad[2]);
-  poison(m.shade.grad_bary1, fragments);
-  poison(m.shade.grad_bary2, fragments);
-  poison(m.shade.grad_corner_colors, 9 * m.bin.pairs);
-  poison(m.shade.grad_eye, 3 * m.bin.pairs);
-  m.shade.backward(s.inputs(), device_grad);
+  dpr::test::set_planes(
+      m.rasterize.grads, m.frame.grad_fragments,
+      {{DPR_PLANE_COLOR, grad[0]}, {DPR_PLANE_COLOR + 1, grad[1]}, {DPR_PLANE_COLOR + 2, grad[2]}});
+  poison(m.shade.grad_pairs, (DPR_PAIR_LIT(false) + DPR_PAIR_LIT_END) * m.bin.pairs);
+  m.shade.backward(s.inputs());
   Buffer<cl_float4> grad_world;
   if (model.shading) m.shade.backward_world(s.inputs(), m.gather, grad_world);
 
   // The reference, fragment by fragment.
   std::vector<ref::ShadeGradient> totals;
   for (const ref::ShadeScene& scene : s.reference) totals.push_back(ref::make_shade_gradient(scene));
-  const std::vector<float> grad_bary1 = m.shade.grad_bary1.download(),
-                           grad_bary2 = m.shade.grad_bary2.download(),
-                           corner_colors = m.shade.grad_corner_colors.download();
+  const std::vector<float> grad_bary1 = m.rasterize.grad_plane(m.frame, DPR_PLANE_BARY),
+                           grad_bary2 = m.rasterize.grad_plane(m.frame, DPR_PLANE_BARY + 1),
+                           grad_pairs = m.shade.grad_pairs.download();
   std::vector<ref::CornerColors> pair_colors(m.bin.pairs);
   for (const cl_uint i : s.list) {
     const ref::ShadeScene& scene = s.reference[s.view(i)];
     const ref::Vec3d c = s.barycentric(i);
-    errors.color.add({number(red[i]), number(green[i]), number(blue[i])},
-                     ref::shade_forward(scene, s.face(i), c, s.corners(i)));
+    errors.color.add(color(i), ref::shade_forward(scene, s.face(i), c, s.corners(i)));
     const ref::ShadeFragmentGradient g =
         ref::shade_backward(scene, s.face(i), c, s.corners(i),
                             {number(grad[0][i]), number(grad[1][i]), number(grad[2][i])}, totals[s.view(i)]);
@@ -249,7 +251,7 @@ ShadeErrors all_errors(const Model& model) {
   for (std::size_t v = 0; v < views; ++v) ref::shade_finish_backward(s.reference[v], totals[v]);
   for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
     for (std::size_t k = 0; k < 9; ++k) {
-      errors.corner_colors.add(number(corner_colors[9 * pair + k]), pair_colors[pair][k / 3][k % 3]);
+      errors.corner_colors.add(number(grad_pairs[9 * pair + k]), pair_colors[pair][k / 3][k % 3]);
     }
   }
   const std::vector<cl_float4> world = grad_world.download();
@@ -258,7 +260,8 @@ ShadeErrors all_errors(const Model& model) {
   }
   if (!model.shading) return errors;
 
-  const std::vector<float> eye = m.shade.grad_eye.download();
+  const std::span<const float> eye =
+      std::span(grad_pairs).subspan((DPR_PAIR_LIT(false) + DPR_PAIR_EYE) * m.bin.pairs);
   std::vector<ref::Vec3d> eye_sums(views);
   for (std::size_t pair = 0; pair < m.bin.pairs; ++pair) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -267,7 +270,7 @@ ShadeErrors all_errors(const Model& model) {
   }
   for (std::size_t v = 0; v < views; ++v) errors.eye.add(eye_sums[v], totals[v].camera);
   poison(m.shade.light_channels, m.shade.light_channel_count() * m.bin.pairs);
-  for (std::size_t l = 0; l < m.shade.lights(); ++l) m.shade.backward_light(s.inputs(), device_grad, l);
+  for (std::size_t l = 0; l < m.shade.lights(); ++l) m.shade.backward_light(s.inputs(), l);
   const std::vector<float> channels = m.shade.light_channels.download();
   std::vector<float> sums;
   for (std::size_t k = 0; k < m.shade.light_channel_count(); ++k) {
@@ -329,11 +332,11 @@ TEST_SUITE("unit") {
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> lit = impl_of(renderer).shade.color.red.download();
+    const std::vector<float> lit = planes_of(impl_of(renderer), DPR_PLANE_COLOR)[0];
     scene.lights.reset();
     renderer.set_scene(scene);
     renderer.forward();
-    const std::vector<float> unlit = impl_of(renderer).shade.color.red.download();
+    const std::vector<float> unlit = planes_of(impl_of(renderer), DPR_PLANE_COLOR)[0];
     REQUIRE(lit.size() == unlit.size());
     Worst worst;
     for (std::size_t i = 0; i < lit.size(); ++i)

@@ -149,7 +149,7 @@ std::vector<double> channels_of(const ref::TransformGradient& g, double flip) {
 TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
   TwoMeshes t(lens);
   dpr::Renderer::Impl& m = t.impl();
-  m.transform.forward(m.frame, m.device_views, *m.geometry);
+  m.transform.forward(m.frame, m.device_views, *m.geometry, false);
   const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
   RandomFloat random(6);
   std::vector<cl_float4> grad_ndc, grad_clip, grad_world;
@@ -219,7 +219,7 @@ TEST_SUITE("unit") {
       const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
       poison(m.transform.world, count, cl_float4{{NAN, NAN, NAN, NAN}});
       poison(m.transform.ndc, count, cl_float4{{NAN, NAN, NAN, NAN}});
-      m.transform.forward(m.frame, m.device_views, *m.geometry);
+      m.transform.forward(m.frame, m.device_views, *m.geometry, false);
       const std::vector<cl_float4> world = m.transform.world.download(), ndc = m.transform.ndc.download();
       Worst world_error, ndc_error, shifted;
       for (std::size_t i = 0; i < count; ++i) {
@@ -251,7 +251,7 @@ TEST_SUITE("unit") {
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
     dpr::Renderer::Impl& m = impl_of(renderer);
-    m.transform.forward(m.frame, m.device_views, *m.geometry);
+    m.transform.forward(m.frame, m.device_views, *m.geometry, false);
     const std::vector<cl_float4> ndc = m.transform.ndc.download();
     const ref::Projection p = to_reference(dpr::projection(scene.camera, 8, 8), scene.camera);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -301,7 +301,7 @@ TEST_SUITE("gradient") {
     dpr::Renderer renderer(dpr::test::test_device());
     renderer.set_scene(scene);
     dpr::Renderer::Impl& m = impl_of(renderer);
-    m.transform.forward(m.frame, m.device_views, *m.geometry);
+    m.transform.forward(m.frame, m.device_views, *m.geometry, false);
     const std::vector<cl_float4> zeros(3, cl_float4{});
     const dpr::Buffer<cl_float4> grad_lit(impl_of(m.device), std::span<const cl_float4>(zeros));
     dpr::Buffer<cl_float4> grad(impl_of(m.device), std::span<const cl_float4>(zeros));

@@ -33,6 +33,7 @@ class ContourFrame {
     p.vertices = static_cast<cl_uint>(geometry.vertices);
     p.normals = p.vertices;
     p.faces = static_cast<cl_uint>(geometry.faces);
+    p.color_faces = static_cast<cl_uint>(geometry.color_faces);
     p.width = static_cast<cl_uint>(width);
     p.height = static_cast<cl_uint>(height);
     p.tiles_x = (p.width + DPR_TILE - 1) / DPR_TILE;
@@ -63,7 +64,8 @@ class ContourFrame {
   ContourInputs inputs() {
     Buffer<cl_uint> tile_counts;
     setup.forward(p, views, geometry, transform.ndc, hidden_, tile_counts);
-    return {p, views, geometry, edges, transform, setup.facing, clipped, shading};
+    set_edges(p, edges, shading, depth_reach);
+    return {p, views, geometry, edges, transform, setup.facing, clipped};
   }
 
   std::size_t samples() const { return std::size_t{p.width} * p.height; }
@@ -76,6 +78,7 @@ class ContourFrame {
   Buffer<shared::ClippedFace> clipped;
   Edges edges;
   std::optional<Shading> shading;
+  float depth_reach = 0;
   Contour contour;
   Antialias antialias;
 

@@ -90,10 +90,7 @@ class NdcStages {
   void forward() {
     list_pairs();
     rasterize.forward(params, setup.triangles, bin);
-    for (Buffer<float>* buffer :
-         {&rasterize.distance, &rasterize.depth, &rasterize.bary1, &rasterize.bary2}) {
-      poison(*buffer, rasterize.fragments);
-    }
+    set_planes(rasterize.values, params.fragments, {});
     poison(rasterize.list, rasterize.fragments, 0xdeadbeefU);
     poison(rasterize.fragment_pair, rasterize.fragments, 0xdeadbeefU);
     rasterize.forward(params, setup.triangles, bin);
@@ -149,8 +146,9 @@ inline FoundFragments read_fragments(const NdcStages& s) {
   const std::vector<cl_uint> starts = r.pixel_starts.download(), list = r.list.download(),
                              pair = r.fragment_pair.download(), place = r.fragment_pixel.download(),
                              faces = s.bin.pair_face.download();
-  const std::vector<float> distance = r.distance.download(), depth = r.depth.download(),
-                           bary1 = r.bary1.download(), bary2 = r.bary2.download();
+  const auto plane = [&](cl_uint number) { return r.plane(s.params, number); };
+  const std::vector<float> distance = plane(DPR_PLANE_DISTANCE), depth = plane(DPR_PLANE_DEPTH),
+                           bary1 = plane(DPR_PLANE_BARY), bary2 = plane(DPR_PLANE_BARY + 1);
   FoundFragments found;
   const std::size_t pixels = std::size_t{s.params.width} * s.params.height;
   for (std::size_t pixel = 0; pixel < pixels * s.params.views; ++pixel) {

@@ -33,6 +33,16 @@ void poison(Buffer<T>& buffer, std::size_t count, const T& value) {
 }
 inline void poison(Buffer<float>& buffer, std::size_t count) { poison(buffer, count, k_poison); }
 
+/// The planes of fragments of a frame (DPR_PLANE_...), all of them poisoned but for those given, of as many
+/// fragments each; `size` is that of a plane.
+inline void set_planes(Buffer<float>& buffer, std::size_t size,
+                       const std::vector<std::pair<std::size_t, std::vector<float>>>& planes) {
+  std::vector<float> all((DPR_PLANE_BASE + 3) * size, k_poison);
+  for (const auto& [plane, values] : planes)
+    std::ranges::copy(values, all.begin() + static_cast<std::ptrdiff_t>(plane * size));
+  buffer.upload(device_impl(), all);
+}
+
 /// A kernel file with what it includes in place, but for what `included` names: each file once.
 inline std::string header_text(std::string_view name, std::set<std::string, std::less<>>& included) {
   if (!included.emplace(name).second) return {};

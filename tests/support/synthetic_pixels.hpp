@@ -60,11 +60,7 @@ inline reference::AggregateParameters reference_parameters(const Smoothing& s, c
 class SyntheticFrame {
  public:
   explicit SyntheticFrame(const std::vector<SyntheticPixel>& pixels)
-      : bin_(device_impl()),
-        rasterize_(device_impl()),
-        occupancy_(device_impl()),
-        shade_(device_impl()),
-        aggregate_(device_impl()) {
+      : bin_(device_impl()), rasterize_(device_impl()), aggregate_(device_impl()) {
     std::vector<cl_uint> starts{0}, list, pair, faces;
     std::size_t count = 0, most = 0;
     for (const SyntheticPixel& pixel : pixels) {
@@ -101,19 +97,21 @@ class SyntheticFrame {
     frame_.width = static_cast<cl_uint>(pixels.size());
     frame_.height = 1;
     frame_.faces = static_cast<cl_uint>(faces.size());
+    frame_.fragments = frame_.grad_fragments = static_cast<cl_uint>(fragments_);
     make_pairs(bin_, faces);
     rasterize_.fragments = fragments_;
     rasterize_.pixel_starts.upload(device_impl(), starts);
     rasterize_.list.resize(device_impl(), std::max<std::size_t>(count, 1));
     rasterize_.list.upload(device_impl(), list);
     rasterize_.fragment_pair.upload(device_impl(), pair);
-    rasterize_.depth.upload(device_impl(), depth);
-    rasterize_.distance.upload(device_impl(), distance);
-    occupancy_.log_occupancy.upload(device_impl(), log_p);
-    occupancy_.occupancy.upload(device_impl(), p);
-    shade_.color.red.upload(device_impl(), red);
-    shade_.color.green.upload(device_impl(), green);
-    shade_.color.blue.upload(device_impl(), blue);
+    set_planes(rasterize_.values, fragments_,
+               {{DPR_PLANE_DEPTH, depth},
+                {DPR_PLANE_DISTANCE, distance},
+                {DPR_PLANE_LOG_OCCUPANCY, log_p},
+                {DPR_PLANE_OCCUPANCY, p},
+                {DPR_PLANE_COLOR, red},
+                {DPR_PLANE_COLOR + 1, green},
+                {DPR_PLANE_COLOR + 2, blue}});
     shared::ViewParams view{};
     view.znear = k_znear;
     view.zfar = k_zfar;
@@ -141,24 +139,19 @@ class SyntheticFrame {
   };
   Gradients backward(const glm::vec3& background, const std::vector<cl_float4>& grad_image) {
     const Buffer<cl_float4> grad(device_impl(), std::span<const cl_float4>(grad_image));
-    for (Buffer<float>* buffer :
-         {&aggregate_.grad_depth, &aggregate_.grad_log_occupancy, &aggregate_.grad_color.red,
-          &aggregate_.grad_color.green, &aggregate_.grad_color.blue}) {
-      poison(*buffer, fragments_);
-    }
+    set_planes(rasterize_.grads, fragments_, {});
     const std::size_t pixels = frame_.width;
     poison(aggregate_.channels, aggregate_.channel_count() * pixels);
-    poison(aggregate_.grad_distance, fragments_);
     poison(aggregate_.grad_sigma, pixels);
     aggregate_.backward(inputs(), background, grad);
     Gradients g;
-    g.depth = by_pixel(aggregate_.grad_depth);
-    g.log_occupancy = by_pixel(aggregate_.grad_log_occupancy);
-    g.red = by_pixel(aggregate_.grad_color.red);
-    g.green = by_pixel(aggregate_.grad_color.green);
-    g.blue = by_pixel(aggregate_.grad_color.blue);
+    g.depth = by_pixel(DPR_PLANE_DEPTH);
+    g.log_occupancy = by_pixel(DPR_PLANE_LOG_OCCUPANCY);
+    g.red = by_pixel(DPR_PLANE_COLOR);
+    g.green = by_pixel(DPR_PLANE_COLOR + 1);
+    g.blue = by_pixel(DPR_PLANE_COLOR + 2);
     if (aggregate_.perturbs_distances()) {
-      g.distance = by_pixel(aggregate_.grad_distance);
+      g.distance = by_pixel(DPR_PLANE_DISTANCE);
       g.sigma = aggregate_.grad_sigma.download();
     }
     const std::vector<float> channels = aggregate_.channels.download();
@@ -175,13 +168,13 @@ class SyntheticFrame {
 
   /// The fragments as the pixels list them now: the joint composition sorts.
   std::vector<cl_uint> list() const { return rasterize_.list.download(); }
-  std::vector<float> depths() const { return rasterize_.depth.download(); }
+  std::vector<float> depths() const { return rasterize_.plane(frame_, DPR_PLANE_DEPTH); }
 
  private:
-  AggregateInputs inputs() { return {frame_, views_, bin_, rasterize_, occupancy_, shade_}; }
+  AggregateInputs inputs() { return {frame_, views_, bin_, rasterize_}; }
 
-  std::vector<std::vector<float>> by_pixel(const Buffer<float>& buffer) const {
-    const std::vector<float> all = buffer.download();
+  std::vector<std::vector<float>> by_pixel(cl_uint plane) const {
+    const std::vector<float> all = rasterize_.grad_plane(frame_, plane);
     std::vector<std::vector<float>> values(frame_.width);
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) values[i].push_back(all[place_[at]]);
@@ -193,8 +186,6 @@ class SyntheticFrame {
   DeviceViews views_;
   Bin bin_;
   Rasterize rasterize_;
-  Occupancy occupancy_;
-  Shade shade_;
   Aggregate aggregate_;
   std::size_t fragments_ = 0;
   std::vector<cl_uint> first_, place_;
