@@ -1,11 +1,8 @@
 // Blur of the rigid image by the noise of the pixel's position, I(x) = E[R(x + s Z)]: passes along columns
 // and rows, all of one form (BlurPass). The transpose is a pass too, so backward needs no kernels of its own.
 // The order of additions is fixed.
+#include "blur_pixels.h"
 #include "shared_types.h"
-
-#ifndef DPR_LANES
-#define DPR_LANES 8 /* the device's width; the host chooses it */
-#endif
 
 /// Outputs of a work-item along its pass: they share what they read, and their sums do not wait for each
 /// other. Along rows, where they are vectors, they are fewer: the first and the last of a row, which read
@@ -16,30 +13,6 @@
 #define DPR_BLUR_BLOCK 8
 #endif
 #define DPR_BLUR_ROW_BLOCK 4
-
-/// Neighbours of a row in one vector.
-#if DPR_LANES == 16
-#define DPR_BLUR_PIXELS 4
-typedef float16 pixels_n;
-#define load_pixels(pointer) vload16(0, (global const float*)(pointer))
-#define store_pixels(value, pointer) vstore16(value, 0, (global float*)(pointer))
-#define store_lanes(value, lanes) vstore16(value, 0, (float*)(lanes))
-#define join_lines(lines, k) ((float16)((lines)[0][k], (lines)[1][k], (lines)[2][k], (lines)[3][k]))
-#elif DPR_LANES == 8
-#define DPR_BLUR_PIXELS 2
-typedef float8 pixels_n;
-#define load_pixels(pointer) vload8(0, (global const float*)(pointer))
-#define store_pixels(value, pointer) vstore8(value, 0, (global float*)(pointer))
-#define store_lanes(value, lanes) vstore8(value, 0, (float*)(lanes))
-#define join_lines(lines, k) ((float8)((lines)[0][k], (lines)[1][k]))
-#else
-#define DPR_BLUR_PIXELS 1
-typedef float4 pixels_n;
-#define load_pixels(pointer) (*(pointer))
-#define store_pixels(value, pointer) (*(pointer) = (value))
-#define store_lanes(value, lanes) ((lanes)[0] = (value))
-#define join_lines(lines, k) ((lines)[0][k])
-#endif
 
 /// Place of a work-item's outputs.
 typedef struct {
