@@ -316,8 +316,8 @@ def readme_with(results, text):
     def cells(match):
         name = {"dpr": "dpr NumPy"}.get(match[2], match[2])
         figures = [f"{steps[name, workload]:,.{1 if steps[name, workload] < 10 else 0}f}"
-                   if (name, workload) in steps else "" for workload in ("sphere256", "million")]
-        return f"{match[1]} {'; '.join(figures).strip()} |" if any(figures) else match[0]
+                   if (name, workload) in steps else None for workload in ("sphere256", "million")]
+        return f"{match[1]} {'; '.join(figure or '–' for figure in figures)} |" if any(figures) else match[0]
 
     return re.sub(r"^(\| (\w+) .*\|)[^|\n]*\|$", cells, text, flags=re.MULTILINE)
 
