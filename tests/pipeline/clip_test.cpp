@@ -189,7 +189,7 @@ TEST_SUITE("pipeline") {
       renderer.forward();
       for (std::size_t v = 0; v < views.size(); ++v) CHECK(same_bits(renderer.image(v), first.image));
       Device small = open_device();
-      small.set_memory_budget(std::max<std::size_t>(renderer.statistics().fragments * 50 / 3, 26000));
+      small.set_memory_budget(std::max<std::size_t>(renderer.statistics().fragments * 50 / 3, 28000));
       Renderer in_bands(small);
       in_bands.set_scene(scene);
       CHECK(same_bits(render(in_bands), first));
@@ -249,6 +249,7 @@ TEST_SUITE("pipeline") {
     const Device device = open_device();
     for (const bool of_pixel : {false, true}) {
       CAPTURE(of_pixel);
+      if (of_pixel && dpr::test::is_reduced()) continue;  // ten pixels are too few for its gradients
       // Longer ones see jumps of faces seen edge-on; noise of the pixel has kinks where samples change faces.
       const float step = of_pixel ? 1e-3F : 1e-4F;
       std::vector<double> of_intrinsics, of_lens;

@@ -119,7 +119,7 @@ TEST_SUITE("pipeline") {
     // A larger image is told apart, and what is destroyed is given back.
     const Device device = open_device();
     Scene scene = sampled_scene();
-    scene.width *= 2;
+    scene.width *= 4;
     {
       Renderer renderer(device);
       renderer.set_scene(scene);

@@ -136,7 +136,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("hidden: the same bits in bands") {
     const Scene scene = with_gamma(layered_scenes().back(), Prior::gaussian, 2e-3F);
     Device small = open_device();
-    small.set_memory_budget(static_cast<std::size_t>(reduced(24576, 8500)));
+    small.set_memory_budget(static_cast<std::size_t>(reduced(24576, 9000)));
     Renderer banded(small);
     banded.set_scene(scene);
     CHECK(same_bits(frame_of(open_device(), scene, true).result, render(banded)));

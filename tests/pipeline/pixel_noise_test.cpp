@@ -602,7 +602,7 @@ TEST_SUITE("pipeline") {
     CHECK(same_bits(first, render(open_device(), scene)));
 
     Device small = open_device();
-    small.set_memory_budget(static_cast<std::size_t>(reduced(131072, 9400)));
+    small.set_memory_budget(static_cast<std::size_t>(reduced(131072, 11500)));
     Renderer banded(small);
     banded.set_scene(scene);
     CHECK(same_bits(first, render(banded)));
