@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "dpr/error.hpp"
 
@@ -162,6 +163,13 @@ std::uint64_t JsonNode::whole_number(std::uint64_t most) const {
     fail_type("a whole number from 0 to " + std::to_string(most));
   }
   return value_->get<std::uint64_t>();
+}
+
+int JsonNode::image_side() const {
+  constexpr auto k_most = static_cast<std::uint64_t>(checks::k_largest_side);
+  if (!value_->is_number_unsigned() || value_->get<std::uint64_t>() - 1 >= k_most)
+    fail_type("a whole number from 1 to " + std::to_string(k_most));
+  return value_->get<int>();
 }
 
 glm::vec3 JsonNode::vec3() const {

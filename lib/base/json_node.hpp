@@ -51,6 +51,7 @@ class JsonNode {
   glm::mat4 mat4() const;  ///< four rows of four
   /// A whole number of at most that value; negative ones are refused.
   std::uint64_t whole_number(std::uint64_t most) const;
+  int image_side() const;  ///< pixels, from 1 to the largest side of an image
 
   /// Name of this value in messages: "sigma (FILE)" and the like.
   std::string name() const;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 
@@ -43,6 +44,7 @@ Image grey(const std::vector<float>& values, const Scene& scene) {
 AovFiles::AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene)
     : output_(output) {
   for (const std::string& name : names) {
+    require_writable(file_name(name));
     if (name == k_standard_error) {
       standard_error_ = true;
     } else if (name == k_gradient_standard_error) {

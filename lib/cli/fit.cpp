@@ -17,6 +17,7 @@
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "dpr/photographs.hpp"
+#include "scene/scene_json.hpp"
 #include "solve/resample.hpp"
 #include "solve/shape_views.hpp"
 
@@ -73,7 +74,9 @@ ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
   if (common.size) resize(views, parse_size(*common.size));
   const SmoothingOptions flags = smoothing_options(common);
   if (file.smoothing) {
-    views.smoothing = resolve_smoothing(overlay(*file.smoothing, flags), views.width, views.height);
+    with_keys_of(options.views, *file.smoothing, flags, [&] {
+      views.smoothing = resolve_smoothing(overlay(*file.smoothing, flags), views.width, views.height);
+    });
   } else if (common.seed || gives_any(command, k_smoothing_group)) {
     Smoothing otherwise = finest_smoothing(views, options.solver);
     if (!says_nothing(flags)) otherwise.noise = Noise::triangle;

@@ -131,7 +131,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   }
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
-  const Image target = read_target(options.target, options.descent.loss, common.encoding());
+  const Image target = read_target(options.target, options.descent.loss, common.encoding(), scene);
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);

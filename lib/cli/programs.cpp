@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -13,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/module.hpp"
 #include "base/child_process.hpp"
+#include "base/module.hpp"
 #include "cli/commands.hpp"
 #include "cli/completion.hpp"
 #include "dpr/error.hpp"
@@ -24,7 +25,7 @@ namespace {
 
 struct Program {
   std::string command, description;
-  std::string missing, remedy;  // what an installation without it is, and what to do
+  std::string build;                                                  // a build that has it
   std::vector<std::pair<std::string, std::string>> environment = {};  // where the user's says nothing else
 };
 
@@ -32,10 +33,18 @@ std::filesystem::path file_of(const std::string& command) {
   return std::filesystem::canonical(running_program()).parent_path() / ("dpr-" + command);
 }
 
-[[noreturn]] void run(const Program& program, const std::vector<std::string>& arguments) {
+/// Returns only where the program is missing and its help was asked for.
+void run(const Program& program, const std::vector<std::string>& arguments) {
   const std::filesystem::path file = file_of(program.command);
   if (!std::filesystem::exists(file)) {
-    throw InvalidArgument(program.command + " (dpr)", program.missing, program.remedy);
+    const std::string name = file.filename().string();
+    const bool wants_help = std::ranges::any_of(
+        arguments, [](const std::string& word) { return word == "--help" || word == "-h"; });
+    if (!wants_help)
+      throw InvalidArgument(program.command + " (dpr)", "a build without " + name, program.build);
+    std::printf("%s.\nThis build has no %s, which describes the options: expected %s.\n",
+                program.description.c_str(), name.c_str(), program.build.c_str());
+    return;
   }
   for (const auto& [variable, value] : program.environment) setenv(variable.c_str(), value.c_str(), 0);
   std::string name = file.string();
@@ -59,8 +68,7 @@ void add(CLI::App& application, const Program& program) {
 void add_learn_command(CLI::App& application) {
   add(application, {"learn",
                     "Trains and evaluates single-image reconstruction (needs libtorch)",
-                    "a build without libtorch",
-                    "one with it: libtorch-dev, and cmake --preset release, which builds dpr-learn",
+                    "a build by cmake --preset release where libtorch-dev is installed",
                     // OpenBLAS' threads sleep at once instead of waiting busily while the renderer works, and
                     // freed memory is kept: a step's tensors take the pages of the last one's. Libtorch's
                     // log would tell of every attempt to connect.
@@ -72,7 +80,7 @@ void add_learn_command(CLI::App& application) {
 
 void add_bench_command(CLI::App& application) {
   add(application, {"bench", "Measures forward and backward passes, compares results, draws them",
-                    "a build without the program dpr-bench", "that of cmake --preset release"});
+                    "a build by cmake --preset release"});
 }
 
 void print_entries_of_programs() {

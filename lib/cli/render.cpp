@@ -11,10 +11,12 @@
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/lens_options.hpp"
+#include "cli/option_names.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
+#include "image/codec.hpp"
 #include "mesh/bounding_box.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
@@ -47,7 +49,8 @@ Sphere bounding_sphere(const Mesh& mesh) {
 }
 
 /// A camera from which the sphere fills the image but for a margin.
-Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width, int height) {
+Camera fit_camera(const CLI::App& command, const Sphere& sphere, const RenderOptions& options, int width,
+                  int height) {
   constexpr float k_margin = 1.05F;
   constexpr float k_fov_y_degrees = 40.0F;
   const float aspect = static_cast<float>(width) / static_cast<float>(height);
@@ -57,7 +60,10 @@ Camera fit_camera(const Sphere& sphere, const RenderOptions& options, int width,
   if (!std::isfinite(distance))
     throw IoError(options.mesh,
                   "a mesh as large as numbers can be, expected one that a camera can stand before");
-  Camera camera = orbit_camera(distance, options.elevation, options.azimuth, sphere.center);
+  const OptionNames names{{"elevation_degrees", "--elevation"}, {"azimuth_degrees", "--azimuth"}};
+  Camera camera = with_option_names(command, names, [&] {
+    return orbit_camera(distance, options.elevation, options.azimuth, sphere.center);
+  });
   camera.fov_y_degrees = k_fov_y_degrees;
   camera.znear = distance - radius;
   camera.zfar = distance + radius;
@@ -92,7 +98,7 @@ Lights fit_lights(const Camera& camera, const Sphere& sphere) {
   return lights;
 }
 
-Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
+Scene mesh_scene(const CLI::App& command, const RenderOptions& options, const CommonOptions& common) {
   constexpr int k_size = 256;
   Scene scene;
   scene.width = scene.height = k_size;
@@ -105,7 +111,7 @@ Scene mesh_scene(const RenderOptions& options, const CommonOptions& common) {
   apply(common, scene);
   print_notes(notes, common);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);
-  scene.camera = fit_camera(sphere, options, scene.width, scene.height);
+  scene.camera = fit_camera(command, sphere, options, scene.width, scene.height);
   scene.lights = fit_lights(scene.camera, sphere);
   return scene;
 }
@@ -133,9 +139,11 @@ void print_triangles(const RenderOptions& options, const Scene& scene, const Ren
 }
 
 void run(const CLI::App& command, const RenderOptions& options, CommonOptions& common) {
+  require_image_format(options.output);
   require_writable(options.output);
   if (options.rigid) common.smoothing.preset = "rigid";
-  Scene scene = options.scene.empty() ? mesh_scene(options, common) : read_scene(options.scene, common);
+  Scene scene =
+      options.scene.empty() ? mesh_scene(command, options, common) : read_scene(options.scene, common);
   if (options.shading) set_shading(scene, *options.shading);
   if (options.cull) scene.cull = parse_cull(*options.cull, "--cull");
   const AovFiles aovs(options.aovs, options.output, scene);
@@ -215,7 +223,8 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
   }
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");
   command->callback([command, options, &common] {
-    if (options->mesh.empty() && options->scene.empty()) throw CLI::RequiredError("MESH or --scene");
+    if (options->mesh.empty() && options->scene.empty())
+      throw InvalidArgument("arguments (dpr render)", "neither MESH nor --scene", "one of the two");
     run(*command, *options, common);
   });
 }

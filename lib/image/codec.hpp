@@ -41,4 +41,7 @@ using ImageCodecFunction = const ImageCodec*();
 /// As the public read_image(), with what the file says of its pixels.
 Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts);
 
+/// Throws IoError unless the extension is of a format that write_image() knows: to be called before the work.
+void require_image_format(const std::filesystem::path& file);
+
 }  // namespace dpr

@@ -107,6 +107,8 @@ Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding en
   return image;
 }
 
+void require_image_format(const std::filesystem::path& file) { format_of(file); }
+
 void write_image(const std::filesystem::path& file, const Image& image, Encoding encoding) {
   const Format& format = format_of(file);
   const auto width = static_cast<std::size_t>(std::max(image.width, 0));

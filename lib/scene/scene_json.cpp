@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "dpr/scene.hpp"
@@ -33,8 +34,7 @@ void take_vec3(const JsonNode& node, std::string_view key, glm::vec3& value) {
 }
 
 void take_size(const JsonNode& node, std::string_view key, int& value) {
-  constexpr std::uint64_t k_most = std::numeric_limits<int>::max();
-  take(node, key, value, [](const JsonNode& n) { return static_cast<int>(n.whole_number(k_most)); });
+  take(node, key, value, [](const JsonNode& n) { return n.image_side(); });
 }
 
 std::vector<glm::vec3> vec3_list(const JsonNode& node) {
@@ -251,6 +251,25 @@ Scene parse_scene(const JsonNode& node, const std::filesystem::path& folder, Not
 
 namespace {
 
+constexpr std::string_view k_of_smoothing = " (smoothing)";
+
+bool gives(const SmoothingOptions& options, std::string_view key) {
+  bool found = false;
+  for_each_option([&](std::string_view name, auto, auto member) {
+    found = found || (name == key && (options.*member).has_value());
+  });
+  return found;
+}
+
+/// "camera.znear" for the argument "znear (camera)", "width" for "width (scene)".
+std::string key_of(const std::string& argument) {
+  const std::size_t bracket = argument.rfind(" (");
+  if (bracket == std::string::npos) return argument;
+  const std::string field = argument.substr(0, bracket);
+  const std::string parent = argument.substr(bracket + 2, argument.size() - bracket - 3);
+  return parent == "scene" ? field : parent + "." + field;
+}
+
 Distortion parse_distortion(const JsonNode& node) {
   const std::vector<JsonNode> k = node.elements(5);
   return {k[0].number(), k[1].number(), k[2].number(), k[3].number(), k[4].number()};
@@ -311,6 +330,20 @@ void resize(Scene& scene, glm::ivec2 size) {
   scene.height = size.y;
 }
 
+void with_keys_of(const std::filesystem::path& file, const SmoothingOptions& smoothing,
+                  const SmoothingOptions& overrides, const std::function<void()>& check) {
+  try {
+    check();
+  } catch (const InvalidArgument& error) {
+    const std::string& argument = error.argument();
+    if (argument.ends_with(k_of_smoothing)) {
+      const std::string_view key(argument.data(), argument.size() - k_of_smoothing.size());
+      if (gives(overrides, key) || !(gives(smoothing, key) || says_nothing(overrides))) throw;
+    }
+    throw InvalidArgument(checks::in(key_of(argument), file.string()), error.got(), error.expected());
+  }
+}
+
 Scene parse_scene(const std::filesystem::path& file, std::string_view text, Notes& notes,
                   const SceneOverrides& overrides) {
   const nlohmann::json document = parse_json(file, text);
@@ -321,8 +354,10 @@ Scene parse_scene(const std::filesystem::path& file, std::string_view text, Note
   take(node, "smoothing", smoothing, parse_smoothing);
   const std::string note = noise_note(smoothing, overrides.smoothing);
   if (!note.empty()) notes.push_back(note);
-  scene.smoothing = resolve_smoothing(overlay(smoothing, overrides.smoothing), scene.width, scene.height);
-  validate(scene);
+  with_keys_of(file, smoothing, overrides.smoothing, [&] {
+    scene.smoothing = resolve_smoothing(overlay(smoothing, overrides.smoothing), scene.width, scene.height);
+    validate(scene);
+  });
   return scene;
 }
 

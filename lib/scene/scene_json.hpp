@@ -1,6 +1,7 @@
 // The parts of the scene format that other files share with it, and what a command line replaces of a scene.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "base/json_node.hpp"
@@ -22,6 +23,11 @@ struct SceneOverrides {
   std::optional<glm::ivec2> size;  ///< pixels
   SmoothingOptions smoothing;
 };
+
+/// Calls `check`. An InvalidArgument that it throws about a field, such as "znear (camera)", names the file and
+/// the key in it instead. A field of the smoothing keeps its name where the overrides decide on it.
+void with_keys_of(const std::filesystem::path& file, const SmoothingOptions& smoothing,
+                  const SmoothingOptions& overrides, const std::function<void()>& check);
 
 /// The same picture with other pixels: intrinsics, which are in pixels, follow.
 void resize(Scene& scene, glm::ivec2 size);

@@ -15,12 +15,6 @@
 namespace dpr {
 namespace {
 
-int parse_side(const JsonNode& node) {
-  const auto side = static_cast<int>(node.whole_number(checks::k_largest_side));
-  if (side < 1) node.fail("0", "at least 1");
-  return side;
-}
-
 /// True if an image's alpha tells the object from its surroundings. Programs without transparency write 1.
 bool shows_silhouette(const Image& image) {
   return std::ranges::any_of(image.pixels, [](const glm::vec4& pixel) { return pixel.a < 1; });
@@ -133,7 +127,10 @@ ShapeViews read_views(const std::filesystem::path& file) {
 ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes) {
   ViewsFile parsed = parse_views_file(file, text, notes);
   ShapeViews& views = parsed.views;
-  if (parsed.smoothing) views.smoothing = resolve_smoothing(*parsed.smoothing, views.width, views.height);
+  if (parsed.smoothing) {
+    with_keys_of(file, *parsed.smoothing, {},
+                 [&] { views.smoothing = resolve_smoothing(*parsed.smoothing, views.width, views.height); });
+  }
   return std::move(views);
 }
 
@@ -144,8 +141,8 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
   node.require_keys({"width", "height", "background", "views", "initial", "smoothing", "depth_scale"});
   ViewsFile result;
   ShapeViews& views = result.views;
-  views.width = parse_side(node.at("width"));
-  views.height = parse_side(node.at("height"));
+  views.width = node.at("width").image_side();
+  views.height = node.at("height").image_side();
   if (const auto background = node.find("background")) views.background = background->vec3();
   const std::filesystem::path folder = file.parent_path();
   MeasuredImages measured = measured_images(node);

@@ -105,14 +105,14 @@ Smoothing by_values(const json& smoothing, bool is_reversed) {
   return resolve_smoothing(options, k_width, k_height);
 }
 
-/// The smoothing as the renderer sees it, or the reason of its refusal.
+/// The smoothing as the renderer sees it, or the reason of its refusal without its place, which differs.
 template <typename Resolve>
 std::string outcome(Resolve resolve, Smoothing& smoothing) {
   try {
     smoothing = resolve();
     return "";
   } catch (const InvalidArgument& error) {
-    return error.what();
+    return error.got() + ", expected " + error.expected();
   }
 }
 

@@ -291,7 +291,7 @@ TEST_SUITE("robustness") {
     check(with(R"("lights": {"area": []})"), "\"area\", expected keys out of ambient, harmonics");
     check(with(R"("lights": {"harmonics": [[1, 1, 1]]})"), "lights.harmonics (");
     check(with(R"("lights": {"directional": [{"direction": [0, 0, 0]}]})"),
-          "direction (lights.directional[0])");
+          "lights.directional[0].direction (");
     check(with(R"("lights": {"shading": "matt"})"), "flat, phong, gouraud or blinn");
     check(with(R"("smoothing": {"Sigma": 1})"), "smoothing (");
     check(with_mesh(R"("file": "a", "colour": 1)"), "meshes[0] (");
@@ -306,7 +306,8 @@ TEST_SUITE("robustness") {
     };
     check(with(R"("width": "3")"), "width (");
     check(with(R"("width": 3.5)"), "got 3.5, expected a whole number");
-    check(with(R"("width": -1)"), "got -1, expected a whole number");
+    check(with(R"("width": -1)"), "got -1, expected a whole number from 1 to 16384");
+    check(with(R"("width": 99999)"), "got 99999, expected a whole number from 1 to 16384");
     check(with(R"("background": [0, 0])"), "got a list of 2, expected a list of 3");
     check(with(R"("background": [0, 0, null])"), "background[2] (");
     check(with(R"("lights": null)"), "lights (");
@@ -320,7 +321,7 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"preset": "soft"})"), "got \"soft\", expected softras");
     check(with(R"("smoothing": {"occupancy_width": "wide"})"),
           "got \"wide\", expected fixed, variable or zero");
-    check(with(R"("smoothing": {"occupancy_width": "variable"})"), "occupancy_width (smoothing)");
+    check(with(R"("smoothing": {"occupancy_width": "variable"})"), "smoothing.occupancy_width (");
     check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong, gouraud or blinn");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
     const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";
@@ -346,7 +347,7 @@ TEST_SUITE("robustness") {
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text(second)), part);
     };
     check(R"("instance_of": 1)",
-          "instance_of (meshes[1]): got 1, which is the instance itself, expected the number of an earlier");
+          "S.json): got 1, which is the instance itself, expected the number of an earlier");
     check(R"("instance_of": -1)", "meshes[1].instance_of");
     check(R"("instance_of": 0, "face_colors": [[1, 0, 0]])", "face_colors");
   }
@@ -379,19 +380,18 @@ TEST_SUITE("robustness") {
     const auto check = [&](const std::string& text, const std::string& part) {
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, read(folder, text), part);
     };
-    check(R"({"meshes": []})", "meshes (scene): got none");
-    check(with(R"("width": 0)"), "width (scene): got 0, expected 1 to 16384");
-    check(with(R"("height": 16385)"), "height (scene): got 16385");
-    check(with(R"("camera": {"znear": -1})"), "znear (camera)");
+    check(R"({"meshes": []})", "S.json): got none");
+    check(with(R"("width": 0)"), "S.json): got 0, expected a whole number from 1 to 16384");
+    check(with(R"("height": 16385)"), "S.json): got 16385, expected a whole number from 1 to 16384");
+    check(with(R"("camera": {"znear": -1})"), "camera.znear (");
     check(with(R"("cull": "both")"), "got \"both\", expected none, back or front");
-    check(with(R"("lights": {"shininess": 0})"), "shininess (lights)");
-    check(with(R"("smoothing": {"alpha": 0})"), "alpha (smoothing)");
+    check(with(R"("lights": {"shininess": 0})"), "lights.shininess (");
+    check(with(R"("smoothing": {"alpha": 0})"), "smoothing.alpha (");
     check(with(R"("smoothing": {"estimator": "monte_carlo", "depth_prior": "uniform"})"), "uniform");
-    check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,0,1]])"), "faces[0] (meshes[0])");
-    check(with_mesh(R"("positions": [[0,0,0]], "faces": [])"), "faces (meshes[0])");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [[0,0,1]])"), "meshes[0].faces[0] (");
+    check(with_mesh(R"("positions": [[0,0,0]], "faces": [])"), "meshes[0].faces (");
     const std::string flat = R"([[1,0,0,0],[0,1,0,0],[0,0,0,0],[0,0,0,1]])";
-    check(with_mesh(k_triangle + R"(, "transform": )" + flat),
-          "transform (meshes[0]): got a singular matrix");
+    check(with_mesh(k_triangle + R"(, "transform": )" + flat), "S.json): got a singular matrix");
     Scene scene = read(folder, with(""));
     scene.background.r = std::numeric_limits<float>::quiet_NaN();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(scene), "background (scene)");
