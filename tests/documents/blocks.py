@@ -81,6 +81,17 @@ def make_programs(folder, build, is_reduced):
         script.chmod(script.stat().st_mode | stat.S_IXUSR)
 
 
+def require_ignored(source, work, kept):
+    """What the document's commands leave in the root of a checkout must not show up in `git status`."""
+    if subprocess.run(["git", "-C", source, "rev-parse"], capture_output=True, check=False).returncode:
+        return  # not a checkout
+    left = [name + "/" * (work / name).is_dir() for name in sorted(set(os.listdir(work)) - kept)]
+    ignored = subprocess.run(["git", "-C", source, "check-ignore", "--no-index", *left], capture_output=True, text=True,
+                             check=False).stdout.split("\n")
+    if litter := [name for name in left if name not in ignored]:
+        sys.exit(f".gitignore lacks {', '.join(litter)}")
+
+
 def run(arguments):
     work, build = arguments.work, arguments.build.resolve()
     shutil.rmtree(work, ignore_errors=True)
@@ -97,6 +108,7 @@ def run(arguments):
         if subprocess.run(command, cwd=work, env=environment, check=False).returncode:
             sys.exit(f"{what} failed")
 
+    kept = set(os.listdir(work))
     call("dpr demo", "dpr", "demo", "-o", "demo-output", "--quiet")
     tried, python = 0, ""
     for language, first, marker, text in blocks(arguments.document):
@@ -120,11 +132,12 @@ def run(arguments):
             python += "\n" * (first - 1 - python.count("\n")) + text
         tried += language in ("json", "sh", "python")
     if python and arguments.python:
-        (work / "document.py").write_text(python)
-        call(f"{arguments.document}, Python", arguments.python, "document.py")
+        (work / "programs/document.py").write_text(python)
+        call(f"{arguments.document}, Python", arguments.python, "programs/document.py")
     if arguments.program:
         call(f"{arguments.document}, C++", str(arguments.program.resolve()))
         tried += 1
+    require_ignored(arguments.source, work, kept)
     if tried == 0:
         sys.exit(f"{arguments.document} has nothing to try")
 
