@@ -137,9 +137,11 @@ static inline void swap_slots(global Slot* a, global Slot* b) {
   vstore4(moved, 0, (global uint*)b);
 }
 
-/// A pixel's share of the gradients of gamma, alpha and the background colour, which had that weight in it.
+/// A pixel's share of the gradients of gamma, alpha and the background colour, which had that weight in it;
+/// where there are channels.
 static inline void write_channels(const AggregateParams p, uint pixel, float grad_gamma, float grad_alpha,
                                   float background_weight, float4 grad, global float* channels) {
+  if (p.channels == 0) return;
   channels[DPR_CHANNEL_BACKGROUND * p.pixels + pixel] = background_weight * grad.x;
   channels[(DPR_CHANNEL_BACKGROUND + 1) * p.pixels + pixel] = background_weight * grad.y;
   channels[(DPR_CHANNEL_BACKGROUND + 2) * p.pixels + pixel] = background_weight * grad.z;

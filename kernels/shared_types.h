@@ -330,7 +330,7 @@ typedef struct AggregateParams {
   uint faces;                     /* of one view */
   uint first_view;                /* of the batch that names the noise */
   uint last_pixel;                /* where those of the launch end */
-  uint channels;                  /* DPR_PIXEL_CHANNELS, or those before alpha's */
+  uint channels;                  /* DPR_PIXEL_CHANNELS, or those before alpha's; or 0: none are written */
   uint fragments, grad_fragments; /* as in FrameParams */
   uint unused0, unused1;
 } AggregateParams;

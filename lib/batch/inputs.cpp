@@ -99,7 +99,7 @@ std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings&
 }
 
 /// Texture coordinates and what refers to them: of vertices, of corners, or by indices.
-void take_texcoords(NamedArrays arrays, const Faces& faces, std::size_t vertices, Surface& surface) {
+void take_texcoords(NamedArrays arrays, const NamedArray& faces, std::size_t vertices, Surface& surface) {
   const NamedArray* const texcoords = find(arrays, "texcoords");
   const NamedArray* const indices = find(arrays, "face_texcoords");
   if (!texcoords) {
@@ -112,15 +112,15 @@ void take_texcoords(NamedArrays arrays, const Faces& faces, std::size_t vertices
     surface.face_texcoords = read_triples(*indices);
     return;
   }
-  const std::string of_faces = std::to_string(faces.size());
-  require_form(*texcoords, Element::float32, {{vertices, 2}, {faces.size(), 3, 2}},
+  const std::size_t count = faces.shape[0];
+  const std::string of_faces = std::to_string(count);
+  require_form(*texcoords, Element::float32, {{vertices, 2}, {count, 3, 2}},
                "[" + std::to_string(vertices) + ", 2] or [" + of_faces + ", 3, 2], or face_texcoords beside");
   if (texcoords->shape.size() == 2) {
-    surface.face_texcoords = faces;
+    surface.face_texcoords = read_triples(faces);
     return;
   }
-  for (std::uint32_t i = 0; i < 3 * faces.size(); i += 3)
-    surface.face_texcoords.emplace_back(i, i + 1, i + 2);
+  for (std::uint32_t i = 0; i < 3 * count; i += 3) surface.face_texcoords.emplace_back(i, i + 1, i + 2);
 }
 
 std::size_t count_materials(NamedArrays arrays) {
@@ -232,14 +232,17 @@ std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings)
   const std::size_t count = matrices.shape[0], numbers = intrinsics.shape[1];
   const auto positions = vertices.rows<const glm::vec3>();
   const std::size_t of_mesh = vertices.shape[vertices.shape.size() - 2];
+  const bool is_own = positions.size() > of_mesh;
+  std::optional<BoxCorners> box;  // of the vertices; none: no planes are set by them
   std::vector<View> views;
   for (std::size_t v = 0; v < count; ++v) {
     View view{{}, {glm::mat4(1.0F)}};
+    if (of_mesh > 0 && !settings.has_clipping() && (v == 0 || is_own))
+      box = box_corners(positions.subspan(v * of_mesh, of_mesh));
     // Row-major here.
     view.camera.view = glm::transpose(matrices.rows<const glm::mat4>()[v]);
     set_projection(view.camera, intrinsics.rows<const float>().subspan(v * numbers, numbers));
-    const bool is_own = positions.size() > of_mesh;
-    settings.set_clipping(view.camera, positions.subspan(is_own ? v * of_mesh : 0, of_mesh));
+    settings.set_clipping(view.camera, box);
     views.push_back(view);
   }
   return views;
@@ -282,20 +285,25 @@ std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& option
 
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
   const BatchSizes sizes = check_sizes(arrays);
-  auto faces = std::make_shared<const Faces>(read_triples(require(arrays, "faces")));
+  const NamedArray& faces = require(arrays, "faces");
+  require_triples(faces);
   Surface surface;
   surface.textures = texture_forms(arrays, settings);
-  take_texcoords(arrays, *faces, sizes.vertices, surface);
+  take_texcoords(arrays, faces, sizes.vertices, surface);
   const bool has_textures = !surface.textures.empty();
   if (has_textures == (surface.texcoords == 0)) {
     throw InvalidArgument(has_textures ? "texcoords (batch)" : "textures (batch)",
                           has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
   }
   surface.materials = count_materials(arrays);
-  surface.face_textures = read_of_faces(arrays, "face_textures", faces->size(), -1);
-  surface.face_materials = read_of_faces(arrays, "face_materials", faces->size(), 0);
-  return {std::move(faces), sizes.vertices,    find(arrays, "face_colors") != nullptr,
-          settings.width(), settings.height(), std::move(surface)};
+  surface.face_textures = read_of_faces(arrays, "face_textures", faces.shape[0], -1);
+  surface.face_materials = read_of_faces(arrays, "face_materials", faces.shape[0], 0);
+  return {faces,
+          sizes.vertices,
+          find(arrays, "face_colors") != nullptr,
+          settings.width(),
+          settings.height(),
+          std::move(surface)};
 }
 
 RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {

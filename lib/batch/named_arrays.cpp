@@ -27,24 +27,18 @@ std::string_view name_of(Element element) {
   return "int64";
 }
 
-/// All of them in the array's order.
-std::vector<std::uint32_t> read_all(const NamedArray& array, std::int64_t least) {
-  std::vector<std::uint32_t> indices(array.count());
-  const auto read = [&](const auto* values) {
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      const std::int64_t index = values[i];
-      if (index < least || index >= std::numeric_limits<std::uint32_t>::max())
-        throw InvalidArgument(argument(array), std::to_string(index),
-                              "indices from " + std::to_string(least) + " on");
-      indices[i] = static_cast<std::uint32_t>(index);
-    }
-  };
-  if (array.element == Element::int64) {
-    read(static_cast<const std::int64_t*>(array.data));
-  } else {
-    read(static_cast<const std::int32_t*>(array.data));
-  }
-  return indices;
+/// visit(values) for the elements of an array of indices.
+template <class Visit>
+auto visit_indices(const NamedArray& array, const Visit& visit) {
+  return array.element == Element::int64 ? visit(static_cast<const std::int64_t*>(array.data))
+                                         : visit(static_cast<const std::int32_t*>(array.data));
+}
+
+std::uint32_t to_index(const NamedArray& array, std::int64_t index, std::int64_t least) {
+  if (index < least || index >= std::numeric_limits<std::uint32_t>::max())
+    throw InvalidArgument(argument(array), std::to_string(index),
+                          "indices from " + std::to_string(least) + " on");
+  return static_cast<std::uint32_t>(index);
 }
 
 void require_indices(const NamedArray& array, Shape shape, const std::string& expected) {
@@ -90,19 +84,42 @@ void require_floats(const NamedArray& array, Shape shape, const std::string& exp
   require_form(array, Element::float32, {shape}, expected);
 }
 
+void require_triples(const NamedArray& array) { require_indices(array, {k_any, 3}, "[F, 3]"); }
+
+bool holds(const NamedArray& array, std::span<const glm::uvec3> triples) {
+  constexpr std::size_t k_block = 4096;  // compared without a branch
+  if (array.count() != 3 * triples.size()) return false;
+  return visit_indices(array, [&](const auto* values) {
+    for (; !triples.empty(); triples = triples.subspan(std::min(k_block, triples.size()))) {
+      std::uint64_t differences = 0;
+      for (const glm::uvec3& triple : triples.first(std::min(k_block, triples.size()))) {
+        for (int corner = 0; corner < 3; ++corner)
+          differences |= static_cast<std::uint64_t>(std::int64_t{*values++}) ^ triple[corner];
+      }
+      if (differences != 0) return false;
+    }
+    return true;
+  });
+}
+
 std::vector<glm::uvec3> read_triples(const NamedArray& array) {
-  require_indices(array, {k_any, 3}, "[F, 3]");
-  const std::vector<std::uint32_t> corners = read_all(array, 0);
-  std::vector<glm::uvec3> triples;
-  triples.reserve(corners.size() / 3);
-  for (std::size_t i = 0; i < corners.size(); i += 3)
-    triples.emplace_back(corners[i], corners[i + 1], corners[i + 2]);
+  require_triples(array);
+  std::vector<glm::uvec3> triples(array.count() / 3);
+  visit_indices(array, [&](const auto* values) {
+    for (glm::uvec3& triple : triples) {
+      for (int corner = 0; corner < 3; ++corner) triple[corner] = to_index(array, *values++, 0);
+    }
+  });
   return triples;
 }
 
 std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t count, std::int64_t least) {
   require_indices(array, {count}, "[" + std::to_string(count) + "]");
-  return read_all(array, least);
+  std::vector<std::uint32_t> indices(count);
+  visit_indices(array, [&](const auto* values) {
+    for (std::uint32_t& index : indices) index = to_index(array, *values++, least);
+  });
+  return indices;
 }
 
 }  // namespace dpr::batch

@@ -49,6 +49,10 @@ void require_form(const NamedArray& array, Element element, std::initializer_lis
 /// The same for floats of one shape.
 void require_floats(const NamedArray& array, Shape shape, const std::string& expected);
 
+/// Throws InvalidArgument unless these are whole numbers of either type, [F, 3].
+void require_triples(const NamedArray& array);
+/// True if these are those triples. Copies nothing.
+bool holds(const NamedArray& array, std::span<const glm::uvec3> triples);
 /// Whole numbers of either type, [F, 3] from 0, or [count] from `least`; -1 becomes the largest number there
 /// is. Throw InvalidArgument for a smaller one, another type and another shape.
 std::vector<glm::uvec3> read_triples(const NamedArray& array);

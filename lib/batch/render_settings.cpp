@@ -113,12 +113,12 @@ void RenderSettings::set(const std::string& name, const OptionValue& value) {
   *this = std::move(changed);
 }
 
-void RenderSettings::set_clipping(Camera& camera, std::span<const glm::vec3> points) const {
+void RenderSettings::set_clipping(Camera& camera, const std::optional<BoxCorners>& box) const {
   constexpr double k_widest = 1024, k_rounding = 1e-3;
   camera.znear = znear_.value_or(camera.znear);
   camera.zfar = zfar_.value_or(std::max(camera.zfar, 2 * camera.znear));
-  if ((znear_ && zfar_) || points.empty()) return;
-  const DepthRange range = depth_range(box_corners(points), camera, glm::mat4(1.0F));
+  if (has_clipping() || !box) return;
+  const DepthRange range = depth_range(*box, camera, glm::mat4(1.0F));
   if (!(range.furthest > 0) || !std::isfinite(range.furthest)) return;  // nothing is before the camera
   if (!zfar_) camera.zfar = 2 * power_of_two_below((1 + k_rounding) * range.furthest);
   if (!znear_) {

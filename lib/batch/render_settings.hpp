@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "dpr/scene.hpp"
 #include "dpr/smoothing_options.hpp"
 #include "dpr/texture.hpp"
+#include "renderer/depth_range.hpp"
 #include "smoothing/option_fields.hpp"
 
 namespace dpr::batch {
@@ -38,10 +38,12 @@ class RenderSettings {
   /// One of each texture, or of all; none: those of a Texture.
   const std::vector<Wrap>& wraps() const { return wraps_; }
   const std::vector<Filter>& filters() const { return filters_; }
-  /// Sets the camera's planes: as they were set, or else to powers of two around the depths of the points,
-  /// the near one at least 1/1024 of the far one. Small motions leave these alone, so they have no
-  /// derivatives.
-  void set_clipping(Camera& camera, std::span<const glm::vec3> points) const;
+  /// True if both planes were set.
+  bool has_clipping() const { return znear_ && zfar_; }
+  /// Sets the camera's planes: as they were set, or else to powers of two around the depths of a box, if
+  /// there is one, the near one at least 1/1024 of the far one. Small motions leave these alone, so they have
+  /// no derivatives.
+  void set_clipping(Camera& camera, const std::optional<BoxCorners>& box) const;
 
  private:
   int width_, height_;

@@ -26,7 +26,17 @@ void require_own_process() {
                         "the start method \"spawn\", or a parent that renders nothing before it forks");
 }
 
-/// Numbers are yet to come.
+bool has_surface(const Mesh& mesh, const Surface& surface) {
+  const auto has_form = [](const Texture& texture, const TextureForm& form) {
+    return texture.width == form.width && texture.height == form.height && texture.wrap == form.wrap &&
+           texture.filter == form.filter;
+  };
+  return mesh.texcoords.size() == surface.texcoords && mesh.materials.size() == surface.materials &&
+         std::ranges::equal(mesh.textures, surface.textures, has_form) &&
+         mesh.face_texcoords == surface.face_texcoords && mesh.face_textures == surface.face_textures &&
+         mesh.face_materials == surface.face_materials;
+}
+
 void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.texcoords.resize(surface.texcoords);
   mesh.face_texcoords = surface.face_texcoords;
@@ -40,26 +50,25 @@ void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.face_materials = surface.face_materials;
 }
 
-Scene scene_of(const Topology& topology) {
-  Scene scene;
-  scene.width = topology.width;
-  scene.height = topology.height;
-  Mesh mesh;
-  mesh.positions.resize(topology.vertices);
-  mesh.faces = *topology.faces;
-  (topology.face_colors ? mesh.face_colors : mesh.vertex_colors)
-      .resize(topology.face_colors ? mesh.faces.size() : topology.vertices);
-  add_surface(mesh, topology.surface);
-  scene.meshes.push_back({std::move(mesh)});
-  return scene;
-}
-
 }  // namespace
 
-bool Topology::operator==(const Topology& other) const {
-  return vertices == other.vertices && face_colors == other.face_colors && width == other.width &&
-         height == other.height && surface == other.surface &&
-         (faces == other.faces || *faces == *other.faces);
+bool Topology::is_of(const Scene& scene) const {
+  const Mesh& mesh = scene.meshes[0].mesh;
+  return scene.width == width && scene.height == height && mesh.positions.size() == vertices &&
+         mesh.vertex_colors.empty() == face_colors && has_surface(mesh, surface) && holds(faces, mesh.faces);
+}
+
+Scene Topology::scene() const {
+  Scene scene;
+  scene.width = width;
+  scene.height = height;
+  Mesh mesh;
+  mesh.positions.resize(vertices);
+  mesh.faces = read_triples(faces);
+  (face_colors ? mesh.face_colors : mesh.vertex_colors).resize(face_colors ? mesh.faces.size() : vertices);
+  add_surface(mesh, surface);
+  scene.meshes.push_back({std::move(mesh)});
+  return scene;
 }
 
 Device open_device_of_process(const std::string& selector) {
@@ -78,34 +87,35 @@ PooledRenderer RendererPool::take(const Topology& topology) {
   {
     const std::lock_guard lock(mutex_);
     State& state = *state_;
-    const auto found = std::find_if(state.free.rbegin(), state.free.rend(),
-                                    [&](const Free& free) { return free.topology == topology; });
+    const auto found = std::find_if(state.free.rbegin(), state.free.rend(), [&](const PooledRenderer& free) {
+      return topology.is_of(free.renderer.scene());
+    });
     if (found != state.free.rend()) {
-      PooledRenderer renderer = std::move(found->renderer);
+      PooledRenderer renderer = std::move(*found);
       state.free.erase(std::next(found).base());
       state.most_lent = std::max(state.most_lent, ++state.lent);
       return renderer;
     }
   }
   PooledRenderer renderer{Renderer(state_->device)};
-  renderer.renderer.set_scene(scene_of(topology));
+  renderer.renderer.set_scene(topology.scene());
   const std::lock_guard lock(mutex_);
   state_->most_lent = std::max(state_->most_lent, ++state_->lent);
   return renderer;
 }
 
-void RendererPool::put_back(PooledRenderer renderer, Topology topology) {
-  std::list<Free> dropped;  // which outlives the lock: releasing buffers takes its time
+void RendererPool::put_back(PooledRenderer renderer) {
+  std::list<PooledRenderer> dropped;  // which outlives the lock: releasing buffers takes its time
   const std::lock_guard lock(mutex_);
   State& state = *state_;
   --state.lent;
-  state.free.push_back({std::move(renderer), std::move(topology)});
+  state.free.push_back(std::move(renderer));
   if (state.free.size() > state.most_lent) dropped.splice(dropped.end(), state.free, state.free.begin());
 }
 
 void RendererPool::clear() {
   require_own_process();
-  std::list<Free> dropped;
+  std::list<PooledRenderer> dropped;
   const std::lock_guard lock(mutex_);
   dropped.swap(state_->free);
 }
@@ -129,10 +139,8 @@ void RendererPools::clear() {
   }
 }
 
-Frame::Frame(std::shared_ptr<RendererPool> pool, Topology topology)
-    : pool_(std::move(pool)),
-      topology_(std::move(topology)),
-      pooled_(std::make_unique<PooledRenderer>(pool_->take(topology_))) {}
+Frame::Frame(std::shared_ptr<RendererPool> pool, const Topology& topology)
+    : pool_(std::move(pool)), pooled_(std::make_unique<PooledRenderer>(pool_->take(topology))) {}
 
 Frame::~Frame() {
   if (is_forked()) {
@@ -140,7 +148,7 @@ Frame::~Frame() {
     return;
   }
   try {
-    pool_->put_back(std::move(*pooled_), std::move(topology_));
+    pool_->put_back(std::move(*pooled_));
   } catch (...) {
     // Without memory to keep the renderer it is let go.
   }

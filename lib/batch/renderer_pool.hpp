@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "batch/named_arrays.hpp"
 #include "dpr/attribute_images.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/texture.hpp"
@@ -34,19 +35,21 @@ struct Surface {
   Faces face_texcoords;
   std::vector<TextureForm> textures;
   std::vector<std::uint32_t> face_textures, face_materials;
-
-  bool operator==(const Surface&) const = default;
 };
 
-/// Contents of the device that a renderer keeps from one batch to the next.
+/// Contents of the device that a renderer keeps from one batch to the next. Valid as long as the caller's
+/// array of faces is.
 struct Topology {
-  std::shared_ptr<const Faces> faces;
+  NamedArray faces;
   std::size_t vertices = 0;
   bool face_colors = false;
   int width = 0, height = 0;
   Surface surface;
 
-  bool operator==(const Topology& other) const;
+  /// True if a scene that was made by scene() is of this topology. Copies nothing.
+  bool is_of(const Scene& scene) const;
+  /// Numbers are yet to come. Throws InvalidArgument for what is no index.
+  Scene scene() const;
 };
 
 /// Opens a device, as dpr::open_device(). OpenCL does not survive fork(): in a process that was forked from
@@ -69,21 +72,17 @@ class RendererPool {
   RendererPool& operator=(const RendererPool&) = delete;
 
   PooledRenderer take(const Topology& topology);
-  void put_back(PooledRenderer renderer, Topology topology);
+  void put_back(PooledRenderer renderer);
   /// Forgets the renderers that are kept, with what they hold on the device.
   void clear();
 
  private:
   static constexpr std::size_t k_least = 8;
 
-  struct Free {
-    PooledRenderer renderer;
-    Topology topology;
-  };
   struct State {
     explicit State(Device device_) : device(std::move(device_)) {}
     Device device;
-    std::list<Free> free;  // the last one was given back last
+    std::list<PooledRenderer> free;  // the last one was given back last
     std::size_t lent = 0, most_lent = k_least;
   };
 
@@ -111,7 +110,7 @@ class RendererPools {
 /// back.
 class Frame {
  public:
-  Frame(std::shared_ptr<RendererPool> pool, Topology topology);
+  Frame(std::shared_ptr<RendererPool> pool, const Topology& topology);
   ~Frame();
   Frame(const Frame&) = delete;
   Frame& operator=(const Frame&) = delete;
@@ -123,7 +122,6 @@ class Frame {
 
  private:
   std::shared_ptr<RendererPool> pool_;
-  Topology topology_;
   std::unique_ptr<PooledRenderer> pooled_;
 };
 

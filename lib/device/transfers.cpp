@@ -37,6 +37,8 @@ void Device::Impl::read(const cl::Buffer& buffer, std::size_t first, std::span<s
   bytes_from_device += bytes.size();
   check_cl(queue.enqueueReadBuffer(buffer, CL_TRUE, first, bytes.size(), bytes.data()),
            "clEnqueueReadBuffer");
+  const std::scoped_lock lock(writes_mutex_);
+  std::erase_if(writes_, [](const PendingWrite& write) { return write.has_run(); });
 }
 
 PendingReads::~PendingReads() {

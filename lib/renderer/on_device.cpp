@@ -101,9 +101,9 @@ BufferRef<cl_float4> gradient_of_images(Renderer::Impl& m, const FloatVectors& f
   const bool is_packed = from.first == 0 && from.stride == k_pixel;
   if (is_packed && !(m.pixel_noise && m.pixel_noise->blur.loads_behind_images()))
     return BufferRef<cl_float4>(from.buffer);
-  m.host_grad_images.resize(impl_of(m.device), count);
-  m.made_exchange().give(from, count, vectors_of(m.host_grad_images, 0, k_pixel));
-  return m.host_grad_images;
+  const Buffer<cl_float4>& room = m.room_for_grad_images(count);
+  m.made_exchange().give(from, count, vectors_of(room, 0, k_pixel));
+  return room;
 }
 
 void backward_on_device(Renderer& renderer, const BufferSpan& grad_images, const Events& events) {

@@ -73,14 +73,15 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
     if (!sampled && !blur_holds_image_) blur.forward(size, raster, image);
     blur_holds_image_ = true;
   }
-  raster_is_gradient_ = is_whole && !sampled && !blur.scale_reads_raster();
+  raster_is_gradient_ = is_whole && !sampled && !(by_scale && blur.scale_reads_raster());
   Buffer<cl_float4>& grad_raster = raster_is_gradient_ ? raster : grad_raster_;
   if (sampled) {
     sampled->backward(grad_image, grad_raster);
     if (by_scale) sampled->backward_scale(raster, grad_image);
   } else {
-    blur.backward(size, grad_image, grad_raster);
+    blur.backward(size, grad_image, grad_raster, by_scale);
     if (by_scale) blur.backward_scale(size, raster, grad_image);
+    blur_holds_image_ = by_scale;
   }
   antialias.backward(in, contour, kept_, grad_raster);
 }

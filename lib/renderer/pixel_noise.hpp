@@ -47,12 +47,14 @@ class PixelNoise {
   void unblend() { is_blended_ = raster_is_gradient_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale. `is_whole`: the raster is not
   /// rendered again, by bands, before the gradient is read. That takes its place then, unless the scale's
-  /// gradient is found by the raster itself.
+  /// gradient is asked for and found by the raster itself.
   void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                 const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole);
-  /// True if backward() lacks the raster, whose place a gradient has taken: other samples have been smoothed
-  /// since, and the blur no longer holds what it kept of the raster.
-  bool lacks_raster(bool by_scale) const { return by_scale && raster_is_gradient_ && !blur_holds_image_; }
+  /// True if backward() lacks the raster, whose place a gradient has taken, and the blur does not hold all
+  /// that the scale's gradient needs of it.
+  bool lacks_raster(bool by_scale) const {
+    return by_scale && raster_is_gradient_ && (blur.scale_reads_raster() || !blur_holds_image_);
+  }
 
   /// Samples other than those of forward() the same way, to [view][height][width].
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,

@@ -277,6 +277,12 @@ void Renderer::Impl::shade_and_aggregate() {
   pixel_noise->unblend();
 }
 
+Buffer<cl_float4>& Renderer::Impl::room_for_grad_images(std::size_t pixels) {
+  if (pixel_noise) return pixel_noise->antialias.scratch(frame, pixels);
+  grad_images_.resize(impl_of(device), pixels);
+  return grad_images_;
+}
+
 SceneGradient Renderer::Impl::backward(const BufferRef<cl_float4>& grad_images,
                                        const AddToGradient& add_to_positions) {
   enqueue_backward(grad_images, add_to_positions);
@@ -341,7 +347,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
 void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
-  aggregate.backward(aggregate_inputs(), scene.background, grad_images);
+  aggregate.backward(aggregate_inputs(), scene.background, grad_images, sums_pixels());
   // Distances without noise have no gradient, and rasterization does not read one.
   if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise) {
     occupancy.backward(frame, bin, rasterize);
@@ -371,7 +377,7 @@ std::size_t Renderer::Impl::bytes() const {
          (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + (aov ? aov->bytes() : 0) +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + host_grad_images.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + grad_images_.capacity_bytes() +
          grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
          grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +

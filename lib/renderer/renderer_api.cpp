@@ -100,14 +100,43 @@ void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
   read_image(m, 0, pixels);
 }
 
+namespace {
+
+/// A write that reads the host's own memory, which it waits for as it is destroyed.
+class LentWrite {
+ public:
+  LentWrite(Device::Impl& device, const cl::Buffer& buffer, std::span<const std::byte> bytes)
+      : device_(device) {
+    check_cl(device.queue.enqueueWriteBuffer(buffer, CL_FALSE, 0, bytes.size(), bytes.data(), nullptr, &run_),
+             "clEnqueueWriteBuffer");
+    device.bytes_to_device += bytes.size();
+  }
+  ~LentWrite() {
+    if (run_.wait() != CL_SUCCESS) device_.queue.finish();
+  }
+  LentWrite(const LentWrite&) = delete;
+  LentWrite& operator=(const LentWrite&) = delete;
+
+ private:
+  Device::Impl& device_;
+  cl::Event run_;
+};
+
+/// Of the gradient of all pixels, which is not copied: the host waits for what comes of it anyway.
+SceneGradient backward_from(Renderer::Impl& m, std::span<const std::byte> grad_pixels) {
+  const Buffer<cl_float4>& room = m.room_for_grad_images(m.image().size());
+  const LentWrite write(impl_of(m.device), room.cl_buffer(), grad_pixels);
+  return m.backward(room);
+}
+
+}  // namespace
+
 SceneGradient Renderer::backward_pixels(std::span<const glm::vec4> grad_pixels) {
   Impl& m = *impl_;
   m.require_forward("Renderer::backward_pixels");
   require_pixel_count(grad_pixels.size(), m.image().size());
   checks::require_finite(grad_pixels, "grad_pixels");
-  m.host_grad_images.resize(impl_of(m.device), grad_pixels.size());
-  impl_of(m.device).write(m.host_grad_images.cl_buffer(), 0, std::as_bytes(grad_pixels));
-  return m.backward(m.host_grad_images);
+  return backward_from(m, std::as_bytes(grad_pixels));
 }
 
 SceneGradient Renderer::backward(std::span<const Image> grad_images) {
@@ -117,8 +146,8 @@ SceneGradient Renderer::backward(std::span<const Image> grad_images) {
     throw InvalidArgument("grad_images", std::to_string(grad_images.size()) + " images",
                           "one for each of the " + std::to_string(m.views.size()) + " views");
   }
-  m.host_grad_images.upload(impl_of(m.device), checked_pixels(grad_images, m.scene.width, m.scene.height));
-  return m.backward(m.host_grad_images);
+  const std::vector<cl_float4> pixels = checked_pixels(grad_images, m.scene.width, m.scene.height);
+  return backward_from(m, std::as_bytes(std::span(pixels)));
 }
 
 RenderStatistics Renderer::statistics() const {

@@ -248,8 +248,7 @@ void Renderer::Impl::sum_gradients() {
           : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma, pairs};
   std::vector<std::pair<SumOf, Summation>> all{
       {SumOf::pixels,
-       {pixels, channels(wanted.smoothing || wanted.background, aggregate.channel_count()), 1, 1, all_pixels,
-        aggregate.channels}},
+       {pixels, channels(sums_pixels(), aggregate.channel_count()), 1, 1, all_pixels, aggregate.channels}},
       {SumOf::sigma, sigma},
       {SumOf::poses,
        {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),

@@ -174,7 +174,6 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::shared_ptr<CornerTexcoords> corner_texcoords;  // of the scene, made when first asked for
   Buffer<cl_float4> aov_surface, aov_coverage;        // of noise on the pixel: Auxiliary::weigh(), as pixels
 
-  Buffer<cl_float4> host_grad_images;       // where gradients that come from the host go
   Buffer<cl_float4> grad_vertices;          // [view][vertex] by NDC, then by world position; see spare_for()
   Buffer<cl_float4> grad_lit;               // [view][vertex] what shading adds to those by world position
   Buffer<cl_float4> grad_colors;            // [color]
@@ -185,6 +184,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::uint64_t device_gradient_frame = 0;  // the frame of backward_on_device()
   std::optional<GradientMap> gradient_map;  // of the scene and views as they are
 
+  /// Memory for the gradient of the last frame's images, until the next backward pass, which uses it again.
+  Buffer<cl_float4>& room_for_grad_images(std::size_t pixels);
   Exchange& made_exchange();
   /// The gradient of zero sums: all arrays of the last backward pass but those of vertices, colours, texels.
   SceneGradient empty_gradient() const;
@@ -206,6 +207,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   ShadeInputs shade_inputs() {
     return {frame, device_views, *geometry, transform, setup.triangles, clip.faces, bin, rasterize};
   }
+  /// True if gradients are asked for to which every pixel adds its share.
+  bool sums_pixels() const { return scene.gradients.smoothing || scene.gradients.background; }
   ContourInputs contour_inputs() const;
   Blur::Size image_size() const;
   AggregateInputs aggregate_inputs() { return {frame, device_views, bin, rasterize}; }
@@ -240,7 +243,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void join_material_gradients();
 
   std::size_t found_emptied_ = 0;
-  Buffer<float> hidden_;  // [view][mesh] BackFaces::hidden()
+  Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
+  Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;
 
   Buffer<float> gradient_sums_;  // of sum_gradients()

@@ -37,11 +37,11 @@ void check_scenes(std::span<const Scene> scenes) {
 }
 
 /// Enqueues a copy of as many pixels as `to` has, from `first` on.
-void copy_part(Device::Impl& device, const BufferRef<cl_float4>& from, std::size_t first,
+void copy_part(Device::Impl& device, const BufferRef<cl_float4>& from, std::size_t first, std::size_t count,
                const Buffer<cl_float4>& to) {
   constexpr std::size_t k_bytes = sizeof(cl_float4);
   check_cl(device.queue.enqueueCopyBuffer(cl::Buffer(from.handle(), /*retain*/ true), to.cl_buffer(),
-                                          first * k_bytes, 0, to.size() * k_bytes),
+                                          first * k_bytes, 0, count * k_bytes),
            "clEnqueueCopyBuffer");
 }
 
@@ -98,10 +98,9 @@ std::vector<SceneGradient> SceneBatch::Impl::backward(const BufferRef<cl_float4>
   for (std::size_t i = 0; i < renderers.size(); ++i) {
     Renderer::Impl& scene = impl_of(renderers[i]);
     const std::size_t pixels = scene.image().size();
-    scene.host_grad_images.resize(impl_of(device), pixels);
-    copy_part(impl_of(device), grad_images, first, scene.host_grad_images);
-    scene.enqueue_backward(scene.host_grad_images,
-                           add_to_positions.empty() ? AddToGradient() : add_to_positions[i]);
+    const Buffer<cl_float4>& room = scene.room_for_grad_images(pixels);
+    copy_part(impl_of(device), grad_images, first, pixels, room);
+    scene.enqueue_backward(room, add_to_positions.empty() ? AddToGradient() : add_to_positions[i]);
     first += pixels;
   }
   std::vector<SceneGradient> gradients;

@@ -30,7 +30,8 @@ Aggregate::Setting Aggregate::prepare(const Smoothing& smoothing) const {
   });
 }
 
-shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background) const {
+shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const glm::vec3& background,
+                                          bool with_channels) const {
   shared::AggregateParams a{};
   a.background = to_cl(background);
   a.sigma = now_.smoothing.sigma;
@@ -42,7 +43,7 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   a.pixels = p.views * a.pixels_per_view;
   a.faces = p.faces;
   a.first_view = p.first_view;
-  a.channels = to_uint(channel_count());
+  a.channels = with_channels ? to_uint(channel_count()) : 0;
   a.fragments = p.fragments;
   a.grad_fragments = p.grad_fragments;
   return a;
@@ -64,9 +65,9 @@ struct AggregateArguments {
 /// Launches the kernels in force by runs of the band's pixels.
 template <class Barrier, class Joint, class Sampled, class JointSampled>
 void Aggregate::launch(const AggregateInputs& in, const glm::vec3& background,
-                       const BufferRef<cl_float4>& grad_image) {
+                       const BufferRef<cl_float4>& grad_image, bool with_channels) {
   Rasterize& r = in.rasterize;
-  AggregateArguments all{.p = params(in.p, background),
+  AggregateArguments all{.p = params(in.p, background, with_channels),
                          .views = in.views.cameras,
                          .starts = r.pixel_starts,
                          .list = r.list,
@@ -99,17 +100,17 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
     slot_counts_.resize(device_, pixels);
   }
   launch<kernel::aggregate_forward, kernel::aggregate_joint_forward, kernel::aggregate_sampled_forward,
-         kernel::aggregate_joint_sampled_forward>(in, background, BufferRef<cl_float4>(nullptr));
+         kernel::aggregate_joint_sampled_forward>(in, background, BufferRef<cl_float4>(nullptr), false);
 }
 
 void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
-                         const BufferRef<cl_float4>& grad_image) {
+                         const BufferRef<cl_float4>& grad_image, bool with_channels) {
   const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
   in.rasterize.start_gradients(in.p);
-  channels.resize(device_, channel_count() * pixels);
+  channels.resize(device_, with_channels ? channel_count() * pixels : 1);  // an argument all the same
   if (perturbs_distances()) grad_sigma.resize(device_, pixels);
   launch<kernel::aggregate_backward, kernel::aggregate_joint_backward, kernel::aggregate_sampled_backward,
-         kernel::aggregate_joint_sampled_backward>(in, background, grad_image);
+         kernel::aggregate_joint_sampled_backward>(in, background, grad_image, with_channels);
 }
 
 std::size_t Aggregate::bytes() const {

@@ -48,9 +48,10 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   /// Sorts the lists by depth for the joint composition; leaves the slots that backward() goes over.
   void forward(const AggregateInputs& in, const glm::vec3& background);
-  /// `grad_image` is [view][height][width]. The gradients of fragments that no pixel lists are not written.
+  /// `grad_image` is [view][height][width]. The gradients of fragments that no pixel lists are not written, nor
+  /// are `channels` unless they are asked for.
   void backward(const AggregateInputs& in, const glm::vec3& background,
-                const BufferRef<cl_float4>& grad_image);
+                const BufferRef<cl_float4>& grad_image, bool with_channels = true);
 
   /// Number of `channels`: the joint composition has none of alpha.
   std::size_t channel_count() const {
@@ -72,8 +73,10 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
  private:
   template <class Barrier, class Joint, class Sampled, class JointSampled>
-  void launch(const AggregateInputs& in, const glm::vec3& background, const BufferRef<cl_float4>& grad_image);
-  shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background) const;
+  void launch(const AggregateInputs& in, const glm::vec3& background, const BufferRef<cl_float4>& grad_image,
+              bool with_channels);
+  shared::AggregateParams params(const shared::FrameParams& p, const glm::vec3& background,
+                                 bool with_channels) const;
 
   Buffer<shared::Slot> slots_;   // [fragment], and in the barrier composition [pixel] more
   Buffer<cl_uint> slot_counts_;  // [pixel]

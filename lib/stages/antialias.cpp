@@ -1,5 +1,7 @@
 #include "stages/antialias.hpp"
 
+#include <algorithm>
+
 namespace dpr {
 namespace {
 
@@ -96,6 +98,11 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
                                                  .cut = cut,
                                                  .raster = kept.faded,
                                                  .blended = samples});
+}
+
+Buffer<cl_float4>& Antialias::scratch(const shared::FrameParams& p, std::size_t count) {
+  kept_grad_.resize(device_, std::max(samples_of(p), count));
+  return kept_grad_;
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,

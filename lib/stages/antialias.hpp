@@ -38,6 +38,8 @@ class Antialias {
   /// as forward() leaves it.
   void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                 Buffer<cl_float4>& grad);
+  /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
+  Buffer<cl_float4>& scratch(const shared::FrameParams& p, std::size_t count);
 
   Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is; only near
                                   ///< contours
@@ -61,7 +63,7 @@ class Antialias {
   Buffer<cl_uchar> crowded_;        // [tile][DPR_TILE_BYTES]
   Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
   Buffer<cl_float2> grad_seconds_;  // as `seconds`
-  Buffer<cl_float4> kept_grad_;     // [view][height][width] near contours
+  Buffer<cl_float4> kept_grad_;     // [view][height][width] near contours; see scratch()
 };
 
 }  // namespace dpr

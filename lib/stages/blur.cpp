@@ -184,19 +184,22 @@ void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_
   }
 }
 
-void Blur::backward(const Size& size, const BufferRef<cl_float4>& grad_image,
-                    Buffer<cl_float4>& grad_raster) {
+void Blur::backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster,
+                    bool keeps_forward) {
   const Axis x = axis(size.width), y = axis(size.height);
+  Buffer<cl_float4>& grad_in = keeps_forward ? grad_in_ : in_;
+  Buffer<cl_float4>& grad_between = keeps_forward ? grad_between_ : between_;
+  Buffer<cl_float4>& grad_out = keeps_forward ? grad_out_ : out_;
   if (is_coarse()) {
     columns(transposed(expansion(y)), size.views, x.pixels, now_.expand, grad_image, scratch_);
-    rows(transposed(expansion(x)), size.views * y.out, now_.expand, scratch_, grad_out_);
+    rows(transposed(expansion(x)), size.views * y.out, now_.expand, scratch_, grad_out);
   }
-  rows(transposed(convolution(x)), size.views * y.out, now_.weights, is_coarse() ? grad_out_ : grad_image,
-       grad_between_);
-  columns(transposed(convolution(y)), size.views, x.in, now_.weights, grad_between_,
-          is_coarse() ? grad_in_ : grad_raster);
+  rows(transposed(convolution(x)), size.views * y.out, now_.weights, is_coarse() ? grad_out : grad_image,
+       grad_between);
+  columns(transposed(convolution(y)), size.views, x.in, now_.weights, grad_between,
+          is_coarse() ? grad_in : grad_raster);
   if (is_coarse()) {
-    rows(transposed(reduction(x)), size.views * y.in, now_.reduce, grad_in_, scratch_);
+    rows(transposed(reduction(x)), size.views * y.in, now_.reduce, grad_in, scratch_);
     columns(transposed(reduction(y)), size.views, x.samples, now_.reduce, scratch_, grad_raster);
   }
 }

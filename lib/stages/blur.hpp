@@ -33,10 +33,12 @@ class Blur {
   void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
-  /// The transpose of forward().
-  void backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster);
+  /// The transpose of forward(). Takes the memory of what forward() has left for backward_scale(), unless that
+  /// is kept.
+  void backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster,
+                bool keeps_forward);
   /// The derivative by the scale of sum grad_image . image, in `grad_scale`. After forward() and backward()
-  /// of the same raster and gradient.
+  /// of the same raster and gradient, which has kept what forward() left.
   void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                       const BufferRef<cl_float4>& grad_image);
 

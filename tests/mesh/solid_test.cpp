@@ -69,6 +69,12 @@ TEST_SUITE("unit") {
     CHECK(winding_of(joined(ball, ball, {3, 0, 0})) == 1);
     CHECK(winding_of(joined(ball, inside_out(ball), {3, 0, 0})) == 0);
     CHECK(winding_of(joined(inside_out(ball), inside_out(ball), {3, 0, 0})) == -1);
+    for (const Mesh& other : {ball, inside_out(ball)}) {
+      Mesh both = joined(ball, other, {3, 0, 0}), mixed = both;
+      const std::size_t half = both.faces.size() / 2;  // faces of the parts by turns
+      for (std::size_t i = 0; i < both.faces.size(); ++i) mixed.faces[i] = both.faces[i % 2 * half + i / 2];
+      CHECK(winding_of(mixed) == winding_of(both));
+    }
   }
 
   TEST_CASE("solid: positions that are not finite have none") {

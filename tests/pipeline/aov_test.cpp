@@ -15,6 +15,7 @@
 #include "pipeline/scenes.hpp"
 #include "reference/aggregate.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "scene/gradient_table.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
@@ -236,6 +237,36 @@ TEST_SUITE("pipeline") {
           &impl_of(renderer).aggregate.image);
     static_cast<void>(auxiliary_outputs(renderer));
     CHECK(same_bits(first, renderer.backward(grads)));
+  }
+
+  TEST_CASE("aov: of noise on the pixel, gradients without the scale's take less memory, and change none") {
+    for (const float sigma : {1e-3F, 0.1F}) {  // by the raster itself, and by a coarse grid
+      Scene scene = two_meshes(32, 32);
+      scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
+      scene.smoothing.sigma = sigma;
+      const std::vector<Image> grads(1, random_image(scene.width, scene.height, -1.0F, 1.0F));
+      Renderer whole(open_device());
+      whole.set_scene(scene);
+      whole.forward();
+      const SceneGradient expected = whole.backward(grads);
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      renderer.forward();
+      GradientRequest shape = no_gradients();
+      shape.positions = shape.colors = true;
+      renderer.set_gradients(shape);
+      const SceneGradient first = renderer.backward(grads), second = renderer.backward(grads);
+      CHECK(first.meshes[0].positions == expected.meshes[0].positions);
+      CHECK(first.meshes[0].colors == expected.meshes[0].colors);
+      CHECK(same_bits(first, second));
+      const auto& p = impl_of(renderer).frame;
+      // Four sums of each sample, and where the raster is read its gradient beside it.
+      const std::size_t of_samples = std::size_t{p.width} * p.height * sizeof(cl_float4);
+      const std::size_t spared = impl_of(renderer).pixel_noise->blur.scale_reads_raster() ? 2 : 1;
+      CHECK(renderer.statistics().device_bytes + spared * of_samples < whole.statistics().device_bytes);
+      renderer.set_gradients(scene.gradients);
+      CHECK(same_bits(expected, renderer.backward(grads)));
+    }
   }
 
   TEST_CASE("aov: frames in bands show the same") {

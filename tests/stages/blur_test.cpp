@@ -80,10 +80,10 @@ struct Run {
     blur.forward(size, raster_buffer, image_buffer);
     return image_buffer.download();
   }
-  Pixels backward() {
+  Pixels backward(bool keeps_forward = true) {
     grad_buffer.upload(device, grad_image);
     poison(raster.size(), grad_raster_buffer);
-    blur.backward(size, grad_buffer, grad_raster_buffer);
+    blur.backward(size, grad_buffer, grad_raster_buffer, keeps_forward);
     return grad_raster_buffer.download();
   }
   std::vector<float> backward_scale() {
@@ -353,9 +353,11 @@ TEST_SUITE("gradient") {
   TEST_CASE("backward is the transpose of forward") {
     for (const Case& c : cases()) {
       Run run(c);
-      const double there = inner(run.forward(), run.grad_image), back = inner(run.raster, run.backward());
+      const double there = inner(run.forward(), run.grad_image);
+      const Pixels back = run.backward();
       CAPTURE(text(c));
-      CHECK(back == doctest::Approx(there).epsilon(1e-6));
+      CHECK(inner(run.raster, back) == doctest::Approx(there).epsilon(1e-6));
+      CHECK(same_bits(back, run.backward(/*keeps_forward*/ false)));
     }
   }
 
