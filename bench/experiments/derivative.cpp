@@ -83,7 +83,6 @@ Scene make_scene(int side) {
   scene.width = scene.height = side;
   scene.background = glm::vec3(1);
   Mesh mesh = read_mesh(folder / "spot_control_mesh.obj");
-  mesh.textures = {read_texture(folder / "spot_texture.png")};
   mesh.textures[0].filter = Filter::trilinear;
   for (std::size_t i = 0; i < k_subdivisions; ++i) mesh = subdivided_smoothly(mesh);
   const glm::vec3 middle = center(bounding_box(mesh.positions));

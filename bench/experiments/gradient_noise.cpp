@@ -91,7 +91,7 @@ void run_gradient_noise(const Settings& settings) {
   for (unsigned m = 4; m <= (settings.smoke ? 16U : 512U); m *= 2) samples.push_back(m);
   Json operators = Json::array();
   std::string script = "set multiplot layout 2,2\nset grid\nset key outside right font ',9'\n";
-  cli::Progress progress(static_cast<unsigned>(std::size(k_operators)), settings.quiet);
+  cli::Progress progress(static_cast<unsigned>(std::size(k_operators)), settings.quiet, "operator");
   for (const Operator& op : k_operators) {
     operators.push_back(run_operator(settings, op, samples, repeats));
     script += panels(operators.back(), samples);

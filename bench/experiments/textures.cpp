@@ -29,7 +29,6 @@ Scene make_scene(bool smoke) {
   Mesh& mesh = scene.meshes[0].mesh;
   const glm::vec3 middle = center(bounding_box(mesh.positions));
   for (glm::vec3& p : mesh.positions) p -= middle;
-  mesh.textures = {read_texture(folder / "spot_texture.png")};
   mesh.textures[0].filter = Filter::trilinear;
   PointLight light;
   light.position = {2, 4, 5};

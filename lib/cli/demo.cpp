@@ -9,6 +9,7 @@
 #include "cli/fit_report.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"
+#include "cli/scene_file.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
 
@@ -64,26 +65,10 @@ glm::dvec3 random_axis(std::uint64_t seed) {
   }
 }
 
-Json camera_to_json(const Camera& camera) {
-  return {{"view", rows_to_json(glm::dmat4(camera.view))},
-          {"fov_y_degrees", number(camera.fov_y_degrees)},
-          {"znear", number(camera.znear)},
-          {"zfar", number(camera.zfar)}};
-}
-
-/// A scene file of the demo's scene, with the cube in a pose.
-Json scene_to_json(const Scene& scene, const Pose& pose) {
-  const PointLight& light = scene.lights->point.front();
-  const auto vector = [](glm::vec3 v) { return Json::array({number(v.x), number(v.y), number(v.z)}); };
-  const glm::dmat4 transform(affine(pose.rotation, pose.translation));
-  return {{"width", scene.width},
-          {"height", scene.height},
-          {"camera", camera_to_json(scene.camera)},
-          {"meshes", Json::array({{{"file", "cube.obj"}, {"transform", rows_to_json(transform)}}})},
-          {"lights",
-           {{"point", Json::array({{{"position", vector(light.position)},
-                                    {"diffuse", vector(light.diffuse)},
-                                    {"specular", vector(light.specular)}}})}}}};
+/// A scene file of the demo's scene, with the cube in a pose. It leaves the smoothing to the commands.
+Json scene_to_json(Scene scene, const Pose& pose) {
+  scene.meshes.front().transform = affine(pose.rotation, pose.translation);
+  return scene_without_smoothing(scene, {"cube.obj"});
 }
 
 /// Two rings of cameras about the cube, one above it and one below.
@@ -110,7 +95,7 @@ void write_views(const std::filesystem::path& folder, const Device& device, cons
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const std::string file = "views/" + std::to_string(i) + ".exr";
     write_image(folder / file, images[i]);
-    views.push_back({{"image", file}, {"camera", camera_to_json(cameras[i])}});
+    views.push_back({{"image", file}, {"camera", camera_with_view(cameras[i])}});
   }
   write_json(folder / "views.json", {{"width", k_size}, {"height", k_size}, {"views", views}});
 }

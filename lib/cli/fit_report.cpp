@@ -10,6 +10,7 @@
 #include "cli/difference.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
+#include "cli/scene_file.hpp"
 #include "cli/text.hpp"
 #include "dpr/aov.hpp"
 #include "dpr/error.hpp"
@@ -75,11 +76,7 @@ bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIter
 /// As scenes and views have them.
 Json cameras_to_json(const ShapeViews& views) {
   Json list = Json::array();
-  for (const ShapeView& view : views.views) {
-    Json camera{{"view", rows_to_json(glm::dmat4(view.camera.view))}};
-    camera.update(camera_to_json(view.camera));
-    list.push_back(camera);
-  }
+  for (const ShapeView& view : views.views) list.push_back(camera_with_view(view.camera));
   return list;
 }
 

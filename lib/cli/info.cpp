@@ -9,6 +9,7 @@
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
 #include "cli/mesh_materials.hpp"
+#include "cli/triangles_in_view.hpp"
 #include "image/texture_words.hpp"
 #include "mesh/bounding_box.hpp"
 #include "mesh/mesh_facts.hpp"
@@ -42,10 +43,6 @@ Json vector_to_json(const glm::vec3& v) { return Json::array({number(v.x), numbe
 
 const char* colors_of(const Mesh& mesh) {
   return !mesh.vertex_colors.empty() ? "vertex" : !mesh.face_colors.empty() ? "face" : "none";
-}
-
-std::string counted(std::size_t count, const char* what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
 /// Notes on a mesh's treatment that its user may not expect.
@@ -90,24 +87,14 @@ Json mesh_to_json(const Mesh& mesh, const std::vector<MeshMaterial>& materials) 
 
 /// Triangles that the camera's clipping planes drop or clip.
 void add_clipping_notes(const Scene& scene, std::size_t entry, Json& notes) {
-  const Mesh& mesh = mesh_of(scene, entry);
-  std::vector<float> depths;
-  for (const glm::vec3& p : mesh.positions)
-    depths.push_back(-(scene.camera.view * scene.meshes[entry].transform * glm::vec4(p, 1)).z);
-  std::size_t near = 0, crossing = 0, far = 0;
-  for (const glm::uvec3& face : mesh.faces) {
-    const auto [low, high] = std::minmax({depths[face.x], depths[face.y], depths[face.z]});
-    if (high < scene.camera.znear) {
-      ++near;
-    } else if (low < scene.camera.znear) {
-      ++crossing;
-    } else if (low > scene.camera.zfar) {
-      ++far;
-    }
-  }
-  if (near > 0) notes.push_back(counted(near, "triangle") + " nearer than znear: dropped when rendered");
-  if (crossing > 0) notes.push_back(counted(crossing, "triangle") + " clipped at znear");
-  if (far > 0) notes.push_back(counted(far, "triangle") + " beyond zfar: dropped when rendered");
+  const TrianglesInView counts = triangles_in_view(scene, entry);
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count > 0) notes.push_back(counted(count, "triangle") + what);
+  };
+  add(counts.near, " nearer than znear: dropped when rendered");
+  add(counts.clipped, " clipped at znear");
+  add(counts.far, " beyond zfar: dropped when rendered");
+  add(counts.outside, " outside the image");
 }
 
 Json smoothing_to_json(const Smoothing& s) {

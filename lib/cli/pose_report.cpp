@@ -168,7 +168,7 @@ std::span<const std::string_view> light_names() {
 std::string name_of(PoseLight light) { return std::string(light_names()[static_cast<std::size_t>(light)]); }
 
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
-  const auto progress = std::make_shared<Progress>(iterations, quiet);
+  const auto progress = std::make_shared<Progress>(iterations, quiet, "step", "of at most");
   return [progress, iterations](const PoseIteration& step) {
     const std::string restart = step.descent > 0 ? format("restart %u  ", step.descent) : "";
     progress->update(step.iteration % iterations + 1,

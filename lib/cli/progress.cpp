@@ -5,11 +5,16 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 namespace dpr::cli {
 
-Progress::Progress(unsigned total, bool quiet)
-    : total_(total), quiet_(quiet), is_terminal_(isatty(STDOUT_FILENO) != 0) {}
+Progress::Progress(unsigned total, bool quiet, std::string unit, std::string of)
+    : total_(total),
+      unit_(std::move(unit)),
+      of_(std::move(of)),
+      quiet_(quiet),
+      is_terminal_(isatty(STDOUT_FILENO) != 0) {}
 
 Progress::~Progress() {
   if (line_is_open_) std::printf("\n");
@@ -30,8 +35,8 @@ void Progress::update(unsigned done, double share, const std::string& text) {
       first_time_ = Clock::now();
     }
     last_share_ = share;
-    std::printf("%s[%-30s] %u/%u  %s%s", k_erase_line, bar.c_str(), done, total_, time_left(share).c_str(),
-                text.c_str());
+    std::printf("%s[%-30s] %s  %s%s", k_erase_line, bar.c_str(), count_text(done).c_str(),
+                time_left(share).c_str(), text.c_str());
     line_is_open_ = true;
     std::fflush(stdout);
     return;
@@ -39,14 +44,20 @@ void Progress::update(unsigned done, double share, const std::string& text) {
   const auto tenths = static_cast<unsigned>(10 * share);
   if (tenths == printed_tenths_) return;
   printed_tenths_ = tenths;
-  std::printf("%u/%u  %s\n", done, total_, text.c_str());
+  std::printf("%s  %s\n", count_text(done).c_str(), text.c_str());
   std::fflush(stdout);
+}
+
+std::string Progress::count_text(unsigned done) const {
+  return unit_ + " " + std::to_string(done) + " " + of_ + " " + std::to_string(total_);
 }
 
 std::string Progress::time_left(double share) const {
   const double seconds = std::chrono::duration<double>(Clock::now() - first_time_).count();
   const double since = share - first_share_;
-  return since > 0 ? duration_text(seconds * (1 - share) / since) + " left  " : "";
+  return since > 0
+             ? (of_ == "of" ? "" : "at most ") + duration_text(seconds * (1 - share) / since) + " left  "
+             : "";
 }
 
 std::string duration_text(double seconds) {

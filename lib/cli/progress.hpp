@@ -8,8 +8,9 @@ namespace dpr::cli {
 
 class Progress {
  public:
-  /// `total` units of work. Prints nothing at all if `quiet`.
-  Progress(unsigned total, bool quiet);
+  /// `total` units of work, printed as "step 3 of 9"; `of` is "of at most" where the work may end earlier.
+  /// Prints nothing at all if `quiet`.
+  Progress(unsigned total, bool quiet, std::string unit = "step", std::string of = "of");
   /// Ends the bar's line.
   ~Progress();
   Progress(const Progress&) = delete;
@@ -24,10 +25,13 @@ class Progress {
  private:
   using Clock = std::chrono::steady_clock;
 
+  /// "3 of 9", with the unit.
+  std::string count_text(unsigned done) const;
   /// "12 s left", or nothing while there is nothing to tell it from.
   std::string time_left(double share) const;
 
   unsigned total_;
+  std::string unit_, of_;
   bool quiet_, is_terminal_, line_is_open_ = false;
   unsigned printed_tenths_ = 0;
   /// Share at the update from which time is counted: earlier runs may have done much of the work, and a

@@ -12,7 +12,9 @@
 #include "cli/commands.hpp"
 #include "cli/lens_options.hpp"
 #include "cli/option_names.hpp"
+#include "cli/scene_file.hpp"
 #include "cli/text.hpp"
+#include "cli/triangles_in_view.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -26,7 +28,7 @@ namespace dpr::cli {
 namespace {
 
 struct RenderOptions {
-  std::string mesh, scene, output;
+  std::string mesh, scene, output, saved_scene;
   std::vector<std::string> aovs;
   bool rigid = false;
   std::optional<std::string> cull, shading;
@@ -123,24 +125,38 @@ void set_shading(Scene& scene, const std::string& word) {
   scene.lights->shading = shading;
 }
 
-/// Prints the number of triangles, and of those that were dropped.
+/// Prints the number of triangles, and of those that the camera does not show.
 void print_triangles(const RenderOptions& options, const Scene& scene, const RenderStatistics& statistics) {
   std::size_t faces = 0;
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i) faces += mesh_of(scene, i).faces.size();
-  std::printf("%s: %dx%d, %zu triangles", options.output.c_str(), scene.width, scene.height, faces);
-  if (statistics.faces > faces) std::printf(", cut into %zu for the lens", statistics.faces);
-  if (statistics.faces_dropped > 0) {
-    std::printf(
-        ", of which %zu cannot be seen: the back of a closed mesh, outside the image, nearer than znear, "
-        "beyond zfar, culled, or without area",
-        statistics.faces_dropped);
+  TrianglesInView sum;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    faces += mesh_of(scene, i).faces.size();
+    const TrianglesInView counts = triangles_in_view(scene, i);
+    sum.without_area += counts.without_area;
+    sum.near += counts.near;
+    sum.far += counts.far;
+    sum.outside += counts.outside;
   }
+  std::printf("%s: %dx%d, %s", options.output.c_str(), scene.width, scene.height,
+              counted(faces, "triangle").c_str());
+  if (statistics.faces > faces) std::printf(", cut into %zu for the lens", statistics.faces);
+  const char* separator = "; not shown: ";
+  const auto print = [&](std::size_t count, const char* why) {
+    if (count == 0) return;
+    std::printf("%s%zu %s", separator, count, why);
+    separator = ", ";
+  };
+  print(sum.near, "nearer than znear");
+  print(sum.far, "beyond zfar");
+  print(sum.outside, "outside the image");
+  print(sum.without_area, "without area");
   std::printf("\n");
 }
 
 void run(const CLI::App& command, const RenderOptions& options, CommonOptions& common) {
   require_image_format(options.output);
   require_writable(options.output);
+  if (!options.saved_scene.empty()) require_writable(options.saved_scene);
   if (options.rigid) common.smoothing.preset = "rigid";
   Scene scene =
       options.scene.empty() ? mesh_scene(command, options, common) : read_scene(options.scene, common);
@@ -156,6 +172,7 @@ void run(const CLI::App& command, const RenderOptions& options, CommonOptions& c
   const RenderStatistics statistics = renderer.statistics();  // before there is a file: it may fail
   write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
   const std::vector<std::string> files_beside = aovs.write(renderer, scene, drawn);
+  if (!options.saved_scene.empty()) write_scene(options.saved_scene, scene, {options.mesh});
   if (statistics.fragments == 0) {
     print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
                  "znear and zfar"},
@@ -188,6 +205,11 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
   command->add_option("-o,--output", options->output, "Image to write; .exr keeps float RGBA")
       ->required()
       ->type_name("OUT.png");
+  command
+      ->add_option("--save-scene", options->saved_scene,
+                   "Scene file to write, which shows MESH as the image does: the start for dpr gradient and "
+                   "dpr pose")
+      ->type_name("S.json");
   command->add_flag("--rigid", options->rigid,
                     "The nearest triangle wins, without any smoothing: --preset rigid");
   command
@@ -218,7 +240,7 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
   add_lens_options(*command, options->lens);
   add_common_options(*command, common);
   command->get_option("--rigid")->excludes(command->get_option("--preset"));
-  for (const char* const fitted : {"--elevation", "--azimuth"}) {
+  for (const char* const fitted : {"--elevation", "--azimuth", "--save-scene"}) {
     command->get_option(fitted)->excludes(command->get_option("--scene"));
   }
   command->footer("Example: dpr render bunny.obj -o bunny.png --size 512x512 --rigid");

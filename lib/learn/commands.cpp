@@ -90,7 +90,8 @@ void run_data(DataCommand& command, const CommonOptions& common) {
     std::unique_ptr<Progress> bar;
     learn::generate(open_device(common), command.generate, command.output,
                     [&](std::size_t done, std::size_t all, const std::string& what) {
-                      if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet);
+                      if (!bar)
+                        bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet, "object");
                       bar->update(static_cast<unsigned>(done), what);
                     });
   }
@@ -318,8 +319,8 @@ void run_eval(const EvalCommand& command, const CommonOptions& common) {
     std::unique_ptr<Progress> bar;
     evaluation =
         learn::evaluate(command.checkpoint, dataset, command.views, [&](std::size_t done, std::size_t all) {
-          if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet);
-          bar->update(static_cast<unsigned>(done), "images");
+          if (!bar) bar = std::make_unique<Progress>(static_cast<unsigned>(all), common.quiet, "image");
+          bar->update(static_cast<unsigned>(done), "");
         });
   }
   if (!command.output.empty()) write_json(command.output, evaluation_to_json(evaluation, command));

@@ -28,11 +28,6 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-bool has_area(const Mesh& mesh, const glm::uvec3& face) {
-  const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
-  return glm::cross(b - a, c - a) != glm::dvec3(0);
-}
-
 bool has_three_corners(const glm::uvec3& face) {
   return face.x != face.y && face.y != face.z && face.z != face.x;
 }
@@ -80,6 +75,11 @@ void look_at_vertices(const Sides& sides, std::size_t vertices, MeshFacts& facts
 }
 
 }  // namespace
+
+bool has_area(const Mesh& mesh, const glm::uvec3& face) {
+  const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
+  return glm::cross(b - a, c - a) != glm::dvec3(0);
+}
 
 MeshFacts mesh_facts(const Mesh& mesh) {
   MeshFacts facts;

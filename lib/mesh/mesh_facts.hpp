@@ -25,6 +25,9 @@ struct MeshFacts {
   bool is_oriented() const { return reversed_edges == 0; }
 };
 
+/// False for a face whose area is exactly zero.
+bool has_area(const Mesh& mesh, const glm::uvec3& face);
+
 /// Computes the facts of a valid mesh in O(n log n).
 MeshFacts mesh_facts(const Mesh& mesh);
 

@@ -1,7 +1,6 @@
 // Validity of a scene.
 #include "dpr/scene.hpp"
 
-#include <array>
 #include <string>
 
 #include "base/checks.hpp"
@@ -42,8 +41,7 @@ void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t
 }
 
 Cull parse_cull(std::string_view word, std::string_view where) {
-  constexpr std::array<std::string_view, 3> k_names{"none", "back", "front"};  // in the order of Cull
-  return static_cast<Cull>(position_of(word, k_names, std::string(where)));
+  return static_cast<Cull>(position_of(word, k_culls, std::string(where)));
 }
 
 void validate(const Scene& scene) {

@@ -1,6 +1,7 @@
 // Parts of a scene that files, commands and the C interface read alike.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -14,6 +15,9 @@ namespace dpr {
 /// `source`; says what is wrong with it.
 void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t source,
                     const std::string& argument);
+
+/// Names in files, in the order of Cull.
+inline constexpr std::array<std::string_view, 3> k_culls{"none", "back", "front"};
 
 /// Throws InvalidArgument that says `where` for another word than none, back or front.
 Cull parse_cull(std::string_view word, std::string_view where);

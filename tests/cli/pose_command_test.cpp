@@ -55,10 +55,12 @@ TEST_SUITE("pipeline") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    REQUIRE(run(folder,
-                "pose --scene scene.json --target target.exr --search --translation -o pose.json "
-                "--report report")
-                .status == 0);
+    const Outcome search = run(
+        folder,
+        "pose --scene scene.json --target target.exr --search --translation -o pose.json --report report");
+    REQUIRE(search.status == 0);
+    CHECK(search.out.starts_with("step "));  // the search ends long before the most that it may take
+    CHECK(contains(search.out, " of at most "));
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
     CHECK(pose["translation"].size() == 3);

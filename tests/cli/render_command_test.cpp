@@ -1,8 +1,11 @@
 // dpr render: what it says and refuses before it renders.
 #include <doctest/doctest.h>
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
+#include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"
@@ -59,9 +62,81 @@ TEST_SUITE("pipeline") {
             folder, {"render", name + ".obj", "-o", name + ".png", "--size", "16x16", "--noise", noise});
         CAPTURE(outcome.err);
         CHECK(outcome.status == 0);
-        CHECK(contains(outcome.out, "cannot be seen"));
+        CHECK(contains(outcome.out, "; not shown: "));
+        CHECK(contains(outcome.out, " without area"));
       }
     }
+  }
+
+  TEST_CASE("dpr render: it says which triangles the camera does not show, and not that a mesh has a back") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    folder.write("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const auto printed = [&](std::vector<std::string> arguments) {
+      arguments.insert(arguments.begin(), "render");
+      arguments.insert(arguments.end(), {"-o", "a.png"});
+      return dpr::test::succeed(folder, arguments).out;
+    };
+    CHECK(printed({"cube.ply"}) == "a.png: 256x256, 12 triangles\n");
+    CHECK(printed({"one.obj"}) == "a.png: 256x256, 1 triangle\n");
+    // One triangle in view, one that crosses an edge of the image, and one for each reason.
+    const auto triangles = [](const std::string& camera) {
+      return R"({"width": 20, "height": 10, "camera": {"znear": 1, "zfar": 9)" + camera + R"(}, "meshes": [
+          {"positions": [[0,0,-5],[1,0,-5],[0,1,-5]], "faces": [[0,1,2]]},
+          {"positions": [[0,0,-5],[99,0,-5],[0,1,-5]], "faces": [[0,1,2]]},
+          {"positions": [[0,0,-0.5],[1,0,-0.5],[0,1,0.5]], "faces": [[0,1,2]]},
+          {"positions": [[0,0,-10],[1,0,-10],[0,1,-10]], "faces": [[0,1,2]]},
+          {"positions": [[30,0,-5],[31,0,-5],[30,1,-5]], "faces": [[0,1,2]]},
+          {"positions": [[0,-30,-0.5],[1,-31,-5],[0,-30,-5]], "faces": [[0,1,2]]},
+          {"positions": [[0,0,-5],[1,0,-5],[2,0,-5]], "faces": [[0,1,2]]}]})";
+    };
+    const std::string shown =
+        "7 triangles; not shown: 1 nearer than znear, 1 beyond zfar, 2 outside the image, 1 without area\n";
+    folder.write("perspective.json", triangles(""));
+    CHECK(printed({"--scene", "perspective.json"}) == "a.png: 20x10, " + shown);
+    folder.write("parallel.json", triangles(R"(, "projection": "orthographic", "orthographic_height": 4)"));
+    CHECK(printed({"--scene", "parallel.json"}) == "a.png: 20x10, " + shown);
+    CHECK(contains(dpr::test::succeed(folder, {"info", "perspective.json"}).out,
+                   "1 triangle outside the image"));
+  }
+
+  TEST_CASE("dpr render --save-scene: the scene file shows the same image to the bit") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    std::filesystem::create_directories(folder / "meshes");
+    std::filesystem::create_directories(folder / "scenes");
+    dpr::write_mesh(folder / "meshes/cube.ply", dpr::make_cube());
+    const std::vector<std::vector<std::string>> cases{
+        {},
+        {"--rigid"},
+        {"--azimuth", "200", "--elevation", "-10", "--shading", "flat", "--cull", "back"},
+        {"--sigma", "1e-3", "--composition", "barrier"},
+        {"--preset", "nmr"},
+        {"--preset", "softras", "--blur-radius", "0.02"},
+        {"--preset", "paper_gaussian", "--seed", "7", "--samples", "4"},
+        {"--noise", "pixel", "--supersampling", "2", "--occupancy-prior", "logistic"}};
+    for (const std::vector<std::string>& options : cases) {
+      std::vector<std::string> words{"render",       "meshes/cube.ply",  "-o",
+                                     "mesh.exr",     "--size",           "24x16",
+                                     "--save-scene", "scenes/cube.json", "--quiet"};
+      words.insert(words.end(), options.begin(), options.end());
+      CAPTURE(options.empty() ? "" : options.back());
+      dpr::test::succeed(folder, words);
+      dpr::test::succeed(folder, {"render", "--scene", "scenes/cube.json", "-o", "scene.exr"});
+      CHECK(dpr::read_image(folder / "mesh.exr").pixels == dpr::read_image(folder / "scene.exr").pixels);
+    }
+    CHECK(contains(folder.read("scenes/cube.json"), "\"file\": \"../meshes/cube.ply\""));
+    dpr::test::succeed(folder,
+                       {"gradient", "--scene", "scenes/cube.json", "--target", "mesh.exr", "-o", "g.json"});
+    const auto refused = run_command(
+        folder, {"render", "--scene", "scenes/cube.json", "-o", "a.png", "--save-scene", "b.json"});
+    CHECK(refused.status == 1);
+    CHECK(contains(refused.err, "got both --scene and --save-scene"));
+    const auto lost =
+        run_command(folder, {"render", "meshes/cube.ply", "-o", "a.png", "--save-scene", "no_folder/b.json"});
+    CHECK(lost.status == 1);
+    CHECK_FALSE(std::filesystem::exists(folder / "a.png"));
   }
 
   TEST_CASE("dpr render: --shading replaces the scene's") {

@@ -8,6 +8,7 @@
 #include "dpr/image.hpp"
 #include "dpr/texture.hpp"
 #include "support/command.hpp"
+#include "support/data.hpp"
 #include "support/messages.hpp"
 
 namespace {
@@ -81,6 +82,16 @@ TEST_SUITE("pipeline") {
           json::parse(R"([{"width": 2, "height": 2, "wrap": "repeat", "filter": "bilinear"}])"));
     CHECK(square["materials"] == json::parse(R"([{"name": "paint", "texture": "paint.exr"}])"));
     CHECK(contains(run_command(folder, {"info", "square.obj"}).out, "2x2 repeat bilinear"));
+  }
+
+  TEST_CASE("dpr info: Spot's control mesh has its texture") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    const auto file = dpr::test::data_folder() / "../../bench/data/spot_control_mesh.obj";
+    const auto info = json::parse(dpr::test::succeed(folder, {"info", file.string(), "--json"}).out);
+    REQUIRE(info["textures"].size() == 1);
+    CHECK(info["textures"][0]["width"] == 512);
+    CHECK(info["materials"][0]["texture"] == "spot_texture.png");
   }
 
   TEST_CASE("dpr render: a texture that is no image, or is not there") {

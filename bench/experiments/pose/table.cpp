@@ -162,7 +162,7 @@ Json run_poses(const Device& device, const PoseRun& run, const std::filesystem::
   Json results = head(device, run);
   Json rows = earlier_rows(file, results);
   const auto count = static_cast<unsigned>(run.problems.size());
-  cli::Progress progress(count, run.quiet);
+  cli::Progress progress(count, run.quiet, "problem");
   for (std::size_t i = rows.size(); i < run.problems.size(); ++i) {
     rows.push_back(solve_row(device, scene, camera, run, i));
     results["summary"] = summary(rows);
