@@ -87,6 +87,10 @@ std::string expected_value(const CLI::Option& option, const std::string& got) {
            check.substr(high + 3, check.find(']') - high - 3);
   if (check == "POSITIVE") return "a number above 0";
   if (check == "NONNEGATIVE") return "a number that is not negative";
+  if (check.starts_with('{') && check.ends_with('}')) {
+    const std::vector<std::string> words = split_list(check.substr(1, check.size() - 2));
+    return one_of(std::vector<std::string_view>(words.begin(), words.end()));
+  }
   if (!check.empty()) return check;
   const bool is_whole =
       !got.empty() && got.find_first_not_of("0123456789", got[0] == '-') == std::string::npos;

@@ -16,6 +16,7 @@
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "image/codec.hpp"
 #include "learn/generate.hpp"
 #include "learn/learning.hpp"
 #include "learn/ranks.hpp"
@@ -373,6 +374,7 @@ void add_show_command(CLI::App& application, CommonOptions& common) {
   add_device_options(*command, common);
   command->footer("Example: dpr learn show --checkpoint run/checkpoint.pt --data data -o figure.png");
   command->callback([options, &common] {
+    require_image_format(options->output);
     require_writable(options->output);
     const Dataset dataset = read(options->data, learn::parse_split(options->split));
     write_image(options->output,

@@ -65,13 +65,11 @@ std::optional<Image> parse_silhouette(const JsonNode& node, const std::filesyste
 }
 
 /// The camera of a view, and what is known of it.
-void parse_view_camera(const JsonNode& node, ShapeView& view, const std::string& name) {
+void parse_view_camera(const JsonNode& node, ShapeView& view) {
   const auto camera = node.find("camera"), near = node.find("initial_camera");
   if (camera && near) near->fail("one beside a camera", "one of the two");
   view.knowledge = camera ? CameraKnowledge::known : near ? CameraKnowledge::near : CameraKnowledge::unknown;
-  if (!camera && !near) return;
-  view.camera = parse_camera(camera ? *camera : *near);
-  validate(view.camera, name + (camera ? ".camera" : ".initial_camera"));
+  if (camera || near) view.camera = parse_camera(camera ? *camera : *near);
 }
 
 MeasuredImages measured_images(const JsonNode& views) {
@@ -83,8 +81,9 @@ MeasuredImages measured_images(const JsonNode& views) {
 }
 
 /// The next of the views, in what is known of all.
-ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, const ShapeViews& views,
+ShapeView parse_view(const JsonNode& node, const std::filesystem::path& views_file, const ShapeViews& views,
                      Encoding encoding, MeasuredImages& measured) {
+  const std::filesystem::path folder = views_file.parent_path();
   node.require_keys(
       {"image", "camera", "initial_camera", "silhouette", "background", "mask", "depth", "normal"});
   ShapeView view;
@@ -108,8 +107,13 @@ ShapeView parse_view(const JsonNode& node, const std::filesystem::path& folder, 
   if (const auto normal = node.find("normal"))
     view.normal = measured.read(normal->file_in(folder), view.image, Measured::normal);
   const std::string name = checks::element("views", views.views.size());
-  parse_view_camera(node, view, name);
-  if (view.knowledge == CameraKnowledge::known) measured.check_range(view, name);
+  parse_view_camera(node, view);
+  with_keys_of(views_file, {}, {}, [&] {
+    if (view.knowledge == CameraKnowledge::unknown) return;
+    const bool is_known = view.knowledge == CameraKnowledge::known;
+    validate(view.camera, name + (is_known ? ".camera" : ".initial_camera"));
+    if (is_known) measured.check_range(view, name);
+  });
   return view;
 }
 
@@ -147,7 +151,7 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
   const std::filesystem::path folder = file.parent_path();
   MeasuredImages measured = measured_images(node);
   for (const JsonNode& view : node.at("views").elements())
-    views.views.push_back(parse_view(view, folder, views, encoding, measured));
+    views.views.push_back(parse_view(view, file, views, encoding, measured));
   measured.append_to(notes);
   if (views.views.empty()) node.at("views").fail("none", "at least one");
   if (const auto initial = node.find("initial")) views.initial = read_mesh(initial->file_in(folder), notes);

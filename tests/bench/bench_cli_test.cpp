@@ -141,7 +141,11 @@ TEST_SUITE("bench-smoke") {
     folder.write("text.json", "no results");
     check_fails(folder, {"--workload", "sphere", "-o", "r.json"}, "sphere256");
     check_fails(folder, {"--workload", "cube128", "--stage", "nonsense"}, "rasterize");
-    check_fails(folder, {"--workload", "cube128", "--preset", "nonsense"}, "pixel-sharp");
+    check_fails(folder, {"--workload", "cube128", "--preset", "nonsense"},
+                "--preset (command line): got \"nonsense\", expected gaussian, softras, default, pixel, "
+                "pixel-sharp or sharp");
+    check_fails(folder, {"--devices", "gpu"}, "--devices (command line): got \"gpu\", expected all");
+    check_fails(folder, {"--repetitions", "0"}, "expected a number from 1 to 1000");
     check_fails(folder, {"--workload", "cube128", "--preset", "softras", "-o", "r.json"}, "softras");
     check_fails(folder, {"--workload", "cube128", "-o", "no_folder/r.json"}, "no_folder");
     check_fails(folder, {"--repetitions", "0"}, "--repetitions");

@@ -73,6 +73,7 @@ TEST_SUITE("robustness") {
                   "below 1");
     outcome = with_data({"train", "-o", "wild", "--steps", "50", "--batch", "2", "--learning-rate", "1e30"});
     check_refused(outcome, "got");
+    check_refused(with_data({"show", "--checkpoint", "no.pt", "-o", "f.nonsense"}), "got the extension");
     CHECK_FALSE(contains(outcome.err, "error: dpr"));
     check_refused(learn(folder, {"train", "-o", "run", "--data", "data", "--classes", "horse"}), "horse");
     check_refused(learn(folder, {"fly"}), "unknown command \"fly\"");

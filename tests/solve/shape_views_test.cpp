@@ -117,5 +117,15 @@ TEST_SUITE("unit") {
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument,
                           read(R"(, "camera": )" + camera + R"(, "initial_camera": )" + camera),
                           "one of the two");
+    const std::string of_file = " (" + (folder / "views.json").string() + "): got -1";
+    for (const std::string key : {"camera", "initial_camera"}) {
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read(", \"" + key + R"(": {"znear": -1})"),
+                            "views[0]." + key + ".znear" + of_file);
+    }
+    folder.write(
+        "views.json",
+        R"({"width": 2, "height": 1, "views": [{"image": "view.exr"}], "smoothing": {"sigma": -1}})");
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::read_views(folder / "views.json"),
+                          "smoothing.sigma" + of_file);
   }
 }
