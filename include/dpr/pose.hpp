@@ -83,12 +83,15 @@ struct Descent {
 
 struct PoseOptions {
   std::variant<LeastSquares, Descent> method;
+  /// The translation too. LeastSquares then turns about the middle of the mesh's bounding box, wherever its
+  /// origin lies; without, about the origin.
   bool solve_translation = false;
   bool solve_focal = false;  ///< a factor on the camera's focal length too; LeastSquares only
   /// The lens' k1 and k2 too, from the scene's or none; LeastSquares only, perspective cameras only.
   bool solve_distortion = false;
-  /// In (0, 1): the target counts as explained once the loss is below that part of what a wrong pose leaves:
-  /// in descents the initial one, in least squares the median over rotations; both at the finest level.
+  /// In (0, 1): the target counts as explained once the loss is below that part of what is left without the
+  /// pose, at the finest level: in descents by the initial pose; in least squares by the median over
+  /// rotations, by the background alone, or by one colour everywhere, whichever is least.
   float explained = 0.1F;
 };
 

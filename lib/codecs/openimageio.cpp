@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "image/codec.hpp"
@@ -101,6 +102,24 @@ void append_pixels(const std::vector<float>& values, std::size_t channels, const
   }
 }
 
+/// The image as a camera's owner held it; `orientation` is Exif's, 1 to 8: cameras store rows as the sensor
+/// has them.
+Image upright(Image stored, int orientation) {
+  if (orientation < 2 || orientation > 8) return stored;
+  const bool transposes = orientation > 4;
+  const bool flips_x = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool flips_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  Image image(transposes ? stored.height : stored.width, transposes ? stored.width : stored.height);
+  for (int row = 0; row < image.height; ++row) {
+    for (int column = 0; column < image.width; ++column) {
+      const int x = transposes ? row : column, y = transposes ? column : row;
+      image.at(column, row) =
+          stored.at(flips_x ? stored.width - 1 - x : x, flips_y ? stored.height - 1 - y : y);
+    }
+  }
+  return image;
+}
+
 Image read(const std::string& file, PixelFacts& facts) {
   const auto input = open(file);
   const OIIO::ImageSpec& spec = input->spec();
@@ -124,8 +143,10 @@ Image read(const std::string& file, PixelFacts& facts) {
       throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
     append_pixels(values, static_cast<std::size_t>(spec.nchannels), source, image.pixels);
   }
+  // A JPEG file that ends too soon is read to its end, grey below, and is an error by its message alone.
+  if (input->has_error()) throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
   facts = {source[3] >= 0, spec.format.is_floating_point()};
-  return image;
+  return upright(std::move(image), spec.get_int_attribute("Orientation", 1));
 }
 
 constexpr ImageCodec k_codec{read, encode};

@@ -191,7 +191,7 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
     if (i == 0 || loss < result.loss) {
       std::tie(result.pose, result.loss, result.descent) = std::tie(found.pose, loss, i);
     }
-    result.explained = result.loss <= enough;
+    result.explained = result.loss < enough;
     if (found.stopped || result.explained) break;
   }
   return result;

@@ -44,6 +44,8 @@ void average(const std::vector<cl_float4>& drawn, int width, int samples, std::v
   }
 }
 
+glm::vec3 rgb(const cl_float4& color) { return {color.s[0], color.s[1], color.s[2]}; }
+
 /// Robust loss of a pixel's squared colour difference (Geman & McClure 1985).
 double robust(float weight, float squared, float inverse_scale_squared) {
   return static_cast<double>(weight * squared / (1 + squared * inverse_scale_squared));
@@ -199,17 +201,28 @@ std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hy
   return result;
 }
 
+double PoseLevel::pixel_loss(std::size_t i, const glm::vec3& color) const {
+  const glm::vec3 residual = color - rgb(target_.colors[i]);
+  return robust(target_.weights[i], glm::dot(residual, residual), target_.inverse_scale_squared);
+}
+
 double PoseLevel::loss(const HypothesisImages& image) const {
   double sum = 0;
-  for (std::size_t i = 0; i < target_.colors.size(); ++i) {
-    float squared = 0;
-    for (int c = 0; c < 3; ++c) {
-      const float r = image.colors[i].s[c] - target_.colors[i].s[c];
-      squared += r * r;
-    }
-    sum += robust(target_.weights[i], squared, target_.inverse_scale_squared);
-  }
+  for (std::size_t i = 0; i < target_.colors.size(); ++i) sum += pixel_loss(i, rgb(image.colors[i]));
   return sum / (static_cast<double>(k_channels) * weight_);
+}
+
+double PoseLevel::blank_loss() const {
+  const std::size_t pixels = target_.colors.size();
+  glm::dvec3 mean(0.0);
+  for (std::size_t i = 0; i < pixels; ++i)
+    mean += glm::dvec3(rgb(target_.colors[i]) * target_.weights[i]) / weight_;
+  const auto loss_of = [&](const glm::vec3& color) {
+    double sum = 0;
+    for (std::size_t i = 0; i < pixels; ++i) sum += pixel_loss(i, color);
+    return sum / (static_cast<double>(k_channels) * weight_);
+  };
+  return std::min(loss_of(target_.background), loss_of(glm::vec3(mean)));
 }
 
 void PoseLevel::find_shown(const HypothesisImages& images, std::size_t count) {
@@ -232,12 +245,7 @@ double PoseLevel::background_loss() const {
       ++next;
       continue;
     }
-    float squared = 0;
-    for (int c = 0; c < 3; ++c) {
-      const float r = target_.background[c] - target_.colors[i].s[c];
-      squared += r * r;
-    }
-    sum += robust(target_.weights[i], squared, target_.inverse_scale_squared);
+    sum += pixel_loss(i, target_.background);
   }
   return sum;
 }

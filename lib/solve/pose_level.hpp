@@ -42,6 +42,9 @@ class PoseLevel {
   /// Sets the scale of the robust loss, a colour difference; 0: squared differences.
   void set_scale(float scale);
   float scale() const { return scale_; }
+  /// The loss of the better of two pictures without an object: the scene's background, and the target's mean
+  /// colour.
+  double blank_loss() const;
 
   int width() const { return scene_.width / samples_; }
   int height() const { return scene_.height / samples_; }
@@ -57,6 +60,7 @@ class PoseLevel {
   HypothesisImages images_at(std::size_t pixel) const;
   /// Pixels that one of so many images from `images` on shows the object at.
   void find_shown(const HypothesisImages& images, std::size_t count);
+  double pixel_loss(std::size_t i, const glm::vec3& color) const;
   double background_loss() const;
 
   std::vector<View> views_of(std::span<const Hypothesis> hypotheses) const;

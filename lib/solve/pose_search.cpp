@@ -1,11 +1,14 @@
 // Hypotheses from a grid of rotations, halved from level to level.
 #include "solve/pose_search.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <optional>
 
+#include "solve/polar.hpp"
 #include "solve/pose_candidates.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/rotation_grid.hpp"
@@ -114,6 +117,8 @@ PoseResult Fit::run(bool anywhere) {
   sampled.set_scale(level.scale());
   wrong_ = wrong_loss(sampled);
   finish(anywhere);
+  const double unexplained = std::min(wrong_, sampled.blank_loss());
+  result_.explained = result_.loss < static_cast<double>(options_.explained) * unexplained;
   return result_;
 }
 
@@ -299,7 +304,6 @@ void Fit::finish(bool anywhere) {
   result_.covariance = covariance(candidates_.front().equations, space_.size());
   if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
   result_.light = light_;
-  result_.explained = result_.loss <= static_cast<double>(options_.explained) * wrong_;
 }
 
 /// The poses that explain the target as well as the best, the one to return first.
@@ -326,11 +330,56 @@ double Fit::wrong_loss(PoseLevel& level) const {
   return losses[losses.size() / 2];
 }
 
+/// The middle of a mesh's bounding box.
+glm::vec3 middle_of(const Mesh& mesh) {
+  glm::vec3 least = mesh.positions.front(), most = least;
+  for (const glm::vec3& p : mesh.positions) {
+    least = glm::min(least, p);
+    most = glm::max(most, p);
+  }
+  return (least + most) / 2.0F;
+}
+
+/// The covariance of motions about a point that lies `arm` away, world: a rotation moves that by its cross product.
+void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance) {
+  const auto n = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Matrix to = Matrix::Identity(n, n);
+  if (n > 3) to.block<3, 3>(3, 0) << 0, arm.z, -arm.y, -arm.z, 0, arm.x, arm.y, -arm.x, 0;
+  Eigen::Map<Matrix> mapped(covariance.data(), n, n);
+  mapped = (to * mapped * to.transpose()).eval();
+}
+
 }  // namespace
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {
-  return Fit(device, scene, target, options, initial, callback).run(anywhere);
+  const glm::vec3 middle = middle_of(scene.meshes.front().mesh);
+  if (!options.solve_translation || middle == glm::vec3(0))
+    return Fit(device, scene, target, options, initial, callback).run(anywhere);
+  // A mesh may lie far from its origin, about which a rotation would throw it out of the picture.
+  Scene centered = scene;
+  Instance& object = centered.meshes.front();
+  for (glm::vec3& p : object.mesh.positions) p -= middle;
+  object.transform[3] = object.transform * glm::vec4(middle, 1);
+  const glm::dvec3 arm =
+      polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch * glm::dvec3(middle);
+  const auto to_origin = [&](Pose& pose) { pose.translation -= pose.rotation * arm; };
+  std::vector<Pose> places(initial.begin(), initial.end());
+  for (Pose& pose : places) pose.translation += pose.rotation * arm;
+  PoseSolver::Callback report;
+  if (callback) {
+    report = [&](PoseIteration step) {
+      to_origin(step.pose);
+      return callback(step);
+    };
+  }
+  PoseResult result = Fit(device, centered, target, options, places, report).run(anywhere);
+  if (!result.covariance.empty()) move_pivot(-(result.pose.rotation * arm), result.covariance);
+  for (Pose* pose : {&result.pose, &result.start}) to_origin(*pose);
+  for (PoseHypothesis& h : result.equals) to_origin(h.pose);
+  for (PoseIteration& step : result.history) to_origin(step.pose);
+  return result;
 }
 
 }  // namespace dpr

@@ -52,6 +52,45 @@ void check_kept(const std::filesystem::path& file, const Image& image, bool alph
 }  // namespace
 
 TEST_SUITE("unit") {
+  TEST_CASE("photographs are turned as Exif says") {
+    const TempDir folder;
+    // Corners: red on top, black at the lower left, blue at the lower right.
+    Image image(32, 16, glm::vec4(1, 0, 0, 1));
+    for (int row = 8; row < 16; ++row) {
+      for (int column = 0; column < 32; ++column)
+        image.at(column, row) = glm::vec4(0, 0, column < 16 ? 0 : 1, 1);
+    }
+    write_image(folder / "plain.jpg", image);
+    const std::string plain = folder.read("plain.jpg");
+    // Where the stored corners, upper left and lower right, go; Exif 2.3, table of the tag 0x0112.
+    const auto corner = [](const Image& of, bool right, bool low) {
+      return of.at(right ? of.width - 2 : 1, low ? of.height - 2 : 1);
+    };
+    struct Place {
+      int orientation;
+      bool portrait, red_right, red_low, black_right, black_low;
+    };
+    for (const Place& p :
+         {Place{1, false, false, false, false, true}, Place{2, false, true, false, true, true},
+          Place{3, false, true, true, true, false}, Place{4, false, false, true, false, false},
+          Place{5, true, false, false, true, false}, Place{6, true, true, false, false, false},
+          Place{7, true, true, true, false, true}, Place{8, true, false, true, true, true}}) {
+      CAPTURE(p.orientation);
+      const std::string exif{
+          "\xff\xe1\x00\x22"
+          "Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0",
+          29};
+      const std::string tail{"\0\0\0\0\0\0", 6};
+      const std::string segment = exif + static_cast<char>(p.orientation) + tail;
+      const Image turned =
+          read_image(folder.write("turned.jpg", plain.substr(0, 2) + segment + plain.substr(2)));
+      CHECK((turned.height > turned.width) == p.portrait);
+      CHECK(corner(turned, p.red_right, p.red_low).r > 0.8F);
+      const glm::vec4 black = corner(turned, p.black_right, p.black_low);
+      CHECK(black.r + black.b < 0.2F);
+    }
+  }
+
   TEST_CASE("rows and columns") {
     Image image(3, 2, glm::vec4(0.5F));
     image.at(2, 1).g = 7;
@@ -171,7 +210,7 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("truncated images") {
     const TempDir folder;
-    for (const std::string extension : {".png", ".exr", ".tif", ".tga"}) {
+    for (const std::string extension : {".png", ".exr", ".tif", ".tga", ".jpg"}) {
 #ifdef __SANITIZE_ADDRESS__
       // libpng jumps over a destructor in OpenImageIO, which leaks the text of its message.
       if (extension == ".png") continue;

@@ -440,4 +440,68 @@ TEST_SUITE("robustness") {
     CHECK_FALSE(result.explained);
     CHECK(result.covariance.empty());
   }
+
+  TEST_CASE("least squares: a mesh far from its own origin is found as one about it") {
+    if (is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene(64);
+    glm::mat4& transform = scene.meshes.front().transform;
+    transform = glm::rotate(glm::mat4(1.0F), glm::radians(100.0F), glm::vec3(k_axis)) *
+                glm::scale(glm::mat4(1.0F), glm::vec3(0.9F, 1.1F, 1.0F));
+    const dpr::Image target = rigid_target(device, scene);
+    transform = glm::mat4(glm::mat3(glm::scale(glm::mat4(1.0F), glm::vec3(0.9F, 1.1F, 1.0F))));
+    const dpr::PoseOptions options{.method = least_squares(), .solve_translation = true};
+    const dpr::PoseResult about_origin = dpr::PoseSolver(device, scene, target, options).search();
+
+    const glm::vec3 far(4, 4, 4);
+    for (glm::vec3& p : scene.meshes.front().mesh.positions) p += far;
+    transform[3] = transform * glm::vec4(-far, 1);  // the middle is at the same place
+    std::vector<dpr::PoseIteration> reported;
+    const dpr::PoseResult result =
+        dpr::PoseSolver(device, scene, target, options).search([&](const dpr::PoseIteration& step) {
+          reported.push_back(step);
+          return true;
+        });
+    CHECK(result.explained);
+    CHECK(dpr::angle_degrees(result.pose.rotation, about_origin.pose.rotation) < 0.05);
+    const glm::dvec3 arm = result.pose.rotation * (glm::dvec3(0.9, 1.1, 1.0) * glm::dvec3(far));
+    CHECK(glm::length(result.pose.translation + arm - about_origin.pose.translation) < 0.005);
+    CHECK(glm::length(result.start.translation - glm::dvec3(transform[3])) < 1e-5);
+    CHECK(reported.back().pose.translation == result.history.back().pose.translation);
+    // The origin swings at the end of the arm, so its place is less certain by that much than the middle's.
+    REQUIRE(result.covariance.size() == 36);
+    double of_turn = 0, of_origin = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      of_turn += result.covariance[7 * axis];
+      of_origin += result.covariance[7 * (axis + 3)];
+    }
+    const double ratio = of_origin / (of_turn * glm::dot(arm, arm));
+    CHECK(ratio > 0.3);  // of the three axes two, at most, swing the arm
+    CHECK(ratio < 3);
+  }
+
+  TEST_CASE("a target without the object is never explained, wherever the object goes and in any light") {
+    const dpr::Device device = dpr::open_device();
+    const int size = reduced(32, 8);
+    dpr::LeastSquares method = least_squares();
+    method.rotations = 8;
+    for (const float grey : {0.0F, 0.5F, 1.0F}) {
+      for (const float height : {0.0F, 100.0F}) {  // in sight; out of it
+        for (const dpr::PoseLight light : {dpr::PoseLight::fixed, dpr::PoseLight::harmonics}) {
+          CAPTURE(grey);
+          CAPTURE(height);
+          dpr::Scene scene = cube_scene(size);
+          scene.meshes.front().transform[3] = glm::vec4(0, height, 0, 1);
+          method.light = light;
+          const dpr::Image target(size, size, glm::vec4(glm::vec3(grey), 1));
+          const dpr::PoseSolver solver(device, scene, target, {.method = method, .solve_translation = true});
+          CHECK_FALSE(solver.search().explained);
+        }
+      }
+    }
+    dpr::Scene far = cube_scene(size);
+    far.meshes.front().transform[3] = glm::vec4(0, 100, 0, 1);
+    const dpr::PoseSolver solver(device, far, dpr::Image(size, size, glm::vec4(0)), descent(1));
+    CHECK_FALSE(solver.solve(solver.scene_pose()).explained);
+  }
 }
