@@ -12,12 +12,11 @@ namespace {
 Json to_list(const glm::vec3& v) { return Json::array({number(v.x), number(v.y), number(v.z)}); }
 
 Json rows(const glm::mat4& matrix) {
-  Json list = Json::array();
-  for (int row = 0; row < 4; ++row) {
-    Json& entries = list.emplace_back(Json::array());
-    for (int column = 0; column < 4; ++column) entries.push_back(number(matrix[column][row]));
+  glm::dmat4 numbers;
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) numbers[column][row] = number(matrix[column][row]);
   }
-  return list;
+  return rows_to_json(numbers);
 }
 
 template <typename Light>

@@ -8,7 +8,7 @@
 namespace dpr::cli {
 namespace {
 
-/// True if three points in view space lie beyond one edge of the image.
+/// The edges of a scene's image.
 class ImageEdges {
  public:
   explicit ImageEdges(const Scene& scene)
@@ -17,6 +17,7 @@ class ImageEdges {
         half_(glm::vec2(scene.width, scene.height) /
               static_cast<float>(std::min(scene.width, scene.height))) {}
 
+  /// True if three points in view space lie beyond one of them. A lens' images leave nothing out.
   bool leaves_out(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) const {
     if (camera_.distortion) return false;
     for (int axis = 0; axis < 2; ++axis) {

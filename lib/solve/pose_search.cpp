@@ -8,6 +8,7 @@
 #include <iterator>
 #include <optional>
 
+#include "mesh/bounding_box.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_candidates.hpp"
 #include "solve/pose_pyramid.hpp"
@@ -330,16 +331,6 @@ double Fit::wrong_loss(PoseLevel& level) const {
   return losses[losses.size() / 2];
 }
 
-/// The middle of a mesh's bounding box.
-glm::vec3 middle_of(const Mesh& mesh) {
-  glm::vec3 least = mesh.positions.front(), most = least;
-  for (const glm::vec3& p : mesh.positions) {
-    least = glm::min(least, p);
-    most = glm::max(most, p);
-  }
-  return (least + most) / 2.0F;
-}
-
 /// The covariance of motions about a point that lies `arm` away, world: a rotation moves that by its cross product.
 void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance) {
   const auto n = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
@@ -354,7 +345,7 @@ void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance) {
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {
-  const glm::vec3 middle = middle_of(scene.meshes.front().mesh);
+  const glm::vec3 middle = center(bounding_box(scene.meshes.front().mesh.positions));
   if (!options.solve_translation || middle == glm::vec3(0))
     return Fit(device, scene, target, options, initial, callback).run(anywhere);
   // A mesh may lie far from its origin, about which a rotation would throw it out of the picture.

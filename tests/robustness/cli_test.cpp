@@ -55,6 +55,12 @@ void check_fails(const TempDir& folder, int status, const std::string& part,
   CHECK(files(folder) == before);
 }
 
+/// A good command, and more arguments.
+std::vector<std::string> render(std::vector<std::string> more) {
+  more.insert(more.begin(), {"render", "cube.ply", "-o", "a.png"});
+  return more;
+}
+
 }  // namespace
 
 TEST_SUITE("robustness") {
@@ -126,10 +132,6 @@ TEST_SUITE("robustness") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    const auto render = [](std::vector<std::string> more) {
-      more.insert(more.begin(), {"render", "cube.ply", "-o", "a.png"});
-      return more;
-    };
     check_fails(folder, 1, "dpr: error: --sigma (command line): got \"x\", expected a number\n",
                 render({"--sigma", "x"}));
     check_fails(folder, 1, "--samples (command line): got \"1.5\", expected a whole number\n",
@@ -196,10 +198,6 @@ TEST_SUITE("robustness") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    const auto render = [](std::vector<std::string> more) {
-      more.insert(more.begin(), {"render", "cube.ply", "-o", "a.png"});
-      return more;
-    };
     check_fails(folder, 1, "error: --sigma (command line): got -1, expected a finite number > 0",
                 render({"--sigma", "-1"}));
     check_fails(folder, 1, "error: --azimuth (command line): got nan", render({"--azimuth", "nan"}));
