@@ -313,6 +313,7 @@ RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {
     require_form(*array, Element::float32, {{}, {1}}, "[] or [1], a number");
     settings.set(std::string(name), static_cast<double>(array->rows<const float>()[0]));
   }
+  settings.require_parts();
   return settings;
 }
 

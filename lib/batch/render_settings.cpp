@@ -73,6 +73,29 @@ void validate_clipping(const std::optional<float>& znear, const std::optional<fl
   validate(camera);
 }
 
+/// Fails for an option without a part in the smoothing that the options come to.
+void require_parts(const SmoothingOptions& given, const Smoothing& smoothing) {
+  const auto require = [](bool has_part, const std::string& name, bool is_given, const char* with,
+                          const char* because) {
+    if (is_given && !has_part)
+      throw InvalidArgument(name + " (batch)", std::string("a value with ") + with,
+                            std::string("none: ") + because);
+  };
+  const bool has_width = smoothing.occupancy_width != OccupancyWidth::zero;
+  constexpr const char *k_zero = "occupancy_width zero (preset rigid)", *k_sharp = "no distance is perturbed";
+  require(has_width, "sigma", given.sigma.has_value(), k_zero, k_sharp);
+  require(has_width, "occupancy_prior", given.occupancy_prior.has_value(), k_zero, k_sharp);
+  const bool has_barrier = smoothing.composition == Composition::barrier;
+  constexpr const char *k_joint = "the joint composition", *k_weight = "the barrier alone has it";
+  require(has_barrier, "alpha", given.alpha.has_value(), k_joint, k_weight);
+  require(has_barrier, "background_depth", given.background_depth.has_value(), k_joint, k_weight);
+  constexpr const char *k_exact = "the exact estimators", *k_draws = "monte_carlo alone draws samples";
+  require(is_sampled(smoothing), "samples", given.samples.has_value(), k_exact, k_draws);
+  require(is_sampled(smoothing), "draws", given.draws.has_value(), k_exact, k_draws);
+  require(is_sampled(smoothing), "variance_reduction", given.variance_reduction.has_value(), k_exact,
+          k_draws);
+}
+
 float power_of_two_below(double value) { return static_cast<float>(std::exp2(std::floor(std::log2(value)))); }
 
 }  // namespace
@@ -113,6 +136,8 @@ void RenderSettings::set(const std::string& name, const OptionValue& value) {
   *this = std::move(changed);
 }
 
+void RenderSettings::require_parts() const { batch::require_parts(options_, smoothing_); }
+
 void RenderSettings::set_clipping(Camera& camera, const std::optional<BoxCorners>& box) const {
   constexpr double k_widest = 1024, k_rounding = 1e-3;
   camera.znear = znear_.value_or(camera.znear);
@@ -151,6 +176,7 @@ RenderSettings settings_from_texts(std::int64_t width, std::int64_t height,
                                    const std::vector<std::string>& texts) {
   RenderSettings settings(width, height);
   for (const std::string& text : texts) set_from_text(settings, text);
+  settings.require_parts();
   return settings;
 }
 

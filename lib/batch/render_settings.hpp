@@ -28,6 +28,9 @@ class RenderSettings {
   void set(const std::string& name, const OptionValue& value);
   /// Instead of what was set of the smoothing until now.
   void set_smoothing(const Smoothing& smoothing);
+  /// Fails for a number or a word that was set and has no part in the smoothing: alpha in the joint
+  /// composition, say. The seed may always be set.
+  void require_parts() const;
 
   int width() const { return width_; }
   int height() const { return height_; }

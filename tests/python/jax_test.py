@@ -40,6 +40,29 @@ class JaxTest(unittest.TestCase):
                 self.assertGreater(np.abs(theirs).sum(), 0)
                 np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-5)
 
+    def test_converted_arguments(self):
+        views, intrinsics = cameras(1)
+        renderer, shapes = dpr.Renderer(SIZE, SIZE, **SMOOTH), np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])
+        _, pullback = renderer.vjp(shapes, FACES, views, intrinsics, blur=np.float32(0.6).reshape(1))
+        weights = random(2, SIZE, SIZE, 4)
+        expected = pullback(weights)
+
+        def loss(shapes, views, blur):
+            return (renderer(shapes, jnp.asarray(FACES, jnp.uint8), views, intrinsics.tolist(), blur=blur) * weights).sum()
+
+        for kind, tolerance in ((jnp.float32, 1e-4), (jnp.bfloat16, 0.05)):
+            given = [jnp.asarray(array, kind) for array in (shapes, views, 0.6)]
+            for found, name in zip(jax.jit(jax.grad(loss, argnums=(0, 1, 2)))(*given), ("vertices", "views", "blur")):
+                self.assertEqual(found.dtype, kind)
+                scale = np.abs(expected[name]).max()
+                self.assertGreater(scale, 0)
+                np.testing.assert_allclose(np.asarray(found, np.float32).reshape(expected[name].shape) / scale,
+                                           expected[name] / scale, atol=tolerance)
+        two = cameras(2)
+        found = jax.grad(lambda v: renderer([v, v[:0]], [FACES, FACES[:0]], *two).sum())(jnp.asarray(TETRAHEDRON))
+        alone = jax.grad(lambda v: renderer(v, FACES, *cameras(1)).sum())(jnp.asarray(TETRAHEDRON))
+        np.testing.assert_array_equal(found, alone)
+
     def test_training(self):
         views, intrinsics = cameras(2)
         renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)

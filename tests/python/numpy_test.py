@@ -138,23 +138,24 @@ class NumpyTest(unittest.TestCase):
                 "height": SIZE}
         expected = dpr.render(**good)
         for kind, words, change in [
-                (TypeError, "vertices .* got float64, expected float32", {"vertices": TETRAHEDRON.astype(float)}),
-                (TypeError, "vertices .* got list, expected a tensor or an array", {"vertices": TETRAHEDRON.tolist()}),
+                (TypeError, "vertices .* got int64, expected float32", {"vertices": TETRAHEDRON.astype(int)}),
+                (TypeError, "vertices .* got list, expected a tensor or an array", {"vertices": [["a", "b", "c"]]}),
                 (TypeError, "faces .* got NoneType", {"faces": None}),
-                (TypeError, "faces .* got uint8, expected int64", {"faces": FACES.astype(np.uint8)}),
+                (TypeError, "faces .* got float64, expected int64", {"faces": FACES.astype(float).tolist()}),
+                (TypeError, "faces .* got bool, expected int64", {"faces": FACES.astype(bool)}),
                 (dpr.InvalidArgument, r"views .* got \[4, 4\], expected \[N, 4, 4\]", {"views": views[0]}),
                 (dpr.InvalidArgument, "finite", {"vertices": TETRAHEDRON / np.float32(np.inf) * np.float32(np.inf)}),
                 (ValueError, "lights .* got 'a|b', expected names", {"lights": {"a|b": random(3)}}),
                 (ValueError, "wrap", {"textures": random(2, 2, 3), "texcoords": random(4, 2), "wrap": "a|b"}),
-                (ValueError, "did you mean vertices|did you mean zfar", {"zfr": 3}),
-                (TypeError, "did you mean texcoords", {"texcoord": random(4, 2)}),
+                (ValueError, "did you mean 'zfar'", {"zfr": 3}),
+                (TypeError, "did you mean 'texcoords'", {"texcoord": random(4, 2)}),
                 (ValueError, "no-such-device", {"device": "no-such-device"})]:
             with self.subTest(words), warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 with self.assertRaisesRegex(kind, words):
                     dpr.render(**{**good, **change})
         np.testing.assert_array_equal(dpr.render(**good), expected)
-        with self.assertRaisesRegex(TypeError, "did you mean background"):
+        with self.assertRaisesRegex(TypeError, "did you mean 'background'"):
             dpr.Renderer(SIZE, SIZE)(TETRAHEDRON, FACES, views, intrinsics, backgrund=random(3))
 
     def test_subdivision(self):

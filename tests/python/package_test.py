@@ -323,6 +323,57 @@ class PackageTest(RenderTest):
         finally:
             torch.set_default_dtype(torch.float32)
 
+    def test_gradients_have_the_tensors_types(self):
+        renderer, (views, intrinsics) = dpr.Renderer(SIZE, SIZE, **SMOOTH), cameras(1)
+        expected = {}
+        for kind, tolerance in ((torch.float32, 0), (torch.float64, 0), (torch.float16, 0.03), (torch.bfloat16, 0.2)):
+            given = {"vertices": TETRAHEDRON, "views": views, "colors": random(4, 3), "blur": torch.tensor(0.6)}
+            given = {name: tensor.to(kind).clone().requires_grad_() for name, tensor in given.items()}
+            image = renderer(faces=FACES.to(torch.uint8).tolist(), intrinsics=intrinsics, **given)
+            self.assertEqual(image.dtype, torch.float32)
+            image.square().sum().backward()
+            for name, tensor in given.items():
+                self.assertEqual(tensor.grad.dtype, kind)
+                scale = expected.setdefault(name, tensor.grad).abs().max()
+                self.assertGreater(scale, 0)
+                self.assert_same(tensor.grad.float() / scale, expected[name] / scale, tolerance)
+
+    def test_autocast(self):
+        renderer, (views, intrinsics) = dpr.Renderer(SIZE, SIZE, **SMOOTH), cameras(1)
+        layer = torch.nn.Linear(3, 3, bias=False)
+        layer.weight.data = torch.eye(3)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            vertices = layer(TETRAHEDRON)
+            self.assertEqual(vertices.dtype, torch.bfloat16)
+            image = renderer(vertices, FACES, views, intrinsics)
+            loss = image.square().sum()
+        loss.backward()
+        self.assert_same(image, renderer(vertices.float(), FACES, views, intrinsics))
+        self.assertGreater(layer.weight.grad.abs().sum(), 0)
+
+    def test_one_camera_and_many_shapes(self):
+        renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)
+        view, intrinsics = (tensor.requires_grad_() for tensor in cameras(1))
+        shapes = torch.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])
+        image = renderer(shapes, FACES, view, intrinsics)
+        self.assert_same(image, renderer(shapes, FACES, view.repeat(2, 1, 1), intrinsics.repeat(2, 1)))
+        image.square().sum().backward()
+        found, view.grad = view.grad, None
+        renderer(shapes, FACES, view.repeat(2, 1, 1), intrinsics.repeat(2, 1)).square().sum().backward()
+        self.assertGreater(found.abs().sum(), 0)
+        self.assert_same(found, view.grad, 1e-3)
+        mixed = renderer(shapes, FACES, view.detach().numpy(), intrinsics.tolist())
+        self.assert_same(mixed, image.detach())
+
+    def test_a_mesh_without_faces(self):
+        views, intrinsics = cameras(2)
+        vertices = [TETRAHEDRON.clone().requires_grad_(), torch.zeros(0, 3, requires_grad=True)]
+        image = dpr.render(vertices, [FACES, FACES[:0]], views, intrinsics, width=SIZE, height=SIZE)
+        image.square().sum().backward()
+        self.assertEqual(image[1].abs().max(), 0)
+        self.assertGreater(vertices[0].grad.abs().sum(), 0)
+        self.assertEqual(vertices[1].grad.shape, (0, 3))
+
     def test_a_wanted_gradient_is_never_dropped(self):
         views, intrinsics = cameras(1)
         for name in ("shininess", "znear", "blur_radius", "sigma"):
@@ -340,12 +391,12 @@ class PackageTest(RenderTest):
                 "height": SIZE}
         expected = dpr.render(**good)
         wrong = [
-            (TypeError, "vertices .* got float64, expected float32; vertices.fl", {"vertices": TETRAHEDRON.double()}),
-            (TypeError, "vertices .* got list, expected a tensor", {"vertices": TETRAHEDRON.tolist()}),
+            (TypeError, "vertices .* got complex64, expected float32", {"vertices": TETRAHEDRON + 0j}),
             (ValueError, r"vertices .* got \[4\], expected \[V, 3\] or \[N, V, 3\]", {"vertices": TETRAHEDRON[:, 0]}),
             (ValueError, "vertices .* got a tensor on meta, expected one on the CPU.* copy=True",
              {"vertices": TETRAHEDRON.to("meta")}),
-            (RuntimeError, r"vertices .* got \[3, 4, 3\], expected 1 or 1", {"vertices": TETRAHEDRON.repeat(3, 1, 1)}),
+            (RuntimeError, r"vertices .* got \[3, 4, 3\], expected 1 or 2", {"vertices": TETRAHEDRON.repeat(3, 1, 1),
+                                                                           "views": views.repeat(2, 1, 1)}),
             (RuntimeError, "finite", {"vertices": TETRAHEDRON / 0}),
             (TypeError, "faces .* got float32, expected int64", {"faces": FACES.float().requires_grad_()}),
             (ValueError, r"faces .* got \[4, 2\]", {"faces": FACES[:, :2]}),
@@ -358,14 +409,14 @@ class PackageTest(RenderTest):
             (ValueError, "background", {"background": torch.ones(4)}),
             (ValueError, "lights .* got 'lamp', expected ambient, harmonics", {"lights": {"lamp": torch.ones(3)}}),
             (ValueError, r"lights.spot .* expected \[L, 14\]", {"lights": {"spot": torch.ones(1, 9)}}),
-            (TypeError, "lights.point .* got list, expected a tensor", {"lights": {"point": [[1.0] * 9]}}),
+            (TypeError, "lights.point .* got str, expected a tensor", {"lights": {"point": "bright"}}),
             (ValueError, r"lights.point .* got \[\], expected \[L, 9\]", {"lights": {"point": torch.tensor(1.0)}}),
             (ValueError, "sigma", {"sigma": torch.ones(2)}),
             (RuntimeError, "sigma", {"sigma": -1.0}),
             (RuntimeError, "width", {"width": 0}),
             (RuntimeError, "preset", {"preset": "hard"}),
-            (RuntimeError, "name .* got \"zfat\", .* did you mean zfar", {"zfat": 3}),
-            (ValueError, "name .* got \"backgroud\", .* did you mean background", {"backgroud": torch.ones(3)}),
+            (RuntimeError, "name .* got \"zfat\", .* did you mean 'zfar'", {"zfat": 3}),
+            (ValueError, "name .* got \"backgroud\", .* did you mean 'background'", {"backgroud": torch.ones(3)}),
             (RuntimeError, "cull", {"cull": "both"}),
             (RuntimeError, "zfar", {"znear": 3, "zfar": 2}),
             (RuntimeError, "no-such-device", {"device": "no-such-device"}),
@@ -538,6 +589,19 @@ class CompileTest(CompiledTest):
             return (images[..., :3] * outputs["depth"][..., None]).square().mean()
 
         self.check(loss, (TETRAHEDRON, SQUARE, random(4, 3), torch.ones(3)), backend="aot_eager")
+
+    def test_converted_arguments(self):
+        renderer, (views, intrinsics) = dpr.Renderer(SIZE, SIZE, **SMOOTH), cameras(1)
+        renderer.blur, listed = 0.5, FACES.tolist()
+
+        def loss(shapes, eye, blur):
+            views = dpr.look_at(eye)
+            image = renderer(shapes, FACES, views, dpr.perspective(50, SIZE, SIZE), blur=blur) + \
+                dpr.Renderer(SIZE, SIZE, blur=1.5)(shapes, listed, views, intrinsics)
+            return (image - 0.5).square().mean()
+
+        shapes = torch.stack([TETRAHEDRON, 0.8 * TETRAHEDRON]).double()
+        self.check(loss, (shapes, torch.tensor([0.3, 0.2, 4.0]), torch.tensor(0.7)), backend="aot_eager")
 
     def test_operator(self):
         importlib.import_module("dpr._torch")  # which a first call with tensors does

@@ -1,11 +1,12 @@
 """Arrays of whatever library, which is imported only by those who hand its arrays in."""
+import numbers
 import sys
 
 import numpy as np
 
 
-def fail(error, name, got, expected):
-    raise error(f"dpr: error: {name} (dpr.render): got {got}, expected {expected}")
+def fail(error, name, got, expected, where="dpr.render"):
+    raise error(f"dpr: error: {name} ({where}): got {got}, expected {expected}")
 
 
 def module_of(array):
@@ -23,17 +24,70 @@ def is_array(value):
     return module_of(value) is not None
 
 
+def is_compiling():
+    """True within torch.compile, which traces what is done with tensors."""
+    if "torch" not in sys.modules:
+        return False
+    from . import _torch
+    return _torch.is_compiling()
+
+
 def type_of(array):
     """"float32\""""
     return str(array.dtype).rpartition(".")[2]
 
 
-def require(name, array, types, expected):
-    """Fails unless it is an array of one of the types."""
+def from_numbers(value, is_indices=False):
+    """Nested lists of numbers as an array; what else is given as it is, ragged lists too."""
+    if not _is_numbers(value):
+        return value
+    if is_compiling():
+        torch = sys.modules["torch"]
+        return torch.tensor(value, dtype=None if is_indices else torch.float32)
+    try:
+        array = np.array(value, np.float32)
+    except ValueError:  # ragged
+        return value
+    return np.array(value) if is_indices else array
+
+
+def _is_numbers(value):
+    return isinstance(value, (list, tuple)) and len(value) > 0 and all(
+        isinstance(item, numbers.Real) or _is_numbers(item) for item in value)
+
+
+def as_type(array, name):
+    """The same in another type; a differentiable function of tensors."""
+    kind = module_of(array)
+    if kind == "torch":
+        return array.to(getattr(sys.modules["torch"], name))
+    return array.astype(name) if kind == "jax" else to_numpy(array).astype(name, copy=False)
+
+
+def converted(name, array, is_indices=False):
+    """The array as float32, or as int32 or int64. Fails for no array and for another kind of numbers."""
     if not is_array(array):
         fail(TypeError, name, type(array).__name__, "a tensor or an array")
-    if type_of(array) not in types:
-        fail(TypeError, name, type_of(array), expected)
+    kind = array.dtype.name if isinstance(array, np.ndarray) else type_of(array)
+    if is_indices:
+        if not kind.startswith(("int", "uint")):
+            fail(TypeError, name, kind, "int64 or int32, indices")
+        wanted = kind if kind in ("int64", "int32") else "int32" if module_of(array) == "jax" else "int64"
+    else:
+        if not kind.startswith(("float", "bfloat")):
+            fail(TypeError, name, kind, "float32, or another type of floating-point numbers")
+        wanted = "float32"
+    return array if type_of(array) == wanted else as_type(array, wanted)
+
+
+def repeated(array, count):
+    """[1, ...] as [count, ...]; a differentiable function of tensors."""
+    shape, kind = (count, *array.shape[1:]), module_of(array)
+    if kind == "torch":
+        return array.expand(shape)
+    if kind == "jax":
+        return sys.modules["jax"].numpy.broadcast_to(array, shape)
+    return np.repeat(to_numpy(array), count, 0)
 
 
 def require_on_cpu(name, array, copy):
@@ -59,6 +113,13 @@ def to_numpy(array):
     if array.__dlpack_device__()[0] == 1:
         return np.from_dlpack(array)
     return np.from_dlpack(array, device="cpu", copy=True)
+
+
+def restored(array, gradient):
+    """The gradient of an array from that of what it was converted to, and repeated in the first dimension."""
+    if gradient.shape != tuple(array.shape):
+        gradient = gradient.sum(0, keepdims=True)
+    return as_type(like(array, gradient), type_of(array))
 
 
 def like(array, result):

@@ -15,6 +15,8 @@ NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer 
                     "area")
 _OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
 """Arrays that outputs beside the image depend on."""
+_NO_MESH = [("vertices", np.zeros((1, 3), np.float32)), ("faces", np.zeros((1, 3), np.int64))]
+"""Triangle without area, which is dropped: shows the background of a mesh without faces."""
 _LEAST_WEIGHT = 1e-12
 _ELEMENTS = {np.dtype(np.float32): 0, np.dtype(np.int32): 1, np.dtype(np.int64): 2}
 
@@ -143,7 +145,7 @@ class Rendered:
     def __init__(self, spec, arrays, wanted):
         """arrays: of float32, int32 or int64; wanted: indices of those whose gradients gradients() may be asked for."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
-        self.spec, self._shapes, self._frames = spec, [array.shape for array in arrays], []
+        self.spec, self._shapes, self._frames, self._has_meshes = spec, [array.shape for array in arrays], [], []
         frames = _frames_of(spec.parts)
         views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
         shapes = shapes_of(spec, len(views) if views.ndim else 0)
@@ -152,10 +154,18 @@ class Rendered:
         for i, (settings, parts) in enumerate(frames):
             rows = slice(i, i + 1) if len(frames) > 1 else slice(None)
             gradients = [part.name for part in parts if part.leaf in wanted]
-            frame = _Frame(options_of(spec, settings, i, gradients),
-                           [(part.name, part.of(arrays[part.leaf])) for part in parts])
+            named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
+            has_mesh = any(part.name == "faces" for part in parts)
+            try:
+                frame = _Frame(options_of(spec, settings, i, gradients), named if has_mesh else named + _NO_MESH)
+            except _library.InvalidArgument as error:
+                if len(frames) == 1:
+                    raise
+                text = str(error).replace("(batch)", f"(view {i})").replace("meshes[0]", f"view {i}")
+                raise _library.InvalidArgument(text) from None
             _library.call("dpr_frame_read", frame.handle, *c_arrays([(name, array[rows]) for name, array in raw.items()]))
             self._frames.append((frame, parts, rows))
+            self._has_meshes.append(has_mesh)
         self._sums = {name: raw[name] for name in spec.outputs if name in WITH_GRADIENTS}
         self.outputs = [_means(name, array)[0].reshape(shape) if name in WITH_GRADIENTS else array
                         for (name, array), (shape, _) in zip(raw.items(), shapes)]
@@ -167,8 +177,8 @@ class Rendered:
                 if name in OTHERS or not names & _OF_OUTPUTS]
 
     def is_empty(self):
-        """True if a frame shows no triangle."""
-        return any(frame.is_empty() for frame, _, _ in self._frames)
+        """True if a frame shows no triangle of its mesh."""
+        return any(has_mesh and frame.is_empty() for has_mesh, (frame, _, _) in zip(self._has_meshes, self._frames))
 
     def gradients(self, grads, wanted):
         """{index: gradient} of sum <grad, output>, of the outputs whose grad is not None."""

@@ -4,6 +4,7 @@ import glob
 import os
 import pathlib
 import warnings
+from typing import Any, Dict, List
 
 from ._version import VERSION
 
@@ -124,7 +125,7 @@ def call(name, *arguments):
         raise _ERRORS.get(status, Error)("dpr: error: " + library.dpr_last_error().decode(errors="replace"))
 
 
-def devices():
+def devices() -> List[Dict[str, Any]]:
     """Every OpenCL device as a dictionary: index, platform, name, vendor, version, driver, type ("cpu", "gpu" or
     "accelerator"), memory_bytes, compute_units, lanes (width of the kernels' vectors), is_default. Empty without a
     driver. Drivers are loaded by this: processes forked from this one cannot render."""
@@ -140,6 +141,6 @@ def devices():
     return found
 
 
-def release():
+def release() -> None:
     """Frees what is kept on devices for later calls; what graphs hold stays."""
     call("dpr_frames_release")

@@ -1,4 +1,6 @@
 """Gradients of arrays that have none of their own."""
+import numpy as np
+
 from . import _arrays, _frames
 
 
@@ -43,6 +45,9 @@ def vjp(spec, plan, wrt):
             if grad is not None and tuple(grad.shape) != shape:
                 _arrays.fail(ValueError, "gradient", list(grad.shape), list(shape))
         found = rendered.gradients([grad if grad is None else _arrays.to_numpy(grad) for grad in grads], wanted)
-        return _nested(paths, {leaf: _arrays.like(leaves[leaf], gradient) for leaf, gradient in found.items()})
+        for leaf, slope in plan.slopes.items():
+            if leaf in found:
+                found[leaf] = np.asarray(found[leaf] * slope(), np.float32)
+        return _nested(paths, {leaf: _arrays.restored(plan.given[leaf], gradient) for leaf, gradient in found.items()})
 
-    return [_arrays.like(leaves[0], output) for output in rendered.outputs], pullback, rendered.is_empty()
+    return [_arrays.like(plan.given[0], output) for output in rendered.outputs], pullback, rendered.is_empty()

@@ -1,5 +1,9 @@
 """Arguments of a call as a list of arrays, and how frames are made of them."""
 import difflib
+import math
+import numbers
+
+import numpy as np
 
 from . import _arrays, _library
 from ._arrays import fail
@@ -7,7 +11,8 @@ from ._frames import OTHERS, WITH_GRADIENTS, Spec
 
 _FLOATS = ("vertices", "colors", "face_colors", "texcoords")
 _INDICES = ("faces", "face_texcoords", "face_textures", "face_materials")
-_NUMBERS = ("sigma", "gamma", "alpha")
+_EUCLIDEAN = ("opendr", "nmr")
+"""Presets with distances in NDC, not squared."""
 
 
 def dictionary(name, given):
@@ -59,8 +64,24 @@ def require_names(given, known):
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            fail(InvalidName, "name", f'"{name}"', "one of " + ", ".join(known) + hint)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            fail(InvalidName, "name", f'"{name}"', "one of " + ", ".join(dict.fromkeys(known)) + hint)
+
+
+def power_of_blur(renderer_settings, width, height):
+    """(scale, power): sigma, in the unit of the settings' distances, is (scale * blur)**power of a blur in pixels."""
+    distance = renderer_settings.get("distance")
+    if distance is None:
+        distance = "euclidean" if renderer_settings.get("preset") in _EUCLIDEAN else "squared"
+    return 2 / min(width, height), 1 if distance == "euclidean" else 2
+
+
+def sigma_of_blur(blur, scale, power):
+    if not isinstance(blur, numbers.Real):
+        fail(TypeError, "blur", repr(blur), "a number of pixels")
+    if not 0 < blur < math.inf:
+        fail(_library.InvalidArgument, "blur", blur, "a number of pixels above 0")
+    return (scale * blur) ** power
 
 
 class InvalidName(_library.InvalidArgument, TypeError):
@@ -75,15 +96,17 @@ class _Row:
 
 
 class Plan:
-    """The arrays of a call, `leaves`, each once, where they were given, `paths`, and the frames made of them."""
+    """The arrays of a call, `leaves`, each once, as they were `given`, where, `paths`, and the frames made of them."""
 
     def __init__(self, copy):
-        self.copy, self.leaves, self.paths, self.parts = copy, [], [], []
+        self.copy, self.leaves, self.given, self.paths, self.parts = copy, [], [], [], []
+        self.slopes = {}  # functions that compute derivatives of leaves by what was given, by the leaves' numbers
 
     def add(self, path, array, indices=False, which=()):
         """(number, row, count) of an array that was given at the path, ("lights", "point") say; `which` is the index of
         its mesh in a list."""
         row = count = None
+        array = _arrays.from_numbers(array, indices)
         if isinstance(array, _Row):
             array, row, count = array.array, array.row, array.count
         else:
@@ -92,18 +115,30 @@ class Plan:
             return self.paths.index(path), row, count
         words = [str(key) for key in path if not isinstance(key, int)]
         name = ".".join(words) + (f"[{path[-1]}]" if words == ["textures"] else "")
-        if indices:
-            _arrays.require(name, array, ("int64", "int32"), "int64 or int32, indices")
-        else:
-            hint = f"; {name}.float() has its gradients too" if _arrays.module_of(array) == "torch" else ""
-            _arrays.require(name, array, ("float32",), "float32" + hint)
+        leaf = _arrays.converted(name, array, indices)
         _arrays.require_on_cpu(name, array, self.copy)
-        self.leaves.append(array)
+        self.leaves.append(leaf)
+        self.given.append(array)
         self.paths.append(path)
         return len(self.leaves) - 1, row, count
 
+    def repeat(self, number, count):
+        """Makes an array of one view one of as many."""
+        if count != 1 and self.leaves[number].shape[0] == 1:
+            self.leaves[number] = _arrays.repeated(self.leaves[number], count)
+
+    def blur_to_sigma(self, number, scale, power):
+        blur = self.leaves[number]
+        if _arrays.module_of(blur) not in ("torch", "jax"):
+            blur = _arrays.to_numpy(blur)
+        sigma = (scale * blur) ** power
+        self.leaves[number] = sigma if _arrays.is_array(sigma) else np.asarray(sigma)
+        self.leaves[number] = _arrays.as_type(self.leaves[number], "float32")
+        self.slopes[number] = lambda: power * scale * (scale * _arrays.to_numpy(blur)) ** (power - 1)
+
     def mesh(self, mesh, which=()):
-        """{name of an array of a frame: (number, row, count)} of a mesh, by the index `which` of a list of meshes."""
+        """{name of an array of a frame: (number, row, count)} of a mesh, by the index `which` of a list of meshes; none
+        of a mesh without faces."""
         found = {}
         for name in (*_FLOATS, *_INDICES):
             if mesh[name] is not None or name in ("vertices", "faces"):
@@ -113,7 +148,9 @@ class Plan:
         for name, array in dictionary("materials", mesh["materials"]).items():
             if array is not None:
                 found[f"materials.{name}"] = self.add(("materials", name), array, which=which)
-        return found
+        faces, _, count = found["faces"]
+        rows = self.leaves[faces].shape[0] if count is None and self.leaves[faces].shape else count
+        return {} if rows == 0 else found
 
     def frame(self, frame, arrays, wrap, filter):
         """One more frame, of {name: (number, row, count)}."""
@@ -143,9 +180,9 @@ def _meshes_of_each(mesh, count):
     return lists
 
 
-def _lists_of_meshes(meshes, count):
-    """The same of meshes that are lists already. Words and materials may be those of all."""
-    lists = {}
+def _lists_of_meshes(meshes, views):
+    """The same of meshes that are lists already. Words and materials may be those of all, one mesh that of all views."""
+    lists, count = {}, 1 if len(meshes["faces"]) == 1 else views
     for name, given in meshes.items():
         if given is None or isinstance(given, (str, dict)):
             given = [given] * count
@@ -154,14 +191,13 @@ def _lists_of_meshes(meshes, count):
         if not isinstance(given, (list, tuple)) or len(given) != count:
             got = f"{len(given)} meshes" if isinstance(given, (list, tuple)) else type(given).__name__
             fail(ValueError, name, got, f"a list of {count}, one a view, as faces are a list")
-        lists[name] = list(given)
+        lists[name] = list(given) * (views if count == 1 else 1)
     return lists
 
 
 def _lists_of_padded(meshes):
     """A padded batch as lists of the rows' beginnings."""
-    _arrays.require("faces", meshes["faces"], ("int64", "int32"), "int64 or int32, indices")
-    faces = _arrays.to_numpy(meshes["faces"])
+    faces = _arrays.to_numpy(_arrays.converted("faces", meshes["faces"], True))
     face_counts = [int((mesh[:, 0] >= 0).sum()) for mesh in faces]
     of_faces = [mesh[:count] for mesh, count in zip(faces, face_counts)]
     if any((mesh < 0).any() for mesh in of_faces):
@@ -185,28 +221,70 @@ def _lists_of_padded(meshes):
     return lists
 
 
-def of_call(renderer, mesh, views, intrinsics, background, lights, numbers, outputs, copy):
-    """(Spec, Plan) of Renderer.__call__()'s arguments."""
+def _from_lists(mesh):
+    """The mesh, or meshes, with arrays where lists of numbers were given."""
+    mesh = {name: _arrays.from_numbers(value, name in _INDICES) for name, value in mesh.items()}
+    if isinstance(mesh["textures"], (list, tuple)):
+        mesh["textures"] = [_arrays.from_numbers(texture) for texture in mesh["textures"]]
+    faces, vertices = mesh["faces"], mesh["vertices"]
+    if isinstance(vertices, (list, tuple)) and _arrays.is_array(faces) and not _has_views(faces, 2):
+        mesh["faces"] = [faces] * len(vertices)
+    return mesh
+
+
+def _count_views(cameras, mesh, lights):
+    """Number of views: of the cameras, or where there is one, of meshes, shapes, colours, textures or lights."""
+    faces = mesh["faces"]
+    counts = [array.shape[0] for array in cameras if array.shape]
+    if isinstance(faces, (list, tuple)):
+        counts.append(len(faces))
+    arrays = [(mesh[name], 2) for name in ("faces", "vertices", "colors", "face_colors")]
+    arrays += [(texture, 3) for texture in listed(mesh["textures"])]
+    arrays += [(array, _light_dimensions(name)) for name, array in lights.items()]
+    counts += [array.shape[0] for array, dimensions in arrays if _has_views(array, dimensions)]
+    counts = [count for count in counts if count != 1]
+    return counts[0] if counts else 1
+
+
+def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, outputs, copy):
+    """(Spec, Plan) of Renderer.__call__()'s arguments; smoothing: those of sigma, blur, gamma and alpha."""
     known = [*WITH_GRADIENTS, *OTHERS]
+    if isinstance(outputs, str):
+        fail(TypeError, "outputs", repr(outputs), "a list of names")
     for name in outputs:
         if name not in known:
             fail(ValueError, "outputs", repr(name), ", ".join(known[:-1]) + " or " + known[-1])
+    mesh = _from_lists(mesh)
     if mesh["colors"] is not None and mesh["face_colors"] is not None:
         fail(ValueError, "colors", "colors and face_colors", "one of them")
+    if smoothing["sigma"] is not None and smoothing["blur"] is not None:
+        fail(ValueError, "blur", "blur and sigma", "one of them")
     plan, settings, shared, of_views = Plan(copy), list(renderer._texts), {}, {}
     of_views["views"], of_views["intrinsics"] = plan.add(("views",), views), plan.add(("intrinsics",), intrinsics)
+    views, intrinsics = plan.leaves
     if len(views.shape) != 3:
         fail(_library.InvalidArgument, "views", list(views.shape), "[N, 4, 4]")
-    count, faces, lights_given = views.shape[0], mesh["faces"], dictionary("lights", lights)
+    lights_given = {name: _arrays.from_numbers(array) for name, array in dictionary("lights", lights).items()}
+    count = _count_views((views, intrinsics), mesh, lights_given)
+    if len(intrinsics.shape) == 2:
+        for number in range(2):
+            plan.repeat(number, count)
+        views, intrinsics = plan.leaves
     if background is not None:
         shared["background"] = plan.add(("background",), background)
-    for name, value in zip(_NUMBERS, numbers):
+    of_blur = power_of_blur(renderer._settings, renderer.width, renderer.height)
+    for name, value in smoothing.items():
         if _arrays.is_array(value):
-            shared[name] = plan.add((name,), value)
+            found = plan.add((name,), value)
+            shared["sigma" if name == "blur" else name] = found
+            if name == "blur":
+                plan.blur_to_sigma(found[0], *of_blur)
+        elif name == "blur" and value is not None:
+            settings.append(setting("sigma", sigma_of_blur(value, *of_blur)))
         elif value is not None:
             settings.append(setting(name, value))
 
-    if _has_views(faces, 2):
+    if _has_views(mesh["faces"], 2):
         mesh = _lists_of_padded(mesh)
     if isinstance(mesh["faces"], (list, tuple)):
         lists = _lists_of_meshes(mesh, count)
@@ -223,10 +301,10 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, numbers, outp
             fail(ValueError, "views", [0, 4, 4], "at least one view")
         if len(intrinsics.shape) != 2 or intrinsics.shape[0] != count:
             fail(ValueError, "intrinsics", list(intrinsics.shape), " or ".join(f"[{count}, {n}]" for n in (4, 9, 1)))
-        is_list = isinstance(mesh["faces"], (list, tuple))
+        meshes = len(mesh["faces"]) if isinstance(mesh["faces"], (list, tuple)) else 0
         for i in range(count):
             own = {name: values[i] for name, values in lists.items()}
-            arrays = plan.mesh(own, (i,) if is_list else ())
+            arrays = plan.mesh(own, (i % meshes,) if meshes else ())
             for name, array in lights_given.items():
                 if array is not None:
                     row = _of_view(f"lights.{name}", array, _light_dimensions(name), i, count)

@@ -1,9 +1,11 @@
 """Renderer, and render() in one call."""
 from __future__ import annotations
 
-import sys
+import inspect
+import numbers
+import types
 import warnings
-from typing import Any, Callable, Dict, Iterable, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -14,15 +16,7 @@ Array = Any
 """Array of NumPy, PyTorch, JAX, or any library with DLPack."""
 Meshes = Union[Array, Sequence[Array]]
 """An array, or a list of one a mesh."""
-
-
-def _compiles() -> bool:
-    return "torch" in sys.modules and _front_of_torch().is_compiling()
-
-
-def _front_of_torch():
-    from . import _torch
-    return _torch
+Setting = Union[float, str, None]
 
 
 class Renderer:
@@ -32,45 +26,88 @@ class Renderer:
     device          OpenCL device: "" for DPR_DEVICE or else the best there is, "cpu", "gpu", a number, or a part of
                     a name (dpr.devices())
     settings        any key of a scene's "smoothing" (lib/cli/README.md), with a number or a word: preset ("pixel"
-                    unless given), sigma (in squared NDC by default), gamma, samples, ...; and
+                    unless given), sigma, gamma, samples, ...; and
+        blur        instead of sigma: the standard deviation of the edges' noise in pixels, so that
+                    sigma = (2 blur / short side of the image)^2, in squared NDC, or the root of that with Euclidean
+                    distances. The default, sigma 1e-3, is a blur of 1 pixel at 64 pixels a side, of 4 at 256
         znear, zfar world units, between which triangles are rendered. Left out, every view has powers of two around the
                     depths of its vertices, the near one at least 1/1024 of the far one. Triangles that reach beyond
                     zfar are dropped whole; at znear they are clipped.
         cull        "none", "back" or "front"
         shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
 
-    A Renderer is pickled with its settings. Devices are opened, and kernels built, by the first call in a process.
-    Several threads may render with it at once. OpenCL does not survive fork(): a process forked after that gets an
-    error from a call; start it with "spawn", or render in the parent later. Frames of a graph hold buffers on the device
-    until the graph is freed; some buffers are kept for later calls with the same faces and size (release()).
+    What is given may be changed later, as an attribute: renderer.blur = 0.5. A name that there is not is refused, and
+    so is a setting without a part in the smoothing: sigma of the preset "rigid", alpha of the joint composition,
+    samples of an exact estimator. A Renderer is pickled with its settings. Devices are opened, and kernels built, by
+    the first call in a process. Several threads may render with it at once. OpenCL does not survive fork(): a process
+    forked after that gets an error from a call; start it with "spawn", or render in the parent later. Frames of a graph
+    hold buffers on the device until the graph is freed; some buffers are kept for later calls with the same faces and
+    size (release()). An interrupt (Ctrl-C) ends a call when the device has done the mesh under way, or all views of the
+    only mesh.
     """
 
-    def __init__(self, width: int, height: int, *, device: str = "", **settings: Union[float, str, None]):
-        settings = {"preset": "pixel", **settings}
-        self.width, self.height, self.device = width, height, device
-        self.settings = {name: value.item() if _checked(name, value) else value for name, value in settings.items()
-                         if value is not None}
-        self._texts = [_plan.setting(name, value) for name, value in self.settings.items()]
-        _plan.require_names(self.settings, _library.setting_names)
-        if not _compiles():
-            _library.call("dpr_frame_check", _frames.options_of(self._spec()))
+    def __init__(self, width: int, height: int, *, device: str = "", **settings: Setting):
+        self._configure({"width": width, "height": height, "device": device, "preset": "pixel", **settings})
+
+    def _configure(self, given):
+        """Takes all of a renderer, once it has been checked."""
+        _plan.require_names(given, _OF_A_RENDERER)
+        given = {name: value.item() if _checked(name, value) else value for name, value in given.items()
+                 if value is not None}
+        if "sigma" in given and "blur" in given:
+            _arrays.fail(ValueError, "blur", "blur and sigma", "one of them")
+        width, height = (_pixels(name, given.pop(name)) for name in ("width", "height"))
+        device, texts = given.pop("device", ""), []
+        for name, value in given.items():
+            if name == "blur":
+                of_blur = _plan.power_of_blur(given, width, height)
+                name, value = "sigma", _plan.sigma_of_blur(value, *of_blur)
+            texts.append(_plan.setting(name, value))
+        if not _arrays.is_compiling():
+            _library.call("dpr_frame_check", _frames.options_of(_spec_of(device, width, height, texts)))
+        for name, value in (("width", width), ("height", height), ("device", device), ("_settings", given),
+                            ("_texts", texts)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def settings(self) -> Mapping[str, Setting]:
+        """Settings that were given, to read: attributes of a Renderer change them."""
+        return types.MappingProxyType(self._settings)
+
+    def __setattr__(self, name: str, value: Setting) -> None:
+        """Changes width, height, device or a setting for later calls; None takes a setting back. sigma takes the place of
+        blur, and blur of sigma."""
+        given = {"width": self.width, "height": self.height, "device": self.device, **self._settings}
+        if name in ("sigma", "blur") and value is not None:
+            given.pop("blur" if name == "sigma" else "sigma", None)
+        self._configure({**given, name: value})
+
+    def __getattr__(self, name: str) -> Setting:
+        if name in _OF_A_RENDERER:
+            return self._settings.get(name)
+        raise AttributeError(f"'Renderer' object has no attribute '{name}'")
 
     def __repr__(self):
         return f"dpr.Renderer({self.width}, {self.height}, device={self.device!r}, " + \
-            ", ".join(f"{name}={value!r}" for name, value in self.settings.items()) + ")"
+            ", ".join(f"{name}={value!r}" for name, value in self._settings.items()) + ")"
 
-    def __call__(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, colors: Meshes = None,
-                 face_colors: Meshes = None, texcoords: Meshes = None, face_texcoords: Meshes = None,
-                 textures: Any = None, face_textures: Meshes = None, wrap: Union[str, Sequence[str]] = "repeat",
-                 filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None, face_materials: Meshes = None,
-                 background: Array = None, lights: Dict[str, Array] = None, sigma: Union[float, Array] = None,
-                 gamma: Union[float, Array] = None, alpha: Union[float, Array] = None, outputs: Iterable[str] = (),
-                 copy: bool = False, **misspelt: Any) -> Any:
-        """Renders N views of one mesh, of N shapes of one topology, or of N meshes.
+    def __call__(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *,
+                 colors: Optional[Meshes] = None, face_colors: Optional[Meshes] = None,
+                 texcoords: Optional[Meshes] = None, face_texcoords: Optional[Meshes] = None, textures: Any = None,
+                 face_textures: Optional[Meshes] = None, wrap: Union[str, Sequence[str]] = "repeat",
+                 filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None,
+                 face_materials: Optional[Meshes] = None, background: Optional[Array] = None,
+                 lights: Optional[Dict[str, Array]] = None, sigma: Union[float, Array, None] = None,
+                 blur: Union[float, Array, None] = None, gamma: Union[float, Array, None] = None,
+                 alpha: Union[float, Array, None] = None, outputs: Iterable[str] = (), copy: bool = False,
+                 **misspelt: Any) -> Any:
+        """Renders N views of one mesh, of N shapes of one topology, or of N meshes, or one view of N.
 
         vertices     [V, 3] or [N, V, 3], world space
         faces        [F, 3], int64 or int32: indices of vertices
-        views        [N, 4, 4], world to camera, acting on column vectors; the camera looks down -z, y is up (OpenGL)
+        views        [N, 4, 4], world to camera, acting on column vectors; the camera looks down -z, y is up (OpenGL).
+                     dpr.look_at(), dpr.perspective() and dpr.cameras make views and intrinsics. One of either, and one
+                     mesh, go with N of the others
         intrinsics   [N, 4], fx, fy, cx, cy in pixels from the corner of the top-left pixel (OpenCV's cx and cy plus
                      0.5); [N, 9], the same and OpenCV's k1, k2, p1, p2, k3; [N, 1], orthographic: world units from
                      the lower to the upper edge
@@ -91,7 +128,7 @@ class Renderer:
                      [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"
                      [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading
                      N of each view by itself. Without a dictionary colours are as they are.
-        sigma, gamma, alpha   instead of the settings': numbers, or tensors of one number
+        sigma or blur, gamma, alpha   instead of the settings': numbers, or tensors of one number
         outputs      names of "depth", "position", "normal", "texcoords", "face_id", "barycentrics", "uv",
                      "effective_faces". The first four are those of what may cover a pixel, at full size wherever alpha
                      is above 0: weigh them by alpha
@@ -99,13 +136,14 @@ class Renderer:
 
         Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and likewise of their
         colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
-        may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices
-        [N, V, 3]. They are rendered one after the other, each with a node of its own in the graph; so are views that
-        have textures or lights by themselves.
+        may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices [N, V,
+        3]. A mesh without faces shows the background. They are rendered one after the other, each with a node of its
+        own in the graph; so are views that have textures or lights by themselves.
 
-        Arrays are float32, or indices, of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the
-        same. Their memory is read where it is, if it is packed and on the CPU. With PyTorch and JAX the result is a
-        function of them with first derivatives; vjp() has those of all others.
+        Arrays are of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the same, float32;
+        nested lists of numbers are NumPy's. float32, int64 and int32 are read where they are, if packed and on the CPU;
+        other floating-point numbers and integers are converted, and have gradients of their own type. With PyTorch and
+        JAX the result is a function of them with first derivatives; vjp() has those of all others.
 
         Returns the images [N, height, width, 4]: linear RGB over the background, which is not to be blended by alpha
         again, and alpha, the silhouette. With outputs, (images, {name: tensor}): depth [N, height, width] along the
@@ -124,24 +162,27 @@ class Renderer:
         UserWarning tells that every triangle was dropped, but not from within torch.compile.
         """
         _plan.require_names(misspelt, _OF_A_CALL)
-        spec, plan = self._plan(vertices, faces, views, intrinsics, colors, face_colors, texcoords, face_texcoords,
-                                textures, face_textures, wrap, filter, materials, face_materials, background, lights,
-                                sigma, gamma, alpha, outputs, copy)
+        spec, plan = self._plan(vertices, faces, views, intrinsics, {
+            "colors": colors, "face_colors": face_colors, "texcoords": texcoords, "face_texcoords": face_texcoords,
+            "textures": textures, "face_textures": face_textures, "wrap": wrap, "filter": filter, "materials": materials,
+            "face_materials": face_materials, "background": background, "lights": lights, "sigma": sigma, "blur": blur,
+            "gamma": gamma, "alpha": alpha, "outputs": outputs, "copy": copy})
         kinds = {_arrays.module_of(leaf) for leaf in plan.leaves}
         if "torch" in kinds:
-            found, is_empty = _front_of_torch().render(spec, plan.leaves, copy)
+            from . import _torch
+            found, is_empty = _torch.render(spec, plan.leaves, copy)
         elif "jax" in kinds:
             from . import _jax
             found, is_empty = _jax.render(spec, plan.leaves), False
         else:
             rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in plan.leaves], ())
-            found, is_empty = [_arrays.like(plan.leaves[0], array) for array in rendered.outputs], rendered.is_empty()
+            found, is_empty = [_arrays.like(plan.given[0], array) for array in rendered.outputs], rendered.is_empty()
         if is_empty:
             warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
         return (found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]
 
-    def vjp(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, wrt: Iterable[str] = None,
-            **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
+    def vjp(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *,
+            wrt: Optional[Iterable[str]] = None, **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
         """Result of a call, and a function from gradients of the result to gradients of the call's arrays.
 
         The arguments are those of a call. wrt: names of those whose gradients are wanted, ("vertices", "lights") say;
@@ -156,15 +197,15 @@ class Renderer:
             gradient = pullback(2 * (image - target) / image.size)["vertices"]
         """
         _plan.require_names(arguments, _OF_A_CALL)
-        given = {**_DEFAULTS, **arguments}
-        spec, plan = self._plan(vertices, faces, views, intrinsics, *(given[name] for name in _OF_A_CALL))
+        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, **arguments})
         found, pullback, is_empty = _numpy.vjp(spec, plan, wrt)
         if is_empty:
             warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
         return ((found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]), pullback
 
-    def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *, texcoords: Array = None,
-                  face_texcoords: Array = None, tolerance: float = 0.25, copy: bool = False) -> Subdivision:
+    def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
+                  texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,
+                  copy: bool = False) -> Subdivision:
         """Cuts a mesh's faces where lenses bend their edges, which images draw straight between vertices.
 
         vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a
@@ -179,33 +220,33 @@ class Renderer:
         Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
         """
         plan = _plan.Plan(copy)
-        named = [("vertices", vertices, False), ("faces", faces, True), ("views", views, False),
-                 ("intrinsics", intrinsics, False)]
-        for name, array, is_index in named:
-            plan.add((name,), array, is_index)
+        for name, array in (("vertices", vertices), ("faces", faces), ("views", views), ("intrinsics", intrinsics)):
+            plan.add((name,), array, name == "faces")
         _, _, tolerance = _plan.setting("tolerance", tolerance).partition("=")
-        arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(array))) for name, array, _ in named]
-        cut = Subdivision(self._spec(), arrays, float(tolerance), vertices)
+        arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(leaf))) for (name,), leaf in zip(plan.paths, plan.leaves)]
+        cut = Subdivision(self._spec(), arrays, float(tolerance), plan.given[0])
         if texcoords is None:
             if face_texcoords is not None:
                 _arrays.fail(ValueError, "face_texcoords", "them alone", "them beside texcoords")
             return cut
         plan.add(("texcoords",), texcoords)
-        corners = corner_texcoords(texcoords, face_texcoords, arrays[1][1], arrays[0][1].shape[0])
+        corners = corner_texcoords(plan.given[-1], face_texcoords, arrays[1][1], arrays[0][1].shape[0])
         cut.texcoords = cut.of_corners(corners)
         return cut
 
     def _spec(self):
-        return _frames.Spec(self.device, self.width, self.height, 0, tuple(self._texts), (), ())
+        return _spec_of(self.device, self.width, self.height, self._texts)
 
-    def _plan(self, vertices, faces, views, intrinsics, colors, face_colors, texcoords, face_texcoords, textures,
-              face_textures, wrap, filter, materials, face_materials, background, lights, sigma, gamma, alpha, outputs,
-              copy):
-        mesh = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors,
-                "texcoords": texcoords, "face_texcoords": face_texcoords, "textures": textures,
-                "face_textures": face_textures, "wrap": wrap, "filter": filter, "materials": materials,
-                "face_materials": face_materials}
-        return _plan.of_call(self, mesh, views, intrinsics, background, lights, (sigma, gamma, alpha), outputs, copy)
+    def _plan(self, vertices, faces, views, intrinsics, given):
+        mesh = {"vertices": vertices, "faces": faces, **{name: given[name] for name in _OF_A_MESH}}
+        smoothing = {name: given[name] for name in ("sigma", "blur", "gamma", "alpha")}
+        return _plan.of_call(self, mesh, views, intrinsics, given["background"], given["lights"], smoothing,
+                             given["outputs"], given["copy"])
+
+
+def _spec_of(device, width, height, texts):
+    """Of no call."""
+    return _frames.Spec(device, width, height, 0, tuple(texts), (), ())
 
 
 def _checked(name, value):
@@ -216,13 +257,24 @@ def _checked(name, value):
     return False
 
 
+def _pixels(name, value):
+    if not isinstance(value, numbers.Real):
+        _arrays.fail(TypeError, name, repr(value), "a whole number of pixels")
+    if not value % 1 == 0:
+        _arrays.fail(_library.InvalidArgument, name, value, "a whole number of pixels")
+    return int(value)
+
+
 _DEFAULTS = Renderer.__call__.__kwdefaults__
 _OF_A_CALL = tuple(_DEFAULTS)
+_OF_A_MESH = _OF_A_CALL[:_OF_A_CALL.index("background")]
+_SETTINGS = tuple(name for name in ("blur", *_library.setting_names) if name not in _OF_A_MESH)
+_OF_A_RENDERER = ("width", "height", "device", *_SETTINGS)
 
 
 def _split(arguments):
     """(settings, keywords of a call)"""
-    _plan.require_names(arguments, (*_library.setting_names, *_OF_A_CALL))
+    _plan.require_names(arguments, (*_SETTINGS, *_OF_A_CALL))
     return ({name: value for name, value in arguments.items() if name not in _OF_A_CALL},
             {name: value for name, value in arguments.items() if name in _OF_A_CALL})
 
@@ -237,18 +289,43 @@ def render(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, 
 
 
 def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
-                    device: str = "", wrt: Iterable[str] = None, **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
+                    device: str = "", wrt: Optional[Iterable[str]] = None,
+                    **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
     """Renderer(width, height, device=device, ...) and its vjp() in one, with the keywords of both: see there."""
     settings, of_call = _split(arguments)
     return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
 
 
 def subdivide(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
-              texcoords: Array = None, face_texcoords: Array = None, tolerance: float = 0.25, copy: bool = False,
-              **settings: Union[float, str, None]) -> Subdivision:
+              texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,
+              copy: bool = False, **settings: Setting) -> Subdivision:
     """Renderer(width, height, **settings).subdivide(): see there."""
     return Renderer(width, height, **settings).subdivide(vertices, faces, views, intrinsics, texcoords=texcoords,
                                                          face_texcoords=face_texcoords, tolerance=tolerance, copy=copy)
 
 
+def _keywords_of(function):
+    return [parameter for parameter in inspect.signature(function).parameters.values()
+            if parameter.kind == inspect.Parameter.KEYWORD_ONLY]
+
+
+def _sign(function, *more):
+    """Lists more keywords in a function's signature, in the place of those that it passes on."""
+    signature = inspect.signature(function)
+    own = [parameter for parameter in signature.parameters.values() if parameter.kind != inspect.Parameter.VAR_KEYWORD]
+    names = {parameter.name for parameter in own}
+    function.__signature__ = signature.replace(
+        parameters=own + [parameter for parameter in more if parameter.name not in names])
+
+
+_setting_keywords = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation="Setting",
+                                       default="pixel" if name == "preset" else None) for name in _SETTINGS]
+_call_keywords = _keywords_of(Renderer.__call__)
+_sign(Renderer.__init__, *_setting_keywords)
+_sign(Renderer.__call__)
+_sign(Renderer.vjp, *_call_keywords)
+_all_keywords = {parameter.name: parameter for parameter in (*_setting_keywords, *_call_keywords)}
+_sign(render, *_all_keywords.values())
+_sign(render_with_vjp, *_all_keywords.values())
+_sign(subdivide, *_keywords_of(Renderer.__init__))
 render.__doc__ += Renderer.__doc__ + "\n    The call:\n\n" + Renderer.__call__.__doc__

@@ -72,8 +72,7 @@ def corner_texcoords(texcoords, face_texcoords, faces, vertex_count):
     else:
         if len(shape) != 2 or shape[1] != 2:
             _arrays.fail(ValueError, "texcoords", list(shape), "[T, 2]")
-        _arrays.require("face_texcoords", face_texcoords, ("int64", "int32"), "int64 or int32, indices")
-        indices = _arrays.to_numpy(face_texcoords)
+        indices = _arrays.to_numpy(_arrays.converted("face_texcoords", face_texcoords, True))
         if indices.shape != (count, 3):
             _arrays.fail(ValueError, "face_texcoords", list(indices.shape), [count, 3])
     if count and not 0 <= indices.min() <= indices.max() < shape[0]:
