@@ -203,6 +203,27 @@ class ArgumentsTest(unittest.TestCase):
         of_padded = renderer(np.stack([TETRAHEDRON] * 2), padded, views[:2], intrinsics[:2])
         self.assertEqual([of_padded[i, ..., 3].max() > 0.5 for i in range(2)], [True, False])
 
+    def test_warns_of_triangles_beyond_zfar(self):
+        views, intrinsics = dpr.look_at([0, 0, 4]), dpr.perspective(40, SIZE, SIZE)
+        near = np.float32([[-1, -1, 0], [1, -1, 0], [0, 1, 0]])
+        both, faces = np.concatenate([near, near - [0, 0, 0.5], near - [0, 0, 9]]), np.arange(9).reshape(3, 3)
+
+        def told(vertices, faces, zfar, count=1):
+            with warnings.catch_warnings(record=True) as found:
+                warnings.simplefilter("always")
+                dpr.render(vertices, faces, np.repeat(views, count, 0), intrinsics, width=SIZE, height=SIZE, zfar=zfar)
+            return [str(warning.message) for warning in found]
+
+        beyond = "dpr: {} triangles reach beyond zfar ({}) and were dropped whole"
+        self.assertEqual(told(both, faces, 20), [])
+        self.assertEqual(told(both, faces, None), [])
+        self.assertEqual(told(both, faces[:2], 5), [])  # a vertex of no face
+        self.assertEqual(told(both, faces, 5), [beyond.format(1, 5)])
+        self.assertEqual(told(both, faces, 4.25, 2), [beyond.format(4, 4.25)])
+        self.assertEqual(told(np.stack([near, near - np.float32([0, 0, 9])]), faces[:1], 5), [beyond.format(1, 5)])
+        self.assertEqual(told([near, both], [faces[:1], faces], 5), [beyond.format(1, 5)])
+        self.assertRegex(told(both, faces, 3)[0], "every triangle was dropped")
+
     def test_errors_name_the_mesh_of_a_list(self):
         views, intrinsics = cameras(2)
         meshes = [TETRAHEDRON, SQUARE], [FACES, SQUARE_FACES + 3]

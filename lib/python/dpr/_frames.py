@@ -11,13 +11,13 @@ from . import _library
 WITH_GRADIENTS = {"depth": 1, "position": 3, "normal": 3, "texcoords": 2}
 """Outputs with gradients, and how many numbers a pixel of theirs has."""
 OTHERS = {"face_id": (), "barycentrics": (3,), "uv": (2,), "effective_faces": ()}
-NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer than znear, beyond zfar, culled, or without "
-                    "area")
+_NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer than znear, beyond zfar, culled, or without "
+                     "area")
 _OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
 """Arrays that outputs beside the image depend on."""
 _NO_MESH = [("vertices", np.zeros((1, 3), np.float32)), ("faces", np.zeros((1, 3), np.int64))]
 """Triangle without area, which is dropped: shows the background of a mesh without faces."""
-_LEAST_WEIGHT = 1e-12
+_LEAST_WEIGHT, _ROUNDING = 1e-12, 1e-6
 _ELEMENTS = {np.dtype(np.float32): 0, np.dtype(np.int32): 1, np.dtype(np.int64): 2}
 
 Spec = collections.namedtuple("Spec", "device width height is_lit settings outputs parts")
@@ -136,16 +136,33 @@ def shapes_of(spec, views):
                                           for name in spec.outputs]
 
 
+def _faces_beyond(zfar, vertices, faces, views):
+    """Number of triangles, of all views, with a vertex behind the plane."""
+    axes = views[:, 2, :]
+    depths = -(vertices @ axes[:, :3, None])[..., 0] - axes[:, 3:]
+    is_beyond = depths > zfar * (1 + _ROUNDING)
+    return int(is_beyond[:, faces].any(2).sum()) if is_beyond.any() else 0
+
+
+def _warning(frame, zfar, arrays):
+    if frame.is_empty():
+        return _NOTHING_RENDERED
+    count = _faces_beyond(zfar, arrays["vertices"], arrays["faces"], arrays["views"]) if zfar is not None else 0
+    return f"dpr: {count} triangles reach beyond zfar ({zfar:g}) and were dropped whole" if count else None
+
+
 class Rendered:
     """A call's frames, and what they show.
 
     outputs  [image, *those of spec.outputs]
+    warning  about triangles that a frame does not show; None without
     """
 
     def __init__(self, spec, arrays, wanted):
         """arrays: of float32, int32 or int64; wanted: indices of those whose gradients gradients() may be asked for."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
-        self.spec, self._shapes, self._frames, self._has_meshes = spec, [array.shape for array in arrays], [], []
+        self.spec, self._shapes, self._frames, self.warning = spec, [array.shape for array in arrays], [], None
+        zfar = next((float(text[5:]) for text in reversed(spec.settings) if text.startswith("zfar=")), None)
         frames = _frames_of(spec.parts)
         views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
         shapes = shapes_of(spec, len(views) if views.ndim else 0)
@@ -165,7 +182,8 @@ class Rendered:
                 raise _library.InvalidArgument(text) from None
             _library.call("dpr_frame_read", frame.handle, *c_arrays([(name, array[rows]) for name, array in raw.items()]))
             self._frames.append((frame, parts, rows))
-            self._has_meshes.append(has_mesh)
+            if has_mesh:
+                self.warning = self.warning or _warning(frame, zfar, dict(named))
         self._sums = {name: raw[name] for name in spec.outputs if name in WITH_GRADIENTS}
         self.outputs = [_means(name, array)[0].reshape(shape) if name in WITH_GRADIENTS else array
                         for (name, array), (shape, _) in zip(raw.items(), shapes)]
@@ -175,10 +193,6 @@ class Rendered:
         names = {part.name for _, parts, _ in self._frames for part in parts if part.leaf in wanted}
         return [1 + i for i, name in enumerate(self.spec.outputs)
                 if name in OTHERS or not names & _OF_OUTPUTS]
-
-    def is_empty(self):
-        """True if a frame shows no triangle of its mesh."""
-        return any(has_mesh and frame.is_empty() for has_mesh, (frame, _, _) in zip(self._has_meshes, self._frames))
 
     def gradients(self, grads, wanted):
         """{index: gradient} of sum <grad, output>, of the outputs whose grad is not None."""

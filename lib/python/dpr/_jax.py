@@ -26,8 +26,8 @@ jax.tree_util.register_pytree_node(_Constant, lambda constant: ((), constant.val
 
 def _forward(spec, wanted, *leaves):
     rendered = _frames.Rendered(spec, [np.asarray(leaf) for leaf in leaves], wanted)
-    if rendered.is_empty():
-        warnings.warn(_frames.NOTHING_RENDERED)
+    if rendered.warning:
+        warnings.warn(rendered.warning)
     return tuple(output.astype(np.int32) if output.dtype == np.int64 and not jax.config.jax_enable_x64 else output
                  for output in rendered.outputs)
 
@@ -73,5 +73,5 @@ _render.defvjp(_render_and_keep, _pull_back, symbolic_zeros=True)
 
 
 def render(spec, leaves):
-    """The outputs. Those whose frames are empty are told of where they are computed."""
+    """The outputs. Their warnings are told where they are computed."""
     return list(_render(spec, [jax.numpy.asarray(leaf) for leaf in leaves]))

@@ -26,7 +26,7 @@ def _nested(paths, found):
 
 
 def vjp(spec, plan, wrt):
-    """(outputs, pullback, whether a frame is empty)"""
+    """(outputs, pullback, warning)"""
     leaves, paths = plan.leaves, plan.paths
     names = {path[0] for path in paths}
     for name in wrt or ():
@@ -50,4 +50,4 @@ def vjp(spec, plan, wrt):
                 found[leaf] = np.asarray(found[leaf] * slope(), np.float32)
         return _nested(paths, {leaf: _arrays.restored(plan.given[leaf], gradient) for leaf, gradient in found.items()})
 
-    return [_arrays.like(plan.given[0], output) for output in rendered.outputs], pullback, rendered.is_empty()
+    return [_arrays.like(plan.given[0], output) for output in rendered.outputs], pullback, rendered.warning

@@ -155,11 +155,12 @@ class Renderer:
 
         The images have first derivatives with respect to every float array above: those of the views are of any affine
         matrices, with lights of rigid motions. Depth, position, normal and texcoords have those of vertices, views (of
-        rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how
-        much of it is seen, and cost about an image each, normals four. The other outputs have none. Errors name the
-        argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes and of what arrays hold,
-        dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as those have them. A
-        UserWarning tells that every triangle was dropped, but not from within torch.compile.
+        rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how much
+        of it is seen, and cost about an image each, normals four. The other outputs have none. Errors name the
+        argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes and of what arrays
+        hold, dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as those have them. A
+        UserWarning tells that every triangle was dropped, or some beyond the zfar that was set, but not from within
+        torch.compile.
         """
         _plan.require_names(misspelt, _OF_A_CALL)
         spec, plan = self._plan(vertices, faces, views, intrinsics, {
@@ -170,15 +171,15 @@ class Renderer:
         kinds = {_arrays.module_of(leaf) for leaf in plan.leaves}
         if "torch" in kinds:
             from . import _torch
-            found, is_empty = _torch.render(spec, plan.leaves, copy)
+            found, warning = _torch.render(spec, plan.leaves, copy)
         elif "jax" in kinds:
             from . import _jax
-            found, is_empty = _jax.render(spec, plan.leaves), False
+            found, warning = _jax.render(spec, plan.leaves), None
         else:
             rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in plan.leaves], ())
-            found, is_empty = [_arrays.like(plan.given[0], array) for array in rendered.outputs], rendered.is_empty()
-        if is_empty:
-            warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
+            found, warning = [_arrays.like(plan.given[0], array) for array in rendered.outputs], rendered.warning
+        if warning:
+            warnings.warn(warning, stacklevel=2)
         return (found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]
 
     def vjp(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *,
@@ -198,9 +199,9 @@ class Renderer:
         """
         _plan.require_names(arguments, _OF_A_CALL)
         spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, **arguments})
-        found, pullback, is_empty = _numpy.vjp(spec, plan, wrt)
-        if is_empty:
-            warnings.warn(_frames.NOTHING_RENDERED, stacklevel=2)
+        found, pullback, warning = _numpy.vjp(spec, plan, wrt)
+        if warning:
+            warnings.warn(warning, stacklevel=2)
         return ((found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]), pullback
 
     def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,

@@ -36,7 +36,7 @@ class _Render(torch.autograd.Function):
     @staticmethod
     def forward(ctx, spec, wanted, told, *tensors):
         rendered = Rendered(spec, [_arrays.to_numpy(tensor) for tensor in tensors], wanted)
-        told.append(rendered.is_empty())
+        told.append(rendered.warning)
         outputs = [_tensor(array) for array in rendered.outputs]
         ctx.rendered, ctx.wanted, ctx.count = rendered, wanted, len(tensors)
         ctx.set_materialize_grads(False)
@@ -54,21 +54,21 @@ class _Render(torch.autograd.Function):
 
 
 def render(spec, leaves, copy):
-    """(outputs, whether a frame is empty)"""
+    """(outputs, warning)"""
     home = next(leaf.device for leaf in leaves if isinstance(leaf, torch.Tensor))
     tensors = [leaf if isinstance(leaf, torch.Tensor) else torch.from_dlpack(_arrays.to_numpy(leaf)) for leaf in leaves]
     if copy:
         tensors = [tensor.cpu() for tensor in tensors]
     wanted = [i for i, tensor in enumerate(tensors) if tensor.requires_grad]
     if is_compiling():
-        outputs, is_empty = torch.ops.dpr.render(tensors, wanted, _text_of(spec))[:-1], False
+        outputs, warning = torch.ops.dpr.render(tensors, wanted, _text_of(spec))[:-1], None
     else:
         told = []
         outputs = _Render.apply(spec, tuple(wanted), told, *tensors)
-        (is_empty,) = told
+        (warning,) = told
     if copy:
         outputs = [tensor.to(home) for tensor in outputs]
-    return list(outputs), is_empty
+    return list(outputs), warning
 
 
 def _text_of(spec):
