@@ -5,8 +5,8 @@
 #ifndef DPR_LIGHTING_H
 #define DPR_LIGHTING_H
 
+#include "harmonics.h"
 #include "shared_types.h"
-#include "vec3n.h"
 
 #ifndef DPR_SHADING
 #define DPR_SHADING DPR_PHONG
@@ -63,27 +63,6 @@ static inline LightTerm light_term(Vec3n position, Vec3n normal, float4 eye, glo
 /// Part of `v` that comes through the light's cone.
 static inline realn through_cone(const LightTerm t, realn v) {
   return (DPR_LIGHTS & DPR_LIGHTS_CONES) ? v * t.cone : v;
-}
-
-/// The basis, but for its constants, at a normal: of degree 0, 1 and 2, so that without a normal the mean is
-/// left. In the order (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), ..., (2, 2).
-static inline void harmonic_basis(Vec3n n, realn basis[DPR_HARMONICS]) {
-  basis[0] = 1.0f;
-  basis[1] = n.y;
-  basis[2] = n.z;
-  basis[3] = n.x;
-  basis[4] = n.x * n.y;
-  basis[5] = n.y * n.z;
-  basis[6] = 2.0f * n.z * n.z - n.x * n.x - n.y * n.y;
-  basis[7] = n.x * n.z;
-  basis[8] = n.x * n.x - n.y * n.y;
-}
-
-/// Its gradient to the normal, from those of the basis.
-static inline Vec3n harmonic_basis_backward(Vec3n n, const realn g[DPR_HARMONICS]) {
-  return make_vec3n(g[3] + n.y * g[4] + n.z * g[7] + 2.0f * n.x * (g[8] - g[6]),
-                    g[1] + n.x * g[4] + n.z * g[5] - 2.0f * n.y * (g[8] + g[6]),
-                    g[2] + n.y * g[5] + n.x * g[7] + 2.0f * n.z * (g[6] + g[6]));
 }
 
 /// The light at a point, RGB: colour = base * factor + coefficient * specular.

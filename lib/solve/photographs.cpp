@@ -14,9 +14,10 @@
 #include "base/checks.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
+#include "renderer/frame.hpp"
 #include "scene/gradient_table.hpp"
+#include "solve/normal_equations.hpp"
 #include "solve/polar.hpp"
-#include "solve/pose_light.hpp"
 #include "solve/scene_light.hpp"
 #include "solve/shape_space.hpp"
 
@@ -217,29 +218,26 @@ std::optional<ColorGain> find_gain(const Device& device, Scene scene, const Shap
                                    float robust_scale) {
   WeighedTarget target;
   target.background = std::exchange(scene.background, glm::vec3(0));
-  target.inverse_scale_squared = robust_scale > 0 ? 1 / (robust_scale * robust_scale) : 0;
   scene.lights.reset();
   scene.gradients = no_gradients();
   scene.camera = view.camera;
   Renderer renderer(device);
   renderer.set_scene(scene);
   renderer.forward();
-  const Image image = renderer.image();
-  std::vector<cl_float4> colors;
-  std::vector<std::size_t> shown;
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const glm::vec4 &p = image.pixels[i], &q = view.image.pixels[i];
-    colors.push_back({{p.x, p.y, p.z, p.w}});
+  for (std::size_t i = 0; i < view.image.pixels.size(); ++i) {
+    const glm::vec4& q = view.image.pixels[i];
     target.colors.push_back({{q.x, q.y, q.z, q.w}});
     target.weights.push_back(view.mask.pixels.empty() ? 1.0F : view.mask.pixels[i].x);
-    if (p.w > 0) shown.push_back(i);
   }
-  if (shown.empty()) return std::nullopt;
-  const LightFit fit(target, shown, {colors.data(), nullptr});
+  const Buffer<cl_float4>& image = last_frame(renderer, "find_gain").image;
+  NormalSums sums(device, target, PoseLight::gain, 1);
+  static_cast<void>(sums.losses({1, image, image}, robust_scale));
   ColorGain found;
   for (int c = 0; c < 3; ++c) {
-    found.gain[c] = fit.gain(c);
-    found.offset[c] = fit.offset(c);
+    const ChannelLight& light = sums.lights().front()[static_cast<std::size_t>(c)];
+    if (light.seen <= 0) return std::nullopt;
+    found.gain[c] = light.light[0];
+    found.offset[c] = light.light[1];
   }
   return found;
 }

@@ -1,0 +1,510 @@
+// Normal equations of hypotheses about an object's pose, and the light that explains each best: sums over the
+// pixels, from which the host makes the next light and the next step; and the images that these are of.
+// reduce.cl adds the slots.
+//
+// A pixel of coverage a, colour c and unit normal n is modelled in each channel as
+//
+//   c sum_k l_k Y_k(n) + o a + background (1 - a)
+//
+// with the basis Y of harmonic_basis(), nine polynomials that hold the irradiance of any distant light, or the
+// first of them alone, and o reflected whatever the colour. The terms t of a channel are the factors of l and
+// o. Without terms the image is taken as it is.
+//
+// The loss is that of loss_robust.h. Its weights w are those of the squares that have its derivative
+// (iteratively reweighted least squares).
+//
+// Kernels of sums have one work-item per vector of slots, of a view, and of a part that each names. A slot
+// sums pixels of its view as in reduce.cl: every slots-th on a GPU, those of a run on a CPU. Deterministic.
+// in   pixels     of a view
+// in   views      that are summed
+// in   slots      a multiple of the widest vector
+// in   background RGB, which shows where the object does not, if the light has terms
+// in   active     uint[views]  the numbers of those that are summed, of all that there are
+// in   fits       float[view][DPR_FIT_LENGTH]  1 / scale^2 of the robust loss, 0: squares; [channel][term] light
+// in   colors     float4[view][pixel]  RGBA; if the light has terms without light, over black
+// in   normals    float4[view][pixel]  as colours, over black; of harmonics alone
+// in   target     float4[pixel]        RGBA
+// in   weights    float[pixel]         how much a pixel counts
+//      residuals  float[view][4][pixel]             RGB in their light less the target's; w
+//      lit        float[direction][view][3][pixel]  derivatives J of RGB in their light
+//      left       float[direction][view][3][pixel]  J less what the light makes up for, P
+// out  sums       float[sum][view][slot]
+#include "tile_lanes.h"
+
+#include "harmonics.h"
+
+#ifndef DPR_TERMS
+#define DPR_TERMS 10 /* of a channel's light: 0; gain and offset; harmonics and offset */
+#endif
+#ifndef DPR_DIRECTIONS
+#define DPR_DIRECTIONS 6 /* in which hypotheses move */
+#endif
+
+#define DPR_FACTORS (DPR_TERMS - 1) /* terms that the colour multiplies */
+#define DPR_FIT_LENGTH (1 + 3 * DPR_TERMS)
+#define DPR_TRIANGLE(n) ((n) * ((n) + 1) / 2)
+
+/// A vector of pixels, RGBA.
+typedef struct {
+  Vec3n color;
+  realn alpha;
+} PixelsN;
+
+/// Those from `first` on; lanes from `last` on repeat the pixel before.
+static inline PixelsN load_pixels(uint first, uint last, global const float4* image) {
+  PixelsN p;
+#if DPR_WIDTH == 1
+  (void)last;
+  p.color = splat3(image[first]);
+  p.alpha = image[first].w;
+#else
+  float16 a, b;
+  if (last - first >= DPR_WIDTH) {
+    a = vload16(0, (global const float*)(image + first));
+    b = vload16(1, (global const float*)(image + first));
+  } else {
+    float4 lanes[DPR_WIDTH];
+    for (uint lane = 0; lane < DPR_WIDTH; ++lane) lanes[lane] = image[min(first + lane, last - 1)];
+    a = vload16(0, (const float*)lanes);
+    b = vload16(1, (const float*)lanes);
+  }
+  p.color = make_vec3n((realn)(a.s048c, b.s048c), (realn)(a.s159d, b.s159d), (realn)(a.s26ae, b.s26ae));
+  p.alpha = (realn)(a.s37bf, b.s37bf);
+#endif
+  return p;
+}
+
+/// Three planes; lanes from `last` on are 0.
+static inline Vec3n load_planes(uint first, uint last, uint pixels, global const float* planes) {
+  const intn in_run = lanes_before(last, first);
+  return make_vec3n(load_run(in_run, first, planes), load_run(in_run, first, planes + pixels),
+                    load_run(in_run, first, planes + 2 * (size_t)pixels));
+}
+
+static inline void store_planes(Vec3n v, uint first, uint last, uint pixels, global float* planes) {
+  store_run(v.x, first, last, planes);
+  store_run(v.y, first, last, planes + pixels);
+  store_run(v.z, first, last, planes + 2 * (size_t)pixels);
+}
+
+static inline realn channel_of(Vec3n v, uint channel) {
+  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
+}
+
+/// A vector of slots, and the pixels that it sums.
+typedef struct {
+  uint slot, view, part;
+  uint first, last, step;
+} Slots;
+
+static inline Slots make_slots(uint pixels, uint views, uint slots) {
+  const uint i = (uint)get_global_id(0), vectors = slots / DPR_WIDTH;
+  Slots s;
+  s.slot = i % vectors * DPR_WIDTH;
+  s.view = i / vectors % views;
+  s.part = i / vectors / views;
+#if DPR_WIDTH == 1
+  s.first = s.slot;
+  s.last = pixels;
+  s.step = slots;
+#else
+  const uint run = (pixels + slots - 1) / slots;  // vectors
+  s.first = s.slot * run;
+  s.last = min(pixels, s.first + DPR_WIDTH * run);
+  s.step = DPR_WIDTH;
+#endif
+  return s;
+}
+
+static inline void store_sum(realn sum, uint number, const Slots s, uint views, uint slots,
+                             global float* sums) {
+  store_n(sum, 0, sums + ((size_t)number * views + s.view) * slots + s.slot);
+}
+
+#if DPR_TERMS > 0
+/// The part of a light that is a term's, by channel.
+static inline Vec3n light_at(global const float* light, uint term) {
+  return make_vec3n((realn)(light[term]), (realn)(light[DPR_TERMS + term]),
+                    (realn)(light[2 * DPR_TERMS + term]));
+}
+
+/// Where pixels' surfaces face, 0 where there is none, and what the light multiplies.
+typedef struct {
+  Vec3n normal;
+  realn inverse_length;  // of the normal in the image
+  realn basis[DPR_FACTORS];
+} Facing;
+
+static inline Facing load_facing(uint first, uint last, global const float4* normals) {
+  Facing f;
+#if DPR_FACTORS == DPR_HARMONICS
+  f.normal = load_pixels(first, last, normals).color;
+  f.inverse_length = normalize3n(&f.normal);
+  harmonic_basis(f.normal, f.basis);
+#else
+  (void)first, (void)last, (void)normals;
+  f.basis[0] = 1.0f;
+#endif
+  return f;
+}
+
+/// Sum of the terms that the colour multiplies, times a light, by channel.
+static inline Vec3n shade(const realn basis[DPR_FACTORS], global const float* light) {
+  Vec3n shading = zero3n();
+#pragma unroll
+  for (uint k = 0; k < DPR_FACTORS; ++k) shading = mad3n(light_at(light, k), basis[k], shading);
+  return shading;
+}
+#endif
+
+/// Residuals, their weights and losses. One part.
+kernel void normal_loss(const uint pixels, const uint views, const uint slots, const float4 background,
+                        global const uint* restrict active, global const float* restrict fits,
+                        global const float4* restrict colors, global const float4* restrict normals,
+                        global const float4* restrict target, global const float* restrict weights,
+                        global float* restrict residuals, global float* restrict sums) {
+  const Slots s = make_slots(pixels, views, slots);
+  if (s.part >= 1) return;
+  const size_t view = active[s.view];
+  global const float* fit = fits + view * DPR_FIT_LENGTH;
+  realn loss = 0.0f;
+  for (uint i = s.first; i < s.last; i += s.step) {
+    const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
+    const Vec3n wanted = load_pixels(i, s.last, target).color;
+#if DPR_TERMS == 0
+    (void)normals, (void)background;
+    const Vec3n residual = sub3n(image.color, wanted);
+#else
+    const Vec3n behind = splat3(background);
+    Vec3n residual = sub3n(behind, wanted);
+    if (any_lane(image.alpha > 0.0f)) {
+      const Facing facing = load_facing(i, s.last, normals + view * pixels);
+      const Vec3n lit = mul3n(image.color, shade(facing.basis, fit + 1));
+      residual = mad3n(sub3n(light_at(fit + 1, DPR_FACTORS), behind), image.alpha,
+                       sub3n(lit, sub3n(wanted, behind)));
+    }
+#endif
+    const realn mask = load_run(lanes_before(s.last, i), i, weights), squared = dot3n(residual, residual);
+    const realn slope = 1.0f / mad(squared, (realn)(fit[0]), (realn)(1.0f));
+    loss += mask * slope * squared;
+    global float* planes = residuals + 4 * view * pixels;
+    store_planes(residual, i, s.last, pixels, planes);
+    store_run(mask * square(slope), i, s.last, planes + 3 * (size_t)pixels);
+  }
+  store_sum(loss, 0, s, views, slots, sums);
+}
+
+#if DPR_TERMS > 0
+#define DPR_LIGHT_PRODUCTS DPR_TRIANGLE(DPR_TERMS)
+#define DPR_LIGHT_SUMS (DPR_LIGHT_PRODUCTS + 2 * DPR_TERMS)
+
+/// Channels that a work-item sums, numbers of each, and where those that are not products begin: on a GPU, whose
+/// registers hold no more, products or others of one channel.
+#if DPR_WIDTH == 1
+#define DPR_FIT_CHANNELS 1
+#define DPR_FIT_ROOM (DPR_LIGHT_PRODUCTS + 1)
+#define DPR_FIT_OTHERS 0
+#else
+#define DPR_FIT_CHANNELS 3
+#define DPR_FIT_ROOM DPR_LIGHT_SUMS
+#define DPR_FIT_OTHERS DPR_LIGHT_PRODUCTS
+#endif
+
+/// Least squares of the light, which are summed behind the loss. Each channel sums w t t^T, its lower triangle;
+/// w t; and w t y, y being the target less the background that shows. Parts are the first of the channels, then
+/// the others, on a GPU, else all are one.
+kernel void normal_light(const uint pixels, const uint views, const uint slots, const float4 background,
+                         global const uint* restrict active, global const float4* restrict colors,
+                         global const float4* restrict normals, global const float4* restrict target,
+                         global const float* restrict residuals, global float* restrict sums) {
+  const Slots s = make_slots(pixels, views, slots);
+  if (s.part >= (DPR_WIDTH == 1 ? 6 : 1)) return;
+  const uint first_channel = s.part % 3;
+  const int has_products = DPR_WIDTH != 1 || s.part < 3, has_others = DPR_WIDTH != 1 || s.part >= 3;
+  const size_t view = active[s.view];
+  realn sum[DPR_FIT_CHANNELS * DPR_FIT_ROOM];
+#pragma unroll
+  for (uint k = 0; k < DPR_FIT_CHANNELS * DPR_FIT_ROOM; ++k) sum[k] = 0.0f;
+  for (uint i = s.first; i < s.last; i += s.step) {
+    const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
+    if (!any_lane(image.alpha > 0.0f)) continue;  // there all terms are 0
+    const Vec3n behind = splat3(background);
+    const Vec3n wanted = mad3n(behind, image.alpha, sub3n(load_pixels(i, s.last, target).color, behind));
+    const realn weight = load_run(lanes_before(s.last, i), i, residuals + (4 * view + 3) * pixels);
+    const Facing facing = load_facing(i, s.last, normals + view * pixels);
+    for (uint c = 0; c < DPR_FIT_CHANNELS; ++c) {
+      const realn color = channel_of(image.color, first_channel + c);
+      realn terms[DPR_TERMS], *const of_channel = sum + c * DPR_FIT_ROOM;
+#pragma unroll
+      for (uint k = 0; k < DPR_FACTORS; ++k) terms[k] = color * facing.basis[k];
+      terms[DPR_FACTORS] = image.alpha;
+#pragma unroll
+      for (uint k = 0; k < DPR_TERMS; ++k) {
+        const realn term = weight * terms[k];
+        if (has_products) {
+#pragma unroll
+          for (uint l = 0; l <= k; ++l) of_channel[DPR_TRIANGLE(k) + l] += term * terms[l];
+        }
+        if (has_others) {
+          of_channel[DPR_FIT_OTHERS + k] += term;
+          of_channel[DPR_FIT_OTHERS + DPR_TERMS + k] += term * channel_of(wanted, first_channel + c);
+        }
+      }
+    }
+  }
+#pragma unroll
+  for (uint c = 0; c < DPR_FIT_CHANNELS; ++c) {
+    const uint number = 1 + (first_channel + c) * DPR_LIGHT_SUMS;
+#pragma unroll
+    for (uint k = 0; k < DPR_LIGHT_PRODUCTS; ++k) {
+      if (has_products) store_sum(sum[c * DPR_FIT_ROOM + k], number + k, s, views, slots, sums);
+    }
+#pragma unroll
+    for (uint k = 0; k < 2 * DPR_TERMS; ++k) {
+      if (has_others)
+        store_sum(sum[c * DPR_FIT_ROOM + DPR_FIT_OTHERS + k], number + DPR_LIGHT_PRODUCTS + k, s, views,
+                  slots, sums);
+    }
+  }
+}
+#endif
+
+#define DPR_THRESHOLDS 16 /* a pass of the search for a median tells so many parts apart */
+
+/// Number of residuals, of all channels where the object shows, whose size is below thresholds. One part.
+/// in   thresholds  float[view][DPR_THRESHOLDS]
+kernel void normal_counts(const uint pixels, const uint views, const uint slots,
+                          global const float* restrict thresholds, global const float4* restrict colors,
+                          global const float* restrict residuals, global float* restrict sums) {
+  const Slots s = make_slots(pixels, views, slots);
+  if (s.part >= 1) return;
+  realn sum[DPR_THRESHOLDS];
+#pragma unroll
+  for (uint k = 0; k < DPR_THRESHOLDS; ++k) sum[k] = 0.0f;
+  for (uint i = s.first; i < s.last; i += s.step) {
+    const realn alpha = load_pixels(i, s.last, colors + (size_t)s.view * pixels).alpha;
+    const intn shows = lanes_before(s.last, i) & (alpha > 0.0f);
+    if (!any_lane(shows)) continue;
+    const Vec3n residual = load_planes(i, s.last, pixels, residuals + 4 * (size_t)s.view * pixels);
+#pragma unroll
+    for (uint k = 0; k < DPR_THRESHOLDS; ++k) {
+      const realn threshold = thresholds[s.view * DPR_THRESHOLDS + k];
+#pragma unroll
+      for (uint c = 0; c < 3; ++c)
+        sum[k] += choose(shows & (fabs(channel_of(residual, c)) < threshold), (realn)(1.0f), (realn)(0.0f));
+    }
+  }
+#pragma unroll
+  for (uint k = 0; k < DPR_THRESHOLDS; ++k) store_sum(sum[k], k, s, views, slots, sums);
+}
+
+/// A vector of pixels of a view moved in a direction.
+typedef struct {
+  uint first, view;
+  size_t image;  // direction * views + view
+} Moved;
+
+static inline Moved make_moved(uint pixels, uint views) {
+  const uint i = (uint)get_global_id(0), vectors = (pixels + DPR_WIDTH - 1) / DPR_WIDTH;
+  Moved m;
+  m.first = i % vectors * DPR_WIDTH;
+  m.image = i / vectors;
+  m.view = i / vectors % views;
+  return m;
+}
+
+/// Derivatives in the light. One work-item per vector of pixels, view and direction.
+/// in   tangents, normal_tangents  float4[direction][view][pixel]  of colors and normals
+/// out  lit
+kernel void normal_lit(const uint pixels, const uint views, const float4 background,
+                       global const float* restrict fits, global const float4* restrict colors,
+                       global const float4* restrict normals, global const float4* restrict tangents,
+                       global const float4* restrict normal_tangents, global float* restrict lit) {
+  const Moved m = make_moved(pixels, views);
+  if (m.image >= DPR_DIRECTIONS * views) return;
+  const PixelsN moved = load_pixels(m.first, pixels, tangents + m.image * pixels);
+  Vec3n tangent = moved.color;
+#if DPR_TERMS == 0
+  (void)background, (void)fits, (void)colors, (void)normals, (void)normal_tangents;
+#else
+  const size_t view = m.view;
+  global const float* light = fits + view * DPR_FIT_LENGTH + 1;
+  const Facing facing = load_facing(m.first, pixels, normals + view * pixels);
+  tangent = mad3n(sub3n(light_at(light, DPR_FACTORS), splat3(background)), moved.alpha,
+                  mul3n(tangent, shade(facing.basis, light)));
+#if DPR_FACTORS == DPR_HARMONICS
+  // The derivative of n / |n| is a symmetric matrix: its product with a gradient is that with a tangent.
+  const Vec3n turned =
+      normalize3n_backward(facing.normal, facing.inverse_length,
+                           load_pixels(m.first, pixels, normal_tangents + m.image * pixels).color);
+  realn basis[DPR_HARMONICS];
+  harmonic_basis_tangent(facing.normal, turned, basis);
+  const Vec3n color = load_pixels(m.first, pixels, colors + view * pixels).color;
+  tangent = mad3n(mul3n(color, shade(basis, light)), (realn)(1.0f), tangent);
+#else
+  (void)colors, (void)normal_tangents;
+#endif
+#endif
+  store_planes(tangent, m.first, pixels, pixels, lit + 3 * m.image * pixels);
+}
+
+#if DPR_TERMS > 0
+/// Products w t J, from which follows what of a direction the light makes up for. Parts are the directions;
+/// those sum [channel][term].
+kernel void normal_cross(const uint pixels, const uint views, const uint slots,
+                         global const float4* restrict colors, global const float4* restrict normals,
+                         global const float* restrict residuals, global const float* restrict lit,
+                         global float* restrict sums) {
+  const Slots s = make_slots(pixels, views, slots);
+  if (s.part >= DPR_DIRECTIONS) return;
+  const size_t view = s.view;
+  Vec3n sum[DPR_TERMS];
+#pragma unroll
+  for (uint k = 0; k < DPR_TERMS; ++k) sum[k] = zero3n();
+  for (uint i = s.first; i < s.last; i += s.step) {
+    const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
+    if (!any_lane(image.alpha > 0.0f)) continue;
+    const realn weight = load_run(lanes_before(s.last, i), i, residuals + (4 * view + 3) * pixels);
+    const Vec3n tangent =
+        scale3n(load_planes(i, s.last, pixels, lit + 3 * ((size_t)s.part * views + view) * pixels), weight);
+    const Vec3n of_color = mul3n(image.color, tangent);
+    const Facing facing = load_facing(i, s.last, normals + view * pixels);
+#pragma unroll
+    for (uint k = 0; k < DPR_FACTORS; ++k) sum[k] = mad3n(of_color, facing.basis[k], sum[k]);
+    sum[DPR_FACTORS] = mad3n(tangent, image.alpha, sum[DPR_FACTORS]);
+  }
+#pragma unroll
+  for (uint k = 0; k < DPR_TERMS; ++k) {
+    const uint number = s.part * 3 * DPR_TERMS + k;
+    store_sum(sum[k].x, number, s, views, slots, sums);
+    store_sum(sum[k].y, number + DPR_TERMS, s, views, slots, sums);
+    store_sum(sum[k].z, number + 2 * DPR_TERMS, s, views, slots, sums);
+  }
+}
+
+/// Takes from the derivatives what the light makes up for: the light being at its best, those of the residuals
+/// are left (variable projection: Golub and Pereyra 1973, in the approximation of Kaufman 1975). One work-item
+/// per vector of pixels, view and direction.
+/// in   taken  float[direction][view][channel][term]  change of the light
+/// out  left
+kernel void normal_left(const uint pixels, const uint views, global const float* restrict taken,
+                        global const float4* restrict colors, global const float4* restrict normals,
+                        global const float* restrict lit, global float* restrict left) {
+  const Moved m = make_moved(pixels, views);
+  if (m.image >= DPR_DIRECTIONS * views) return;
+  global const float* light = taken + m.image * 3 * DPR_TERMS;
+  const PixelsN image = load_pixels(m.first, pixels, colors + (size_t)m.view * pixels);
+  const Facing facing = load_facing(m.first, pixels, normals + (size_t)m.view * pixels);
+  const Vec3n change =
+      mad3n(light_at(light, DPR_FACTORS), image.alpha, mul3n(image.color, shade(facing.basis, light)));
+  const size_t place = 3 * m.image * pixels;
+  store_planes(sub3n(load_planes(m.first, pixels, pixels, lit + place), change), m.first, pixels, pixels,
+               left + place);
+}
+#endif
+
+/// Rows and columns of the matrices that a work-item sums: on a GPU, whose registers hold no more, one.
+#if DPR_WIDTH == 1
+#define DPR_SIDE 1
+#else
+#define DPR_SIDE DPR_DIRECTIONS
+#endif
+
+/// The normal equations. With a pixel's residual r they sum w J^T r, then the lower triangles of w J^T P, made
+/// symmetric, and of the products of w P^T r with itself. Parts are the elements of a lower triangle on a GPU,
+/// else all are one.
+kernel void normal_equations(const uint pixels, const uint views, const uint slots,
+                             global const float* restrict residuals, global const float* restrict lit,
+                             global const float* restrict left, global float* restrict sums) {
+  const Slots s = make_slots(pixels, views, slots);
+  uint first_row = 0, first_column = s.part;
+  while (first_column > first_row) first_column -= ++first_row;
+  if (first_row * DPR_SIDE >= DPR_DIRECTIONS) return;
+  realn gradient[DPR_SIDE], hessian[DPR_SIDE][DPR_SIDE], scatter[DPR_SIDE][DPR_SIDE];
+#pragma unroll
+  for (uint row = 0; row < DPR_SIDE; ++row) {
+    gradient[row] = 0.0f;
+#pragma unroll
+    for (uint column = 0; column < DPR_SIDE; ++column) hessian[row][column] = scatter[row][column] = 0.0f;
+  }
+  const size_t plane = 3 * (size_t)pixels, view = s.view;
+  for (uint i = s.first; i < s.last; i += s.step) {
+    const intn in_run = lanes_before(s.last, i);
+    Vec3n tangents[DPR_SIDE], rests[DPR_SIDE];
+    realn largest = 0.0f;
+#pragma unroll
+    for (uint row = 0; row < DPR_SIDE; ++row) {
+      const size_t place = ((first_row + row) * views + view) * plane;
+      tangents[row] = load_planes(i, s.last, pixels, lit + place);
+      rests[row] = load_planes(i, s.last, pixels, left + place);
+      largest += dot3n(tangents[row], tangents[row]) + dot3n(rests[row], rests[row]);
+    }
+    if (!any_lane(largest > 0.0f)) continue;  // most pixels show no edge: nothing there depends on the pose
+    const Vec3n residual = load_planes(i, s.last, pixels, residuals + 4 * view * pixels);
+    const realn weight = load_run(in_run, i, residuals + (4 * view + 3) * pixels);
+    realn scores[DPR_SIDE];
+#pragma unroll
+    for (uint row = 0; row < DPR_SIDE; ++row) {
+      gradient[row] += weight * dot3n(residual, tangents[row]);
+      scores[row] = weight * dot3n(residual, rests[row]);
+    }
+#pragma unroll
+    for (uint column = 0; column < DPR_SIDE; ++column) {
+      Vec3n tangent = tangents[column], rest = rests[column];
+      realn score = scores[column];
+#if DPR_SIDE == 1
+      const size_t place = (first_column * views + view) * plane;
+      tangent = load_planes(i, s.last, pixels, lit + place);
+      rest = load_planes(i, s.last, pixels, left + place);
+      score = weight * dot3n(residual, rest);
+#endif
+#pragma unroll
+      for (uint row = column; row < DPR_SIDE; ++row) {
+        hessian[row][column] += 0.5f * weight * (dot3n(tangents[row], rest) + dot3n(rests[row], tangent));
+        scatter[row][column] += scores[row] * score;
+      }
+    }
+  }
+#pragma unroll
+  for (uint row = 0; row < DPR_SIDE; ++row) {
+    const uint k = first_row + row;
+    if (first_row == first_column) store_sum(gradient[row], k, s, views, slots, sums);
+#pragma unroll
+    for (uint column = 0; column <= row; ++column) {
+      const uint number = DPR_DIRECTIONS + DPR_TRIANGLE(k) + first_column + column;
+      store_sum(hessian[row][column], number, s, views, slots, sums);
+      store_sum(scatter[row][column], number + DPR_TRIANGLE(DPR_DIRECTIONS), s, views, slots, sums);
+    }
+  }
+}
+
+/// Means of blocks of samples x samples. One work-item per pixel.
+/// in   width    of the means' images; the samples' is a multiple, and so is their height
+/// in   pixels   of all images
+/// in   image    float4[image][row][column]  samples
+/// out  means    float4[image][row][column]
+kernel void normal_means(const uint width, const uint samples, const uint pixels,
+                         global const float4* restrict image, global float4* restrict means) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= pixels) return;
+  global const float4* block = image + ((size_t)(i / width) * width * samples + i % width) * samples;
+  float4 sum = 0.0f;
+  for (uint row = 0; row < samples; ++row, block += width * samples) {
+    for (uint column = 0; column < samples; ++column) sum += block[column];
+  }
+  means[i] = sum / (float)(samples * samples);
+}
+
+/// Tangents from the images of moved hypotheses. One work-item per pixel of a tangent.
+/// in   pixels         of all hypotheses
+/// in   directions
+/// in   inverse_steps  float[direction]
+/// in   images         float4[1 + direction][hypothesis][pixel]  unmoved ones first
+/// out  tangents       float4[direction][hypothesis][pixel]
+kernel void normal_differences(const uint pixels, const uint directions,
+                               global const float* restrict inverse_steps,
+                               global const float4* restrict images, global float4* restrict tangents) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= pixels * directions) return;
+  tangents[i] = (images[pixels + i] - images[i % pixels]) * inverse_steps[i / pixels];
+}

@@ -1,0 +1,329 @@
+#include "solve/normal_equations.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+
+namespace dpr {
+namespace {
+
+constexpr std::size_t k_channels = 3;
+constexpr std::size_t k_thresholds = 16;  // as the kernel has them
+
+// Weighing and solving in turn: until the loss falls by no more than a part, but no more often than that. The
+// loss of a hypothesis must be at its least for its derivatives to hold.
+constexpr int k_most_reweightings = 30;
+constexpr double k_least_fall = 1e-5;
+
+// Scale of the robust loss, in standard deviations of the residuals, and its lower bound: the colour
+// difference that blur and rounding leave anywhere.
+constexpr float k_scale = 4, k_least_scale = 0.02F;
+constexpr int k_scale_iterations = 3;  // the light of the robust fit leaves other residuals
+
+std::size_t terms_of(PoseLight light) {
+  if (light == PoseLight::fixed) return 0;
+  return (light == PoseLight::gain ? 1 : k_harmonics) + 1;
+}
+
+/// Few enough pixels a slot for plain sums, in whole vectors.
+std::size_t slots_of(std::size_t pixels) {
+  constexpr std::size_t k_pixels_of_slot = 64;
+  const std::size_t slots = (pixels + k_pixels_of_slot - 1) / k_pixels_of_slot;
+  return (slots + k_widest_vector - 1) / k_widest_vector * k_widest_vector;
+}
+
+constexpr std::size_t triangle(std::size_t n) { return n * (n + 1) / 2; }
+
+}  // namespace
+
+NormalSums::NormalSums(const Device& device, const WeighedTarget& target, PoseLight light,
+                       std::size_t directions)
+    : pixels_(target.colors.size()),
+      terms_(terms_of(light)),
+      directions_(directions),
+      slots_(slots_of(pixels_)),
+      width_(std::min<std::size_t>(impl_of(device).info.lanes, DPR_TILE)),
+      background_{{target.background.x, target.background.y, target.background.z, 0}},
+      device_(device),
+      launch_(impl_of(device), options()),
+      reduce_(impl_of(device)),
+      target_(impl_of(device), target.colors),
+      weights_(impl_of(device), target.weights) {
+  if (terms_ > 0) launch_light_.emplace(impl_of(device), options());
+  for (const float w : target.weights) weight_ += static_cast<double>(w);
+}
+
+std::size_t NormalSums::moved_items(std::size_t views) const {
+  return directions_ * views * ((pixels_ + width_ - 1) / width_);
+}
+
+std::size_t NormalSums::light_sums() const { return terms_ > 0 ? triangle(terms_) + 2 * terms_ : 0; }
+
+std::string NormalSums::options() const {
+  return " -DDPR_TERMS=" + std::to_string(terms_) + " -DDPR_DIRECTIONS=" + std::to_string(directions_);
+}
+
+template <typename Launch>
+NormalSums::Sums NormalSums::sum(std::size_t count, std::size_t parts, std::size_t views,
+                                 const Launch& launch) {
+  Device::Impl& d = impl_of(device_);
+  slot_sums_.resize(d, count * views * slots_);
+  if (starts_.length().count < views + 1) {
+    std::vector<cl_uint> starts;
+    for (std::size_t view = 0; view <= views; ++view) starts.push_back(to_uint(view * slots_));
+    starts_.upload(d, starts);
+  }
+  launch(parts * views * slots_ / width_);
+  return {reduce_.read({{views * slots_, count, views, 1, starts_, slot_sums_}}).front(), views};
+}
+
+NormalSums::Sums NormalSums::weigh(const HypothesisImages& images, std::span<const float> scales,
+                                   const std::vector<cl_uint>& active) {
+  Device::Impl& d = impl_of(device_);
+  std::vector<float> fits;
+  for (std::size_t view = 0; view < images.views; ++view) {
+    fits.push_back(scales[view] > 0 ? 1 / (scales[view] * scales[view]) : 0);
+    for (const ChannelLight& channel : lights_[view]) {
+      for (const double l : channel.light) fits.push_back(static_cast<float>(l));
+    }
+  }
+  fits_.upload(d, fits);
+  active_.upload(d, active);
+  residuals_.resize(d, 4 * images.views * pixels_);
+  const std::size_t count = 1 + k_channels * light_sums();
+  const bool is_gpu = width_ == 1;
+  return sum(count, 1, active.size(), [&](std::size_t items) {
+    launch_(items, kernel::normal_loss{.pixels = to_uint(pixels_),
+                                       .views = to_uint(active.size()),
+                                       .slots = to_uint(slots_),
+                                       .background = background_,
+                                       .active = active_,
+                                       .fits = fits_,
+                                       .colors = images.colors,
+                                       .normals = images.normals,
+                                       .target = target_,
+                                       .weights = weights_,
+                                       .residuals = residuals_,
+                                       .sums = slot_sums_});
+    if (terms_ == 0) return;
+    (*launch_light_)((is_gpu ? 2 * k_channels : 1) * items,
+                     kernel::normal_light{.pixels = to_uint(pixels_),
+                                          .views = to_uint(active.size()),
+                                          .slots = to_uint(slots_),
+                                          .background = background_,
+                                          .active = active_,
+                                          .colors = images.colors,
+                                          .normals = images.normals,
+                                          .target = target_,
+                                          .residuals = residuals_,
+                                          .sums = slot_sums_});
+  });
+}
+
+void NormalSums::solve(const Sums& sums, std::size_t place, Lights& lights) const {
+  const auto terms = static_cast<Eigen::Index>(terms_);
+  std::size_t number = 1;  // behind the loss
+  for (ChannelLight& channel : lights) {
+    LightSums light{Eigen::MatrixXd(terms, terms), Eigen::VectorXd(terms), Eigen::VectorXd(terms)};
+    for (Eigen::Index k = 0; k < terms; ++k) {
+      for (Eigen::Index l = 0; l <= k; ++l)
+        light.normal(k, l) = light.normal(l, k) = sums.at(number++, place);
+    }
+    for (double& s : light.sum) s = sums.at(number++, place);
+    for (double& r : light.right) r = sums.at(number++, place);
+    channel = solve_light(light);
+  }
+}
+
+std::vector<double> NormalSums::fit(const HypothesisImages& images, std::span<const float> scales) {
+  std::vector<cl_uint> active(images.views);
+  std::iota(active.begin(), active.end(), 0U);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(terms_));
+  lights_.assign(images.views, {});
+  for (Lights& lights : lights_) {
+    for (ChannelLight& channel : lights) channel.light = none;
+  }
+  const std::vector<float> squares(images.views);  // have the first light
+  std::vector<double> losses(images.views, std::numeric_limits<double>::infinity());
+  for (int step = terms_ > 0 ? 0 : 1; !active.empty(); ++step) {
+    const Sums sums = weigh(images, step == 0 ? squares : scales, active);
+    std::vector<cl_uint> falling;
+    for (std::size_t i = 0; i < active.size(); ++i) {
+      const cl_uint view = active[i];
+      bool falls = true;
+      if (step > 0) {
+        const double before = std::exchange(losses[view], sums.at(0, i));
+        for (const ChannelLight& channel : lights_[view]) losses[view] += channel.prior_loss;
+        falls = losses[view] <= (1 - k_least_fall) * before && scales[view] > 0;
+      }
+      if (!falls || terms_ == 0 || step > k_most_reweightings) continue;
+      solve(sums, i, lights_[view]);
+      falling.push_back(view);
+    }
+    active = std::move(falling);
+  }
+  return losses;
+}
+
+std::vector<double> NormalSums::losses(const HypothesisImages& images, float scale) {
+  std::vector<double> losses = fit(images, std::vector<float>(images.views, scale));
+  for (double& loss : losses) loss /= static_cast<double>(k_channels) * weight_;
+  return losses;
+}
+
+void NormalSums::project(const HypothesisImages& images) {
+  Device::Impl& d = impl_of(device_);
+  const std::size_t size = k_channels * terms_;
+  const Sums sums = sum(directions_ * size, directions_, images.views, [&](std::size_t items) {
+    (*launch_light_)(items, kernel::normal_cross{.pixels = to_uint(pixels_),
+                                                 .views = to_uint(images.views),
+                                                 .slots = to_uint(slots_),
+                                                 .colors = images.colors,
+                                                 .normals = images.normals,
+                                                 .residuals = residuals_,
+                                                 .lit = lit_,
+                                                 .sums = slot_sums_});
+  });
+  std::vector<float> taken;  // [direction][view][channel][term]
+  Eigen::VectorXd right(static_cast<Eigen::Index>(terms_));
+  for (std::size_t direction = 0; direction < directions_; ++direction) {
+    for (std::size_t view = 0; view < images.views; ++view) {
+      std::size_t number = direction * size;
+      for (const ChannelLight& channel : lights_[view]) {
+        for (double& r : right) r = sums.at(number++, view);
+        for (const double t : Eigen::VectorXd(channel.inverse * right))
+          taken.push_back(static_cast<float>(t));
+      }
+    }
+  }
+  taken_.upload(d, taken);
+  left_.resize(d, directions_ * images.views * k_channels * pixels_);
+  (*launch_light_)(moved_items(images.views), kernel::normal_left{.pixels = to_uint(pixels_),
+                                                                  .views = to_uint(images.views),
+                                                                  .taken = taken_,
+                                                                  .colors = images.colors,
+                                                                  .normals = images.normals,
+                                                                  .lit = lit_,
+                                                                  .left = left_});
+}
+
+std::vector<NormalEquations> NormalSums::linearize(const HypothesisImages& images,
+                                                   const HypothesisTangents& tangents, float scale) {
+  const std::vector<double> losses = this->losses(images, scale);
+  lit_.resize(impl_of(device_), directions_ * images.views * k_channels * pixels_);
+  launch_(moved_items(images.views), kernel::normal_lit{.pixels = to_uint(pixels_),
+                                                        .views = to_uint(images.views),
+                                                        .background = background_,
+                                                        .fits = fits_,
+                                                        .colors = images.colors,
+                                                        .normals = images.normals,
+                                                        .tangents = tangents.colors,
+                                                        .normal_tangents = tangents.normals,
+                                                        .lit = lit_});
+  if (terms_ > 0) project(images);
+  const std::size_t n = directions_, products = triangle(n);
+  const std::size_t parts = width_ == 1 ? products : 1;
+  const Sums sums = sum(n + 2 * products, parts, images.views, [&](std::size_t items) {
+    launch_(items, kernel::normal_equations{.pixels = to_uint(pixels_),
+                                            .views = to_uint(images.views),
+                                            .slots = to_uint(slots_),
+                                            .residuals = residuals_,
+                                            .lit = lit_,
+                                            .left = terms_ > 0 ? left_ : lit_,
+                                            .sums = slot_sums_});
+  });
+  const double part = 1 / (static_cast<double>(k_channels) * weight_);
+  std::vector<NormalEquations> result(images.views);
+  for (std::size_t view = 0; view < images.views; ++view) {
+    NormalEquations& e = result[view];
+    e.loss = losses[view];
+    std::size_t number = n;
+    for (std::size_t k = 0; k < n; ++k) {
+      e.gradient[k] = part * sums.at(k, view);
+      for (std::size_t l = 0; l <= k; ++l, ++number) {
+        e.hessian[k * n + l] = e.hessian[l * n + k] = part * sums.at(number, view);
+        e.scatter[k * n + l] = e.scatter[l * n + k] = part * part * sums.at(number + products, view);
+      }
+    }
+  }
+  return result;
+}
+
+std::vector<std::optional<float>> NormalSums::medians(const HypothesisImages& images) {
+  // Bits of numbers that are not negative are in the numbers' order: they are found from the first on, four a
+  // pass. Those that are left are below 1e-4 of the number.
+  constexpr unsigned k_bits = 4, k_first_shift = 27, k_last_shift = 7;
+  static_assert(1U << k_bits == k_thresholds);
+  constexpr auto k_infinity = std::bit_cast<cl_uint>(std::numeric_limits<float>::infinity());
+  std::vector<cl_uint> bits(images.views);
+  std::vector<double> middle(images.views);  // number of sizes below the median
+  std::vector<std::optional<float>> result(images.views);
+  for (unsigned shift = k_first_shift; shift >= k_last_shift; shift -= k_bits) {
+    std::vector<float> thresholds;
+    for (const cl_uint first : bits) {
+      for (cl_uint k = 1; k <= k_thresholds; ++k)
+        thresholds.push_back(std::bit_cast<float>(std::min(first + (k << shift), k_infinity)));
+    }
+    thresholds_.upload(impl_of(device_), thresholds);
+    const Sums sums = sum(k_thresholds, 1, images.views, [&](std::size_t items) {
+      launch_(items, kernel::normal_counts{.pixels = to_uint(pixels_),
+                                           .views = to_uint(images.views),
+                                           .slots = to_uint(slots_),
+                                           .thresholds = thresholds_,
+                                           .colors = images.colors,
+                                           .residuals = residuals_,
+                                           .sums = slot_sums_});
+    });
+    for (std::size_t view = 0; view < images.views; ++view) {
+      if (shift == k_first_shift) middle[view] = std::floor(sums.at(k_thresholds - 1, view) / 2);
+      cl_uint k = 0;
+      while (k + 1 < k_thresholds && sums.at(k, view) <= middle[view]) ++k;
+      bits[view] += k << shift;
+      if (sums.at(k_thresholds - 1, view) > 0) result[view] = std::bit_cast<float>(bits[view]);
+    }
+  }
+  return result;
+}
+
+std::vector<float> NormalSums::scales(const HypothesisImages& images) {
+  constexpr float k_normal =
+      1.4826F;  // a normal distribution's standard deviation over the median of the sizes
+  std::vector<float> scales(images.views);
+  for (int i = 0; i < k_scale_iterations; ++i) {
+    fit(images, scales);
+    const std::vector<std::optional<float>> medians = this->medians(images);
+    for (std::size_t view = 0; view < images.views; ++view)
+      scales[view] = medians[view] ? std::max(k_scale * k_normal * *medians[view], k_least_scale) : 0;
+  }
+  return scales;
+}
+
+void NormalSums::average(const Buffer<cl_float4>& images, std::size_t width, std::size_t samples,
+                         Buffer<cl_float4>& means) {
+  means.resize(impl_of(device_), images.size() / (samples * samples));
+  launch_(means.size(), kernel::normal_means{.width = to_uint(width),
+                                             .samples = to_uint(samples),
+                                             .pixels = to_uint(means.size()),
+                                             .image = images,
+                                             .means = means});
+}
+
+void NormalSums::difference(const Buffer<cl_float4>& images, const PoseSpace::Step& steps,
+                            Buffer<cl_float4>& tangents) {
+  std::vector<float> inverse;
+  for (std::size_t k = 0; k < directions_; ++k) inverse.push_back(static_cast<float>(1 / steps[k]));
+  inverse_steps_.upload(impl_of(device_), inverse);
+  const std::size_t pixels = images.size() / (1 + directions_);
+  tangents.resize(impl_of(device_), directions_ * pixels);
+  launch_(tangents.size(), kernel::normal_differences{.pixels = to_uint(pixels),
+                                                      .directions = to_uint(directions_),
+                                                      .inverse_steps = inverse_steps_,
+                                                      .images = images,
+                                                      .tangents = tangents});
+}
+
+}  // namespace dpr

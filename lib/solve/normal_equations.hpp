@@ -1,0 +1,117 @@
+// Hypotheses about an object's pose against a target, on the device: their losses in the light that explains each
+// best, and the normal equations of the next step. Nothing of an image comes back to the host, only sums.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kernels/normal_equations.hpp"
+#include "solve/pose_light.hpp"
+#include "solve/pose_space.hpp"
+#include "stages/reduce.hpp"
+
+namespace dpr {
+
+/// Loss about a hypothesis to second order, by Gauss and Newton.
+struct NormalEquations {
+  double loss = 0;
+  PoseSpace::Step gradient{};   ///< of half the loss
+  PoseSpace::Matrix hessian{};  ///< of half the loss
+  PoseSpace::Matrix scatter{};  ///< sum over pixels of the outer products of what each adds to the gradient
+};
+
+/// Images of hypotheses.
+struct HypothesisImages {
+  std::size_t views;
+  const Buffer<cl_float4>& colors;   ///< [view][pixel] RGBA; where light is found, without any, over black
+  const Buffer<cl_float4>& normals;  ///< [view][pixel] object space, over black; where harmonics are found
+};
+
+/// Derivatives of hypotheses' images by their parameters.
+struct HypothesisTangents {
+  const Buffer<cl_float4>&colors, &normals;  ///< [direction][view][pixel]
+};
+
+/// Colours and weights of a target's pixels.
+struct WeighedTarget {
+  std::vector<cl_float4> colors;
+  std::vector<float> weights;  ///< in [0, 1]
+  glm::vec3 background{0.0F};
+};
+
+/// The loss is the mean over colour channels and pixels of squares, or of their robust version (Geman and McClure
+/// 1985), the light being the best one (pose_light.hpp).
+class NormalSums {
+ public:
+  /// `directions`: number of parameters of a hypothesis.
+  NormalSums(const Device& device, const WeighedTarget& target, PoseLight light, std::size_t directions);
+
+  /// Of every view. `scale`: of the robust loss, a colour difference; 0: squares.
+  std::vector<double> losses(const HypothesisImages& images, float scale);
+  std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,
+                                         float scale);
+  /// Scales for the robust loss, one a view, from the residuals that it leaves where it shows the object; 0 of a
+  /// view that shows nothing.
+  std::vector<float> scales(const HypothesisImages& images);
+
+  /// [view][channel] of the last losses() or linearize().
+  std::span<const std::array<ChannelLight, 3>> lights() const { return lights_; }
+
+  /// Means of blocks of samples x samples, in images of a width of so many blocks.
+  void average(const Buffer<cl_float4>& images, std::size_t width, std::size_t samples,
+               Buffer<cl_float4>& means);
+  /// Tangents from the images of hypotheses, followed by those of the hypotheses moved by each of the steps.
+  void difference(const Buffer<cl_float4>& images, const PoseSpace::Step& steps, Buffer<cl_float4>& tangents);
+
+ private:
+  using Lights = std::array<ChannelLight, 3>;
+  struct Sums {
+    double at(std::size_t number, std::size_t view) const {
+      return static_cast<double>(values[number * views + view]);
+    }
+
+    std::vector<float> values;  // [number][view]
+    std::size_t views;
+  };
+
+  std::string options() const;
+  /// Work-items of kernels that have one for each vector of pixels of the tangents.
+  std::size_t moved_items(std::size_t views) const;
+  /// Adds up what a kernel sums, whose launch with so many work-items is given: so many numbers of every view,
+  /// by so many parts.
+  template <typename Launch>
+  Sums sum(std::size_t count, std::size_t parts, std::size_t views, const Launch& launch);
+  /// Finds the views' lights, and leaves their residuals on the device; returns the losses, summed.
+  std::vector<double> fit(const HypothesisImages& images, std::span<const float> scales);
+  /// Residuals and their weights, of the active views in their lights; sums the loss and, for each channel, what
+  /// its next light is found from.
+  Sums weigh(const HypothesisImages& images, std::span<const float> scales,
+             const std::vector<cl_uint>& active);
+  std::size_t light_sums() const;  ///< of a channel
+  /// Lights of the active view at that place.
+  void solve(const Sums& sums, std::size_t place, Lights& lights) const;
+  /// Makes `left_` of `lit_`.
+  void project(const HypothesisImages& images);
+  /// Of the sizes of the residuals where a view shows the object.
+  std::vector<std::optional<float>> medians(const HypothesisImages& images);
+
+  std::size_t pixels_, terms_, directions_, slots_, width_;
+  double weight_ = 0;  // of all pixels
+  cl_float4 background_;
+  Device device_;
+  Launcher<kernel::normal_loss, kernel::normal_counts, kernel::normal_lit, kernel::normal_equations,
+           kernel::normal_means, kernel::normal_differences>
+      launch_;
+  std::optional<Launcher<kernel::normal_light, kernel::normal_cross, kernel::normal_left>> launch_light_;
+  Reduce reduce_;
+  std::vector<Lights> lights_;  // [view]
+  Buffer<cl_float4> target_;
+  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, inverse_steps_, slot_sums_;
+  Buffer<cl_uint> active_, starts_;
+};
+
+}  // namespace dpr
