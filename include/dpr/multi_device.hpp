@@ -15,8 +15,8 @@
 
 namespace dpr {
 
-/// Parts of a device with `compute_units` units each (clCreateSubDevices), each with a context and a queue of
-/// its own. Throws InvalidArgument if the device has fewer units, DeviceError if it cannot be divided.
+/// Parts of a device (clCreateSubDevices) with `compute_units` units each, with contexts and queues of their
+/// own. Throws InvalidArgument if it has fewer units, DeviceError if it cannot be divided (PoCL 7 in Debian).
 DPR_API std::vector<Device> split_device(const Device& device, unsigned compute_units);
 
 /// Opens a list of devices: selectors as open_device() takes them, separated by commas. Each takes the first

@@ -1,8 +1,10 @@
 // Parts of a device as devices of their own.
+#include <algorithm>
 #include <array>
 #include <string>
 
 #include "device/context.hpp"
+#include "device/info.hpp"
 #include "dpr/multi_device.hpp"
 
 namespace dpr {
@@ -16,8 +18,12 @@ std::vector<Device> split_device(const Device& device, unsigned compute_units) {
   const std::array<cl_device_partition_property, 3> properties{
       CL_DEVICE_PARTITION_EQUALLY, static_cast<cl_device_partition_property>(compute_units), 0};
   cl::Device whole = impl_of(device).device;
+  const std::string call = "clCreateSubDevices of " + info.name;
+  const auto offered = cl_info<CL_DEVICE_PARTITION_PROPERTIES>(whole, "clGetDeviceInfo");
+  if (std::ranges::find(offered, properties[0]) == offered.end())
+    throw DeviceError(CL_DEVICE_PARTITION_FAILED, call + ", which its driver does not divide");
   std::vector<cl::Device> parts;
-  check_cl(whole.createSubDevices(properties.data(), &parts), "clCreateSubDevices of " + info.name);
+  check_cl(whole.createSubDevices(properties.data(), &parts), call);
 
   std::vector<Device> devices;
   for (const cl::Device& part : parts) {

@@ -10,6 +10,7 @@
 #include "dpr/mesh.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"
+#include "support/several_devices.hpp"
 
 namespace {
 
@@ -233,7 +234,7 @@ TEST_SUITE("pipeline") {
 TEST_SUITE("pipeline") {
   TEST_CASE(
       "dpr fit on parts of the CPU is that on the whole with chunks as large; a checkpoint goes on there") {
-    if (is_skipped() || dpr::open_device("cpu").info().compute_units < 2) return;
+    if (is_skipped() || !dpr::test::is_divisible(dpr::open_device("cpu"))) return;
     const TempDir folder;
     write_inputs(folder);
     const auto fit = [&](const std::vector<std::string>& more) {

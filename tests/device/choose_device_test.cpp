@@ -4,13 +4,14 @@
 #include <doctest/doctest.h>
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "dpr/error.hpp"
 #include "dpr/multi_device.hpp"
 #include "support/messages.hpp"
-#include "support/probe.hpp"
+#include "support/several_devices.hpp"
 
 using dpr::by_preference;
 using dpr::Device;
@@ -141,11 +142,18 @@ TEST_SUITE("unit") {
 
   TEST_CASE("lists of devices are opened, parts of the CPU too; one device is refused in their place") {
     CHECK(dpr::open_devices("cpu").size() == 1);
-    const unsigned units = dpr::open_device("cpu").info().compute_units;
+    const Device cpu = dpr::open_device("cpu");
+    const unsigned units = cpu.info().compute_units;
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::open_devices("cpu/" + std::to_string(units + 1)),
                           "compute units for this process");
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::open_device("cpu/2"), "one device, not a list");
-    if (units < 2 || dpr::open_device("cpu").info().platform == "Oclgrind") return;
+    if (units < 2) return;
+    if (!dpr::test::is_divisible(cpu)) {
+      DPR_CHECK_MESSAGE_HAS(DeviceError, dpr::open_devices("cpu/2"),
+                            "clCreateSubDevices of " + cpu.info().name +
+                                ", which its driver does not divide: got CL_DEVICE_PARTITION_FAILED");
+      return;
+    }
     const std::vector<Device> halves = dpr::open_devices("cpu/2");
     REQUIRE(halves.size() == 2);
     CHECK(halves[0].info().compute_units == units / 2);

@@ -14,6 +14,7 @@
 #include "pipeline/scenes.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"
+#include "support/several_devices.hpp"
 
 using namespace dpr;
 using namespace dpr::test;
@@ -209,7 +210,7 @@ TEST_SUITE("robustness") {
 
   TEST_CASE("devices: dpr fit notes a device that vanishes") {
     if (is_skipped() || is_skipped("DPR_OPENCL_FAULTS")) return;
-    if (open_device("cpu").info().compute_units < 2) return;
+    if (!is_divisible(open_device("cpu"))) return;
     const TempDir folder;
     write_views(folder);
     const Outcome whole = fit_on_parts(folder, "whole.obj", "");

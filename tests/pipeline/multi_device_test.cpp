@@ -18,6 +18,7 @@
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
+using dpr::test::is_divisible;
 using dpr::test::reduced;
 using dpr::test::several_devices;
 
@@ -91,17 +92,6 @@ std::size_t total(const std::vector<std::size_t>& counts) {
   return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
-/// Halves of the default device where it can be divided.
-std::vector<Device> halves() {
-  const Device whole = open_device();
-  if (whole.info().compute_units < 2) return {};
-  try {
-    return split_device(whole, whole.info().compute_units / 2);
-  } catch (const DeviceError&) {
-    return {};
-  }
-}
-
 Scene sampled(Scene scene) {
   scene.smoothing.occupancy_estimator = scene.smoothing.aggregation_estimator = Estimator::monte_carlo;
   return scene;
@@ -155,19 +145,18 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("several devices: parts of one device give the bits of the whole") {
-    const std::vector<Device> parts = halves();
-    if (parts.empty()) {
-      MESSAGE("the default device cannot be divided");
-      return;
-    }
+    const Device whole = open_device();
+    if (!is_divisible(whole)) return;
+    const unsigned half = whole.info().compute_units / 2;
+    const std::vector<Device> parts = split_device(whole, half);
     REQUIRE(parts.size() >= 2);
-    CHECK(parts[0].info().compute_units == open_device().info().compute_units / 2);
+    CHECK(parts[0].info().compute_units == half);
     const std::size_t views = reduced(29, 3);
     const Scene scene = small_scene();
     const Result one = render({parts[0]}, scene, views);
     const Result all = render(parts, scene, views);
     CHECK(same_bits(one, all));
-    CHECK(same_bits(one, render({open_device()}, scene, views)));
+    CHECK(same_bits(one, render({whole}, scene, views)));
     CHECK(total(all.views_rendered) == 3 * views);
   }
 

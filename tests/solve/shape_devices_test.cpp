@@ -9,6 +9,7 @@
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
+#include "support/several_devices.hpp"
 
 using namespace dpr;
 using dpr::test::reduced;
@@ -44,17 +45,6 @@ ShapeOptions make_options() {
   return options;
 }
 
-/// One-unit parts of the default device, where it can be divided.
-std::vector<Device> parts() {
-  const Device whole = open_device();
-  if (whole.info().compute_units < 2) return {};
-  try {
-    return split_device(whole, 1);
-  } catch (const DeviceError&) {
-    return {};
-  }
-}
-
 bool same(const ShapeResult& a, const ShapeResult& b) {
   const auto losses = [](const ShapeResult& result) {
     std::vector<double> all;
@@ -72,11 +62,9 @@ bool same(const ShapeResult& a, const ShapeResult& b) {
 
 TEST_SUITE("pipeline") {
   TEST_CASE("a fit on two parts of a device is that on two others, and on one part with chunks as large") {
-    const std::vector<Device> first = parts(), second = parts();
-    if (first.size() < 2) {
-      MESSAGE("the default device cannot be divided");
-      return;
-    }
+    const Device whole = open_device();
+    if (!dpr::test::is_divisible(whole)) return;
+    const std::vector<Device> first = split_device(whole, 1), second = split_device(whole, 1);
     const ShapeViews views = make_views();
     ShapeOptions options = make_options();
     SUBCASE("noise of the pixel, annealed") {}
@@ -94,7 +82,8 @@ TEST_SUITE("pipeline") {
     options.chunk = 4;
     CHECK(same(together, ShapeSolver({first[0], first[1]}, given, options).solve()));
     REQUIRE(two.history.size() == together.history.size());
-    for (std::size_t i = 0; i < std::min<std::size_t>(two.history.size(), 5); ++i)  // later on the last bits matter
+    // Later on the last bits matter.
+    for (std::size_t i = 0; i < std::min<std::size_t>(two.history.size(), 5); ++i)
       CHECK(two.history[i].loss == doctest::Approx(together.history[i].loss).epsilon(1e-3));
     options.regularizers.laplacian += 1e-3F;
     CHECK_FALSE(same(together, ShapeSolver(first[0], given, options).solve()));
