@@ -273,7 +273,8 @@ TEST_SUITE("unit") {
       for (const PoseLight light : k_lights) {
         for (const std::size_t directions : {3U, 6U, 9U}) {
           if (test::is_reduced() && directions != 6) continue;
-          for (const float scale : {0.0F, 0.6F}) {
+          // A light is found to 1e-5 of the loss: with a wide scale, in so few steps that it is exact.
+          for (const float scale : {0.0F, light == PoseLight::fixed ? 0.6F : 4.0F}) {
             CAPTURE(lanes);
             CAPTURE(static_cast<int>(light));
             CAPTURE(directions);
