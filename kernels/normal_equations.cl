@@ -151,7 +151,7 @@ static inline Facing load_facing(uint first, uint last, global const float4* nor
 /// Sum of the terms that the colour multiplies, times a light, by channel.
 static inline Vec3n shade(const realn basis[DPR_FACTORS], global const float* light) {
   Vec3n shading = zero3n();
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_FACTORS; ++k) shading = mad3n(light_at(light, k), basis[k], shading);
   return shading;
 }
@@ -223,7 +223,7 @@ kernel void normal_light(const uint pixels, const uint views, const uint slots, 
   const int has_products = DPR_WIDTH != 1 || s.part < 3, has_others = DPR_WIDTH != 1 || s.part >= 3;
   const size_t view = active[s.view];
   realn sum[DPR_FIT_CHANNELS * DPR_FIT_ROOM];
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_FIT_CHANNELS * DPR_FIT_ROOM; ++k) sum[k] = 0.0f;
   for (uint i = s.first; i < s.last; i += s.step) {
     const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
@@ -235,14 +235,14 @@ kernel void normal_light(const uint pixels, const uint views, const uint slots, 
     for (uint c = 0; c < DPR_FIT_CHANNELS; ++c) {
       const realn color = channel_of(image.color, first_channel + c);
       realn terms[DPR_TERMS], *const of_channel = sum + c * DPR_FIT_ROOM;
-#pragma unroll
+      DPR_UNROLL_ON_GPU
       for (uint k = 0; k < DPR_FACTORS; ++k) terms[k] = color * facing.basis[k];
       terms[DPR_FACTORS] = image.alpha;
-#pragma unroll
+      DPR_UNROLL_ON_GPU
       for (uint k = 0; k < DPR_TERMS; ++k) {
         const realn term = weight * terms[k];
         if (has_products) {
-#pragma unroll
+          DPR_UNROLL_ON_GPU
           for (uint l = 0; l <= k; ++l) of_channel[DPR_TRIANGLE(k) + l] += term * terms[l];
         }
         if (has_others) {
@@ -252,14 +252,14 @@ kernel void normal_light(const uint pixels, const uint views, const uint slots, 
       }
     }
   }
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint c = 0; c < DPR_FIT_CHANNELS; ++c) {
     const uint number = 1 + (first_channel + c) * DPR_LIGHT_SUMS;
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint k = 0; k < DPR_LIGHT_PRODUCTS; ++k) {
       if (has_products) store_sum(sum[c * DPR_FIT_ROOM + k], number + k, s, views, slots, sums);
     }
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint k = 0; k < 2 * DPR_TERMS; ++k) {
       if (has_others)
         store_sum(sum[c * DPR_FIT_ROOM + DPR_FIT_OTHERS + k], number + DPR_LIGHT_PRODUCTS + k, s, views,
@@ -279,22 +279,22 @@ kernel void normal_counts(const uint pixels, const uint views, const uint slots,
   const Slots s = make_slots(pixels, views, slots);
   if (s.part >= 1) return;
   realn sum[DPR_THRESHOLDS];
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_THRESHOLDS; ++k) sum[k] = 0.0f;
   for (uint i = s.first; i < s.last; i += s.step) {
     const realn alpha = load_pixels(i, s.last, colors + (size_t)s.view * pixels).alpha;
     const intn shows = lanes_before(s.last, i) & (alpha > 0.0f);
     if (!any_lane(shows)) continue;
     const Vec3n residual = load_planes(i, s.last, pixels, residuals + 4 * (size_t)s.view * pixels);
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint k = 0; k < DPR_THRESHOLDS; ++k) {
       const realn threshold = thresholds[s.view * DPR_THRESHOLDS + k];
-#pragma unroll
+      DPR_UNROLL_ON_GPU
       for (uint c = 0; c < 3; ++c)
         sum[k] += choose(shows & (fabs(channel_of(residual, c)) < threshold), (realn)(1.0f), (realn)(0.0f));
     }
   }
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_THRESHOLDS; ++k) store_sum(sum[k], k, s, views, slots, sums);
 }
 
@@ -359,7 +359,7 @@ kernel void normal_cross(const uint pixels, const uint views, const uint slots,
   if (s.part >= DPR_DIRECTIONS) return;
   const size_t view = s.view;
   Vec3n sum[DPR_TERMS];
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_TERMS; ++k) sum[k] = zero3n();
   for (uint i = s.first; i < s.last; i += s.step) {
     const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
@@ -369,11 +369,11 @@ kernel void normal_cross(const uint pixels, const uint views, const uint slots,
         scale3n(load_planes(i, s.last, pixels, lit + 3 * ((size_t)s.part * views + view) * pixels), weight);
     const Vec3n of_color = mul3n(image.color, tangent);
     const Facing facing = load_facing(i, s.last, normals + view * pixels);
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint k = 0; k < DPR_FACTORS; ++k) sum[k] = mad3n(of_color, facing.basis[k], sum[k]);
     sum[DPR_FACTORS] = mad3n(tangent, image.alpha, sum[DPR_FACTORS]);
   }
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_TERMS; ++k) {
     const uint number = s.part * 3 * DPR_TERMS + k;
     store_sum(sum[k].x, number, s, views, slots, sums);
@@ -421,10 +421,10 @@ kernel void normal_equations(const uint pixels, const uint views, const uint slo
   while (first_column > first_row) first_column -= ++first_row;
   if (first_row * DPR_SIDE >= DPR_DIRECTIONS) return;
   realn gradient[DPR_SIDE], hessian[DPR_SIDE][DPR_SIDE], scatter[DPR_SIDE][DPR_SIDE];
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint row = 0; row < DPR_SIDE; ++row) {
     gradient[row] = 0.0f;
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint column = 0; column < DPR_SIDE; ++column) hessian[row][column] = scatter[row][column] = 0.0f;
   }
   const size_t plane = 3 * (size_t)pixels, view = s.view;
@@ -432,7 +432,7 @@ kernel void normal_equations(const uint pixels, const uint views, const uint slo
     const intn in_run = lanes_before(s.last, i);
     Vec3n tangents[DPR_SIDE], rests[DPR_SIDE];
     realn largest = 0.0f;
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint row = 0; row < DPR_SIDE; ++row) {
       const size_t place = ((first_row + row) * views + view) * plane;
       tangents[row] = load_planes(i, s.last, pixels, lit + place);
@@ -443,12 +443,12 @@ kernel void normal_equations(const uint pixels, const uint views, const uint slo
     const Vec3n residual = load_planes(i, s.last, pixels, residuals + 4 * view * pixels);
     const realn weight = load_run(in_run, i, residuals + (4 * view + 3) * pixels);
     realn scores[DPR_SIDE];
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint row = 0; row < DPR_SIDE; ++row) {
       gradient[row] += weight * dot3n(residual, tangents[row]);
       scores[row] = weight * dot3n(residual, rests[row]);
     }
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint column = 0; column < DPR_SIDE; ++column) {
       Vec3n tangent = tangents[column], rest = rests[column];
       realn score = scores[column];
@@ -458,18 +458,18 @@ kernel void normal_equations(const uint pixels, const uint views, const uint slo
       rest = load_planes(i, s.last, pixels, left + place);
       score = weight * dot3n(residual, rest);
 #endif
-#pragma unroll
+      DPR_UNROLL_ON_GPU
       for (uint row = column; row < DPR_SIDE; ++row) {
         hessian[row][column] += 0.5f * weight * (dot3n(tangents[row], rest) + dot3n(rests[row], tangent));
         scatter[row][column] += scores[row] * score;
       }
     }
   }
-#pragma unroll
+  DPR_UNROLL_ON_GPU
   for (uint row = 0; row < DPR_SIDE; ++row) {
     const uint k = first_row + row;
     if (first_row == first_column) store_sum(gradient[row], k, s, views, slots, sums);
-#pragma unroll
+    DPR_UNROLL_ON_GPU
     for (uint column = 0; column <= row; ++column) {
       const uint number = DPR_DIRECTIONS + DPR_TRIANGLE(k) + first_column + column;
       store_sum(hessian[row][column], number, s, views, slots, sums);
