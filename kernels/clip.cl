@@ -18,21 +18,6 @@ static inline float4 make_cut(const FrameParams p, global const ViewParams* view
   return (float4)(at.x, at.y, znear, part);
 }
 
-/// The corners of the visible part, in order.
-typedef struct {
-  float3 corner[4];  // x, y in NDC, depth; the last is that of a triangle's first
-} Outline;
-
-/// From the first corner that is kept, and the one after it.
-static inline Outline outline_of(const ClippedFace c, float3 first, float3 next) {
-  Outline o;
-  o.corner[0] = first;
-  o.corner[1] = c.corners == 4 ? next : c.cut[0].xyz;
-  o.corner[2] = c.corners == 4 ? c.cut[0].xyz : c.cut[1].xyz;
-  o.corner[3] = c.corners == 4 ? c.cut[1].xyz : o.corner[0];
-  return o;
-}
-
 /// The orientation of the larger of its two triangles; 0 where there is no area, or it reaches beyond
 /// DPR_MAX_NDC.
 static inline int orientation_of_outline(const Outline o) {
@@ -235,20 +220,6 @@ static inline void store_corners(const FrameParams p, global const ViewParams* v
   }
 }
 
-/// A pair's fragments, [first, last).
-typedef struct {
-  uint first, last;
-  global const uint* pixels;
-} ClippedRun;
-
-/// The samples of the vector of fragments at `i`.
-static inline void load_samples(const FrameParams p, const ClippedRun run, intn in_run, uint i, realn* x,
-                                realn* y) {
-  const uintn packed = load_pixels(in_run, i, run.pixels);
-  *x = pixel_x(p, convert_realn(packed & 0xffffu));
-  *y = pixel_y(p, convert_realn(packed >> 16));
-}
-
 /// Adds what comes by the distance to the outline.
 static inline void add_outline_distances(const FrameParams p, const ClippedTriangles t, const ClippedRun run,
                                          global const float* distance, global const float* grad_distance,
@@ -332,7 +303,7 @@ kernel void clip_backward(const FrameParams p, global const uint* restrict pairs
   const ClippedTriangles t = load_clipped(triangles[face], c);
   CornerGradients g[2];
   realn part[2];
-  for (int k = 0; k < 3; ++k) g[0].x[k] = g[0].y[k] = g[0].z[k] = g[1].x[k] = g[1].y[k] = g[1].z[k] = 0.0f;
+  g[0] = g[1] = no_corner_gradients();
   part[0] = part[1] = 0.0f;
   const ClippedRun run = {fragment_starts[pair], last, pixels};
   if (!p.sharp)

@@ -29,6 +29,21 @@ static inline ClippedTriangles load_clipped(const Triangle first, const ClippedF
   return t;
 }
 
+/// The corners of the visible part, in order.
+typedef struct {
+  float3 corner[4];  // x, y in NDC, depth; the last is that of a triangle's first
+} Outline;
+
+/// From the first corner that is kept, and the one after it.
+static inline Outline outline_of(const ClippedFace c, float3 first, float3 next) {
+  Outline o;
+  o.corner[0] = first;
+  o.corner[1] = c.corners == 4 ? next : c.cut[0].xyz;
+  o.corner[2] = c.corners == 4 ? c.cut[0].xyz : c.cut[1].xyz;
+  o.corner[3] = c.corners == 4 ? c.cut[1].xyz : o.corner[0];
+  return o;
+}
+
 /// The edge of each of a quadrilateral's triangles that is its diagonal.
 #define DPR_FIRST_DIAGONAL 1
 #define DPR_SECOND_DIAGONAL 2
@@ -107,6 +122,20 @@ static inline void outline_barycentrics(const ViewedClip v, intn in_second, cons
   u[1] = choose(in_second, (realn)(0.0f), n1);
   u[2] = choose(in_second, m1, n2);
   u[3] = choose(in_second, m2, (realn)(0.0f));
+}
+
+/// A pair's fragments, [first, last).
+typedef struct {
+  uint first, last;
+  global const uint* pixels;
+} ClippedRun;
+
+/// The samples of the vector of fragments at `i`.
+static inline void load_samples(const FrameParams p, const ClippedRun run, intn in_run, uint i, realn* x,
+                                realn* y) {
+  const uintn packed = load_pixels(in_run, i, run.pixels);
+  *x = pixel_x(p, convert_realn(packed & 0xffffu));
+  *y = pixel_y(p, convert_realn(packed >> 16));
 }
 
 #endif

@@ -24,11 +24,51 @@ static inline float3 slot_color(const Slot s, const Fragments f, float3 backgrou
 
 /// Sums of the slots' gradients: float[fragment], and the background's.
 typedef struct {
-  global float *weight;     // w_k, or w_k / p_k in the joint composition
-  global float *beta;       // dL/dbeta_k
-  global float *occupancy;  // dL/dp_k, joint
+  global float* weight;     // w_k, or w_k / p_k in the joint composition
+  global float* beta;       // dL/dbeta_k
+  global float* occupancy;  // dL/dp_k, joint
   float background_weight, background_beta;
 } SlotGradients;
+
+/// Sums of the derivatives of a pixel's colour, RGB each, by its slots: float[fragment] and float[3][fragment],
+/// and the background's.
+typedef struct {
+  global float* weight;     // w_k, or w_k / p_k in the joint composition
+  global float* beta;       // d colour / d beta_k
+  global float* occupancy;  // d colour / d p_k, joint
+  uint plane;               // from one to the next
+  float background_weight;
+  float3 background_beta;
+} SlotRows;
+
+static inline void add_to_planes(float3 v, uint i, uint plane, global float* values) {
+  values[i] += v.x;
+  values[i + plane] += v.y;
+  values[i + 2 * plane] += v.z;
+}
+static inline float3 load_planes(uint i, uint plane, global const float* values) {
+  return (float3)(values[i], values[i + plane], values[i + 2 * plane]);
+}
+static inline void store_planes(float3 v, uint i, uint plane, global float* values) {
+  values[i] = v.x;
+  values[i + plane] = v.y;
+  values[i + 2 * plane] = v.z;
+}
+
+#ifndef DPR_JOINT
+
+/// Adds to a slot's weight and to the derivative of the colour by its beta.
+static inline void add_row(uint fragment, float weight, float3 by_beta, SlotRows* out) {
+  if (fragment == DPR_BACKGROUND_SLOT) {
+    out->background_weight += weight;
+    out->background_beta += by_beta;
+  } else {
+    out->weight[fragment] += weight;
+    add_to_planes(by_beta, fragment, out->plane, out->beta);
+  }
+}
+
+#endif
 
 #if defined(DPR_JOINT) || !defined(DPR_SOFTMAX)
 
@@ -173,6 +213,64 @@ static inline float2 integrate_gradients(const Slots run, SlotGradients* out) {
     }
   } while (next_stretch(run, &stretch));
   return (float2)(sum_lanes(mass), sum_lanes(seen));
+}
+
+/// Adds a block's share of the integrals to the rows of a slot of that colour: the gradients of each of the
+/// colour's channels.
+static inline void add_rows(const Slot s, const Terms terms, realn product, realn ratio_sum, float3 color,
+                            realn red, realn green, realn blue, SlotRows* out) {
+  const realn share = product * terms.density, ratio = slot_ratio(s, terms), by_ratio = product * ratio;
+  const float4 sums =
+      sum_lanes_of_4(share, by_ratio * (color.x * ratio_sum - red), by_ratio * (color.y * ratio_sum - green),
+                     by_ratio * (color.z * ratio_sum - blue));
+#ifdef DPR_JOINT
+  const realn absent = product * terms.absent;
+  const float4 by_occupancy =
+      sum_lanes_of_4(color.x * share + absent * (red - color.x * ratio),
+                     color.y * share + absent * (green - color.y * ratio),
+                     color.z * share + absent * (blue - color.z * ratio), (realn)(0.0f));
+  out->weight[s.fragment] += sums.x;
+  add_to_planes(sums.yzw, s.fragment, out->plane, out->beta);
+  add_to_planes(by_occupancy.xyz, s.fragment, out->plane, out->occupancy);
+#else
+  add_row(s.fragment, sums.x, sums.yzw, out);
+#endif
+}
+
+/// Adds the integrals to the slots' rows. Colours count from `origin`, which is the background's. Returns the
+/// sum of w times (colour, 1).
+static inline float4 integrate_rows(const Slots run, const Fragments f, float3 origin, SlotRows* out) {
+  realn seen_red = 0.0f, seen_green = 0.0f, seen_blue = 0.0f, mass = 0.0f;
+  Stretch stretch = first_stretch(run);
+  do {
+    for (uint block = 0; block < stretch.blocks; ++block) {
+      realn t, product, ratio_sum = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f;
+      Terms kept[DPR_KEPT_SLOTS + 1];
+      stretch_nodes(stretch, block, &t, &product);
+      for (uint i = 0; i < run.count; ++i) {
+        const Slot s = run.slot[i];
+        const Terms terms = slot_terms(s, t);
+        if (i < DPR_KEPT_SLOTS) kept[i] = terms;
+        const realn ratio = slot_ratio(s, terms);
+        const float3 color = slot_color(s, f, origin) - origin;
+        product *= terms.passing;
+        ratio_sum += ratio;
+        red = mad(ratio, color.x, red);
+        green = mad(ratio, color.y, green);
+        blue = mad(ratio, color.z, blue);
+      }
+      seen_red = mad(product, red, seen_red);
+      seen_green = mad(product, green, seen_green);
+      seen_blue = mad(product, blue, seen_blue);
+      mass = mad(product, ratio_sum, mass);
+      for (uint i = 0; i < run.count; ++i) {
+        const Slot s = run.slot[i];
+        add_rows(s, i < DPR_KEPT_SLOTS ? kept[i] : slot_terms(s, t), product, ratio_sum,
+                 slot_color(s, f, origin) - origin, red, green, blue, out);
+      }
+    }
+  } while (next_stretch(run, &stretch));
+  return sum_lanes_of_4(seen_red, seen_green, seen_blue, mass);
 }
 
 #endif

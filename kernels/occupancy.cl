@@ -107,3 +107,23 @@ kernel void occupancy_backward(const OccupancyParams p, const uint2 range, globa
     grad_sigma[pair] = sum_lanes(sum);
   }
 }
+
+/// Tangents of ln p by those of distances and of sigma. Any number of work-items, by vector of fragments.
+/// Deterministic.
+/// in   fragment_starts, fragments  as occupancy_forward
+/// in   frames       FrameTangent[direction]
+/// in out  tangents  float[direction][planes][fragment]  LOG_OCCUPANCY, where those of distances are
+kernel void occupancy_tangent(const OccupancyParams p, const uint last_pair, const uint directions,
+                              const uint planes, global const uint* restrict fragment_starts,
+                              global const float* restrict fragments,
+                              global const FrameTangent* restrict frames, global float* restrict tangents) {
+  const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
+  for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
+    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+    for (uint d = 0; d < directions; ++d) {
+      global float* const out =
+          tangents + (size_t)d * planes * p.grad_fragments + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
+      store_n(v.slope * (load_n(i, out) - v.ratio * frames[d].sigma), i, out);
+    }
+  }
+}

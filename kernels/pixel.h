@@ -46,6 +46,24 @@ static inline FragmentGradients make_gradients(const AggregateParams p, global f
   return g;
 }
 
+/// The tangents of a pixel's fragments in a direction, and of what the frame has one of.
+typedef struct {
+  global const float *depth, *log_occupancy, *color;
+  global const FrameTangent* frame;
+} FragmentTangents;
+
+static inline FragmentTangents make_tangents(const AggregateParams p, uint direction, uint planes,
+                                             global const FrameTangent* frames,
+                                             global const float* tangents) {
+  global const float* const of = tangents + (size_t)direction * planes * p.grad_fragments;
+  FragmentTangents t;
+  t.depth = of + DPR_GRAD_PLANE(p, DEPTH);
+  t.log_occupancy = of + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
+  t.color = of + DPR_GRAD_PLANE(p, COLOR);
+  t.frame = frames + direction;
+  return t;
+}
+
 /// Stores the gradient of a fragment's colour, which has that weight in its pixel.
 static inline void store_color(const FragmentGradients to, uint fragment, float weight, float4 grad) {
   to.red[fragment] = weight * grad.x;

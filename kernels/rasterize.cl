@@ -271,9 +271,7 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
       for (int k = 0; k < 9; ++k) grad_corners[9 * pair + k] = 0.0f;
       continue;
     }
-    CornerGradients g;
-#pragma unroll
-    for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
+    CornerGradients g = no_corner_gradients();
     const Triangle t = triangles[pair_face[pair]];
     const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
     for (uint i = first; i < last; i += DPR_WIDTH) {
@@ -297,6 +295,60 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
       grad_corners[9 * pair + 3 * k] = sum_lanes(g.x[k]);
       grad_corners[9 * pair + 3 * k + 1] = sum_lanes(g.y[k]);
       grad_corners[9 * pair + 3 * k + 2] = sum_lanes(g.z[k]);
+    }
+  }
+}
+
+/// Tangents of what a fragment is, by those of its triangle's corners. One work-item per group of pairs in
+/// `range`. Deterministic.
+/// in   triangles, pair_face, fragment_starts, pixels  as rasterize_forward
+/// in   faces     uint4[face]  vertex indices
+/// in   vertices  float4[direction][view][vertex]  of x, y (NDC) and view depth
+/// in   fragments  float[plane][fragment]  DISTANCE, whose sign says on which side the sample lies, and BARY
+/// out  tangents  float[direction][planes][fragment]  of DEPTH, BARY; of DISTANCE in place of LOG_OCCUPANCY
+kernel void rasterize_tangent(const FrameParams p, const uint2 range, const uint directions,
+                              const uint planes, global const uint* restrict pairs,
+                              global const Triangle* restrict triangles,
+                              global const uint* restrict pair_face,
+                              global const uint* restrict fragment_starts, global const uint* restrict pixels,
+                              global const uint4* restrict faces, global const float4* restrict vertices,
+                              global const float* restrict fragments, global float* restrict tangents) {
+  const uint2 group = pair_group(range, pairs[0]);
+  if (group.x >= group.y) return;
+  const uint end = fragment_starts[group.y];
+  for (uint pair = group.x; pair < group.y; ++pair) {
+    const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    if (first == last) continue;
+    const uint view_face = pair_face[pair], view = view_face / p.faces;
+    const uint4 face = faces[view_face - view * p.faces];
+    const Triangle t = triangles[view_face];
+    const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
+    for (uint i = first; i < last; i += DPR_WIDTH) {
+      const intn in_run = lanes_before(last, i);
+      const uintn packed = load_pixels(in_run, i, pixels);
+      const View3 v = view_triangle(t, pixel_x(p, convert_realn(packed & 0xffffu)),
+                                    pixel_y(p, convert_realn(packed >> 16)));
+      CornerGradients by_distance = no_corner_gradients(), by_c1 = by_distance, by_c2 = by_distance;
+      if (!p.sharp) {
+        const intn inside = as_intn(load_run(in_run, i, fragments + DPR_PLANE(p, DISTANCE))) >= 0;
+        add_distance_gradient(v, DPR_NO_EDGE, inside, p.euclidean, (realn)(1.0f), &by_distance);
+      }
+      add_barycentric_gradient(v, t, scale, (realn)(0.0f), (realn)(1.0f), (realn)(0.0f), &by_c1);
+      add_barycentric_gradient(v, t, scale, (realn)(0.0f), (realn)(0.0f), (realn)(1.0f), &by_c2);
+      const realn c1 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY));
+      const realn c2 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY) + p.fragments);
+      for (uint d = 0; d < directions; ++d) {
+        global const float4* const of_view = vertices + (size_t)(d * p.views + view) * p.vertices;
+        const CornerTangents move = {{of_view[face.x].xyz, of_view[face.y].xyz, of_view[face.z].xyz}};
+        const realn b1 = along_corners(by_c1, move), b2 = along_corners(by_c2, move);
+        global float* const out = tangents + (size_t)d * planes * p.grad_fragments;
+        store_run(b1, i, end, out + DPR_GRAD_PLANE(p, BARY));
+        store_run(b2, i, end, out + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments);
+        store_run((1.0f - c1 - c2) * move.corner[0].z + c1 * move.corner[1].z + c2 * move.corner[2].z +
+                      b1 * (t.z1 - t.z0) + b2 * (t.z2 - t.z0),
+                  i, end, out + DPR_GRAD_PLANE(p, DEPTH));
+        store_run(along_corners(by_distance, move), i, end, out + DPR_GRAD_PLANE(p, LOG_OCCUPANCY));
+      }
     }
   }
 }

@@ -85,6 +85,26 @@ typedef struct {
   realn x[3], y[3], z[3];
 } CornerGradients;
 
+static inline CornerGradients no_corner_gradients(void) {
+  CornerGradients g;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) g.x[k] = g.y[k] = g.z[k] = 0.0f;
+  return g;
+}
+
+/// The tangents of a triangle's corners: x, y (NDC), view depth.
+typedef struct {
+  float3 corner[3];
+} CornerTangents;
+
+/// The tangent of a value with these gradients.
+static inline realn along_corners(const CornerGradients g, const CornerTangents t) {
+  realn sum = 0.0f;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) sum += g.x[k] * t.corner[k].x + g.y[k] * t.corner[k].y + g.z[k] * t.corner[k].z;
+  return sum;
+}
+
 /// The edge that is left out where none is.
 #define DPR_NO_EDGE 3
 

@@ -93,3 +93,42 @@ kernel void shade_backward(const FrameParams p, const uint2 range, global const 
     for (int k = 0; k < 9; ++k) grad_colors[9 * pair + k] = sum_lanes(sum[k]);
   }
 }
+
+/// Tangents of colours by those of barycentrics and of the corners' colours. One work-item per group of pairs
+/// in `range`. Deterministic. Inputs as shade_forward, and
+/// in   moved_colors    how many colours there are of a direction; 0: none changes, color_tangents is not read
+/// in   color_tangents  float4[direction][color] or, with a stride, float4[direction][view][color]
+/// in out  tangents     float[direction][planes][fragment]  COLOR by BARY
+kernel void shade_tangent(const FrameParams p, const uint2 range, const uint directions, const uint planes,
+                          const uint moved_colors, global const uint* restrict pairs,
+                          global const uint* restrict pair_face, global const uint* restrict fragment_starts,
+                          global const uint4* restrict faces, global const float4* restrict colors,
+                          global const float4* restrict color_tangents,
+                          global const float* restrict fragments, global float* restrict tangents) {
+  const uint2 group = pair_group(range, pairs[0]);
+  if (group.x >= group.y) return;
+  const uint end = fragment_starts[group.y];
+  for (uint pair = group.x; pair < group.y; ++pair) {
+    const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+    if (first == last) continue;
+    const CornerColors c = load_colors(p, pair_face[pair], faces, colors);
+    for (uint d = 0; d < directions; ++d) {
+      CornerColors m = {0.0f, 0.0f, 0.0f};
+      if (moved_colors != 0)
+        m = load_colors(p, pair_face[pair], faces, color_tangents + (size_t)d * moved_colors);
+      global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
+      for (uint i = first; i < last; i += DPR_WIDTH) {
+        const intn in_run = lanes_before(last, i);
+        const realn b1 = load_run(in_run, i, of + DPR_GRAD_PLANE(p, BARY));
+        const realn b2 = load_run(in_run, i, of + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments);
+        const realn c1 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY));
+        const realn c2 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY) + p.fragments);
+        const float4 a1 = c.along1, a2 = c.along2;
+        store_run3(b1 * a1.x + b2 * a2.x + m.base.x + c1 * m.along1.x + c2 * m.along2.x,
+                   b1 * a1.y + b2 * a2.y + m.base.y + c1 * m.along1.y + c2 * m.along2.y,
+                   b1 * a1.z + b2 * a2.z + m.base.z + c1 * m.along1.z + c2 * m.along2.z, i, end,
+                   DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, of);
+      }
+    }
+  }
+}

@@ -2,7 +2,7 @@
 // from the light at the fragment (flat, Phong, Blinn) or interpolate those at the corners (Gouraud).
 // DPR_SHADING says which, DPR_LIGHTS in what lights, and DPR_BASE whether the base colour is interpolated
 // here or comes from the surface stage. Loops over the corners are unrolled, as in geometry.h.
-#include "lit_surface.h"
+#include "lit_backward.h"
 
 /// One work-item per pair, up to p.last_pair. Deterministic. Pairs, fragments and colours as shade_forward,
 /// and
@@ -34,87 +34,6 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, glob
                f.at.base.z * f.lit.factor.z + s.material.z * f.lit.specular.z, i, last, DPR_PLANE(p, COLOR),
                p.fragments, fragments);
   }
-}
-
-/// A vector of them; 0 in the lanes that are not in the run.
-typedef struct {
-  realn c1, c2;
-  Vec3n base, grad;
-} LitFragment;
-
-static inline LitFragment load_fragment(const FrameParams p, uint last, uint i, global const float* fragments,
-                                        global const float* grads) {
-  const intn in_run = lanes_before(last, i);
-  const uint bary = i + DPR_PLANE(p, BARY);
-  const LitFragment f = {load_run(in_run, bary, fragments), load_run(in_run, bary + p.fragments, fragments),
-                         load_base(p, in_run, i, fragments),
-                         load_run3(in_run, i + DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, grads)};
-  return f;
-}
-
-/// Gradients of what a surface is made of, and for Gouraud of the light at its corners, as sums over lanes.
-typedef struct {
-  Vec3n color[3], factor[3], specular[3], coefficient;
-  realn shininess;
-} MaterialGradients;
-
-/// Gradients of where a surface lies, as sums over lanes.
-typedef struct {
-  Vec3n position[3], normal[3], eye;
-} PlaceGradients;
-
-static inline void add_corners(Vec3n grad[3], Vec3n g, realn c1, realn c2) {
-  grad[0] = mad3n(g, 1.0f - c1 - c2, grad[0]);
-  grad[1] = mad3n(g, c1, grad[1]);
-  grad[2] = mad3n(g, c2, grad[2]);
-}
-
-/// Derivative by weight moved from corner 0 to corner k, of an interpolated quantity with gradient g.
-static inline realn along_corner(const Vec3n corner[3], int k, Vec3n g) {
-  return dot3n(sub3n(corner[k], corner[0]), g);
-}
-
-/// One fragment's share in what the surface is made of, its part of the gradients of the barycentrics,
-/// relative to corner 0's, and the gradient of its base colour, which is returned.
-static inline Vec3n material_backward(const Surface s, const LightingParams lp,
-                                      global const Light* restrict lights, const LitFragment f,
-                                      MaterialGradients* g, realn* grad_bary1, realn* grad_bary2) {
-  const Shaded shaded = shade_fragment(s, lp, lights, f.c1, f.c2, f.base);
-  const Vec3n grad_base = mul3n(f.grad, shaded.lit.factor), grad_specular = mul3n(f.grad, splat3(s.material));
-  g->coefficient = mad3n(mul3n(f.grad, shaded.lit.specular), (realn)(1.0f), g->coefficient);
-  g->shininess += dot3n(grad_specular, shaded.lit.by_shininess);
-  *grad_bary1 = *grad_bary2 = 0.0f;
-  if (DPR_BASE == DPR_BASE_OF_CORNERS) {
-    add_corners(g->color, grad_base, f.c1, f.c2);
-    *grad_bary1 = along_corner(s.color, 1, grad_base);
-    *grad_bary2 = along_corner(s.color, 2, grad_base);
-  }
-  if (DPR_SHADING == DPR_GOURAUD) {
-    const Vec3n grad_factor = mul3n(f.grad, shaded.at.base);
-    add_corners(g->factor, grad_factor, f.c1, f.c2);
-    add_corners(g->specular, grad_specular, f.c1, f.c2);
-    *grad_bary1 += along_corner(s.factor, 1, grad_factor) + along_corner(s.specular, 1, grad_specular);
-    *grad_bary2 += along_corner(s.factor, 2, grad_factor) + along_corner(s.specular, 2, grad_specular);
-  }
-  return grad_base;
-}
-
-/// Its share in where the surface lies, by the light at the fragment: adds to the gradients of the
-/// barycentrics.
-static inline void place_backward(const Surface s, const LightingParams lp,
-                                  global const Light* restrict lights, const LitFragment f, PlaceGradients* g,
-                                  realn* grad_bary1, realn* grad_bary2) {
-  const SurfacePoint at = point_on(s, f.c1, f.c2, f.base);
-  PointGradient point = zero_point_gradient();
-  point.eye = g->eye;
-  light_point_backward(lp, lights, s.material.w, s.eye, at.position, at.normal, mul3n(f.grad, at.base),
-                       mul3n(f.grad, splat3(s.material)), &point);
-  g->eye = point.eye;
-  const Vec3n grad_normal = normalize3n_backward(at.normal, at.inverse_normal, point.normal);
-  add_corners(g->position, point.position, f.c1, f.c2);
-  add_corners(g->normal, grad_normal, f.c1, f.c2);
-  *grad_bary1 = along_corner(s.position, 1, point.position) + along_corner(s.normal, 1, grad_normal);
-  *grad_bary2 = along_corner(s.position, 2, point.position) + along_corner(s.normal, 2, grad_normal);
 }
 
 static inline float4 sum_vec3n(Vec3n v) {
@@ -153,26 +72,6 @@ static inline void store_material(const FrameParams p, const MaterialGradients g
       grad_pairs + (DPR_PAIR_LIT(DPR_BASE == DPR_BASE_OF_FRAGMENTS) + DPR_PAIR_MATERIAL) * (size_t)p.pairs);
 }
 
-/// Backward pass of light evaluated at the corners: all lanes hold the same, and lane sums have been taken
-/// before.
-static inline void corners_backward(const Surface s, const LightingParams lp,
-                                    global const Light* restrict lights, const MaterialGradients of,
-                                    PlaceGradients* g) {
-  const realn share = 1.0f / DPR_WIDTH;  // each lane carries its part of the sum
-#pragma unroll
-  for (int k = 0; k < 3; ++k) {
-    const Vec3n grad_factor = scale3n(splat3(sum_vec3n(of.factor[k])), share);
-    const Vec3n grad_specular = scale3n(splat3(sum_vec3n(of.specular[k])), share);
-    PointGradient point = zero_point_gradient();
-    point.eye = g->eye;
-    light_point_backward(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], grad_factor,
-                         grad_specular, &point);
-    g->position[k] = point.position;
-    g->normal[k] = point.normal;
-    g->eye = point.eye;
-  }
-}
-
 /// One work-item per pair, up to p.last_pair. Deterministic. Inputs as shade_lit_forward.
 /// in out  grads    float[plane][fragment]  of BARY by those of COLOR; of BASE where DPR_BASE says so
 /// out  grad_pairs  DPR_PAIR_COLORS where the colours are read, and from DPR_PAIR_LIT on: POSITIONS, NORMALS but
@@ -190,12 +89,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp,
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, colors, world, materials);
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   const uint bary1 = DPR_GRAD_PLANE(p, BARY), bary2 = bary1 + p.grad_fragments;
-  MaterialGradients of_material;
-#pragma unroll
-  for (int k = 0; k < 3; ++k)
-    of_material.color[k] = of_material.factor[k] = of_material.specular[k] = zero3n();
-  of_material.coefficient = zero3n();
-  of_material.shininess = 0.0f;
+  MaterialGradients of_material = no_material_gradients();
   for (uint i = first; i < last; i += DPR_WIDTH) {
     realn b1, b2;
     const Vec3n grad_base =
@@ -207,11 +101,16 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp,
                p.grad_fragments, grads);
   }
   store_material(p, of_material, pair, grad_pairs);
-  PlaceGradients g;
+  PlaceGradients g = no_place_gradients();
+  if (DPR_SHADING == DPR_GOURAUD) {
+    const realn share = 1.0f / DPR_WIDTH;  // each lane carries its part of the sum
 #pragma unroll
-  for (int k = 0; k < 3; ++k) g.position[k] = g.normal[k] = zero3n();
-  g.eye = zero3n();
-  if (DPR_SHADING == DPR_GOURAUD) corners_backward(s, lp, lights, of_material, &g);
+    for (int k = 0; k < 3; ++k) {
+      of_material.factor[k] = scale3n(splat3(sum_vec3n(of_material.factor[k])), share);
+      of_material.specular[k] = scale3n(splat3(sum_vec3n(of_material.specular[k])), share);
+    }
+    corners_backward(s, lp, lights, of_material, &g);
+  }
   for (uint i = first; DPR_SHADING != DPR_GOURAUD && i < last; i += DPR_WIDTH) {
     realn b1, b2;
     place_backward(s, lp, lights, load_fragment(p, last, i, fragments, grads), &g, &b1, &b2);

@@ -101,6 +101,10 @@ using float4 = cl_float4;
 #define DPR_PLANE_OCCUPANCY 8     /* p, in [0, 1]; has no gradient */
 #define DPR_PLANE_BASE 9          /* linear RGB: 3 */
 #define DPR_GRAD_PLANE_BASE 8
+/// Tangents of fragments have the planes before DISTANCE's, which turn into those of ln p, and those of base
+/// colours after them.
+#define DPR_TANGENT_PLANES DPR_PLANE_DISTANCE
+#define DPR_TANGENT_PLANE_BASE DPR_TANGENT_PLANES
 #define DPR_PLANE(p, name) (DPR_PLANE_##name * (p).fragments)
 #define DPR_GRAD_PLANE(p, name) (DPR_PLANE_##name * (p).grad_fragments)
 
@@ -360,6 +364,27 @@ typedef struct SecondCrossing {
   uint reference;    /* what shows the jump across it: see reference_of() in antialias_second.cl */
   float cut, slope2; /* of the contour: Cut of crossing.h */
 } SecondCrossing;
+
+/// Motion of a camera in a direction of tangents.
+typedef struct ViewTangent {
+  float4 rotation;    /* a rotation vector on the left of the view matrix */
+  float4 translation; /* of the view matrix */
+  float4 projection;  /* scale x, y, offset x, y */
+  float4 lens[2];     /* k1, k2, p1, p2; k3 */
+  float4 eye;         /* of the camera centre, or of the direction to it */
+} ViewTangent;
+
+/// Motion of a mesh: a rotation vector on the left of its matrix, and the matrix' translation.
+typedef struct ModelTangent {
+  float4 rotation, translation;
+} ModelTangent;
+
+/// Changes of what a frame has one of.
+typedef struct FrameTangent {
+  float4 background;
+  float sigma, gamma, alpha;
+  uint unused;
+} FrameTangent;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its
 /// sizes.

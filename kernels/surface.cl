@@ -181,6 +181,19 @@ static inline void add_to_clipped_corners(const ClippedFace c, int along_y, floa
   }
 }
 
+/// From the gradients of a level of detail's q_k along an axis to the corners, homogeneous of a clipped face.
+static inline void add_axis_to_corners(const FrameParams p, uint view_face, int is_clipped, int along_y,
+                                       float3 grad_q, global const Triangle* triangles,
+                                       global const ClippedFace* clipped, float3 corner[3]) {
+  if (is_clipped) {
+    add_to_clipped_corners(clipped[view_face], along_y, grad_q, corner);
+  } else {
+    const Triangle t = triangles[view_face];
+    const float3 depths = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
+    add_to_corners(t, depths, along_y, grad_q, corner);
+  }
+}
+
 /// From the levels of detail to the corners on the screen: what a triangle that turns or goes away does to
 /// the texture's sharpness. One work-item per pair, up to p.last_pair. Deterministic.
 /// in   pairs, pair_face, faces, textures, triangles, clipped  as surface_forward has them
@@ -208,14 +221,8 @@ kernel void surface_detail_backward(const FrameParams p, global const uint* rest
     corner[2].z = depth.z;
   }
   for (int along_y = 0; along_y < 2; ++along_y) {
-    const float3 grad_q = vload3((size_t)along_y, grad_steps);
-    if (is_clipped) {
-      add_to_clipped_corners(clipped[view_face], along_y, grad_q, corner);
-    } else {
-      const Triangle t = triangles[view_face];
-      const float3 depths = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
-      add_to_corners(t, depths, along_y, grad_q, corner);
-    }
+    add_axis_to_corners(p, view_face, is_clipped, along_y, vload3((size_t)along_y, grad_steps), triangles,
+                        clipped, corner);
   }
   if (p.orthographic) corner[0].z = corner[1].z = corner[2].z = 0.0f;  // nothing is divided by depths
   global float* grad = (is_clipped ? grad_clip : grad_corners) + 9 * pair;
@@ -273,4 +280,85 @@ kernel void surface_place(const FrameParams p, global const uint* restrict fragm
   const uint i = (uint)get_global_id(0), last = p.levels * fragment_starts[p.last_pair];
   if (i == 0) places[0] = last;
   if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
+}
+
+/// The derivatives of a level of detail by the barycentrics of corners 1 and 2, and by the corners: x, y (NDC)
+/// and view depth, or homogeneous of a clipped face. Places in the texture stay.
+typedef struct {
+  float bary1, bary2;
+  float3 corner[3];
+} DetailRow;
+
+static inline DetailRow detail_row(const FrameParams p, const TexturedFace* f, const Detail d, float c1,
+                                   float c2, uint view_face, global const Triangle* triangles,
+                                   global const ClippedFace* clipped) {
+  const DetailGradient g = detail_backward(f, d, c1, c2, d.by_step);
+  const float3 none = 0.0f, by_q = depths_by_steps(f, d.along_y ? none : g.q, d.along_y ? g.q : none);
+  const float3 depth = p.orthographic || !(f->is_clipped || p.perspective_correct) ? none : g.depth + by_q;
+  DetailRow row = {g.bary1, g.bary2, {{0.0f, 0.0f, depth.x}, {0.0f, 0.0f, depth.y}, {0.0f, 0.0f, depth.z}}};
+  add_axis_to_corners(p, view_face, f->is_clipped, d.along_y, g.q, triangles, clipped, row.corner);
+  if (p.orthographic) row.corner[0].z = row.corner[1].z = row.corner[2].z = 0.0f;
+  return row;
+}
+
+/// Tangents of base colours by those of barycentrics, of the corners and of their colours. One work-item per
+/// pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
+/// in   base_plane      of the tangents: that of base colours where light falls on them, or of colours
+/// in   moved_colors, color_tangents  as shade_tangent has them
+/// in   vertices        float4[direction][view][vertex]  tangents of x, y (NDC) and view depth
+/// in   clip_vertices   the same of homogeneous coordinates, read where p.clips is set
+/// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY
+kernel void surface_tangent(const FrameParams p, const uint directions, const uint planes,
+                            const uint base_plane, const uint moved_colors, global const uint* restrict pairs,
+                            global const uint* restrict pair_face,
+                            global const uint* restrict fragment_starts, global const uint4* restrict faces,
+                            global const float4* restrict colors, global const float4* restrict texcoords,
+                            global const Texture* restrict textures, global const float4* restrict texels,
+                            global const Triangle* restrict triangles,
+                            global const ClippedFace* restrict clipped,
+                            global const float4* restrict color_tangents,
+                            global const float4* restrict vertices,
+                            global const float4* restrict clip_vertices,
+                            global const float* restrict fragments, global float* restrict tangents) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= min(p.last_pair, pairs[0])) return;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  if (first == last) return;
+  const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
+  const uint view_face = pair_face[pair], view = view_face / p.faces;
+  const uint4 corner = faces[view_face - view * p.faces],
+              color = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const TexturedFace face = load_face(scene, p, view_face);
+  for (uint i = first; i < last; ++i) {
+    const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
+    const Detail detail = find_detail(p, &face, c1, c2);
+    const Sample sample = sample_face(&face, detail, c1, c2, texels);
+    const float4 base = base_of_corners(&face, c1, c2);
+    DetailRow row = {0.0f, 0.0f, {0.0f, 0.0f, 0.0f}};
+    if (detail.varies) row = detail_row(p, &face, detail, c1, c2, view_face, triangles, clipped);
+    for (uint d = 0; d < directions; ++d) {
+      global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
+      const float b1 = of[i + DPR_GRAD_PLANE(p, BARY)],
+                  b2 = of[i + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments];
+      const float2 place = b1 * face.place1 + b2 * face.place2;
+      float4 by_corners = b1 * face.color1 + b2 * face.color2;
+      if (moved_colors != 0) {
+        global const float4* const moved = color_tangents + (size_t)d * moved_colors;
+        by_corners += (1.0f - c1 - c2) * moved[color.x] + c1 * moved[color.y] + c2 * moved[color.z];
+      }
+      float4 by_texture = place.x * sample.by_x + place.y * sample.by_y;
+      if (detail.varies) {
+        global const float4* const move =
+            (face.is_clipped ? clip_vertices : vertices) + (size_t)(d * p.views + view) * p.vertices;
+        by_texture += sample.by_detail *
+                      (row.bary1 * b1 + row.bary2 * b2 + dot(row.corner[0], move[corner.x].xyz) +
+                       dot(row.corner[1], move[corner.y].xyz) + dot(row.corner[2], move[corner.z].xyz));
+      }
+      const float4 moved = sample.color * by_corners + base * by_texture;
+      const uint red = i + base_plane * p.grad_fragments;
+      of[red] = moved.x;
+      of[red + p.grad_fragments] = moved.y;
+      of[red + 2 * p.grad_fragments] = moved.z;
+    }
+  }
 }

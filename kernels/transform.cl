@@ -190,3 +190,82 @@ kernel void transform_backward_positions(const FrameParams p, global const float
   }
   grad_positions[first_view * p.position_stride + position] = (float4)(sum, 0.0f);
 }
+
+/// The tangent of where a tangent of camera space is shown: by its own, and by that of the lens.
+static inline float2 move_seen(global const ViewParams* camera, float2 tangent, float2 moved,
+                               global const ViewTangent* by) {
+  if (!camera->distorts) return moved;
+  float2 seen;
+#pragma unroll
+  for (int axis = 0; axis < 2; ++axis) {
+    const float2 unit = axis == 0 ? (float2)(1.0f, 0.0f) : (float2)(0.0f, 1.0f);
+    const float8 by_lens = coefficients_gradient(camera, tangent, unit);
+    const float sum = dot(bend_tangent_backward(camera, tangent, unit), moved) +
+                      dot(by_lens.lo, by->lens[0]) + dot(by_lens.hi, by->lens[1]);
+    if (axis == 0) {
+      seen.x = sum;
+    } else {
+      seen.y = sum;
+    }
+  }
+  return seen;
+}
+
+/// Tangents of what transform_forward leaves. One work-item per (view, vertex).
+/// in   views, models, vertex_mesh, places, world  as transform_forward has them
+/// in   positions  how many there are of a direction; 0: none moves, position_tangents is not read
+/// in   lit        whether world_tangents are written; clip_tangents are where p.clips is set
+/// in   view_tangents   ViewTangent[direction][view]
+/// in   model_tangents  ModelTangent[direction][view][mesh]
+/// in   position_tangents  float4[direction][position] or, with a stride, float4[direction][view][position]
+/// out  ndc_tangents    float4[direction][view][vertex]  of x, y (NDC) and view depth
+/// out  world_tangents  float4[direction][the length of world]  of world positions; those of normals are left
+/// out  clip_tangents   float4[direction][view][vertex]  of homogeneous coordinates without distortion: x and
+///                      y in NDC, times depth, and depth; orthographic: x, y, depth
+kernel void transform_tangent(const FrameParams p, const uint directions, const uint positions,
+                              const uint lit, global const ViewParams* restrict views,
+                              global const float4* restrict models, global const uint* restrict vertex_mesh,
+                              global const MeshPlace* restrict places, global const float4* restrict world,
+                              global const ViewTangent* restrict view_tangents,
+                              global const ModelTangent* restrict model_tangents,
+                              global const float4* restrict position_tangents,
+                              global float4* restrict ndc_tangents, global float4* restrict world_tangents,
+                              global float4* restrict clip_tangents) {
+  const uint i = (uint)get_global_id(0), count = p.views * p.vertices;
+  if (i >= count) return;
+  const uint view = i / p.vertices, vertex = i - view * p.vertices, mesh = vertex_mesh[vertex];
+  const uint segment = view * p.meshes + mesh, position = vertex - places[mesh].vertex_shift;
+  global const float4* model = models + 3 * segment;
+  global const ViewParams* camera = views + view;
+  const float3 w = world[i].xyz;
+  const float3 c = apply_affine(camera->row[0], camera->row[1], camera->row[2], w);
+  const float3 turned_in_world = w - (float3)(model[0].w, model[1].w, model[2].w);
+  const float3 turned_in_camera = c - (float3)(camera->row[0].w, camera->row[1].w, camera->row[2].w);
+  const float inverse_depth = p.orthographic ? 1.0f : -1.0f / c.z;
+  const float2 tangent = c.xy * inverse_depth;
+  const float2 seen = camera->distorts ? bend_tangent(camera, tangent) : tangent;
+  const float4 projection = camera->projection;
+  for (uint d = 0; d < directions; ++d) {
+    global const ModelTangent* of_mesh = model_tangents + (size_t)d * p.views * p.meshes + segment;
+    global const ViewTangent* of_view = view_tangents + d * p.views + view;
+    float3 move = cross(of_mesh->rotation.xyz, turned_in_world) + of_mesh->translation.xyz;
+    if (positions != 0) {
+      const float3 own = position_tangents[(size_t)d * positions + view * p.position_stride + position].xyz;
+      move += (float3)(dot(model[0].xyz, own), dot(model[1].xyz, own), dot(model[2].xyz, own));
+    }
+    const float3 in_camera = (float3)(dot(camera->row[0].xyz, move), dot(camera->row[1].xyz, move),
+                                      dot(camera->row[2].xyz, move)) +
+                             cross(of_view->rotation.xyz, turned_in_camera) + of_view->translation.xyz;
+    const float depth = -in_camera.z;
+    const float2 moved = p.orthographic ? in_camera.xy : (in_camera.xy - tangent * depth) * inverse_depth;
+    const float2 ndc = move_seen(camera, tangent, moved, of_view) * projection.xy +
+                       seen * of_view->projection.xy + of_view->projection.zw;
+    ndc_tangents[(size_t)d * count + i] = (float4)(ndc.x, ndc.y, depth, 0.0f);
+    if (lit) world_tangents[(size_t)d * (count + p.views * p.normals) + i] = (float4)(move, 0.0f);
+    if (!p.clips) continue;
+    const float w_clip = p.orthographic ? 1.0f : -c.z, w_moved = p.orthographic ? 0.0f : depth;
+    const float2 clip = in_camera.xy * projection.xy + c.xy * of_view->projection.xy +
+                        projection.zw * w_moved + of_view->projection.zw * w_clip;
+    clip_tangents[(size_t)d * count + i] = (float4)(clip.x, clip.y, depth, 0.0f);
+  }
+}

@@ -110,6 +110,23 @@ static inline float triple_gradients(const Slots run, SlotGradients* out) {
   return 1.0f;
 }
 
+/// The same of the slots' rows. Colours count from the background's.
+static inline float triple_rows(const Slots run, const Fragments f, float3 background, SlotRows* out) {
+  const float4 slopes = pair_slopes(make_triple(run));
+  const float3 color0 = slot_color(run.slot[0], f, background),
+               color1 = slot_color(run.slot[1], f, background);
+  const float3 color2 = run.count > 2 ? slot_color(run.slot[2], f, background) : color0;
+  const float3 by01 = slopes.x * (color0 - color1), by02 = slopes.y * (color0 - color2),
+               by12 = slopes.z * (color1 - color2);
+  const float3 by_beta[DPR_TRIPLE] = {by01 + by02, by12 - by01, -by02 - by12};
+#pragma unroll
+  for (uint i = 0; i < DPR_TRIPLE; ++i) {
+    if (i >= run.count) continue;
+    add_row(run.slot[i].fragment, run.slot[i].occupancy, by_beta[i], out);
+  }
+  return 1.0f;
+}
+
 #endif
 
 #endif

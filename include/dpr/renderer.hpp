@@ -86,6 +86,11 @@ struct SceneGradient {
 /// Throws InvalidArgument for arrays of other lengths.
 DPR_API void add(SceneGradient& to, const SceneGradient& from);
 
+/// A direction in which a scene changes, with the members of its gradient: how fast each number does. What is
+/// empty stays, and rotations and translations are those of PoseGradient. <gradient, direction> is the
+/// derivative of a loss along it.
+using SceneTangent = SceneGradient;
+
 struct RenderStatistics {
   std::size_t faces = 0;  ///< triangles times views
   /// Faces nearer than znear, beyond zfar, culled, without area, or outside the image.
@@ -210,6 +215,14 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// The same, with the gradient of a mesh's own loss added to that of its positions, on the device. Both
   /// evaluated on the last forward(). Throws InvalidArgument if the scene asks for no positions' gradient.
   SceneGradient backward(const ImageLoss& loss, const MeshLoss& mesh_loss);
+
+  /// Forward mode: the derivatives of the images along directions, RGBA, [direction][view]. After forward(), and
+  /// throws as image() does where a setter came between. Exact, and the transpose of backward(): <u, J v> =
+  /// <J^T u, v> up to rounding (relative error 1e-5). Scene::gradients has no part in it. All directions share
+  /// most of the work: tests/README.md has figures. Memory: 28 bytes a fragment and direction, of as many
+  /// directions at a time as half the device's budget holds. Throws InvalidArgument with noise on the pixel or
+  /// Monte Carlo, and for directions that change texels, texture coordinates, normals, materials or lights.
+  std::vector<Image> tangent(std::span<const SceneTangent> directions);
 
   /// Statistics of the last forward(). Throws as image() does.
   RenderStatistics statistics() const;

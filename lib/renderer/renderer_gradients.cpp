@@ -7,6 +7,7 @@
 
 #include "renderer/renderer_impl.hpp"
 #include "scene/light_table.hpp"
+#include "scene/projection_slopes.hpp"
 
 namespace dpr {
 
@@ -123,20 +124,10 @@ namespace {
 /// From the gradients of the projection's scale and offset to those of the camera's own parameters.
 void add_projection_gradient(const std::array<double, 4>& grad, const Camera& camera, int width, int height,
                              CameraGradient& out) {
-  const double short_side = std::min(width, height);
-  if (camera.orthographic_height) {
-    const double extent = *camera.orthographic_height;
-    out.orthographic_height = -(grad[0] + grad[1]) * 2.0 * height / short_side / (extent * extent);
-    return;
-  }
-  if (camera.intrinsics) {
-    const double factor = 2.0 / short_side;
-    out.intrinsics = {grad[0] * factor, grad[1] * factor, grad[2] * factor, -grad[3] * factor};
-    return;
-  }
-  const double half_angle = glm::radians(static_cast<double>(camera.fov_y_degrees)) / 2;
-  const double scale_by_half_angle = -height / short_side / std::pow(std::sin(half_angle), 2);
-  out.fov_y_degrees = (grad[0] + grad[1]) * scale_by_half_angle * glm::radians(0.5);
+  const ProjectionSlopes slopes = projection_slopes(camera, width, height);
+  out.orthographic_height = (grad[0] + grad[1]) * slopes.by_orthographic_height;
+  out.fov_y_degrees = (grad[0] + grad[1]) * slopes.by_fov_y_degrees;
+  for (std::size_t k = 0; k < 4; ++k) out.intrinsics[k] = grad[k] * slopes.by_intrinsics[k];
 }
 
 /// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh], and

@@ -115,6 +115,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Leaves the gradients on the device: `transform.grad_positions`, `grad_colors`, `grad_texcoords`,
   /// `texels->grad`, and `grad_numbers`. Works on the last frame as it is, even if that has been emptied.
   void backward_on_device(const BufferRef<cl_float4>& grad_images);
+  /// Fills `tangents.images` with the derivatives of the last frame's images. After require_forward().
+  void tangent(std::span<const SceneTangent> directions);
   /// Room for at least so much in all frames of the scene.
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
@@ -166,6 +168,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
   Reduce reduce;
+  Tangents tangents;
   std::optional<Exchange> exchange;                   // made when first asked for
   Raster raster;                                      // around the frame
   std::shared_ptr<PixelNoise> pixel_noise;            // made when first asked for; none: the triangles' noise
@@ -233,6 +236,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void shade_and_aggregate();
   void differentiate(const BufferRef<cl_float4>& grad_images);
 
+  void upload_directions(std::span<const SceneTangent> directions);
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
   void read_mesh_gradients(SceneGradient& gradient, RowReads& rows);

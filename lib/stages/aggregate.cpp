@@ -62,6 +62,19 @@ struct AggregateArguments {
   Buffer<float>&grads, &grad_sigma, &channels;
 };
 
+/// What the kernels of tangents take, by the names of their arguments.
+struct AggregateTangentArguments {
+  shared::AggregateParams p;
+  cl_uint first_direction, directions, planes;
+  const Buffer<shared::ViewParams>& views;
+  const Buffer<cl_uint>&starts, &list, &slot_counts;
+  const Buffer<float>&fragments, &tangents;
+  const Buffer<shared::FrameTangent>& frames;
+  Buffer<shared::Slot>& slots;
+  Buffer<float>& rows;
+  Buffer<cl_float4>& image_tangents;
+};
+
 /// Launches the kernels in force by runs of the band's pixels.
 template <class Barrier, class Joint, class Sampled, class JointSampled>
 void Aggregate::launch(const AggregateInputs& in, const glm::vec3& background,
@@ -111,6 +124,30 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
   if (perturbs_distances()) grad_sigma.resize(device_, pixels);
   launch<kernel::aggregate_backward, kernel::aggregate_joint_backward, kernel::aggregate_sampled_backward,
          kernel::aggregate_joint_sampled_backward>(in, background, grad_image, with_channels);
+}
+
+void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents) {
+  Rasterize& r = in.rasterize;
+  r.start_gradients(in.p);
+  AggregateTangentArguments all{.p = params(in.p, background, false),
+                                .first_direction = tangents.first,
+                                .directions = tangents.directions,
+                                .planes = tangents.planes,
+                                .views = in.views.cameras,
+                                .starts = r.pixel_starts,
+                                .list = r.list,
+                                .slot_counts = slot_counts_,
+                                .fragments = r.values,
+                                .tangents = tangents.fragments,
+                                .frames = tangents.frames,
+                                .slots = slots_,
+                                .rows = r.grads,
+                                .image_tangents = tangents.images};
+  for (const Range& pixels : r.pixels(in.p)) {
+    all.p.last_pixel = pixels.last();
+    if (now_.kernels->barrier) (*now_.kernels->barrier)(pixels, kernel::aggregate_tangent::pick(all));
+    if (now_.kernels->joint) (*now_.kernels->joint)(pixels, kernel::aggregate_joint_tangent::pick(all));
+  }
 }
 
 std::size_t Aggregate::bytes() const {

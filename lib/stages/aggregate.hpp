@@ -29,8 +29,11 @@ struct AggregateInputs {
 struct AggregateKernels {
   std::string built;
   /// Exact. The forward pass leaves the pixels' slots for the backward pass.
-  std::optional<Launcher<kernel::aggregate_forward, kernel::aggregate_backward>> barrier;
-  std::optional<Launcher<kernel::aggregate_joint_forward, kernel::aggregate_joint_backward>> joint;
+  std::optional<Launcher<kernel::aggregate_forward, kernel::aggregate_backward, kernel::aggregate_tangent>>
+      barrier;
+  std::optional<Launcher<kernel::aggregate_joint_forward, kernel::aggregate_joint_backward,
+                         kernel::aggregate_joint_tangent>>
+      joint;
   std::optional<Launcher<kernel::aggregate_sampled_forward, kernel::aggregate_sampled_backward>> sampled;
   /// Perturbs distances too, and so takes the place of the occupancy stage.
   std::optional<Launcher<kernel::aggregate_joint_sampled_forward, kernel::aggregate_joint_sampled_backward>>
@@ -53,10 +56,16 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   void backward(const AggregateInputs& in, const glm::vec3& background,
                 const BufferRef<cl_float4>& grad_image, bool with_channels = true);
 
+  /// From the tangents of the band's fragments to `tangents.images`. Uses the fragments' gradients as scratch.
+  /// Only with the exact estimator.
+  void tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents);
+
   /// Number of `channels`: the joint composition has none of alpha.
   std::size_t channel_count() const {
     return now_.smoothing.composition == Composition::joint ? DPR_CHANNEL_ALPHA : DPR_PIXEL_CHANNELS;
   }
+
+  bool is_sampled() const { return now_.smoothing.aggregation_estimator == Estimator::monte_carlo; }
 
   /// Bytes a fragment of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = sizeof(shared::Slot);

@@ -77,4 +77,25 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                                                .grad_cuts = grad_cuts});
 }
 
+void Clip::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                   const Geometry& geometry, const Bin& bin, const Rasterize& rasterize, Tangents& tangents) {
+  if (!tangent_) tangent_.emplace(device_);
+  (*tangent_)(rasterize.pairs(bin), kernel::clip_tangent{.p = p,
+                                                         .directions = tangents.directions,
+                                                         .planes = tangents.planes,
+                                                         .pairs = bin.pair_count,
+                                                         .views = views_->cameras,
+                                                         .clipped = faces,
+                                                         .triangles = triangles,
+                                                         .pair_face = bin.pair_face,
+                                                         .fragment_starts = rasterize.fragment_starts,
+                                                         .pixels = rasterize.fragment_pixel,
+                                                         .faces = geometry.face_vertices,
+                                                         .view_tangents = tangents.views,
+                                                         .vertices = tangents.ndc,
+                                                         .clip_vertices = tangents.clip,
+                                                         .fragments = rasterize.values,
+                                                         .tangents = tangents.fragments});
+}
+
 }  // namespace dpr

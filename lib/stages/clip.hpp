@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "kernels/clip.hpp"
+#include "kernels/clip_tangent.hpp"
 #include "stages/bin.hpp"
 #include "stages/geometry.hpp"
 #include "stages/setup.hpp"
@@ -32,6 +33,9 @@ class Clip {
   /// give to projections and lenses.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 Rasterize& rasterize);
+  /// Replaces the tangents of their fragments.
+  void tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+               const Geometry& geometry, const Bin& bin, const Rasterize& rasterize, Tangents& tangents);
 
   Buffer<shared::ClippedFace> faces;  ///< [view][face] which of them are clipped, and to what
   Buffer<float> grad_corners;         ///< [pair][9] of the corners' x times depth, y times depth, depth
@@ -48,7 +52,8 @@ class Clip {
   std::optional<
       Launcher<kernel::clip_forward, kernel::clip_cover, kernel::clip_fragments, kernel::clip_backward,
                kernel::clip_backward_lens>>
-      launch_;                          // made for the first frame that may have such faces
+      launch_;  // made for the first frame that may have such faces
+  std::optional<Launcher<kernel::clip_tangent>> tangent_;
   const DeviceViews* views_ = nullptr;  // of the frame
 };
 

@@ -49,10 +49,15 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   return o;
 }
 
+/// Vectors of fragments to launch for.
+std::size_t Occupancy::vectors_of(const Rasterize& rasterize) const {
+  const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
+  return (rasterize.launched_fragments() + width - 1) / width;
+}
+
 void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize) {
   if (now_.kernels->exact) {
-    const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-    (*now_.kernels->exact)((rasterize.launched_fragments() + width - 1) / width,
+    (*now_.kernels->exact)(vectors_of(rasterize),
                            kernel::occupancy_forward{.p = params(p),
                                                      .last_pair = p.last_pair,
                                                      .fragment_starts = rasterize.fragment_starts,
@@ -94,6 +99,18 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, Rasterize
                                                                 .grads = rasterize.grads,
                                                                 .grad_sigma = grad_sigma});
   }
+}
+
+void Occupancy::tangent(const shared::FrameParams& p, const Rasterize& rasterize, Tangents& tangents) {
+  (*now_.kernels->exact)(vectors_of(rasterize),
+                         kernel::occupancy_tangent{.p = params(p),
+                                                   .last_pair = p.last_pair,
+                                                   .directions = tangents.directions,
+                                                   .planes = tangents.planes,
+                                                   .fragment_starts = rasterize.fragment_starts,
+                                                   .fragments = rasterize.values,
+                                                   .frames = tangents.frames,
+                                                   .tangents = tangents.fragments});
 }
 
 }  // namespace dpr

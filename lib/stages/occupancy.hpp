@@ -17,7 +17,8 @@ namespace dpr {
 /// Kernels of one estimator and prior; `built` names them.
 struct OccupancyKernels {
   std::string built;
-  std::optional<Launcher<kernel::occupancy_forward, kernel::occupancy_backward>> exact;
+  std::optional<Launcher<kernel::occupancy_forward, kernel::occupancy_backward, kernel::occupancy_tangent>>
+      exact;
   std::optional<Launcher<kernel::occupancy_sampled_forward, kernel::occupancy_sampled_backward>> sampled;
 };
 
@@ -33,12 +34,17 @@ class Occupancy : public SmoothedStage<OccupancyKernels> {
   void forward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize);
   void backward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize);
 
+  /// From the tangents of distances to those of ln p. Only with the exact estimator.
+  void tangent(const shared::FrameParams& p, const Rasterize& rasterize, Tangents& tangents);
+
   Buffer<float> grad_sigma;  ///< [pair]
 
+  bool is_sampled() const { return now_.smoothing.occupancy_estimator == Estimator::monte_carlo; }
   std::size_t bytes() const { return grad_sigma.capacity_bytes(); }
 
  private:
   shared::OccupancyParams params(const shared::FrameParams& p) const;
+  std::size_t vectors_of(const Rasterize& rasterize) const;
 };
 
 /// The build option that chooses a prior.

@@ -362,6 +362,27 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
   if (clip != nullptr) clip->backward(p, triangles, bin, *this);
 }
 
+void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                        const Geometry& geometry, const Bin& bin, Tangents& tangents) {
+  tangents.planes = DPR_TANGENT_PLANES + 3 * p.has_base;
+  tangents.fragments.resize(device_, std::size_t{tangents.directions} * tangents.planes * p.grad_fragments);
+  const PairGroups groups = pair_groups(bin);
+  launch_(groups.count, kernel::rasterize_tangent{.p = p,
+                                                  .range = groups.pairs,
+                                                  .directions = tangents.directions,
+                                                  .planes = tangents.planes,
+                                                  .pairs = bin.pair_count,
+                                                  .triangles = triangles,
+                                                  .pair_face = bin.pair_face,
+                                                  .fragment_starts = fragment_starts,
+                                                  .pixels = fragment_pixel,
+                                                  .faces = geometry.face_vertices,
+                                                  .vertices = tangents.ndc,
+                                                  .fragments = values,
+                                                  .tangents = tangents.fragments});
+  if (clip != nullptr) clip->tangent(p, triangles, geometry, bin, *this, tangents);
+}
+
 std::size_t Rasterize::bytes() const {
   std::size_t bytes =
       scan_.bytes() + masks.capacity_bytes() + device_rows_.capacity_bytes() + history_.capacity_bytes();

@@ -117,6 +117,10 @@ class Rasterize {
   void start_gradients(const shared::FrameParams& p);
   /// From the gradients of distance, depth and barycentrics to `grad_corners` of the band's pairs.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
+  /// Makes room for the tangents of the band's fragments, and fills those of depths, barycentrics and distances,
+  /// by those of the vertices.
+  void tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+               const Geometry& geometry, const Bin& bin, Tangents& tangents);
   /// The band's fragments' DPR_PLANE_..., or the gradients.
   std::vector<float> plane(const shared::FrameParams& p, cl_uint number) const;
   std::vector<float> grad_plane(const shared::FrameParams& p, cl_uint number) const;
@@ -179,7 +183,7 @@ class Rasterize {
   Device::Impl& device_;
   Launcher<kernel::rasterize_cover, kernel::rasterize_hide, kernel::rasterize_count, kernel::rasterize_rows,
            kernel::rasterize_fit, kernel::rasterize_note, kernel::rasterize_rebase, kernel::rasterize_list,
-           kernel::rasterize_forward, kernel::rasterize_backward>
+           kernel::rasterize_forward, kernel::rasterize_backward, kernel::rasterize_tangent>
       launch_;
   Scan scan_;
   Buffer<cl_uint4> device_rows_, history_;

@@ -170,6 +170,70 @@ void Shade::backward_light(const ShadeInputs& in, std::size_t light) {
   now_.kernels->shade(in.rasterize.pairs(in.bin), kernel::shade_lit_backward_lights::pick(arguments(in)));
 }
 
+void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
+  const GivenNormals& given = in.geometry.given_normals;
+  if (is_flat()) return;
+  now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
+                        kernel::normals_tangent{.p = in.p,
+                                                .directions = tangents.directions,
+                                                .faces = in.geometry.face_vertices,
+                                                .corner_starts = in.geometry.vertex_corners.starts,
+                                                .corners = in.geometry.vertex_corners.corners,
+                                                .world = in.transform.world,
+                                                .tangents = tangents.world});
+  if (given.empty()) return;
+  now_.kernels->normals(in.p.views * given.count,
+                        kernel::normals_given_tangent{.p = in.p,
+                                                      .directions = tangents.directions,
+                                                      .given_mesh = given.mesh,
+                                                      .model_tangents = tangents.models,
+                                                      .world = in.transform.world,
+                                                      .tangents = tangents.world});
+}
+
+void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
+  const bool is_textured = !in.geometry.textures.empty();
+  const Range pairs = in.rasterize.pairs(in.bin);
+  if (is_textured) surface->tangent(arguments(in), pairs, tangents);
+  if (lit()) {
+    if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
+    (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent{.p = in.p,
+                                                              .lp = now_.params,
+                                                              .directions = tangents.directions,
+                                                              .planes = tangents.planes,
+                                                              .moved_colors = tangents.color_count,
+                                                              .pairs = in.bin.pair_count,
+                                                              .views = in.views.cameras,
+                                                              .lights = now_.lights,
+                                                              .faces = in.geometry.face_vertices,
+                                                              .colors = in.geometry.colors_of(in.p),
+                                                              .world = in.transform.world,
+                                                              .materials = in.geometry.materials.values,
+                                                              .pair_face = in.bin.pair_face,
+                                                              .fragment_starts = in.rasterize.fragment_starts,
+                                                              .color_tangents = tangents.colors,
+                                                              .view_tangents = tangents.views,
+                                                              .world_tangents = tangents.world,
+                                                              .fragments = in.rasterize.values,
+                                                              .tangents = tangents.fragments});
+  } else if (!is_textured) {
+    const PairGroups groups = in.rasterize.pair_groups(in.bin);
+    launch_(groups.count, kernel::shade_tangent{.p = in.p,
+                                                .range = groups.pairs,
+                                                .directions = tangents.directions,
+                                                .planes = tangents.planes,
+                                                .moved_colors = tangents.color_count,
+                                                .pairs = in.bin.pair_count,
+                                                .pair_face = in.bin.pair_face,
+                                                .fragment_starts = in.rasterize.fragment_starts,
+                                                .faces = in.geometry.face_vertices,
+                                                .colors = in.geometry.colors_of(in.p),
+                                                .color_tangents = tangents.colors,
+                                                .fragments = in.rasterize.values,
+                                                .tangents = tangents.fragments});
+  }
+}
+
 std::size_t Shade::bytes() const {
   return now_.lights.capacity_bytes() + grad_normals_.capacity_bytes() + grad_given_normals.capacity_bytes() +
          (surface ? surface->bytes() : 0) + grad_pairs.capacity_bytes() + normal_channels.capacity_bytes() +

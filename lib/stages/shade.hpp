@@ -8,6 +8,7 @@
 #include "kernels/normals.hpp"
 #include "kernels/shade.hpp"
 #include "kernels/shade_lit.hpp"
+#include "kernels/shade_lit_tangent.hpp"
 #include "stages/bin.hpp"
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
@@ -33,9 +34,11 @@ class LitShading {
 
   ShadingModel model;
   Launcher<kernel::normals_forward, kernel::normals_backward_normalize, kernel::normals_backward,
-           kernel::normals_given_forward, kernel::normals_given_backward>
+           kernel::normals_given_forward, kernel::normals_given_backward, kernel::normals_tangent,
+           kernel::normals_given_tangent>
       normals;
   Launcher<kernel::shade_lit_forward, kernel::shade_lit_backward, kernel::shade_lit_backward_lights> shade;
+  std::optional<Launcher<kernel::shade_lit_tangent>> tangent;  // made when first asked for
 };
 
 /// Everything of a frame that shading reads.
@@ -99,6 +102,12 @@ class Shade {
   /// The gradients of one light, with the first those of the environment, per pair.
   void backward_light(const ShadeInputs& in, std::size_t light);
 
+  /// Tangents of the normals, behind those of world positions. Only if lit; before tangent().
+  void tangent_of_normals(const ShadeInputs& in, Tangents& tangents);
+  /// From the tangents of the band's fragments' barycentrics, and of all that colours are made of, to those of
+  /// colours.
+  void tangent(const ShadeInputs& in, Tangents& tangents);
+
   std::optional<Surface> surface;        ///< of textured scenes: made for the first of them
   Buffer<float> grad_pairs;              ///< [p.pairs] of each DPR_PAIR_...
   Buffer<cl_float4> grad_given_normals;  ///< [value] of given normals
@@ -109,7 +118,7 @@ class Shade {
 
  private:
   Device::Impl& device_;
-  Launcher<kernel::shade_forward, kernel::shade_backward> launch_;
+  Launcher<kernel::shade_forward, kernel::shade_backward, kernel::shade_tangent> launch_;
   bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
   void find_normals(const ShadeInputs& in);
   /// Of what a scene has not the kernels get null pointers, which they do not read.

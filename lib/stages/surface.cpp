@@ -45,4 +45,28 @@ void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bi
                                                                   .seen = seen});
 }
 
+void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& tangents) {
+  const cl_uint base_plane = in.p.has_base != 0 ? DPR_TANGENT_PLANE_BASE : DPR_PLANE_COLOR;
+  launch_(pairs, kernel::surface_tangent{.p = in.p,
+                                         .directions = tangents.directions,
+                                         .planes = tangents.planes,
+                                         .base_plane = base_plane,
+                                         .moved_colors = tangents.color_count,
+                                         .pairs = in.pairs,
+                                         .pair_face = in.pair_face,
+                                         .fragment_starts = in.fragment_starts,
+                                         .faces = in.faces,
+                                         .colors = in.colors,
+                                         .texcoords = in.texcoords,
+                                         .textures = in.textures,
+                                         .texels = in.texels,
+                                         .triangles = in.triangles,
+                                         .clipped = in.clipped,
+                                         .color_tangents = tangents.colors,
+                                         .vertices = tangents.ndc,
+                                         .clip_vertices = tangents.clip,
+                                         .fragments = in.fragments,
+                                         .tangents = tangents.fragments});
+}
+
 }  // namespace dpr

@@ -43,6 +43,9 @@ class Surface {
   /// Lists the texels that the band's fragments see, by fragment and level, for the stage that gathers.
   void list(const SurfaceArguments& in, const Range& pairs, const Bin& bin, const Rasterize& rasterize);
 
+  /// From the tangents of barycentrics, corners and their colours to those of the base colours.
+  void tangent(const SurfaceArguments& in, const Range& pairs, Tangents& tangents);
+
   /// Bytes a fragment of the buffers below, of two levels, and of those that sorting needs.
   static constexpr std::size_t k_fragment_bytes = 2 * (4 * sizeof(cl_uint) + sizeof(shared::SeenTexels));
 
@@ -58,7 +61,7 @@ class Surface {
  private:
   Device::Impl& device_;
   Launcher<kernel::surface_forward, kernel::surface_backward, kernel::surface_detail_backward,
-           kernel::surface_list, kernel::surface_place>
+           kernel::surface_list, kernel::surface_place, kernel::surface_tangent>
       launch_;
 };
 

@@ -61,4 +61,27 @@ void Transform::backward_positions(const shared::FrameParams& p, const DeviceVie
                                                       .grad_positions = grad_positions});
 }
 
+void Transform::tangent(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
+                        bool lit, Tangents& tangents) {
+  const std::size_t count = std::size_t{p.views} * p.vertices;
+  tangents.ndc.resize(device_, tangents.directions * count);
+  tangents.world.resize(device_, lit ? tangents.directions * world.size() : 1);  // an argument all the same
+  tangents.clip.resize(device_, p.clips != 0 ? tangents.directions * count : 1);
+  launch_(count, kernel::transform_tangent{.p = p,
+                                           .directions = tangents.directions,
+                                           .positions = tangents.position_count,
+                                           .lit = cl_uint{lit},
+                                           .views = views.cameras,
+                                           .models = views.models,
+                                           .vertex_mesh = geometry.vertex_mesh,
+                                           .places = geometry.places,
+                                           .world = world,
+                                           .view_tangents = tangents.views,
+                                           .model_tangents = tangents.models,
+                                           .position_tangents = tangents.positions,
+                                           .ndc_tangents = tangents.ndc,
+                                           .world_tangents = tangents.world,
+                                           .clip_tangents = tangents.clip});
+}
+
 }  // namespace dpr

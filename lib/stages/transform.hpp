@@ -4,6 +4,7 @@
 #include "kernels/transform.hpp"
 #include "stages/geometry.hpp"
 #include "stages/reduce.hpp"
+#include "stages/tangents.hpp"
 
 namespace dpr {
 
@@ -29,6 +30,10 @@ class Transform {
                 Buffer<cl_float4>& grad);
   void backward_positions(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                           const Buffer<cl_float4>& grad_world);
+  /// From directions of poses, cameras and positions to tangents of `ndc`, of `world` if the scene is lit, and
+  /// of homogeneous coordinates where faces may be clipped.
+  void tangent(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry, bool lit,
+               Tangents& tangents);
 
   Buffer<cl_float4> world;  ///< [view][vertex], then [view][normal]
   Buffer<cl_float4> ndc;    ///< [view][vertex] x, y, view depth
@@ -45,7 +50,7 @@ class Transform {
  private:
   Device::Impl& device_;
   Launcher<kernel::transform_forward, kernel::transform_backward, kernel::transform_backward_lens,
-           kernel::transform_backward_positions>
+           kernel::transform_backward_positions, kernel::transform_tangent>
       launch_;
 };
 

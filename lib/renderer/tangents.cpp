@@ -1,0 +1,197 @@
+// Forward mode: directions in which the scene changes, and how the images follow.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/checks.hpp"
+#include "renderer/renderer_impl.hpp"
+#include "renderer/tangents.hpp"
+#include "scene/projection_slopes.hpp"
+
+namespace dpr {
+
+bool has_tangent(const GradientRow& row) {
+  using Request = GradientRequest;
+  constexpr std::array k_known{&Request::positions, &Request::colors,     &Request::transform,
+                               &Request::camera,    &Request::distortion, &Request::smoothing,
+                               &Request::background};
+  return std::ranges::find(k_known, row.wanted) != k_known.end();
+}
+
+namespace {
+
+using glm::dmat3;
+using glm::dmat4;
+using glm::dvec3;
+
+/// Throws InvalidArgument for a list that is neither empty nor as long as it has to be.
+void require_length(std::size_t length, std::size_t wanted, const std::string& name) {
+  if (length != 0 && length != wanted) {
+    throw InvalidArgument("length of " + name + " (tangent)", std::to_string(length),
+                          "0 or " + std::to_string(wanted));
+  }
+}
+
+/// Throws InvalidArgument for a direction that does not suit the scene, or that the images do not follow.
+void validate(const SceneTangent& direction, const Scene& scene, std::size_t views, const Geometry& geometry,
+              const shared::FrameParams& frame) {
+  require_length(direction.meshes.size(), scene.meshes.size(), "meshes");
+  require_length(direction.views.size(), views, "views");
+  const ShapesGradient& shapes = direction.shapes;
+  require_length(shapes.positions.size(), frame.position_stride == 0 ? 0 : views * geometry.position_count,
+                 "shapes.positions");
+  require_length(shapes.colors.size(), frame.color_stride == 0 ? 0 : views * geometry.colors,
+                 "shapes.colors");
+  for (std::size_t m = 0; m < direction.meshes.size(); ++m) {
+    const MeshGradient& mesh = direction.meshes[m];
+    const bool owns = !scene.meshes[m].instance_of;
+    const MeshRange& range = geometry.meshes[m];
+    const std::string name = "meshes[" + std::to_string(m) + "].";
+    require_length(mesh.positions.size(), owns && frame.position_stride == 0 ? range.vertices : 0,
+                   name + "positions");
+    require_length(mesh.colors.size(), owns && frame.color_stride == 0 ? range.colors : 0, name + "colors");
+  }
+  for (const ViewGradient& view : direction.views)
+    require_length(view.transforms.size(), scene.meshes.size(), "transforms");
+  SceneTangent copy = direction;
+  for_each_array(copy, [](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    transform_numbers(array, [&](double number) {
+      const bool known = has_tangent(row);
+      if (!std::isfinite(number) || (!known && number != 0)) {
+        throw InvalidArgument(name_of(row, index) + " (tangent)", checks::text(number),
+                              known ? "a finite number" : "0: images' derivatives by it are not known");
+      }
+      return number;
+    });
+  });
+}
+
+cl_float4 to_cl(const dvec3& v) { return dpr::to_cl(glm::vec3(v)); }
+
+shared::ViewTangent view_tangent(const CameraGradient& by, const Camera& camera, int width, int height) {
+  const ProjectionSlopes slopes = projection_slopes(camera, width, height);
+  const double scale =
+      slopes.by_orthographic_height * by.orthographic_height + slopes.by_fov_y_degrees * by.fov_y_degrees;
+  std::array<double, 4> projection{scale, scale, 0, 0};
+  for (std::size_t k = 0; k < 4; ++k) projection[k] += slopes.by_intrinsics[k] * by.intrinsics[k];
+  // The camera's centre is -A^-1 t. One infinitely far away lies in the direction A^-1 z, which is as if t
+  // were -z and fixed.
+  const dmat4 view(camera.view);
+  const bool is_distant = camera.orthographic_height.has_value();
+  const dvec3 from = is_distant ? dvec3(0, 0, -1) : dvec3(view[3]);
+  const dvec3 moved = glm::cross(by.view.rotation, from) - (is_distant ? dvec3(0) : by.view.translation);
+  shared::ViewTangent t{};
+  t.rotation = to_cl(by.view.rotation);
+  t.translation = to_cl(by.view.translation);
+  for (std::size_t k = 0; k < 4; ++k) t.projection.s[k] = static_cast<float>(projection[k]);
+  for (std::size_t k = 0; k < by.distortion.size(); ++k)
+    t.lens[k / 4].s[k % 4] = static_cast<float>(by.distortion[k]);
+  t.eye = to_cl(glm::inverse(dmat3(view)) * moved);
+  return t;
+}
+
+/// Arrays of meshes, or those of views' own shapes, one direction after the other; none if none moves.
+/// `first` says where a mesh's begin.
+std::vector<cl_float4> joined(std::span<const SceneTangent> directions, std::size_t count,
+                              std::vector<glm::vec3> MeshGradient::*of_mesh,
+                              std::vector<glm::vec3> ShapesGradient::*of_shapes, const Geometry& geometry,
+                              std::size_t MeshRange::*first) {
+  const bool any = std::ranges::any_of(directions, [&](const SceneTangent& d) {
+    return !(d.shapes.*of_shapes).empty() ||
+           std::ranges::any_of(d.meshes, [&](const MeshGradient& m) { return !(m.*of_mesh).empty(); });
+  });
+  std::vector<cl_float4> values(any ? directions.size() * count : 0);
+  for (std::size_t d = 0; any && d < directions.size(); ++d) {
+    const auto copy = [&](const std::vector<glm::vec3>& from, std::size_t begin) {
+      for (std::size_t i = 0; i < from.size(); ++i) values[d * count + begin + i] = dpr::to_cl(from[i]);
+    };
+    copy(directions[d].shapes.*of_shapes, 0);
+    for (std::size_t m = 0; m < directions[d].meshes.size(); ++m)
+      copy(directions[d].meshes[m].*of_mesh, geometry.meshes[m].*first);
+  }
+  return values;
+}
+
+}  // namespace
+
+void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions) {
+  const std::size_t count = directions.size(), meshes = scene.meshes.size();
+  std::vector<shared::ViewTangent> of_views(count * views.size());
+  std::vector<shared::ModelTangent> of_models(count * views.size() * meshes);
+  std::vector<shared::FrameTangent> of_frames(count);
+  for (std::size_t d = 0; d < count; ++d) {
+    const SceneTangent& by = directions[d];
+    of_frames[d] = {to_cl(by.background), static_cast<float>(by.sigma), static_cast<float>(by.gamma),
+                    static_cast<float>(by.alpha), 0};
+    for (std::size_t v = 0; v < by.views.size(); ++v) {
+      const std::size_t view = d * views.size() + v;
+      of_views[view] = view_tangent(by.views[v].camera, views[v].camera, scene.width, scene.height);
+      for (std::size_t m = 0; m < by.views[v].transforms.size(); ++m) {
+        const PoseGradient& pose = by.views[v].transforms[m];
+        of_models[view * meshes + m] = {to_cl(pose.rotation), to_cl(pose.translation)};
+      }
+    }
+  }
+  const auto upload = [&](const std::vector<cl_float4>& values, Buffer<cl_float4>& buffer) {
+    buffer.upload(impl_of(device), values);
+    return to_uint(values.size() / count);
+  };
+  Device::Impl& on = impl_of(device);
+  tangents.directions = to_uint(count);
+  tangents.views.upload(on, of_views);
+  tangents.models.upload(on, of_models);
+  tangents.frames.upload(on, of_frames);
+  const std::size_t shapes = frame.position_stride != 0 ? views.size() : 1,
+                    colorings = frame.color_stride != 0 ? views.size() : 1;
+  tangents.position_count =
+      upload(joined(directions, shapes * geometry->position_count, &MeshGradient::positions,
+                    &ShapesGradient::positions, *geometry, &MeshRange::first_position),
+             tangents.positions);
+  tangents.color_count = upload(joined(directions, colorings * geometry->colors, &MeshGradient::colors,
+                                       &ShapesGradient::colors, *geometry, &MeshRange::first_color),
+                                tangents.colors);
+}
+
+void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
+  if (pixel_noise || aggregate.is_sampled() || occupancy.is_sampled()) {
+    throw InvalidArgument("tangent", pixel_noise ? "noise on the pixel" : "Monte Carlo",
+                          "noise of triangles with the exact estimators");
+  }
+  if (geometry_colors) throw InvalidArgument("tangent", "colours by geometry", "colours of the scene");
+  for (const SceneTangent& direction : directions) validate(direction, scene, views.size(), *geometry, frame);
+  tangents.images.resize(impl_of(device), directions.size() * image().size());
+  const std::size_t bytes_each = (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) *
+                                 std::max<std::size_t>(rasterize.frame_fragments, 1);
+  const std::size_t together = std::max<std::size_t>(device.memory_budget() / 2 / bytes_each, 1);
+  for (std::size_t first = 0; first < directions.size(); first += together) {
+    tangents.first = to_uint(first);
+    upload_directions(directions.subspan(first, std::min(together, directions.size() - first)));
+    transform.tangent(frame, device_views, *geometry, shade.lit(), tangents);
+    if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
+    for (const Band& band : bands) {
+      if (bands.size() > 1) render(band);
+      rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
+      occupancy.tangent(frame, rasterize, tangents);
+      shade.tangent(shade_inputs(), tangents);
+      aggregate.tangent(aggregate_inputs(), scene.background, tangents);
+    }
+  }
+}
+
+std::vector<Image> Renderer::tangent(std::span<const SceneTangent> directions) {
+  Impl& m = *impl_;
+  m.require_forward("Renderer::tangent");
+  m.tangent(directions);
+  std::vector<Image> images(directions.size() * m.views.size(), Image(m.scene.width, m.scene.height));
+  PendingReads reads(impl_of(m.device));
+  std::size_t first = 0;
+  for (Image& image : images) {
+    const auto bytes = std::as_writable_bytes(std::span(image.pixels));
+    reads.start(m.tangents.images.cl_buffer(), first * sizeof(cl_float4), bytes);
+    first += image.pixels.size();
+  }
+  reads.finish();
+  return images;
+}
+
+}  // namespace dpr

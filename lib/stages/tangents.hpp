@@ -1,0 +1,33 @@
+// Directions of tangents on the device, and what the stages leave of them for those behind.
+#pragma once
+
+#include "device/buffer.hpp"
+#include "shared_types.h"
+
+namespace dpr {
+
+/// As many directions at a time as there is memory for: `directions` of them, from `first` on.
+struct Tangents {
+  cl_uint first = 0, directions = 0;
+  cl_uint planes = 0;                           ///< of a direction's fragments: DPR_TANGENT_PLANES, ...
+  Buffer<shared::ViewTangent> views;            ///< [direction][view]
+  Buffer<shared::ModelTangent> models;          ///< [direction][view][mesh]
+  Buffer<shared::FrameTangent> frames;          ///< [direction]
+  cl_uint position_count = 0, color_count = 0;  ///< of a direction; 0: none move, and the buffer is not read
+  Buffer<cl_float4> positions, colors;          ///< [direction][position], [color]; of views' own by view
+
+  Buffer<cl_float4> ndc;     ///< [direction][view][vertex] x, y, view depth
+  Buffer<cl_float4> world;   ///< [direction][as Transform::world], of lit scenes
+  Buffer<cl_float4> clip;    ///< [direction][view][vertex] homogeneous, where p.clips is set
+  Buffer<float> fragments;   ///< [direction][planes][p.grad_fragments]
+  Buffer<cl_float4> images;  ///< [direction][view][height][width] RGBA, of all directions
+
+  std::size_t bytes() const {
+    return views.capacity_bytes() + models.capacity_bytes() + frames.capacity_bytes() +
+           positions.capacity_bytes() + colors.capacity_bytes() + ndc.capacity_bytes() +
+           world.capacity_bytes() + clip.capacity_bytes() + fragments.capacity_bytes() +
+           images.capacity_bytes();
+  }
+};
+
+}  // namespace dpr
