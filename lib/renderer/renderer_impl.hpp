@@ -115,7 +115,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Leaves the gradients on the device: `transform.grad_positions`, `grad_colors`, `grad_texcoords`,
   /// `texels->grad`, and `grad_numbers`. Works on the last frame as it is, even if that has been emptied.
   void backward_on_device(const BufferRef<cl_float4>& grad_images);
-  /// Fills `tangents.images` with the derivatives of the last frame's images. After require_forward().
+  /// Throws InvalidArgument unless images have derivatives along the directions.
+  void require_tangents(std::span<const SceneTangent> directions) const;
+  /// Fills `tangents.images` with the derivatives of the last frame's images. After require_forward() and
+  /// require_tangents().
   void tangent(std::span<const SceneTangent> directions);
   /// Room for at least so much in all frames of the scene.
   void reserve(const FrameCounts& counts);

@@ -152,13 +152,16 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
                                 tangents.colors);
 }
 
-void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
+void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) const {
   if (pixel_noise || aggregate.is_sampled() || occupancy.is_sampled()) {
     throw InvalidArgument("tangent", pixel_noise ? "noise on the pixel" : "Monte Carlo",
                           "noise of triangles with the exact estimators");
   }
   if (geometry_colors) throw InvalidArgument("tangent", "colours by geometry", "colours of the scene");
   for (const SceneTangent& direction : directions) validate(direction, scene, views.size(), *geometry, frame);
+}
+
+void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   tangents.images.resize(impl_of(device), directions.size() * image().size());
   const std::size_t bytes_each = (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) *
                                  std::max<std::size_t>(rasterize.frame_fragments, 1);
@@ -181,6 +184,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
 std::vector<Image> Renderer::tangent(std::span<const SceneTangent> directions) {
   Impl& m = *impl_;
   m.require_forward("Renderer::tangent");
+  m.require_tangents(directions);
   m.tangent(directions);
   std::vector<Image> images(directions.size() * m.views.size(), Image(m.scene.width, m.scene.height));
   PendingReads reads(impl_of(m.device));

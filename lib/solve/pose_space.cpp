@@ -115,6 +115,21 @@ View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
           {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
 }
 
+ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera& camera,
+                                     std::size_t parameter) const {
+  ViewGradient tangent{.camera = {}, .transforms = {{}}};
+  if (parameter < k_translation) {
+    tangent.transforms[0].rotation[static_cast<int>(parameter)] = 1;
+  } else if (parameter < focal_index_) {
+    tangent.transforms[0].translation = camera_axes_[static_cast<int>(parameter - k_translation)];
+  } else if (parameter < radial_index_) {
+    tangent.camera = zoom_tangent(calibrated(camera, hypothesis.focal_scale, hypothesis.radial));
+  } else {
+    tangent.camera.distortion[parameter - radial_index_] = 1;
+  }
+  return tangent;
+}
+
 std::vector<View> PoseSpace::seen_through_lenses(const Camera& camera) const {
   constexpr std::size_t k_rotations = 16;
   std::vector<View> views;

@@ -38,6 +38,8 @@ class PoseSpace {
   /// The same between two hypotheses, rotation and translation counted.
   double distance(const Hypothesis& a, const Hypothesis& b) const;
   View view(const Hypothesis& hypothesis, const Camera& camera) const;
+  /// How that view changes with a parameter.
+  ViewGradient view_tangent(const Hypothesis& hypothesis, const Camera& camera, std::size_t parameter) const;
   /// Poses all around at the initial place, before the camera's lens, and such as may be found where one is
   /// looked for: what faces are cut for. None without a lens.
   std::vector<View> seen_through_lenses(const Camera& camera) const;

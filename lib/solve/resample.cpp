@@ -88,4 +88,17 @@ Camera zoomed(Camera camera, double scale) {
   return camera;
 }
 
+CameraGradient zoom_tangent(const Camera& camera) {
+  CameraGradient tangent;
+  if (camera.orthographic_height) {
+    tangent.orthographic_height = -static_cast<double>(*camera.orthographic_height);
+  } else if (const auto& k = camera.intrinsics) {
+    tangent.intrinsics = {static_cast<double>(k->fx), static_cast<double>(k->fy), 0, 0};
+  } else {
+    // 1 / tan(angle / 2) grows by itself.
+    tangent.fov_y_degrees = -glm::degrees(std::sin(glm::radians(static_cast<double>(camera.fov_y_degrees))));
+  }
+  return tangent;
+}
+
 }  // namespace dpr

@@ -3,6 +3,7 @@
 
 #include "dpr/camera.hpp"
 #include "dpr/image.hpp"
+#include "dpr/renderer.hpp"
 
 namespace dpr {
 
@@ -18,5 +19,7 @@ Camera resample(const Camera& camera, int width, int height, int new_width, int 
 
 /// The camera with another focal length, `scale` times as long; orthographic: with so much less height.
 Camera zoomed(Camera camera, double scale);
+/// How the camera changes with the logarithm of that scale.
+CameraGradient zoom_tangent(const Camera& camera);
 
 }  // namespace dpr
