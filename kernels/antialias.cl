@@ -6,7 +6,7 @@
 // Few steps are crossed: samples are blended where they lie, by those near contours as antialias_fade.cl has
 // faded and kept them. A work-item takes a row of a tile, or on a CPU, whose lanes are a row's samples, all
 // of its rows.
-#include "touched.h"
+#include "blended.h"
 
 /// Keeps the gradients of the samples near contours, which the passes that follow change where they lie. One
 /// work-item per DPR_ROWS of a tile. Deterministic.
@@ -19,21 +19,6 @@ kernel void antialias_keep(const FrameParams p, global const uint* restrict tile
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   for (uint row = rows.first; row < rows.last; ++row) copy_row(row_of(p, rows, row), from, kept);
-}
-
-/// Colours that a sample's parts at a step weigh: the difference of both with the sample's own continued all
-/// the way, and the sum of their changes.
-typedef struct {
-  float4 difference, changes;
-} Taken;
-
-static inline Taken taken_at(const FrameParams p, const Steps steps, Sample s, int step,
-                             global const float4* restrict raster) {
-  const Sample other = sample_beside(p, s, step);
-  const float4 change = change_towards(p, steps, s, step, raster);
-  const Taken t = {raster[other.index] - raster[s.index] - change,
-                   change_towards(p, steps, other, DPR_OPPOSITE(step), raster) + change};
-  return t;
 }
 
 /// Colour that contours add to a sample. One step after the other: unrolled, all four colours would be in

@@ -85,6 +85,32 @@ static inline void add_cut_channels(const FrameParams p, global const ViewParams
   sum->lens += coefficients_gradient(view, tangent, grad * scale);
 }
 
+/// The tangent of a cut: x, y (NDC), and of its part. `kept` and `lost` are those of its corners' homogeneous
+/// coordinates.
+static inline float3 cut_tangent(const FrameParams p, global const ViewParams* view, const ClippedFace c,
+                                 uint cut, float3 kept, float3 lost, global const ViewTangent* by) {
+  const float3 from = clipped_corner(c, kept_corner(c, cut)).xyz;
+  const float3 to = clipped_corner(c, lost_corner(c, cut)).xyz;
+  const float4 at = clipped_cut(c, cut);
+  const float part = at.w, moved_part = ((1.0f - part) * kept.z + part * lost.z) / (from.z - to.z);
+  float2 moved =
+      ((1.0f - part) * kept.xy + part * lost.xy + moved_part * (to.xy - from.xy)) / cut_divisor(p, at.z);
+  if (view->distorts) {
+    const float2 ndc = cut_ndc(p, from, to, part, at.z);
+    float seen[2];
+#pragma unroll
+    for (int axis = 0; axis < 2; ++axis) {
+      const float2 unit = axis == 0 ? (float2)(1.0f, 0.0f) : (float2)(0.0f, 1.0f);
+      CutChannels row = {0.0f, 0.0f};
+      add_cut_channels(p, view, c, cut, unit, &row);
+      seen[axis] = dot(bend_ndc_backward(view, ndc, unit), moved) + dot(row.projection, by->projection) +
+                   dot(row.lens.lo, by->lens[0]) + dot(row.lens.hi, by->lens[1]);
+    }
+    moved = (float2)(seen[0], seen[1]);
+  }
+  return (float3)(moved.x, moved.y, moved_part);
+}
+
 /// Stores them as float[DPR_CUT_CHANNELS][count].
 static inline void store_cut_channels(const CutChannels sum, size_t count, size_t i, global float* channels) {
 #pragma unroll

@@ -86,10 +86,23 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
   antialias.backward(in, contour, kept_, grad_raster);
 }
 
+void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents) {
+  const std::size_t samples = std::size_t{in.p.views} * in.p.width * in.p.height;
+  const std::size_t pixels = size.views * size.width * size.height;
+  moved_raster_.resize(device_, samples);
+  for (std::size_t d = 0; d < tangents.directions; ++d) {
+    tangents.rasters.copy_to(moved_raster_, d * samples, samples, 0);
+    antialias.tangent(in, contour, kept_, d, tangents, moved_raster_);
+    blur_forward(size, moved_raster_, moved_image_);
+    moved_image_.copy_to(tangents.images, (tangents.first + d) * pixels);
+  }
+  blur_holds_image_ = false;
+}
+
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
          (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
-         grad_raster_.capacity_bytes();
+         grad_raster_.capacity_bytes() + moved_raster_.capacity_bytes() + moved_image_.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -60,6 +60,9 @@ class PixelNoise {
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
               Buffer<cl_float4>& pixels);
 
+  /// From the tangents of the samples, `tangents.rasters`, to those of the image, along a group's directions.
+  void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents);
+
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
   Buffer<cl_float4> image;  ///< [view][height][width] RGBA
@@ -74,8 +77,9 @@ class PixelNoise {
   void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
 
   KeptSamples kept_, other_kept_;
-  Buffer<cl_float4> grad_raster_;  // where it has not taken the raster's place
-  bool is_blended_ = false;        // the raster is
+  Buffer<cl_float4> grad_raster_;                 // where it has not taken the raster's place
+  Buffer<cl_float4> moved_raster_, moved_image_;  // tangents along one direction
+  bool is_blended_ = false;                       // the raster is
   bool raster_is_gradient_ = false;
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;

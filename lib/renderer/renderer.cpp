@@ -374,12 +374,12 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
-         (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() + (aov ? aov->bytes() : 0) +
-         (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
-         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + grad_images_.capacity_bytes() +
-         grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
-         grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
+         (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
+         (aov ? aov->bytes() : 0) + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
+         hidden_.capacity_bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
+         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
+         grad_images_.capacity_bytes() + grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() +
+         grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
          (gradient_map ? gradient_map->bytes() : 0) + aov_surface.capacity_bytes() +
          aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +

@@ -153,22 +153,29 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
 }
 
 void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) const {
-  if (pixel_noise || aggregate.is_sampled() || occupancy.is_sampled()) {
-    throw InvalidArgument("tangent", pixel_noise ? "noise on the pixel" : "Monte Carlo",
-                          "noise of triangles with the exact estimators");
-  }
+  if (aggregate.is_sampled() || occupancy.is_sampled())
+    throw InvalidArgument("tangent", "Monte Carlo", "the exact estimators");
   if (geometry_colors) throw InvalidArgument("tangent", "colours by geometry", "colours of the scene");
-  for (const SceneTangent& direction : directions) validate(direction, scene, views.size(), *geometry, frame);
+  for (const SceneTangent& direction : directions) {
+    validate(direction, scene, views.size(), *geometry, frame);
+    if (pixel_noise && direction.sigma != 0)
+      throw InvalidArgument("sigma (tangent)", checks::text(direction.sigma), "0 with noise on the pixel");
+  }
 }
 
 void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
-  tangents.images.resize(impl_of(device), directions.size() * image().size());
+  Device::Impl& on = impl_of(device);
+  const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
+  tangents.images.resize(on, directions.size() * image().size());
   const std::size_t bytes_each = (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) *
-                                 std::max<std::size_t>(rasterize.frame_fragments, 1);
+                                     std::max<std::size_t>(rasterize.frame_fragments, 1) +
+                                 (pixel_noise ? samples * sizeof(cl_float4) : 0);
   const std::size_t together = std::max<std::size_t>(device.memory_budget() / 2 / bytes_each, 1);
   for (std::size_t first = 0; first < directions.size(); first += together) {
+    const auto group = directions.subspan(first, std::min(together, directions.size() - first));
+    upload_directions(group);
     tangents.first = to_uint(first);
-    upload_directions(directions.subspan(first, std::min(together, directions.size() - first)));
+    if (pixel_noise) tangents.rasters.resize(on, group.size() * samples);
     transform.tangent(frame, device_views, *geometry, shade.lit(), tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {
@@ -176,8 +183,10 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
       rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
       occupancy.tangent(frame, rasterize, tangents);
       shade.tangent(shade_inputs(), tangents);
-      aggregate.tangent(aggregate_inputs(), scene.background, tangents);
+      aggregate.tangent(aggregate_inputs(), scene.background, tangents, pixel_noise ? 0 : first,
+                        pixel_noise ? tangents.rasters : tangents.images);
     }
+    if (pixel_noise) pixel_noise->tangent(contour_inputs(), image_size(), tangents);
   }
 }
 

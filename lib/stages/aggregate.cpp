@@ -126,11 +126,12 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
          kernel::aggregate_joint_sampled_backward>(in, background, grad_image, with_channels);
 }
 
-void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents) {
+void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
+                        std::size_t first, Buffer<cl_float4>& images) {
   Rasterize& r = in.rasterize;
   r.start_gradients(in.p);
   AggregateTangentArguments all{.p = params(in.p, background, false),
-                                .first_direction = tangents.first,
+                                .first_direction = to_uint(first),
                                 .directions = tangents.directions,
                                 .planes = tangents.planes,
                                 .views = in.views.cameras,
@@ -142,7 +143,7 @@ void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, 
                                 .frames = tangents.frames,
                                 .slots = slots_,
                                 .rows = r.grads,
-                                .image_tangents = tangents.images};
+                                .image_tangents = images};
   for (const Range& pixels : r.pixels(in.p)) {
     all.p.last_pixel = pixels.last();
     if (now_.kernels->barrier) (*now_.kernels->barrier)(pixels, kernel::aggregate_tangent::pick(all));

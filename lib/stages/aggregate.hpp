@@ -56,9 +56,11 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   void backward(const AggregateInputs& in, const glm::vec3& background,
                 const BufferRef<cl_float4>& grad_image, bool with_channels = true);
 
-  /// From the tangents of the band's fragments to `tangents.images`. Uses the fragments' gradients as scratch.
+  /// From the tangents of the band's fragments to those of the images, of the group's directions from `first`
+  /// on. Uses the fragments' gradients as scratch.
   /// Only with the exact estimator.
-  void tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents);
+  void tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
+               std::size_t first, Buffer<cl_float4>& images);
 
   /// Number of `channels`: the joint composition has none of alpha.
   std::size_t channel_count() const {

@@ -160,6 +160,61 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                                                           .grad_ends = grad_ends});
 }
 
+void Antialias::tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
+                        std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples) {
+  if (!tangent_) tangent_.emplace(device_);
+  // What the backward pass has of cuts, seconds and samples holds their tangents.
+  const std::size_t rows = tiles_of(in.p) * row_items(device_);
+  grad_cut_.resize(device_, 2 * samples_of(in.p));
+  grad_seconds_.resize(device_, seconds.size());
+  kept_grad_.resize(device_, samples_of(in.p));
+  (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{.p = in.p,
+                                                             .direction = to_uint(direction),
+                                                             .pairs = contour.pair_count,
+                                                             .views = in.views.cameras,
+                                                             .edges = in.edges.edges,
+                                                             .faces = in.geometry.face_vertices,
+                                                             .ndc = in.transform.ndc,
+                                                             .clipped = in.clipped,
+                                                             .pair_contour = contour.pair_contour,
+                                                             .pair_tile = contour.pair_tile,
+                                                             .winner = winner,
+                                                             .second_counts = second_counts,
+                                                             .seconds = seconds,
+                                                             .view_tangents = tangents.views,
+                                                             .vertices = tangents.ndc,
+                                                             .clip_vertices = tangents.clip,
+                                                             .cut_tangents = grad_cut_,
+                                                             .second_tangents = grad_seconds_});
+  (*tangent_)(rows, kernel::antialias_fade_tangent{.p = in.p,
+                                                   .tile_starts = contour.tile_starts,
+                                                   .winner = winner,
+                                                   .cut = cut,
+                                                   .raster = kept.samples,
+                                                   .cut_tangents = grad_cut_,
+                                                   .raster_tangents = samples,
+                                                   .faded_tangents = kept_grad_});
+  (*tangent_)(rows, kernel::antialias_blend_tangent{.p = in.p,
+                                                    .tile_starts = contour.tile_starts,
+                                                    .winner = winner,
+                                                    .cut = cut,
+                                                    .raster = kept.faded,
+                                                    .cut_tangents = grad_cut_,
+                                                    .faded_tangents = kept_grad_,
+                                                    .tangents = samples});
+  (*tangent_)(rows, kernel::antialias_second_tangent{.p = in.p,
+                                                     .tile_starts = contour.tile_starts,
+                                                     .counts = second_counts,
+                                                     .seconds = seconds,
+                                                     .winner = winner,
+                                                     .cut = cut,
+                                                     .raster = kept.faded,
+                                                     .cut_tangents = grad_cut_,
+                                                     .second_tangents = grad_seconds_,
+                                                     .faded_tangents = kept_grad_,
+                                                     .tangents = samples});
+}
+
 std::size_t Antialias::bytes() const {
   std::size_t bytes = kept_grad_.capacity_bytes() + winner.capacity_bytes() + crowded_.capacity_bytes() +
                       second_counts.capacity_bytes() + seconds.capacity_bytes() + grad_ends.capacity_bytes() +

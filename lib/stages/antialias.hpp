@@ -5,6 +5,7 @@
 #include "kernels/antialias_cross.hpp"
 #include "kernels/antialias_fade.hpp"
 #include "kernels/antialias_second.hpp"
+#include "kernels/antialias_tangent.hpp"
 #include "stages/contour.hpp"
 #include "stages/rasterize.hpp"
 
@@ -38,6 +39,10 @@ class Antialias {
   /// as forward() leaves it.
   void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                 Buffer<cl_float4>& grad);
+  /// From the tangents of the samples to those of the blended ones, in place, along one of the directions. `kept`
+  /// as forward() leaves it.
+  void tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
+               std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples);
   /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
   Buffer<cl_float4>& scratch(const shared::FrameParams& p, std::size_t count);
 
@@ -60,6 +65,9 @@ class Antialias {
            kernel::antialias_backward, kernel::antialias_second_forward, kernel::antialias_second_backward,
            kernel::antialias_fade_backward, kernel::antialias_cross_backward>
       launch_;
+  std::optional<Launcher<kernel::antialias_cross_tangent, kernel::antialias_fade_tangent,
+                         kernel::antialias_blend_tangent, kernel::antialias_second_tangent>>
+      tangent_;                     // made when first asked for
   Buffer<cl_uchar> crowded_;        // [tile][DPR_TILE_BYTES]
   Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
   Buffer<cl_float2> grad_seconds_;  // as `seconds`
