@@ -4,17 +4,13 @@
 #include "faded.h"
 #include "second.h"
 
-/// The tangent of where an end of an edge is seen, NDC.
-static inline float2 end_tangent(const FrameParams p, global const ViewParams* view, const EdgeScene s,
-                                 const ViewEdge e, uint end, global const float4* vertices,
-                                 global const float4* clip_vertices, global const ViewTangent* by) {
+/// The tangent of where an end of an edge is seen, NDC: that of a vertex, or of a cut. Cuts are the outline's
+/// last two corners.
+static inline float2 end_tangent(const EdgeScene s, const ViewEdge e, uint end, global const float4* vertices,
+                                 global const float4* outlines) {
   const uint cut = end == 0 ? e.cut[0] : e.cut[1];
   if (cut == DPR_NO_CUT) return vertices[end == 0 ? e.record.x : e.record.y].xy;
-  const ClippedFace c = s.clipped[e.cut_face];
-  global const uint4* const face = s.faces + e.cut_face;
-  return cut_tangent(p, view, c, cut, clip_vertices[corner_in(face, kept_corner(c, cut))].xyz,
-                     clip_vertices[corner_in(face, lost_corner(c, cut))].xyz, by)
-      .xy;
+  return outlines[4 * e.cut_face + s.clipped[e.cut_face].corners - 2 + cut].xy;
 }
 
 /// The tangent of what a contour cuts at a crossing, by those of its ends: antialias_cross_backward, transposed.
@@ -33,22 +29,19 @@ static inline Cut tangent_of_cut(const FrameParams p, const TileContour c, const
 }
 
 /// Tangents of what contours cut. One work-item per pair. Deterministic. Inputs as antialias_cross_backward, and
-/// in   direction      of those in the three that follow
-/// in   view_tangents  ViewTangent[direction][view]
+/// in   direction      of those in the two that follow
 /// in   vertices       float4[direction][view][vertex]  of x, y (NDC) and view depth
-/// in   clip_vertices  the same of homogeneous coordinates, read where p.clips is set
+/// in   outlines       as clip_outline_tangent leaves them, read where p.clips is set
 /// out  cut_tangents     Cut[2][pixel]  of the steps' winners
 /// out  second_tangents  Cut[list][DPR_SECOND_ROOM]
 kernel void antialias_cross_tangent(
     const FrameParams p, const uint direction, global const uint* restrict pairs,
-    global const ViewParams* restrict views, global const uint2* restrict edges,
-    global const uint4* restrict faces, global const float4* restrict ndc,
+    global const uint2* restrict edges, global const uint4* restrict faces, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,
     global const uint* restrict second_counts, global const SecondCrossing* restrict seconds,
-    global const ViewTangent* restrict view_tangents, global const float4* restrict vertices,
-    global const float4* restrict clip_vertices, global float2* restrict cut_tangents,
-    global float2* restrict second_tangents) {
+    global const float4* restrict vertices, global const float4* restrict outlines,
+    global float2* restrict cut_tangents, global float2* restrict second_tangents) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= pairs[0]) return;
   const uint contour = pair_contour[pair];
@@ -57,11 +50,9 @@ kernel void antialias_cross_tangent(
   const ViewEdge edge = view_edge(scene, contour / DPR_CONTOUR_FLAGS - c.view * p.edges);
   const size_t of_view = (size_t)direction * p.views + c.view;
   global const float4 *move = vertices + of_view * p.vertices,
-                      *clip_move = clip_vertices + (p.clips ? of_view * p.vertices : 0);
-  const float2 move_a =
-      end_tangent(p, views + c.view, scene, edge, 0, move, clip_move, view_tangents + of_view);
-  const float2 move_b =
-      end_tangent(p, views + c.view, scene, edge, 1, move, clip_move, view_tangents + of_view);
+                      *outline_move = outlines + (p.clips ? 4 * of_view * p.faces : 0);
+  const float2 move_a = end_tangent(scene, edge, 0, move, outline_move);
+  const float2 move_b = end_tangent(scene, edge, 1, move, outline_move);
   const TileSamples s = tile_samples(p, pair_tile[pair]);
   for (int by_rows = 0; by_rows < 2; ++by_rows) {
     const RasterEdge e = raster_edge(c.a, c.b, by_rows);

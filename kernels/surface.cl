@@ -82,6 +82,11 @@ static inline uint base_plane(const FrameParams p) {
 static inline float3 load_plane3(uint i, uint plane, global const float* values) {
   return (float3)(values[i], values[i + plane], values[i + 2 * plane]);
 }
+static inline void store_plane3(float3 v, uint i, uint plane, global float* values) {
+  values[i] = v.x;
+  values[i + plane] = v.y;
+  values[i + 2 * plane] = v.z;
+}
 
 /// One work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
 /// in out  grads  float[plane][fragment]  of BARY by that of the base colours; where p.has_base is set, added
@@ -282,6 +287,55 @@ kernel void surface_place(const FrameParams p, global const uint* restrict fragm
   if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
 }
 
+/// Tangents of base colours by those of barycentrics and of the corners' colours. One work-item per
+/// pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
+/// in   base_plane      of the tangents: that of base colours where light falls on them, or of colours
+/// in   moved_colors, color_tangents  as shade_tangent has them
+/// out  details         float[plane][fragment]  COLOR: what the base colour changes by its level of detail
+/// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY
+kernel void surface_tangent(const FrameParams p, const uint directions, const uint planes,
+                            const uint base_plane, const uint moved_colors, global const uint* restrict pairs,
+                            global const uint* restrict pair_face,
+                            global const uint* restrict fragment_starts, global const uint4* restrict faces,
+                            global const float4* restrict colors, global const float4* restrict texcoords,
+                            global const Texture* restrict textures, global const float4* restrict texels,
+                            global const Triangle* restrict triangles,
+                            global const ClippedFace* restrict clipped,
+                            global const float4* restrict color_tangents,
+                            global const float* restrict fragments, global float* restrict details,
+                            global float* restrict tangents) {
+  const uint pair = (uint)get_global_id(0);
+  if (pair >= min(p.last_pair, pairs[0])) return;
+  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
+  if (first == last) return;
+  const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
+  const uint view_face = pair_face[pair], view = view_face / p.faces;
+  const uint4 color = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const TexturedFace face = load_face(scene, p, view_face);
+  for (uint i = first; i < last; ++i) {
+    const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
+    const Detail detail = find_detail(p, &face, c1, c2);
+    const Sample sample = sample_face(&face, detail, c1, c2, texels);
+    const float3 base = base_of_corners(&face, c1, c2).xyz, by_corners = sample.color.xyz;
+    if (face.texture.levels > 1)
+      store_plane3(base * sample.by_detail.xyz, i + DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, details);
+    const float3 by_x = base * sample.by_x.xyz, by_y = base * sample.by_y.xyz;
+    const float3 by_b1 = by_corners * face.color1.xyz + face.place1.x * by_x + face.place1.y * by_y;
+    const float3 by_b2 = by_corners * face.color2.xyz + face.place2.x * by_x + face.place2.y * by_y;
+    for (uint d = 0; d < directions; ++d) {
+      global float* const of = tangents + (size_t)d * planes * p.grad_fragments + i;
+      float3 moved =
+          of[DPR_GRAD_PLANE(p, BARY)] * by_b1 + of[DPR_GRAD_PLANE(p, BARY) + p.grad_fragments] * by_b2;
+      if (moved_colors != 0) {
+        global const float4* const colored = color_tangents + (size_t)d * moved_colors;
+        moved += by_corners *
+                 ((1.0f - c1 - c2) * colored[color.x] + c1 * colored[color.y] + c2 * colored[color.z]).xyz;
+      }
+      store_plane3(moved, base_plane * p.grad_fragments, p.grad_fragments, of);
+    }
+  }
+}
+
 /// The derivatives of a level of detail by the barycentrics of corners 1 and 2, and by the corners: x, y (NDC)
 /// and view depth, or homogeneous of a clipped face. Places in the texture stay.
 typedef struct {
@@ -301,64 +355,45 @@ static inline DetailRow detail_row(const FrameParams p, const TexturedFace* f, c
   return row;
 }
 
-/// Tangents of base colours by those of barycentrics, of the corners and of their colours. One work-item per
-/// pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
-/// in   base_plane      of the tangents: that of base colours where light falls on them, or of colours
-/// in   moved_colors, color_tangents  as shade_tangent has them
+/// Adds to the tangents of base colours what comes by the levels of detail: the barycentrics' and the corners'. One
+/// work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_tangent, and
 /// in   vertices        float4[direction][view][vertex]  tangents of x, y (NDC) and view depth
 /// in   clip_vertices   the same of homogeneous coordinates, read where p.clips is set
-/// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY
-kernel void surface_tangent(const FrameParams p, const uint directions, const uint planes,
-                            const uint base_plane, const uint moved_colors, global const uint* restrict pairs,
-                            global const uint* restrict pair_face,
-                            global const uint* restrict fragment_starts, global const uint4* restrict faces,
-                            global const float4* restrict colors, global const float4* restrict texcoords,
-                            global const Texture* restrict textures, global const float4* restrict texels,
-                            global const Triangle* restrict triangles,
-                            global const ClippedFace* restrict clipped,
-                            global const float4* restrict color_tangents,
-                            global const float4* restrict vertices,
-                            global const float4* restrict clip_vertices,
-                            global const float* restrict fragments, global float* restrict tangents) {
+/// in   details         as surface_tangent leaves them
+/// in out  tangents     float[direction][planes][fragment]  the base colours, and BARY
+kernel void surface_detail_tangent(
+    const FrameParams p, const uint directions, const uint planes, const uint base_plane,
+    global const uint* restrict pairs, global const uint* restrict pair_face,
+    global const uint* restrict fragment_starts, global const uint4* restrict faces,
+    global const float4* restrict colors, global const float4* restrict texcoords,
+    global const Texture* restrict textures, global const Triangle* restrict triangles,
+    global const ClippedFace* restrict clipped, global const float4* restrict vertices,
+    global const float4* restrict clip_vertices, global const float* restrict fragments,
+    global const float* restrict details, global float* restrict tangents) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(p.last_pair, pairs[0])) return;
-  const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
-  if (first == last) return;
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
-  const uint view_face = pair_face[pair], view = view_face / p.faces;
-  const uint4 corner = faces[view_face - view * p.faces],
-              color = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const uint view_face = pair_face[pair], view = view_face / p.faces, last = fragment_starts[pair + 1];
+  const uint4 corner = faces[view_face - view * p.faces];
   const TexturedFace face = load_face(scene, p, view_face);
-  for (uint i = first; i < last; ++i) {
+  if (face.texture.levels == 1) return;
+  global const float4* const vertices_of = face.is_clipped ? clip_vertices : vertices;
+  for (uint i = fragment_starts[pair]; i < last; ++i) {
     const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
     const Detail detail = find_detail(p, &face, c1, c2);
-    const Sample sample = sample_face(&face, detail, c1, c2, texels);
-    const float4 base = base_of_corners(&face, c1, c2);
-    DetailRow row = {0.0f, 0.0f, {0.0f, 0.0f, 0.0f}};
-    if (detail.varies) row = detail_row(p, &face, detail, c1, c2, view_face, triangles, clipped);
+    if (!detail.varies) continue;
+    const DetailRow row = detail_row(p, &face, detail, c1, c2, view_face, triangles, clipped);
+    const float3 by_detail = load_plane3(i + DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, details);
+#pragma unroll 1
     for (uint d = 0; d < directions; ++d) {
-      global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
-      const float b1 = of[i + DPR_GRAD_PLANE(p, BARY)],
-                  b2 = of[i + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments];
-      const float2 place = b1 * face.place1 + b2 * face.place2;
-      float4 by_corners = b1 * face.color1 + b2 * face.color2;
-      if (moved_colors != 0) {
-        global const float4* const moved = color_tangents + (size_t)d * moved_colors;
-        by_corners += (1.0f - c1 - c2) * moved[color.x] + c1 * moved[color.y] + c2 * moved[color.z];
-      }
-      float4 by_texture = place.x * sample.by_x + place.y * sample.by_y;
-      if (detail.varies) {
-        global const float4* const move =
-            (face.is_clipped ? clip_vertices : vertices) + (size_t)(d * p.views + view) * p.vertices;
-        by_texture += sample.by_detail *
-                      (row.bary1 * b1 + row.bary2 * b2 + dot(row.corner[0], move[corner.x].xyz) +
-                       dot(row.corner[1], move[corner.y].xyz) + dot(row.corner[2], move[corner.z].xyz));
-      }
-      const float4 moved = sample.color * by_corners + base * by_texture;
-      const uint red = i + base_plane * p.grad_fragments;
-      of[red] = moved.x;
-      of[red + p.grad_fragments] = moved.y;
-      of[red + 2 * p.grad_fragments] = moved.z;
+      global float* const of = tangents + (size_t)d * planes * p.grad_fragments + i;
+      global const float4* const move = vertices_of + (size_t)(d * p.views + view) * p.vertices;
+      const float moved = row.bary1 * of[DPR_GRAD_PLANE(p, BARY)] +
+                          row.bary2 * of[DPR_GRAD_PLANE(p, BARY) + p.grad_fragments] +
+                          dot(row.corner[0], move[corner.x].xyz) + dot(row.corner[1], move[corner.y].xyz) +
+                          dot(row.corner[2], move[corner.z].xyz);
+      const uint red = base_plane * p.grad_fragments;
+      store_plane3(load_plane3(red, p.grad_fragments, of) + moved * by_detail, red, p.grad_fragments, of);
     }
   }
 }

@@ -177,6 +177,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
     tangents.first = to_uint(first);
     if (pixel_noise) tangents.rasters.resize(on, group.size() * samples);
     transform.tangent(frame, device_views, *geometry, shade.lit(), tangents);
+    if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {
       if (bands.size() > 1) render(band);

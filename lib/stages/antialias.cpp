@@ -171,7 +171,6 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
   (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{.p = in.p,
                                                              .direction = to_uint(direction),
                                                              .pairs = contour.pair_count,
-                                                             .views = in.views.cameras,
                                                              .edges = in.edges.edges,
                                                              .faces = in.geometry.face_vertices,
                                                              .ndc = in.transform.ndc,
@@ -181,9 +180,8 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                                              .winner = winner,
                                                              .second_counts = second_counts,
                                                              .seconds = seconds,
-                                                             .view_tangents = tangents.views,
                                                              .vertices = tangents.ndc,
-                                                             .clip_vertices = tangents.clip,
+                                                             .outlines = tangents.outlines,
                                                              .cut_tangents = grad_cut_,
                                                              .second_tangents = grad_seconds_});
   (*tangent_)(rows, kernel::antialias_fade_tangent{.p = in.p,

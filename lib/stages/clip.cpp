@@ -77,23 +77,33 @@ void Clip::backward(const shared::FrameParams& p, const Buffer<shared::Triangle>
                                                .grad_cuts = grad_cuts});
 }
 
-void Clip::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-                   const Geometry& geometry, const Bin& bin, const Rasterize& rasterize, Tangents& tangents) {
+void Clip::tangent_of_outlines(const shared::FrameParams& p, const Geometry& geometry, Tangents& tangents) {
   if (!tangent_) tangent_.emplace(device_);
+  const std::size_t count = std::size_t{p.views} * p.faces;
+  tangents.outlines.resize(device_, 4 * tangents.directions * count);
+  (*tangent_)(count, kernel::clip_outline_tangent{.p = p,
+                                                  .directions = tangents.directions,
+                                                  .views = views_->cameras,
+                                                  .clipped = faces,
+                                                  .faces = geometry.face_vertices,
+                                                  .view_tangents = tangents.views,
+                                                  .vertices = tangents.ndc,
+                                                  .clip_vertices = tangents.clip,
+                                                  .outlines = tangents.outlines});
+}
+
+void Clip::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+                   const Rasterize& rasterize, Tangents& tangents) {
   (*tangent_)(rasterize.pairs(bin), kernel::clip_tangent{.p = p,
                                                          .directions = tangents.directions,
                                                          .planes = tangents.planes,
                                                          .pairs = bin.pair_count,
-                                                         .views = views_->cameras,
                                                          .clipped = faces,
                                                          .triangles = triangles,
                                                          .pair_face = bin.pair_face,
                                                          .fragment_starts = rasterize.fragment_starts,
                                                          .pixels = rasterize.fragment_pixel,
-                                                         .faces = geometry.face_vertices,
-                                                         .view_tangents = tangents.views,
-                                                         .vertices = tangents.ndc,
-                                                         .clip_vertices = tangents.clip,
+                                                         .outlines = tangents.outlines,
                                                          .fragments = rasterize.values,
                                                          .tangents = tangents.fragments});
 }

@@ -33,9 +33,11 @@ class Clip {
   /// give to projections and lenses.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 Rasterize& rasterize);
-  /// Replaces the tangents of their fragments.
-  void tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
-               const Geometry& geometry, const Bin& bin, const Rasterize& rasterize, Tangents& tangents);
+  /// The tangents of what is left of them, by those of the vertices.
+  void tangent_of_outlines(const shared::FrameParams& p, const Geometry& geometry, Tangents& tangents);
+  /// Replaces the tangents of their fragments. After tangent_of_outlines().
+  void tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
+               const Rasterize& rasterize, Tangents& tangents);
 
   Buffer<shared::ClippedFace> faces;  ///< [view][face] which of them are clipped, and to what
   Buffer<float> grad_corners;         ///< [pair][9] of the corners' x times depth, y times depth, depth
@@ -53,7 +55,7 @@ class Clip {
       Launcher<kernel::clip_forward, kernel::clip_cover, kernel::clip_fragments, kernel::clip_backward,
                kernel::clip_backward_lens>>
       launch_;  // made for the first frame that may have such faces
-  std::optional<Launcher<kernel::clip_tangent>> tangent_;
+  std::optional<Launcher<kernel::clip_outline_tangent, kernel::clip_tangent>> tangent_;
   const DeviceViews* views_ = nullptr;  // of the frame
 };
 

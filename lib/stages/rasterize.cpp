@@ -364,6 +364,7 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
 
 void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                         const Geometry& geometry, const Bin& bin, Tangents& tangents) {
+  start_gradients(p);
   tangents.planes = DPR_TANGENT_PLANES + 3 * p.has_base;
   tangents.fragments.resize(device_, std::size_t{tangents.directions} * tangents.planes * p.grad_fragments);
   const PairGroups groups = pair_groups(bin);
@@ -380,7 +381,7 @@ void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Trian
                                                   .vertices = tangents.ndc,
                                                   .fragments = values,
                                                   .tangents = tangents.fragments});
-  if (clip != nullptr) clip->tangent(p, triangles, geometry, bin, *this, tangents);
+  if (clip != nullptr) clip->tangent(p, triangles, bin, *this, tangents);
 }
 
 std::size_t Rasterize::bytes() const {

@@ -191,31 +191,50 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
                                                       .tangents = tangents.world});
 }
 
+/// What the kernels of lit tangents take, by the names of their arguments.
+struct LitTangentArguments {
+  const shared::FrameParams& p;
+  const shared::LightingParams& lp;
+  cl_uint directions, planes, moved_colors, channel;
+  const Buffer<cl_uint>&pairs, &pair_face, &fragment_starts;
+  const Buffer<shared::ViewParams>& views;
+  const Buffer<shared::Light>& lights;
+  const Buffer<cl_uint4>& faces;
+  const Buffer<cl_float4>&colors, &world, &materials, &color_tangents, &world_tangents;
+  const Buffer<shared::ViewTangent>& view_tangents;
+  const Buffer<float>& fragments;
+  Buffer<float>& tangents;
+};
+
 void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
   const bool is_textured = !in.geometry.textures.empty();
   const Range pairs = in.rasterize.pairs(in.bin);
   if (is_textured) surface->tangent(arguments(in), pairs, tangents);
   if (lit()) {
     if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
-    (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent{.p = in.p,
-                                                              .lp = now_.params,
-                                                              .directions = tangents.directions,
-                                                              .planes = tangents.planes,
-                                                              .moved_colors = tangents.color_count,
-                                                              .pairs = in.bin.pair_count,
-                                                              .views = in.views.cameras,
-                                                              .lights = now_.lights,
-                                                              .faces = in.geometry.face_vertices,
-                                                              .colors = in.geometry.colors_of(in.p),
-                                                              .world = in.transform.world,
-                                                              .materials = in.geometry.materials.values,
-                                                              .pair_face = in.bin.pair_face,
-                                                              .fragment_starts = in.rasterize.fragment_starts,
-                                                              .color_tangents = tangents.colors,
-                                                              .view_tangents = tangents.views,
-                                                              .world_tangents = tangents.world,
-                                                              .fragments = in.rasterize.values,
-                                                              .tangents = tangents.fragments});
+    LitTangentArguments all{.p = in.p,
+                            .lp = now_.params,
+                            .directions = tangents.directions,
+                            .planes = tangents.planes,
+                            .moved_colors = tangents.color_count,
+                            .channel = 0,
+                            .pairs = in.bin.pair_count,
+                            .pair_face = in.bin.pair_face,
+                            .fragment_starts = in.rasterize.fragment_starts,
+                            .views = in.views.cameras,
+                            .lights = now_.lights,
+                            .faces = in.geometry.face_vertices,
+                            .colors = in.geometry.colors_of(in.p),
+                            .world = in.transform.world,
+                            .materials = in.geometry.materials.values,
+                            .color_tangents = tangents.colors,
+                            .world_tangents = tangents.world,
+                            .view_tangents = tangents.views,
+                            .fragments = in.rasterize.values,
+                            .tangents = tangents.fragments};
+    (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
+    for (all.channel = 0; all.channel < 3; ++all.channel)
+      (*now_.kernels->tangent)(pairs, kernel::shade_lit_place_tangent::pick(all));
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_tangent{.p = in.p,

@@ -63,10 +63,28 @@ void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& 
                                          .triangles = in.triangles,
                                          .clipped = in.clipped,
                                          .color_tangents = tangents.colors,
-                                         .vertices = tangents.ndc,
-                                         .clip_vertices = tangents.clip,
                                          .fragments = in.fragments,
+                                         .details = in.grads,
                                          .tangents = tangents.fragments});
+  if (in.p.levels == 1) return;
+  launch_(pairs, kernel::surface_detail_tangent{.p = in.p,
+                                                .directions = tangents.directions,
+                                                .planes = tangents.planes,
+                                                .base_plane = base_plane,
+                                                .pairs = in.pairs,
+                                                .pair_face = in.pair_face,
+                                                .fragment_starts = in.fragment_starts,
+                                                .faces = in.faces,
+                                                .colors = in.colors,
+                                                .texcoords = in.texcoords,
+                                                .textures = in.textures,
+                                                .triangles = in.triangles,
+                                                .clipped = in.clipped,
+                                                .vertices = tangents.ndc,
+                                                .clip_vertices = tangents.clip,
+                                                .fragments = in.fragments,
+                                                .details = in.grads,
+                                                .tangents = tangents.fragments});
 }
 
 }  // namespace dpr

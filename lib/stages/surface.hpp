@@ -61,7 +61,8 @@ class Surface {
  private:
   Device::Impl& device_;
   Launcher<kernel::surface_forward, kernel::surface_backward, kernel::surface_detail_backward,
-           kernel::surface_list, kernel::surface_place, kernel::surface_tangent>
+           kernel::surface_list, kernel::surface_place, kernel::surface_tangent,
+           kernel::surface_detail_tangent>
       launch_;
 };
 

@@ -16,10 +16,11 @@ struct Tangents {
   cl_uint position_count = 0, color_count = 0;  ///< of a direction; 0: none move, and the buffer is not read
   Buffer<cl_float4> positions, colors;          ///< [direction][position], [color]; of views' own by view
 
-  Buffer<cl_float4> ndc;    ///< [direction][view][vertex] x, y, view depth
-  Buffer<cl_float4> world;  ///< [direction][as Transform::world], of lit scenes
-  Buffer<cl_float4> clip;   ///< [direction][view][vertex] homogeneous, where p.clips is set
-  Buffer<float> fragments;  ///< [direction][planes][p.grad_fragments]
+  Buffer<cl_float4> ndc;       ///< [direction][view][vertex] x, y, view depth
+  Buffer<cl_float4> world;     ///< [direction][as Transform::world], of lit scenes
+  Buffer<cl_float4> clip;      ///< [direction][view][vertex] homogeneous, where p.clips is set
+  Buffer<cl_float4> outlines;  ///< [direction][view][face][4] of clipped faces (kernels/clip_tangent.cl)
+  Buffer<float> fragments;     ///< [direction][planes][p.grad_fragments]
   Buffer<cl_float4>
       rasters;               ///< [direction][view][sample] of noise on the pixel, before contours are blended
   Buffer<cl_float4> images;  ///< [direction][view][height][width] RGBA, of all directions
@@ -27,8 +28,8 @@ struct Tangents {
   std::size_t bytes() const {
     return views.capacity_bytes() + models.capacity_bytes() + frames.capacity_bytes() +
            positions.capacity_bytes() + colors.capacity_bytes() + ndc.capacity_bytes() +
-           world.capacity_bytes() + clip.capacity_bytes() + fragments.capacity_bytes() +
-           rasters.capacity_bytes() + images.capacity_bytes();
+           world.capacity_bytes() + clip.capacity_bytes() + outlines.capacity_bytes() +
+           fragments.capacity_bytes() + rasters.capacity_bytes() + images.capacity_bytes();
   }
 };
 
