@@ -494,17 +494,3 @@ kernel void normal_means(const uint width, const uint samples, const uint pixels
   }
   means[i] = sum / (float)(samples * samples);
 }
-
-/// Tangents from the images of moved hypotheses. One work-item per pixel of a tangent.
-/// in   pixels         of all hypotheses
-/// in   directions
-/// in   inverse_steps  float[direction]
-/// in   images         float4[1 + direction][hypothesis][pixel]  unmoved ones first
-/// out  tangents       float4[direction][hypothesis][pixel]
-kernel void normal_differences(const uint pixels, const uint directions,
-                               global const float* restrict inverse_steps,
-                               global const float4* restrict images, global float4* restrict tangents) {
-  const uint i = (uint)get_global_id(0);
-  if (i >= pixels * directions) return;
-  tangents[i] = (images[pixels + i] - images[i % pixels]) * inverse_steps[i / pixels];
-}

@@ -13,6 +13,14 @@ Frame last_frame(const Renderer& renderer, const char* caller) {
           r.frame.position_stride != 0};
 }
 
+const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const SceneTangent> directions,
+                                       const char* caller) {
+  Renderer::Impl& r = impl_of(renderer);
+  r.require_forward(caller);
+  r.tangent(directions);
+  return r.tangents.images;
+}
+
 FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
   Renderer::Impl& r = impl_of(renderer);
   r.require_forward(caller);

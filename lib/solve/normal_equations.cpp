@@ -312,18 +312,4 @@ void NormalSums::average(const Buffer<cl_float4>& images, std::size_t width, std
                                              .means = means});
 }
 
-void NormalSums::difference(const Buffer<cl_float4>& images, const PoseSpace::Step& steps,
-                            Buffer<cl_float4>& tangents) {
-  std::vector<float> inverse;
-  for (std::size_t k = 0; k < directions_; ++k) inverse.push_back(static_cast<float>(1 / steps[k]));
-  inverse_steps_.upload(impl_of(device_), inverse);
-  const std::size_t pixels = images.size() / (1 + directions_);
-  tangents.resize(impl_of(device_), directions_ * pixels);
-  launch_(tangents.size(), kernel::normal_differences{.pixels = to_uint(pixels),
-                                                      .directions = to_uint(directions_),
-                                                      .inverse_steps = inverse_steps_,
-                                                      .images = images,
-                                                      .tangents = tangents});
-}
-
 }  // namespace dpr

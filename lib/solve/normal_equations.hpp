@@ -64,8 +64,6 @@ class NormalSums {
   /// Means of blocks of samples x samples, in images of a width of so many blocks.
   void average(const Buffer<cl_float4>& images, std::size_t width, std::size_t samples,
                Buffer<cl_float4>& means);
-  /// Tangents from the images of hypotheses, followed by those of the hypotheses moved by each of the steps.
-  void difference(const Buffer<cl_float4>& images, const PoseSpace::Step& steps, Buffer<cl_float4>& tangents);
 
  private:
   using Lights = std::array<ChannelLight, 3>;
@@ -104,13 +102,13 @@ class NormalSums {
   cl_float4 background_;
   Device device_;
   Launcher<kernel::normal_loss, kernel::normal_counts, kernel::normal_lit, kernel::normal_equations,
-           kernel::normal_means, kernel::normal_differences>
+           kernel::normal_means>
       launch_;
   std::optional<Launcher<kernel::normal_light, kernel::normal_cross, kernel::normal_left>> launch_light_;
   Reduce reduce_;
   std::vector<Lights> lights_;  // [view]
   Buffer<cl_float4> target_;
-  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, inverse_steps_, slot_sums_;
+  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, slot_sums_;
   Buffer<cl_uint> active_, starts_;
 };
 

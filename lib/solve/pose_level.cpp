@@ -18,10 +18,6 @@ namespace {
 constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
-// Step of finite differences at the object's rim, as a part of the blur. A longer step would cross edges that
-// the residual does not see; a shorter one would drown in rounding.
-constexpr double k_difference = 0.3;
-
 constexpr double k_channels = 3;
 
 std::size_t pixels_of(const Scene& scene) {
@@ -83,10 +79,12 @@ const Buffer<cl_float4>& PoseLevel::render(Images& images, std::span<const View>
   images.renderer.set_views(views);
   images.renderer.forward();
   const Buffer<cl_float4>& samples = last_frame(images.renderer, "PoseLevel").image;
-  if (samples_ == 1) return samples;
-  sums_->average(samples, static_cast<std::size_t>(width()), static_cast<std::size_t>(samples_),
-                 images.means);
-  return images.means;
+  return samples_ == 1 ? samples : averaged(samples, images.means);
+}
+
+const Buffer<cl_float4>& PoseLevel::averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means) {
+  sums_->average(samples, static_cast<std::size_t>(width()), static_cast<std::size_t>(samples_), means);
+  return means;
 }
 
 HypothesisImages PoseLevel::render(std::span<const Hypothesis> hypotheses) {
@@ -97,24 +95,18 @@ HypothesisImages PoseLevel::render(std::span<const Hypothesis> hypotheses) {
 
 std::pair<HypothesisImages, HypothesisTangents> PoseLevel::render_tangents(
     std::span<const Hypothesis> hypotheses) {
-  const PoseSpace::Step steps =
-      space_.step_lengths(k_difference * static_cast<double>(scene_.smoothing.sigma));
-  std::vector<View> views = views_of(hypotheses);
-  for (std::size_t k = 0; k < space_.size(); ++k) {
-    PoseSpace::Step one{};
-    one[k] = steps[k];
+  const HypothesisImages images = render(hypotheses);
+  std::vector<SceneTangent> directions(space_.size());
+  for (std::size_t k = 0; k < directions.size(); ++k) {
     for (const Hypothesis& hypothesis : hypotheses)
-      views.push_back(space_.view(space_.moved(hypothesis, one), scene_.camera));
+      directions[k].views.push_back(space_.view_tangent(hypothesis, scene_.camera, k));
   }
-  const auto images_of = [&](Images& images) -> const Buffer<cl_float4>& {
-    const Buffer<cl_float4>& all = render(images, views);
-    sums_->difference(all, steps, images.tangents);
-    return all;
+  const auto tangents_of = [&](Images& of) -> const Buffer<cl_float4>& {
+    const Buffer<cl_float4>& samples = last_tangents(of.renderer, directions, "PoseLevel");
+    return samples_ == 1 ? samples : averaged(samples, of.tangents);
   };
-  const Buffer<cl_float4>& colors = images_of(colors_);
-  const Buffer<cl_float4>& normals = normals_ ? images_of(*normals_) : colors;
-  return {{hypotheses.size(), colors, normals},
-          {colors_.tangents, normals_ ? normals_->tangents : colors_.tangents}};
+  const Buffer<cl_float4>& colors = tangents_of(colors_);
+  return {images, {colors, normals_ ? tangents_of(*normals_) : colors}};
 }
 
 void PoseLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {

@@ -57,6 +57,7 @@ class PoseLevel {
   std::vector<View> views_of(std::span<const Hypothesis> hypotheses) const;
   /// Images of views, pixels being means over their samples.
   const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
+  const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
   /// The same beside their tangents.
   std::pair<HypothesisImages, HypothesisTangents> render_tangents(std::span<const Hypothesis> hypotheses);

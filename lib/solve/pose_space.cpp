@@ -111,8 +111,9 @@ double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
 }
 
 View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
-  return {calibrated(camera, hypothesis.focal_scale, hypothesis.radial),
-          {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
+  Camera seen = calibrated(camera, hypothesis.focal_scale, hypothesis.radial);
+  if (distortion_ && !seen.distortion) seen.distortion.emplace();  // a perfect lens, whose tangents are asked for
+  return {seen, {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
 }
 
 ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera& camera,

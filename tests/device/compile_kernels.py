@@ -42,7 +42,8 @@ def option_sets(kernels):
     return {"aggregate.cl": [[prior] for prior in of_exact], "aggregate_joint.cl": [[prior] for prior in of_exact],
             "aggregate_sampled.cl": [[prior] for prior in of_sampled], "aggregate_joint_sampled.cl": joint,
             "normal_equations.cl": fits, "occupancy.cl": [list(pair) for pair in itertools.product(of_exact, WIDTHS)],
-            "occupancy_sampled.cl": [list(pair) for pair in itertools.product(of_sampled, WIDTHS)], "shade_lit.cl": SHADING}
+            "occupancy_sampled.cl": [list(pair) for pair in itertools.product(of_sampled, WIDTHS)], "shade_lit.cl": SHADING,
+            "shade_lit_tangent.cl": SHADING}
 
 
 def compilations(folders, lanes):
