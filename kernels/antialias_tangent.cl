@@ -29,26 +29,25 @@ static inline Cut tangent_of_cut(const FrameParams p, const TileContour c, const
 }
 
 /// Tangents of what contours cut. One work-item per pair. Deterministic. Inputs as antialias_cross_backward, and
-/// in   direction      of those in the two that follow
+/// in   direction_pairs  the direction, and how many pairs there are
 /// in   vertices       float4[direction][view][vertex]  of x, y (NDC) and view depth
 /// in   outlines       as clip_outline_tangent leaves them, read where p.clips is set
-/// out  cut_tangents     Cut[2][pixel]  of the steps' winners
-/// out  second_tangents  Cut[list][DPR_SECOND_ROOM]
+/// out  cut_tangents   Cut[2][pixel]  of the steps' winners; then Cut[list][DPR_SECOND_ROOM]  of the seconds
 kernel void antialias_cross_tangent(
-    const FrameParams p, const uint direction, global const uint* restrict pairs,
-    global const uint2* restrict edges, global const uint4* restrict faces, global const float4* restrict ndc,
+    const FrameParams p, const uint2 direction_pairs, global const uint2* restrict edges,
+    global const uint4* restrict faces, global const float4* restrict ndc,
     global const ClippedFace* restrict clipped, global const uint* restrict pair_contour,
     global const uint* restrict pair_tile, global const uint* restrict winner,
     global const uint* restrict second_counts, global const SecondCrossing* restrict seconds,
     global const float4* restrict vertices, global const float4* restrict outlines,
-    global float2* restrict cut_tangents, global float2* restrict second_tangents) {
+    global float2* restrict cut_tangents) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs[0]) return;
+  if (pair >= direction_pairs.y) return;
   const uint contour = pair_contour[pair];
   const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
   const EdgeScene scene = edges_of_view(p, c.view, edges, faces, ndc, clipped);
   const ViewEdge edge = view_edge(scene, contour / DPR_CONTOUR_FLAGS - c.view * p.edges);
-  const size_t of_view = (size_t)direction * p.views + c.view;
+  const size_t of_view = (size_t)direction_pairs.x * p.views + c.view;
   global const float4 *move = vertices + of_view * p.vertices,
                       *outline_move = outlines + (p.clips ? 4 * of_view * p.faces : 0);
   const float2 move_a = end_tangent(scene, edge, 0, move, outline_move);
@@ -70,7 +69,8 @@ kernel void antialias_cross_tangent(
       const uint list = pair_tile[pair] * DPR_TILE_ITEMS + (uint)(line % DPR_TILE) / DPR_ROWS;
       const uint first = DPR_SECOND_ROOM * list, last = first + second_counts[list];
       for (uint k = first; k < last; ++k) {
-        if (seconds[k].step == step && seconds[k].contour == contour) second_tangents[k] = moved;
+        if (seconds[k].step == step && seconds[k].contour == contour)
+          cut_tangents[2 * p.views * p.width * p.height + k] = moved;
       }
     }
   }
@@ -188,15 +188,17 @@ static inline float4 moved_jump(const FrameParams p, const Steps steps, const Se
 
 /// Adds what the seconds' jumps do. One work-item per DPR_ROWS of a tile. Deterministic. Inputs as
 /// antialias_second_forward, and
-/// in      cut_tangents, second_tangents  as antialias_cross_tangent leaves them
+/// in      cut_tangents     as antialias_cross_tangent leaves them
 /// in      faded_tangents   float4[pixel]
 /// in out  tangents         float4[pixel]
-kernel void antialias_second_tangent(
-    const FrameParams p, global const uint* restrict tile_starts, global const uint* restrict counts,
-    global const SecondCrossing* restrict seconds, global const uint* restrict winner,
-    global const float2* restrict cut, global const float4* restrict raster,
-    global const float2* restrict cut_tangents, global const float2* restrict second_tangents,
-    global const float4* restrict faded_tangents, global float4* restrict tangents) {
+kernel void antialias_second_tangent(const FrameParams p, global const uint* restrict tile_starts,
+                                     global const uint* restrict counts,
+                                     global const SecondCrossing* restrict seconds,
+                                     global const uint* restrict winner, global const float2* restrict cut,
+                                     global const float4* restrict raster,
+                                     global const float2* restrict cut_tangents,
+                                     global const float4* restrict faded_tangents,
+                                     global float4* restrict tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
   const Steps steps = {winner, cut, p.views * p.width * p.height};
@@ -209,7 +211,8 @@ kernel void antialias_second_tangent(
       const uint2 samples = ends_of_step(p, c.step);
       const int has_first = is_in_rows(p, rows, samples.x), has_second = is_in_rows(p, rows, samples.y);
       if (!has_first && !has_second) continue;
-      const Cut first = cut[c.step], moved_first = cut_tangents[c.step], moved = second_tangents[place];
+      const Cut first = cut[c.step], moved_first = cut_tangents[c.step],
+                moved = cut_tangents[2 * steps.pixels + place];
       const float2 parts = parts_gained(c, first);
       const float2 moved_gain =
           (float2)(moved_parts(own_cut(c), -1.0f, moved).x - moved_parts(first, -1.0f, moved_first).x,

@@ -150,14 +150,14 @@ kernel void normals_given_backward(const FrameParams p, global const float4* res
   grad_values[value] = (float4)(sum, 0.0f);
 }
 
-/// Place of a direction's tangents of world positions and normals, which lie as those do.
+/// Place of a direction's tangents of world positions and normals, which lie as those do; the eyes' follow.
 static inline size_t world_tangents_at(const FrameParams p, uint direction) {
-  return (size_t)direction * p.views * (p.vertices + p.normals);
+  return (size_t)direction * p.views * (p.vertices + p.normals + 1);
 }
 
 /// Tangents of the normals of vertices. One work-item per (view, vertex).
 /// in   faces, corner_starts, corners, world  as normals_forward left them
-/// in out  tangents  float4[direction][the length of world]  of vertices' normals by those of world positions
+/// in out  tangents  float4[direction][...]  of vertices' normals by those of world positions
 kernel void normals_tangent(const FrameParams p, const uint directions, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
                             global const float4* restrict world, global float4* restrict tangents) {
@@ -178,7 +178,7 @@ kernel void normals_tangent(const FrameParams p, const uint directions, global c
 /// Tangents of the normals that meshes give, which turn with them. One work-item per (view, given normal).
 /// in   given_mesh, world  as normals_given_forward
 /// in   model_tangents  ModelTangent[direction][view][mesh]
-/// out  tangents        float4[direction][the length of world]  those of given normals
+/// out  tangents        float4[direction][...]  those of given normals
 kernel void normals_given_tangent(const FrameParams p, const uint directions,
                                   global const uint* restrict given_mesh,
                                   global const ModelTangent* restrict model_tangents,

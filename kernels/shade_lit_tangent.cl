@@ -33,13 +33,12 @@ typedef struct {
 
 static inline PlaceTangent load_place_tangent(const FrameParams p, uint direction, uint view_face,
                                               global const uint4* faces, global const float4* world,
-                                              global const ViewTangent* view_tangents,
                                               global const float4* world_tangents) {
   const uint view = view_face / p.faces;
   faces += view_face - view * p.faces;
   const uint4 f = faces[0], n = faces[p.normal_faces];
   const uint vertex[3] = {f.x, f.y, f.z}, normal[3] = {n.x, n.y, n.z};
-  world_tangents += (size_t)direction * p.views * (p.vertices + p.normals);
+  world_tangents += (size_t)direction * p.views * (p.vertices + p.normals + 1);
   global const float4 *positions = world_tangents + view * p.vertices,
                       *normals = world_tangents + p.views * p.vertices + view * p.normals;
   float4 flat = 0.0f;
@@ -50,7 +49,7 @@ static inline PlaceTangent load_place_tangent(const FrameParams p, uint directio
     if (unit.w > DPR_MIN_LENGTH) flat = (float4)((moved - unit.xyz * dot(unit.xyz, moved)) / unit.w, 0.0f);
   }
   PlaceTangent t;
-  t.eye = splat3(view_tangents[direction * p.views + view].eye);
+  t.eye = splat3(world_tangents[p.views * (p.vertices + p.normals) + view]);
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     t.position[k] = splat3(positions[vertex[k]]);
@@ -70,11 +69,10 @@ static inline LitFragment load_of_channel(const FrameParams p, intn in_run, uint
 
 /// Tangents of colours by those of what the surface is made of: barycentrics, base colours and the corners'. One
 /// work-item per pair, up to p.last_pair. Deterministic. Inputs as shade_lit_forward, and
-/// in   moved_colors, color_tangents  as shade_tangent has them
+/// in   color_tangents  as shade_tangent has them
 /// in out  tangents     float[direction][planes][fragment]  COLOR by BARY, and by the base colours where DPR_BASE
 ///                      says so
-kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, const uint directions,
-                              const uint planes, const uint moved_colors, global const uint* restrict pairs,
+kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, const TangentParams q,
                               global const ViewParams* restrict views, global const Light* restrict lights,
                               global const uint4* restrict faces, global const float4* restrict colors,
                               global const float4* restrict world, global const float4* restrict materials,
@@ -83,7 +81,7 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
                               global const float4* restrict color_tangents,
                               global const float* restrict fragments, global float* restrict tangents) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(p.last_pair, pairs[0])) return;
+  if (pair >= p.last_pair) return;
   const uint view_face = pair_face[pair], view = view_face / p.faces;
   const Surface s = load_surface(p, lp, view_face, views, lights, faces, colors, world, materials);
   const uint4 color = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
@@ -96,15 +94,15 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
       realn bary1, bary2;
       const Vec3n base = material_backward(s, lp, lights, load_of_channel(p, in_run, i, channel, fragments),
                                            &row, &bary1, &bary2);
-      for (uint d = 0; d < directions; ++d) {
-        global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
+      for (uint d = 0; d < q.directions; ++d) {
+        global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments;
         realn sum = bary1 * load_run(in_run, i + bary, of) +
                     bary2 * load_run(in_run, i + bary + p.grad_fragments, of);
         if (DPR_BASE == DPR_BASE_OF_FRAGMENTS)
           sum += dot3n(
               base, load_run3(in_run, i + DPR_TANGENT_PLANE_BASE * p.grad_fragments, p.grad_fragments, of));
-        if (DPR_BASE == DPR_BASE_OF_CORNERS && moved_colors != 0) {
-          global const float4* const moved = color_tangents + (size_t)d * moved_colors;
+        if (DPR_BASE == DPR_BASE_OF_CORNERS && q.colors != 0) {
+          global const float4* const moved = color_tangents + (size_t)d * q.colors;
           sum += dot3n(row.color[0], splat3(moved[color.x])) + dot3n(row.color[1], splat3(moved[color.y])) +
                  dot3n(row.color[2], splat3(moved[color.z]));
         }
@@ -118,22 +116,19 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
 /// Adds what comes by where the surface lies: by the light at barycentrics, corners and the eye. One work-item per
 /// pair, up to p.last_pair; one launch for each channel of the colour, for want of registers. Deterministic.
 /// Inputs as shade_lit_tangent, and
-/// in   view_tangents   ViewTangent[direction][view]
-/// in   world_tangents  float4[direction][the length of world]
+/// in   world_tangents  as transform_tangent and normals.cl leave them
 /// in out  tangents     float[direction][planes][fragment]  COLOR
-kernel void shade_lit_place_tangent(const FrameParams p, const LightingParams lp, const uint directions,
-                                    const uint planes, const uint channel, global const uint* restrict pairs,
+kernel void shade_lit_place_tangent(const FrameParams p, const LightingParams lp, const TangentParams q,
                                     global const ViewParams* restrict views,
                                     global const Light* restrict lights, global const uint4* restrict faces,
                                     global const float4* restrict colors, global const float4* restrict world,
                                     global const float4* restrict materials,
                                     global const uint* restrict pair_face,
                                     global const uint* restrict fragment_starts,
-                                    global const ViewTangent* restrict view_tangents,
                                     global const float4* restrict world_tangents,
                                     global const float* restrict fragments, global float* restrict tangents) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(p.last_pair, pairs[0])) return;
+  if (pair >= p.last_pair) return;
   const uint view_face = pair_face[pair];
   const Surface s = load_surface(p, lp, view_face, views, lights, faces, colors, world, materials);
   const uint last = fragment_starts[pair + 1], bary = DPR_GRAD_PLANE(p, BARY);
@@ -141,17 +136,17 @@ kernel void shade_lit_place_tangent(const FrameParams p, const LightingParams lp
     const intn in_run = lanes_before(last, i);
     realn bary1, bary2;
     const PlaceGradients row =
-        place_row(s, lp, lights, load_of_channel(p, in_run, i, (int)channel, fragments), &bary1, &bary2);
+        place_row(s, lp, lights, load_of_channel(p, in_run, i, (int)q.channel, fragments), &bary1, &bary2);
 #pragma unroll 1
-    for (uint d = 0; d < directions; ++d) {
-      global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
-      const PlaceTangent t = load_place_tangent(p, d, view_face, faces, world, view_tangents, world_tangents);
+    for (uint d = 0; d < q.directions; ++d) {
+      global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments;
+      const PlaceTangent t = load_place_tangent(p, d, view_face, faces, world, world_tangents);
       realn sum = bary1 * load_run(in_run, i + bary, of) +
                   bary2 * load_run(in_run, i + bary + p.grad_fragments, of) + dot3n(row.eye, t.eye);
 #pragma unroll
       for (int k = 0; k < 3; ++k)
         sum += dot3n(row.position[k], t.position[k]) + dot3n(row.normal[k], t.normal[k]);
-      const uint out = DPR_GRAD_PLANE(p, COLOR) + channel * p.grad_fragments;
+      const uint out = DPR_GRAD_PLANE(p, COLOR) + q.channel * p.grad_fragments;
       store_run(load_own_run(last + out, i + out, of) + sum, i + out, last + out, of);
     }
   }

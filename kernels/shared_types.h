@@ -386,6 +386,17 @@ typedef struct FrameTangent {
   uint unused;
 } FrameTangent;
 
+/// What stages are told of tangents.
+typedef struct TangentParams {
+  uint directions;
+  uint planes; /* of a direction's fragments; what is the same for all follows the last direction's */
+  uint positions, colors; /* how many there are of a direction; 0: none changes, and none is read */
+  uint lit;               /* tangents of world positions, normals and eyes are found, for the light */
+  uint base_plane;        /* of base colours where light falls on them, else of colours */
+  uint channel;           /* of the colour */
+  uint unused;
+} TangentParams;
+
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its
 /// sizes.
 typedef struct MeshLossParams {

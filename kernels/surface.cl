@@ -287,25 +287,26 @@ kernel void surface_place(const FrameParams p, global const uint* restrict fragm
   if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
 }
 
+/// What the base colours change by their levels of detail, behind the last direction's tangents.
+static inline global float* details_of(const FrameParams p, const TangentParams q, global float* tangents) {
+  return tangents + (size_t)q.directions * q.planes * p.grad_fragments;
+}
+
 /// Tangents of base colours by those of barycentrics and of the corners' colours. One work-item per
 /// pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
-/// in   base_plane      of the tangents: that of base colours where light falls on them, or of colours
-/// in   moved_colors, color_tangents  as shade_tangent has them
-/// out  details         float[plane][fragment]  COLOR: what the base colour changes by its level of detail
-/// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY
-kernel void surface_tangent(const FrameParams p, const uint directions, const uint planes,
-                            const uint base_plane, const uint moved_colors, global const uint* restrict pairs,
-                            global const uint* restrict pair_face,
+/// in   color_tangents  as shade_tangent has them
+/// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY; then, where textures have
+///                      levels, float[3][fragment]  what the base colours change by these
+kernel void surface_tangent(const FrameParams p, const TangentParams q, global const uint* restrict pair_face,
                             global const uint* restrict fragment_starts, global const uint4* restrict faces,
                             global const float4* restrict colors, global const float4* restrict texcoords,
                             global const Texture* restrict textures, global const float4* restrict texels,
                             global const Triangle* restrict triangles,
                             global const ClippedFace* restrict clipped,
                             global const float4* restrict color_tangents,
-                            global const float* restrict fragments, global float* restrict details,
-                            global float* restrict tangents) {
+                            global const float* restrict fragments, global float* restrict tangents) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(p.last_pair, pairs[0])) return;
+  if (pair >= p.last_pair) return;
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   if (first == last) return;
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
@@ -318,20 +319,20 @@ kernel void surface_tangent(const FrameParams p, const uint directions, const ui
     const Sample sample = sample_face(&face, detail, c1, c2, texels);
     const float3 base = base_of_corners(&face, c1, c2).xyz, by_corners = sample.color.xyz;
     if (face.texture.levels > 1)
-      store_plane3(base * sample.by_detail.xyz, i + DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, details);
+      store_plane3(base * sample.by_detail.xyz, i, p.grad_fragments, details_of(p, q, tangents));
     const float3 by_x = base * sample.by_x.xyz, by_y = base * sample.by_y.xyz;
     const float3 by_b1 = by_corners * face.color1.xyz + face.place1.x * by_x + face.place1.y * by_y;
     const float3 by_b2 = by_corners * face.color2.xyz + face.place2.x * by_x + face.place2.y * by_y;
-    for (uint d = 0; d < directions; ++d) {
-      global float* const of = tangents + (size_t)d * planes * p.grad_fragments + i;
+    for (uint d = 0; d < q.directions; ++d) {
+      global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments + i;
       float3 moved =
           of[DPR_GRAD_PLANE(p, BARY)] * by_b1 + of[DPR_GRAD_PLANE(p, BARY) + p.grad_fragments] * by_b2;
-      if (moved_colors != 0) {
-        global const float4* const colored = color_tangents + (size_t)d * moved_colors;
+      if (q.colors != 0) {
+        global const float4* const colored = color_tangents + (size_t)d * q.colors;
         moved += by_corners *
                  ((1.0f - c1 - c2) * colored[color.x] + c1 * colored[color.y] + c2 * colored[color.z]).xyz;
       }
-      store_plane3(moved, base_plane * p.grad_fragments, p.grad_fragments, of);
+      store_plane3(moved, q.base_plane * p.grad_fragments, p.grad_fragments, of);
     }
   }
 }
@@ -359,19 +360,17 @@ static inline DetailRow detail_row(const FrameParams p, const TexturedFace* f, c
 /// work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_tangent, and
 /// in   vertices        float4[direction][view][vertex]  tangents of x, y (NDC) and view depth
 /// in   clip_vertices   the same of homogeneous coordinates, read where p.clips is set
-/// in   details         as surface_tangent leaves them
 /// in out  tangents     float[direction][planes][fragment]  the base colours, and BARY
 kernel void surface_detail_tangent(
-    const FrameParams p, const uint directions, const uint planes, const uint base_plane,
-    global const uint* restrict pairs, global const uint* restrict pair_face,
+    const FrameParams p, const TangentParams q, global const uint* restrict pair_face,
     global const uint* restrict fragment_starts, global const uint4* restrict faces,
     global const float4* restrict colors, global const float4* restrict texcoords,
     global const Texture* restrict textures, global const Triangle* restrict triangles,
     global const ClippedFace* restrict clipped, global const float4* restrict vertices,
     global const float4* restrict clip_vertices, global const float* restrict fragments,
-    global const float* restrict details, global float* restrict tangents) {
+    global float* restrict tangents) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= min(p.last_pair, pairs[0])) return;
+  if (pair >= p.last_pair) return;
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const uint view_face = pair_face[pair], view = view_face / p.faces, last = fragment_starts[pair + 1];
   const uint4 corner = faces[view_face - view * p.faces];
@@ -383,16 +382,16 @@ kernel void surface_detail_tangent(
     const Detail detail = find_detail(p, &face, c1, c2);
     if (!detail.varies) continue;
     const DetailRow row = detail_row(p, &face, detail, c1, c2, view_face, triangles, clipped);
-    const float3 by_detail = load_plane3(i + DPR_GRAD_PLANE(p, COLOR), p.grad_fragments, details);
+    const float3 by_detail = load_plane3(i, p.grad_fragments, details_of(p, q, tangents));
 #pragma unroll 1
-    for (uint d = 0; d < directions; ++d) {
-      global float* const of = tangents + (size_t)d * planes * p.grad_fragments + i;
+    for (uint d = 0; d < q.directions; ++d) {
+      global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments + i;
       global const float4* const move = vertices_of + (size_t)(d * p.views + view) * p.vertices;
       const float moved = row.bary1 * of[DPR_GRAD_PLANE(p, BARY)] +
                           row.bary2 * of[DPR_GRAD_PLANE(p, BARY) + p.grad_fragments] +
                           dot(row.corner[0], move[corner.x].xyz) + dot(row.corner[1], move[corner.y].xyz) +
                           dot(row.corner[2], move[corner.z].xyz);
-      const uint red = base_plane * p.grad_fragments;
+      const uint red = q.base_plane * p.grad_fragments;
       store_plane3(load_plane3(red, p.grad_fragments, of) + moved * by_detail, red, p.grad_fragments, of);
     }
   }

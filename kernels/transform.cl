@@ -213,18 +213,17 @@ static inline float2 move_seen(global const ViewParams* camera, float2 tangent, 
 
 /// Tangents of what transform_forward leaves. One work-item per (view, vertex).
 /// in   views, models, vertex_mesh, places, world  as transform_forward has them
-/// in   positions  how many there are of a direction; 0: none moves, position_tangents is not read
-/// in   lit        whether world_tangents are written; clip_tangents are where p.clips is set
 /// in   view_tangents   ViewTangent[direction][view]
 /// in   model_tangents  ModelTangent[direction][view][mesh]
 /// in   position_tangents  float4[direction][position] or, with a stride, float4[direction][view][position]
 /// out  ndc_tangents    float4[direction][view][vertex]  of x, y (NDC) and view depth
-/// out  world_tangents  float4[direction][the length of world]  of world positions; those of normals are left
-/// out  clip_tangents   float4[direction][view][vertex]  of homogeneous coordinates without distortion: x and
+/// out  world_tangents  float4[direction][view][vertex], then [view][normal] and [view]: of world positions and the
+///                      eyes; those of normals are left. Where q.lit is set
+/// out  clip_tangents   float4[direction][view][vertex]  where p.clips is set: of homogeneous coordinates without distortion: x and
 ///                      y in NDC, times depth, and depth; orthographic: x, y, depth
-kernel void transform_tangent(const FrameParams p, const uint directions, const uint positions,
-                              const uint lit, global const ViewParams* restrict views,
-                              global const float4* restrict models, global const uint* restrict vertex_mesh,
+kernel void transform_tangent(const FrameParams p, const TangentParams q,
+                              global const ViewParams* restrict views, global const float4* restrict models,
+                              global const uint* restrict vertex_mesh,
                               global const MeshPlace* restrict places, global const float4* restrict world,
                               global const ViewTangent* restrict view_tangents,
                               global const ModelTangent* restrict model_tangents,
@@ -245,12 +244,12 @@ kernel void transform_tangent(const FrameParams p, const uint directions, const 
   const float2 tangent = c.xy * inverse_depth;
   const float2 seen = camera->distorts ? bend_tangent(camera, tangent) : tangent;
   const float4 projection = camera->projection;
-  for (uint d = 0; d < directions; ++d) {
+  for (uint d = 0; d < q.directions; ++d) {
     global const ModelTangent* of_mesh = model_tangents + (size_t)d * p.views * p.meshes + segment;
     global const ViewTangent* of_view = view_tangents + d * p.views + view;
     float3 move = cross(of_mesh->rotation.xyz, turned_in_world) + of_mesh->translation.xyz;
-    if (positions != 0) {
-      const float3 own = position_tangents[(size_t)d * positions + view * p.position_stride + position].xyz;
+    if (q.positions != 0) {
+      const float3 own = position_tangents[(size_t)d * q.positions + view * p.position_stride + position].xyz;
       move += (float3)(dot(model[0].xyz, own), dot(model[1].xyz, own), dot(model[2].xyz, own));
     }
     const float3 in_camera = (float3)(dot(camera->row[0].xyz, move), dot(camera->row[1].xyz, move),
@@ -261,7 +260,11 @@ kernel void transform_tangent(const FrameParams p, const uint directions, const 
     const float2 ndc = move_seen(camera, tangent, moved, of_view) * projection.xy +
                        seen * of_view->projection.xy + of_view->projection.zw;
     ndc_tangents[(size_t)d * count + i] = (float4)(ndc.x, ndc.y, depth, 0.0f);
-    if (lit) world_tangents[(size_t)d * (count + p.views * p.normals) + i] = (float4)(move, 0.0f);
+    if (q.lit) {
+      global float4* const of = world_tangents + (size_t)d * p.views * (p.vertices + p.normals + 1);
+      of[i] = (float4)(move, 0.0f);
+      if (vertex == 0) of[p.views * (p.vertices + p.normals) + view] = of_view->eye;
+    }
     if (!p.clips) continue;
     const float w_clip = p.orthographic ? 1.0f : -c.z, w_moved = p.orthographic ? 0.0f : depth;
     const float2 clip = in_camera.xy * projection.xy + c.xy * of_view->projection.xy +

@@ -90,7 +90,7 @@ void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangen
   const std::size_t samples = std::size_t{in.p.views} * in.p.width * in.p.height;
   const std::size_t pixels = size.views * size.width * size.height;
   moved_raster_.resize(device_, samples);
-  for (std::size_t d = 0; d < tangents.directions; ++d) {
+  for (std::size_t d = 0; d < tangents.params.directions; ++d) {
     tangents.rasters.copy_to(moved_raster_, d * samples, samples, 0);
     antialias.tangent(in, contour, kept_, d, tangents, moved_raster_);
     blur_forward(size, moved_raster_, moved_image_);

@@ -137,19 +137,20 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
     return to_uint(values.size() / count);
   };
   Device::Impl& on = impl_of(device);
-  tangents.directions = to_uint(count);
+  tangents.params.directions = to_uint(count);
+  tangents.params.lit = cl_uint{shade.lit()};
   tangents.views.upload(on, of_views);
   tangents.models.upload(on, of_models);
   tangents.frames.upload(on, of_frames);
   const std::size_t shapes = frame.position_stride != 0 ? views.size() : 1,
                     colorings = frame.color_stride != 0 ? views.size() : 1;
-  tangents.position_count =
+  tangents.params.positions =
       upload(joined(directions, shapes * geometry->position_count, &MeshGradient::positions,
                     &ShapesGradient::positions, *geometry, &MeshRange::first_position),
              tangents.positions);
-  tangents.color_count = upload(joined(directions, colorings * geometry->colors, &MeshGradient::colors,
-                                       &ShapesGradient::colors, *geometry, &MeshRange::first_color),
-                                tangents.colors);
+  tangents.params.colors = upload(joined(directions, colorings * geometry->colors, &MeshGradient::colors,
+                                         &ShapesGradient::colors, *geometry, &MeshRange::first_color),
+                                  tangents.colors);
 }
 
 void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) const {
@@ -176,7 +177,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
     upload_directions(group);
     tangents.first = to_uint(first);
     if (pixel_noise) tangents.rasters.resize(on, group.size() * samples);
-    transform.tangent(frame, device_views, *geometry, shade.lit(), tangents);
+    transform.tangent(frame, device_views, *geometry, tangents);
     if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {

@@ -129,10 +129,11 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
 void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
                         std::size_t first, Buffer<cl_float4>& images) {
   Rasterize& r = in.rasterize;
+  r.start_gradients(in.p);
   AggregateTangentArguments all{.p = params(in.p, background, false),
                                 .first_direction = to_uint(first),
-                                .directions = tangents.directions,
-                                .planes = tangents.planes,
+                                .directions = tangents.params.directions,
+                                .planes = tangents.params.planes,
                                 .views = in.views.cameras,
                                 .starts = r.pixel_starts,
                                 .list = r.list,

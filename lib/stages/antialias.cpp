@@ -163,27 +163,25 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
 void Antialias::tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                         std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples) {
   if (!tangent_) tangent_.emplace(device_);
-  // What the backward pass has of cuts, seconds and samples holds their tangents.
+  // What the backward pass has of cuts and samples holds their tangents; seconds follow the cuts.
   const std::size_t rows = tiles_of(in.p) * row_items(device_);
-  grad_cut_.resize(device_, 2 * samples_of(in.p));
-  grad_seconds_.resize(device_, seconds.size());
+  grad_cut_.resize(device_, 2 * samples_of(in.p) + seconds.size());
   kept_grad_.resize(device_, samples_of(in.p));
-  (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{.p = in.p,
-                                                             .direction = to_uint(direction),
-                                                             .pairs = contour.pair_count,
-                                                             .edges = in.edges.edges,
-                                                             .faces = in.geometry.face_vertices,
-                                                             .ndc = in.transform.ndc,
-                                                             .clipped = in.clipped,
-                                                             .pair_contour = contour.pair_contour,
-                                                             .pair_tile = contour.pair_tile,
-                                                             .winner = winner,
-                                                             .second_counts = second_counts,
-                                                             .seconds = seconds,
-                                                             .vertices = tangents.ndc,
-                                                             .outlines = tangents.outlines,
-                                                             .cut_tangents = grad_cut_,
-                                                             .second_tangents = grad_seconds_});
+  (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{
+                                 .p = in.p,
+                                 .direction_pairs = cl_uint2{{to_uint(direction), to_uint(contour.pairs)}},
+                                 .edges = in.edges.edges,
+                                 .faces = in.geometry.face_vertices,
+                                 .ndc = in.transform.ndc,
+                                 .clipped = in.clipped,
+                                 .pair_contour = contour.pair_contour,
+                                 .pair_tile = contour.pair_tile,
+                                 .winner = winner,
+                                 .second_counts = second_counts,
+                                 .seconds = seconds,
+                                 .vertices = tangents.ndc,
+                                 .outlines = tangents.outlines,
+                                 .cut_tangents = grad_cut_});
   (*tangent_)(rows, kernel::antialias_fade_tangent{.p = in.p,
                                                    .tile_starts = contour.tile_starts,
                                                    .winner = winner,
@@ -208,7 +206,6 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                                      .cut = cut,
                                                      .raster = kept.faded,
                                                      .cut_tangents = grad_cut_,
-                                                     .second_tangents = grad_seconds_,
                                                      .faded_tangents = kept_grad_,
                                                      .tangents = samples});
 }

@@ -364,14 +364,16 @@ void Rasterize::backward(const shared::FrameParams& p, const Buffer<shared::Tria
 
 void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                         const Geometry& geometry, const Bin& bin, Tangents& tangents) {
-  start_gradients(p);
-  tangents.planes = DPR_TANGENT_PLANES + 3 * p.has_base;
-  tangents.fragments.resize(device_, std::size_t{tangents.directions} * tangents.planes * p.grad_fragments);
+  shared::TangentParams& q = tangents.params;
+  q.planes = DPR_TANGENT_PLANES + 3 * p.has_base;
+  q.base_plane = p.has_base != 0 ? DPR_TANGENT_PLANE_BASE : DPR_PLANE_COLOR;
+  const std::size_t details = p.levels > 1 ? 3 : 0;
+  tangents.fragments.resize(device_, (std::size_t{q.directions} * q.planes + details) * p.grad_fragments);
   const PairGroups groups = pair_groups(bin);
   launch_(groups.count, kernel::rasterize_tangent{.p = p,
                                                   .range = groups.pairs,
-                                                  .directions = tangents.directions,
-                                                  .planes = tangents.planes,
+                                                  .directions = tangents.params.directions,
+                                                  .planes = tangents.params.planes,
                                                   .pairs = bin.pair_count,
                                                   .triangles = triangles,
                                                   .pair_face = bin.pair_face,

@@ -117,8 +117,7 @@ class Rasterize {
   void start_gradients(const shared::FrameParams& p);
   /// From the gradients of distance, depth and barycentrics to `grad_corners` of the band's pairs.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin);
-  /// Makes room for the tangents of the band's fragments, and for `grads`, where later stages keep what is the same
-  /// for all directions. Fills the tangents of depths, barycentrics and distances,
+  /// Makes room for the tangents of the band's fragments, and fills those of depths, barycentrics and distances,
   /// by those of the vertices.
   void tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
                const Geometry& geometry, const Bin& bin, Tangents& tangents);

@@ -175,7 +175,7 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
   if (is_flat()) return;
   now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
                         kernel::normals_tangent{.p = in.p,
-                                                .directions = tangents.directions,
+                                                .directions = tangents.params.directions,
                                                 .faces = in.geometry.face_vertices,
                                                 .corner_starts = in.geometry.vertex_corners.starts,
                                                 .corners = in.geometry.vertex_corners.corners,
@@ -184,7 +184,7 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
   if (given.empty()) return;
   now_.kernels->normals(in.p.views * given.count,
                         kernel::normals_given_tangent{.p = in.p,
-                                                      .directions = tangents.directions,
+                                                      .directions = tangents.params.directions,
                                                       .given_mesh = given.mesh,
                                                       .model_tangents = tangents.models,
                                                       .world = in.transform.world,
@@ -195,13 +195,12 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
 struct LitTangentArguments {
   const shared::FrameParams& p;
   const shared::LightingParams& lp;
-  cl_uint directions, planes, moved_colors, channel;
-  const Buffer<cl_uint>&pairs, &pair_face, &fragment_starts;
+  shared::TangentParams q;
+  const Buffer<cl_uint>&pair_face, &fragment_starts;
   const Buffer<shared::ViewParams>& views;
   const Buffer<shared::Light>& lights;
   const Buffer<cl_uint4>& faces;
   const Buffer<cl_float4>&colors, &world, &materials, &color_tangents, &world_tangents;
-  const Buffer<shared::ViewTangent>& view_tangents;
   const Buffer<float>& fragments;
   Buffer<float>& tangents;
 };
@@ -214,11 +213,7 @@ void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
     if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
     LitTangentArguments all{.p = in.p,
                             .lp = now_.params,
-                            .directions = tangents.directions,
-                            .planes = tangents.planes,
-                            .moved_colors = tangents.color_count,
-                            .channel = 0,
-                            .pairs = in.bin.pair_count,
+                            .q = tangents.params,
                             .pair_face = in.bin.pair_face,
                             .fragment_starts = in.rasterize.fragment_starts,
                             .views = in.views.cameras,
@@ -229,19 +224,18 @@ void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
                             .materials = in.geometry.materials.values,
                             .color_tangents = tangents.colors,
                             .world_tangents = tangents.world,
-                            .view_tangents = tangents.views,
                             .fragments = in.rasterize.values,
                             .tangents = tangents.fragments};
     (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
-    for (all.channel = 0; all.channel < 3; ++all.channel)
+    for (all.q.channel = 0; all.q.channel < 3; ++all.q.channel)
       (*now_.kernels->tangent)(pairs, kernel::shade_lit_place_tangent::pick(all));
   } else if (!is_textured) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_tangent{.p = in.p,
                                                 .range = groups.pairs,
-                                                .directions = tangents.directions,
-                                                .planes = tangents.planes,
-                                                .moved_colors = tangents.color_count,
+                                                .directions = tangents.params.directions,
+                                                .planes = tangents.params.planes,
+                                                .moved_colors = tangents.params.colors,
                                                 .pairs = in.bin.pair_count,
                                                 .pair_face = in.bin.pair_face,
                                                 .fragment_starts = in.rasterize.fragment_starts,

@@ -46,13 +46,8 @@ void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bi
 }
 
 void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& tangents) {
-  const cl_uint base_plane = in.p.has_base != 0 ? DPR_TANGENT_PLANE_BASE : DPR_PLANE_COLOR;
   launch_(pairs, kernel::surface_tangent{.p = in.p,
-                                         .directions = tangents.directions,
-                                         .planes = tangents.planes,
-                                         .base_plane = base_plane,
-                                         .moved_colors = tangents.color_count,
-                                         .pairs = in.pairs,
+                                         .q = tangents.params,
                                          .pair_face = in.pair_face,
                                          .fragment_starts = in.fragment_starts,
                                          .faces = in.faces,
@@ -64,14 +59,10 @@ void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& 
                                          .clipped = in.clipped,
                                          .color_tangents = tangents.colors,
                                          .fragments = in.fragments,
-                                         .details = in.grads,
                                          .tangents = tangents.fragments});
   if (in.p.levels == 1) return;
   launch_(pairs, kernel::surface_detail_tangent{.p = in.p,
-                                                .directions = tangents.directions,
-                                                .planes = tangents.planes,
-                                                .base_plane = base_plane,
-                                                .pairs = in.pairs,
+                                                .q = tangents.params,
                                                 .pair_face = in.pair_face,
                                                 .fragment_starts = in.fragment_starts,
                                                 .faces = in.faces,
@@ -83,7 +74,6 @@ void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& 
                                                 .vertices = tangents.ndc,
                                                 .clip_vertices = tangents.clip,
                                                 .fragments = in.fragments,
-                                                .details = in.grads,
                                                 .tangents = tangents.fragments});
 }
 

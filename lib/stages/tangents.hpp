@@ -6,21 +6,20 @@
 
 namespace dpr {
 
-/// As many directions at a time as there is memory for: `directions` of them, from `first` on.
+/// As many directions at a time as there is memory for, from `first` on.
 struct Tangents {
-  cl_uint first = 0, directions = 0;
-  cl_uint planes = 0;                           ///< of a direction's fragments: DPR_TANGENT_PLANES, ...
-  Buffer<shared::ViewTangent> views;            ///< [direction][view]
-  Buffer<shared::ModelTangent> models;          ///< [direction][view][mesh]
-  Buffer<shared::FrameTangent> frames;          ///< [direction]
-  cl_uint position_count = 0, color_count = 0;  ///< of a direction; 0: none move, and the buffer is not read
-  Buffer<cl_float4> positions, colors;          ///< [direction][position], [color]; of views' own by view
+  shared::TangentParams params{};
+  cl_uint first = 0;
+  Buffer<shared::ViewTangent> views;    ///< [direction][view]
+  Buffer<shared::ModelTangent> models;  ///< [direction][view][mesh]
+  Buffer<shared::FrameTangent> frames;  ///< [direction]
+  Buffer<cl_float4> positions, colors;  ///< [direction][position], [color]; of views' own by view
 
   Buffer<cl_float4> ndc;       ///< [direction][view][vertex] x, y, view depth
-  Buffer<cl_float4> world;     ///< [direction][as Transform::world], of lit scenes
+  Buffer<cl_float4> world;     ///< [direction][as Transform::world, then eyes], of lit scenes
   Buffer<cl_float4> clip;      ///< [direction][view][vertex] homogeneous, where p.clips is set
   Buffer<cl_float4> outlines;  ///< [direction][view][face][4] of clipped faces (kernels/clip_tangent.cl)
-  Buffer<float> fragments;     ///< [direction][planes][p.grad_fragments]
+  Buffer<float> fragments;     ///< [direction][planes][p.grad_fragments], and what is the same for all
   Buffer<cl_float4>
       rasters;               ///< [direction][view][sample] of noise on the pixel, before contours are blended
   Buffer<cl_float4> images;  ///< [direction][view][height][width] RGBA, of all directions

@@ -62,15 +62,15 @@ void Transform::backward_positions(const shared::FrameParams& p, const DeviceVie
 }
 
 void Transform::tangent(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
-                        bool lit, Tangents& tangents) {
+                        Tangents& tangents) {
   const std::size_t count = std::size_t{p.views} * p.vertices;
-  tangents.ndc.resize(device_, tangents.directions * count);
-  tangents.world.resize(device_, lit ? tangents.directions * world.size() : 1);  // an argument all the same
-  tangents.clip.resize(device_, p.clips != 0 ? tangents.directions * count : 1);
+  tangents.ndc.resize(device_, tangents.params.directions * count);
+  tangents.world.resize(device_, tangents.params.lit != 0
+                                     ? tangents.params.directions * (world.size() + p.views)
+                                     : 1);  // an argument all the same
+  tangents.clip.resize(device_, p.clips != 0 ? tangents.params.directions * count : 1);
   launch_(count, kernel::transform_tangent{.p = p,
-                                           .directions = tangents.directions,
-                                           .positions = tangents.position_count,
-                                           .lit = cl_uint{lit},
+                                           .q = tangents.params,
                                            .views = views.cameras,
                                            .models = views.models,
                                            .vertex_mesh = geometry.vertex_mesh,

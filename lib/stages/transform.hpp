@@ -32,7 +32,7 @@ class Transform {
                           const Buffer<cl_float4>& grad_world);
   /// From directions of poses, cameras and positions to tangents of `ndc`, of `world` if the scene is lit, and
   /// of homogeneous coordinates where faces may be clipped.
-  void tangent(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry, bool lit,
+  void tangent(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,
                Tangents& tangents);
 
   Buffer<cl_float4> world;  ///< [view][vertex], then [view][normal]

@@ -22,7 +22,7 @@ std::vector<glm::vec4> pixels_at(Renderer& renderer, const PoseSpace& space, con
 /// The error of all pixels, relative to the derivatives.
 double error_of(Renderer& renderer, const PoseSpace& space, const Hypothesis& at, const Camera& camera,
                 std::size_t parameter) {
-  constexpr double k_step = 5e-3;  // of the image's half
+  constexpr double k_step = 5e-4;  // of the image's half
   const double step = space.step_lengths(k_step)[parameter];
   PoseSpace::Step ahead{}, back{};
   ahead[parameter] = step;
