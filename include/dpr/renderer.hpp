@@ -219,9 +219,9 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// Forward mode: the derivatives of the images along directions, RGBA, [direction][view]. After forward(), and
   /// throws as image() does where a setter came between. Exact, and the transpose of backward(): <u, J v> =
   /// <J^T u, v> up to rounding (relative error 1e-5). Scene::gradients has no part in it. All directions share
-  /// most of the work: tests/README.md has figures. Memory: 28 bytes a fragment and direction, of as many
-  /// directions at a time as half the device's budget holds. Throws InvalidArgument with noise on the pixel or
-  /// Monte Carlo, and for directions that change texels, texture coordinates, normals, materials or lights.
+  /// most of the work. Memory: 28 bytes a fragment and direction, of as many directions at a time as half the
+  /// device's budget holds. Throws InvalidArgument with sampled depths or triangles, and for directions that change
+  /// texels, texture coordinates, normals, materials or lights, or sigma of noise on the pixel.
   std::vector<Image> tangent(std::span<const SceneTangent> directions);
 
   /// Statistics of the last forward(). Throws as image() does.

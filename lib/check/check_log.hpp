@@ -65,5 +65,7 @@ void check_sampling(const Device& device, CheckLog& log);
 void check_pixel_noise(const Device& device, CheckLog& log);
 /// Losses of images and of meshes.
 void check_losses(const Device& device, CheckLog& log);
+/// Forward mode.
+void check_tangents(const Device& device, CheckLog& log);
 
 }  // namespace dpr::check

@@ -20,6 +20,7 @@ constexpr std::array k_parts{
     Part{"aggregate", check_aggregation},
     Part{"sampled stages", check_sampling},
     Part{"contour, antialias, blur", check_pixel_noise},
+    Part{"tangents", check_tangents},
     Part{"losses", check_losses},
 };
 
