@@ -101,6 +101,16 @@ DPR_API dpr_status dpr_frame_read(dpr_frame* frame, const dpr_array* outputs, si
  * matrices, with lights and of other outputs than the image of rigid motions. */
 DPR_API dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, size_t grad_count,
                                       const dpr_array* gradients, size_t gradient_count);
+/* Forward mode: derivatives of the images along `directions` directions at once, at least one. `tangents` name
+ * arrays of which `gradients` of the options names as well, and are float32 [directions, ...], a row how fast
+ * each number of the array changes; other arrays stay. Fills pixels, RGBA [direction][view][height][width][4],
+ * `pixel_count` floats. The transpose of dpr_frame_backward(), views included. Directions share most of the
+ * work: one costs one to two frames, six two to three. Waits for the device. Images have tangents along
+ * vertices, colors, face_colors, views, intrinsics, background, sigma, gamma and alpha, other outputs none:
+ * textures, texcoords, materials and lights are refused, and so are Monte Carlo and, with noise on the pixel
+ * (preset "pixel"), a sigma that changes. */
+DPR_API dpr_status dpr_frame_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
+                                     size_t tangent_count, float* pixels, size_t pixel_count);
 /* Not 0: no triangle of any view was rendered. */
 DPR_API dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty);
 DPR_API void dpr_frame_destroy(dpr_frame* frame);

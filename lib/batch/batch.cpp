@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -219,6 +220,11 @@ void Batch::backward(NamedArrays grads, NamedArrays gradients) {
   }
 }
 
+std::size_t Batch::image_floats() {
+  const Renderer& renderer = frame_.renderer();
+  return c::image_floats(renderer.views().size(), renderer.scene().width, renderer.scene().height);
+}
+
 bool Batch::is_empty() {
   const Renderer& renderer = frame_.renderer();
   impl_of(renderer).require_forward("dpr_frame_is_empty");
@@ -322,6 +328,19 @@ dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, std::siz
     deref(frame, "frame")
         .batch->backward(dpr::batch::to_arrays(grads, grad_count, "grads"),
                          dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
+dpr_status dpr_frame_tangent(dpr_frame* frame, std::size_t directions, const dpr_array* tangents,
+                             std::size_t tangent_count, float* pixels, std::size_t pixel_count) {
+  return guarded([&] {
+    dpr::batch::Batch& batch = *deref(frame, "frame").batch;
+    const std::size_t floats = batch.image_floats();
+    if (directions == 0 || directions > std::numeric_limits<std::size_t>::max() / floats)
+      throw dpr::InvalidArgument("directions", std::to_string(directions),
+                                 "at least 1, with images in memory");
+    batch.tangent(directions, dpr::batch::to_arrays(tangents, tangent_count, "tangents"),
+                  to_pixels(pixels, pixel_count, directions * floats));
   });
 }
 

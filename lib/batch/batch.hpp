@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,11 @@ class Batch {
   void read(NamedArrays outputs);
   /// The gradients of sum <grads, outputs>, by names of outputs and of arrays, into `gradients`.
   void backward(NamedArrays grads, NamedArrays gradients);
+  /// Derivatives of the images along directions, at least one: [direction][view][height][width]. `tangents` are
+  /// [directions, ...] of the arrays that they name.
+  void tangent(std::size_t directions, NamedArrays tangents, std::span<glm::vec4> images);
+  /// Numbers of all images.
+  std::size_t image_floats();
   /// True if no triangle of any view was rendered.
   bool is_empty();
 
@@ -48,6 +54,10 @@ class Batch {
   /// world space, stay where they are: with them the gradients are those of rigid motions.
   void add_gradients(SceneGradient& found, bool is_affine, NamedArrays gradients);
   void add_gradient(SceneGradient& found, bool is_affine, const NamedArray& gradient);
+  /// A direction in which nothing moves, with room for what these arrays move.
+  SceneTangent resting(NamedArrays tangents);
+  /// Adds the motion of an array's numbers to a direction.
+  void add_tangent(const NamedArray& tangent, std::span<const float> numbers, SceneTangent& direction);
 
   Frame frame_;
   std::vector<std::string> wanted_;

@@ -746,6 +746,67 @@ static void test_own_opencl(const dpr_scene* scene) {
   clReleaseContext(context);
 }
 
+/* A frame of named arrays: <u, J v> = <J^T u, v> of two directions at once, and tangents that are refused. */
+static void test_frame_tangents(void) {
+  static float pixels[FLOATS], tangents[2 * FLOATS], weights[FLOATS], texels[3] = {1, 1, 1};
+  float view[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3, 0, 0, 0, 1}, intrinsics[] = {20, 20, 8.2f, 7.9f};
+  float vertices[9], of_vertices[18], of_view[32], grad_vertices[9], grad_view[16];
+  int32_t of_faces[] = {0, 1, 2};
+  const char* const settings[] = {"preset=joint_gaussian", "sigma=1e-2"};
+  const char* const wanted[] = {"vertices", "views"};
+  const dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 2, {3, 3}},
+                              {"faces", of_faces, DPR_INT32, 2, {1, 3}},
+                              {"views", view, DPR_FLOAT32, 3, {1, 4, 4}},
+                              {"intrinsics", intrinsics, DPR_FLOAT32, 2, {1, 4}}};
+  const dpr_array image = {"image", pixels, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array grad = {"image", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array gradients[] = {{"vertices", grad_vertices, DPR_FLOAT32, 2, {3, 3}},
+                                 {"views", grad_view, DPR_FLOAT32, 3, {1, 4, 4}}};
+  const dpr_array moved[] = {{"vertices", of_vertices, DPR_FLOAT32, 3, {2, 3, 3}},
+                             {"views", of_view, DPR_FLOAT32, 4, {2, 1, 4, 4}}};
+  dpr_array wrong = moved[0];
+  dpr_frame_options options = DPR_FRAME_OPTIONS_INIT;
+  dpr_frame* frame = NULL;
+  int i, direction;
+  memcpy(vertices, positions, sizeof vertices);
+  for (i = 0; i < 18; ++i) of_vertices[i] = sinf((float)i);
+  for (i = 0; i < 32; ++i) of_view[i] = i % 16 < 12 ? cosf((float)i) : 0;
+  for (i = 0; i < FLOATS; ++i) weights[i] = sinf(0.7f * (float)i);
+  options.width = options.height = SIDE;
+  options.settings = settings, options.setting_count = 2;
+  options.gradients = wanted, options.gradient_count = 2;
+  OK(dpr_frame_render(&options, arrays, 4, &frame));
+  OK(dpr_frame_read(frame, &image, 1));
+  OK(dpr_frame_backward(frame, &grad, 1, gradients, 2));
+  OK(dpr_frame_tangent(frame, 2, moved, 2, tangents, 2 * FLOATS));
+  for (direction = 0; direction < 2; ++direction) {
+    double forward = 0, size = 0, backward = 0;
+    for (i = 0; i < FLOATS; ++i) {
+      const double term = (double)weights[i] * (double)tangents[direction * FLOATS + i];
+      forward += term, size += fabs(term);
+    }
+    for (i = 0; i < 9; ++i) backward += (double)grad_vertices[i] * (double)of_vertices[direction * 9 + i];
+    for (i = 0; i < 16; ++i) backward += (double)grad_view[i] * (double)of_view[direction * 16 + i];
+    EXPECT(size > 1 && fabs(forward - backward) < 1e-5 * size);
+  }
+  OK(dpr_frame_tangent(frame, 1, NULL, 0, tangents, FLOATS)); /* nothing moves */
+  for (i = 0; i < FLOATS; ++i) EXPECT(tangents[i] == 0);
+  REFUSED(dpr_frame_tangent(frame, 0, moved, 2, tangents, 0), "directions");
+  REFUSED(dpr_frame_tangent(frame, 2, moved, 2, tangents, FLOATS), "pixels");
+  REFUSED(dpr_frame_tangent(frame, 2, moved, 2, NULL, 2 * FLOATS), "pixels");
+  REFUSED(dpr_frame_tangent(frame, 1, moved, 1, tangents, FLOATS), "[2, 3, 3]");
+  wrong.shape[1] = 2;
+  REFUSED(dpr_frame_tangent(frame, 2, &wrong, 1, tangents, 2 * FLOATS), "9 numbers a direction");
+  wrong = (dpr_array){"background", of_vertices, DPR_FLOAT32, 2, {2, 3}};
+  REFUSED(dpr_frame_tangent(frame, 2, &wrong, 1, tangents, 2 * FLOATS), "`gradients`");
+  wrong = (dpr_array){"textures[0]", texels, DPR_FLOAT32, 4, {1, 1, 1, 3}};
+  REFUSED(dpr_frame_tangent(frame, 1, &wrong, 1, tangents, FLOATS), "textures[0]");
+  of_vertices[4] = NAN;
+  REFUSED(dpr_frame_tangent(frame, 2, moved, 1, tangents, 2 * FLOATS), "finite");
+  REFUSED(dpr_frame_tangent(NULL, 2, moved, 1, tangents, 2 * FLOATS), "frame");
+  dpr_frame_destroy(frame);
+}
+
 /* An image of the renderer's last frame that differs from another. */
 static int differs(const dpr_renderer* renderer, const float* image) {
   float pixels[FLOATS];
@@ -1367,6 +1428,7 @@ int main(void) {
   test_wrap_and_filter(device);
   test_own_opencl(scene);
   test_cameras(device);
+  test_frame_tangents();
   test_setters(device);
   test_mesh_loss(device, scene);
   test_attributes(device, scene);
