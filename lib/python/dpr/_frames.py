@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 
-from . import _library
+from . import _arrays, _library
 
 WITH_GRADIENTS = {"depth": 1, "position": 3, "normal": 3, "texcoords": 2}
 """Outputs with gradients, and how many numbers a pixel of theirs has."""
@@ -214,3 +214,26 @@ class Rendered:
                 for part, array in zip(parts, found):
                     part.of(totals[part.leaf])[...] += array
         return totals
+
+    def tangents(self, given):
+        """Derivatives of the images, [K, N, height, width, 4], along {index: [K, ...]} of arrays that were wanted."""
+        constants = self.constants(given)
+        for i, name in enumerate(self.spec.outputs, 1):
+            if i not in constants:
+                _arrays.fail(_library.InvalidArgument, "outputs", repr(name), "in forward mode none with gradients: the image "
+                             "alone has tangents")
+        given = {leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}
+        count = len(next(iter(given.values())))
+        images = np.empty((count, *self.outputs[0].shape), np.float32)
+        for frame, parts, rows in self._frames:
+            named = []
+            for part in parts:
+                if part.leaf in given:
+                    tangent = given[part.leaf]
+                    own = tangent if part.row is None else np.stack([part.of(direction) for direction in tangent])
+                    named.append((part.name, own.reshape(count, -1)))
+            found = images if len(self._frames) == 1 else np.empty_like(images[:, rows])
+            _library.call("dpr_frame_tangent", frame.handle, count, *c_arrays(named), found.ctypes.data, found.size)
+            if found is not images:
+                images[:, rows] = found
+        return images

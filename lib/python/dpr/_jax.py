@@ -4,72 +4,135 @@ import warnings
 
 import jax
 import numpy as np
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
 
 from . import _frames
 
 
-class _Constant:
-    """A value that JAX passes from the forward to the backward pass as it is."""
-
-    def __init__(self, value):
-        self.value = value
-
-    def __hash__(self):
-        return hash(self.value)
-
-    def __eq__(self, other):
-        return isinstance(other, _Constant) and self.value == other.value
-
-
-jax.tree_util.register_pytree_node(_Constant, lambda constant: ((), constant.value), lambda value, _: _Constant(value))
-
-
-def _forward(spec, wanted, *leaves):
-    rendered = _frames.Rendered(spec, [np.asarray(leaf) for leaf in leaves], wanted)
+def _forward(spec, *leaves):
+    rendered = _rendered(spec, leaves, ())
     if rendered.warning:
         warnings.warn(rendered.warning)
     return tuple(output.astype(np.int32) if output.dtype == np.int64 and not jax.config.jax_enable_x64 else output
                  for output in rendered.outputs)
 
 
-def _call(spec, wanted, leaves):
+def _shapes(spec, leaves):
+    """Of the image and the outputs."""
     views = next(int(part.split("|")[2]) for part in spec.parts if "|views|" in part)
-    shapes = tuple(jax.ShapeDtypeStruct(shape, jax.dtypes.canonicalize_dtype(dtype))
-                   for shape, dtype in _frames.shapes_of(spec, leaves[views].shape[0]))
-    return jax.pure_callback(functools.partial(_forward, spec, wanted), shapes, *leaves, vmap_method="sequential")
+    return tuple(jax.ShapeDtypeStruct(shape, jax.dtypes.canonicalize_dtype(dtype))
+                 for shape, dtype in _frames.shapes_of(spec, leaves[views].shape[0]))
 
 
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _call(spec, leaves):
+    return jax.pure_callback(functools.partial(_forward, spec), _shapes(spec, leaves), *leaves, vmap_method="sequential")
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _render(spec, leaves):
-    return _call(spec, (), leaves)
+    return _call(spec, leaves)
 
 
-def _render_and_keep(spec, leaves):
-    wanted = tuple(i for i, leaf in enumerate(leaves) if leaf.perturbed and leaf.value.dtype == np.float32)
-    leaves = [leaf.value for leaf in leaves]
-    return _call(spec, wanted, leaves), (leaves, _Constant(wanted))
+def _differentiable(spec):
+    """Numbers of the outputs that have derivatives."""
+    return [0] + [i for i, name in enumerate(spec.outputs, 1) if name in _frames.WITH_GRADIENTS]
 
 
-def _pull_back(spec, kept, grads):
-    """The frame is rendered again: what a compiled program does between the passes is not known here."""
-    leaves, wanted = kept
+def _push(spec, primals, tangents):
+    (leaves,), (tangents,) = primals, tangents
+    outputs = _render(spec, leaves)
     symbolic_zero = jax.custom_derivatives.SymbolicZero
-    with_gradients = [True] + [name in _frames.WITH_GRADIENTS for name in spec.outputs]
-    names = [i for i, (grad, has) in enumerate(zip(grads, with_gradients)) if has and not isinstance(grad, symbolic_zero)]
-    shapes = tuple(jax.ShapeDtypeStruct(leaves[i].shape, np.float32) for i in wanted.value)
+    wanted = tuple(i for i, tangent in enumerate(tangents)
+                   if not isinstance(tangent, symbolic_zero) and leaves[i].dtype == np.float32)
+    found = {}
+    if wanted:
+        moved = _tangents_p.bind(*leaves, *(tangents[i][None] for i in wanted), spec=spec, wanted=wanted)
+        found = {i: tangent[0] for i, tangent in zip(_differentiable(spec), moved)}
+    return outputs, tuple(found[i] if i in found else _no_tangent(output) for i, output in enumerate(outputs))
+
+
+def _no_tangent(output):
+    if output.dtype == np.float32:
+        return jax.numpy.zeros_like(output)
+    return np.zeros(output.shape, jax.dtypes.float0)
+
+
+_render.defjvp(_push, symbolic_zeros=True)
+
+_tangents_p = Primitive("dpr_tangents")
+"""From leaves, and tangents [K, ...] of the wanted ones, to those of the outputs that have derivatives, [K, ...]. What a
+compiled program does between the passes is not known here, so that each renders again."""
+_tangents_p.multiple_results = True
+
+
+def _rendered(spec, leaves, wanted):
+    return _frames.Rendered(spec, [np.asarray(leaf) for leaf in leaves], wanted)
+
+
+def _shapes_of_tangents(*arrays, spec, wanted):
+    shapes = _shapes(spec, arrays)
+    return [jax.ShapeDtypeStruct((arrays[-1].shape[0], *shapes[i].shape), np.float32) for i in _differentiable(spec)]
+
+
+def _tangents(*arrays, spec, wanted):
+    shapes = _shapes_of_tangents(*arrays, spec=spec, wanted=wanted)
+
+    def forward(leaves, tangents):
+        images = _rendered(spec, leaves, wanted).tangents(dict(zip(wanted, map(np.asarray, tangents))))
+        return [images, *(np.zeros(shape.shape, np.float32) for shape in shapes[1:])]
+
+    return jax.pure_callback(forward, shapes, arrays[:-len(wanted)], arrays[-len(wanted):])
+
+
+def _pull_back(cotangents, *arrays, spec, wanted):
+    leaves, tangents = arrays[:-len(wanted)], arrays[-len(wanted):]
+    given = {i: grad for i, grad in zip(_differentiable(spec), cotangents) if not isinstance(grad, ad.Zero)}
+    shapes = [jax.ShapeDtypeStruct(tangent.aval.shape, np.float32) for tangent in tangents]
 
     def backward(leaves, given):
-        all_grads = dict(zip(names, given))
-        rendered = _frames.Rendered(spec, [np.asarray(leaf) for leaf in leaves], wanted.value)
-        found = rendered.gradients([all_grads.get(i) for i in range(len(with_gradients))], wanted.value)
-        return tuple(found[i] for i in wanted.value)
+        rendered, given = _rendered(spec, leaves, wanted), {i: np.asarray(grads) for i, grads in given.items()}
+        found = [rendered.gradients([given[i][k] if i in given else None for i in range(1 + len(spec.outputs))], wanted)
+                 for k in range(shapes[0].shape[0])]
+        return [np.stack([gradients[i] for gradients in found]) for i in wanted]
 
-    found = jax.pure_callback(backward, shapes, leaves, [grads[i] for i in names], vmap_method="sequential")
-    gradients = dict(zip(wanted.value, found))
-    return ([gradients.get(i) for i in range(len(leaves))],)
+    return [None] * len(leaves) + jax.pure_callback(backward, shapes, leaves, given, vmap_method="sequential")
 
 
-_render.defvjp(_render_and_keep, _pull_back, symbolic_zeros=True)
+def _batch(arrays, dimensions, *, spec, wanted):
+    """Directions join those that there are; meshes and cameras of their own are rendered one after the other."""
+    size = next(array.shape[dimension] for array, dimension in zip(arrays, dimensions) if dimension is not None)
+    bind = functools.partial(_tangents_p.bind, spec=spec, wanted=wanted)
+
+    def first(array, dimension):
+        if dimension is None:
+            return jax.numpy.broadcast_to(array, (size, *array.shape))
+        return jax.numpy.moveaxis(array, dimension, 0)
+
+    count = len(arrays) - len(wanted)
+    if any(dimension is not None for dimension in dimensions[:count]):
+        found = jax.lax.map(lambda row: bind(*row), tuple(map(first, arrays, dimensions)))
+    else:
+        tangents = map(first, arrays[count:], dimensions[count:])
+        rows = (tangent.reshape(size * tangent.shape[1], *tangent.shape[2:]) for tangent in tangents)
+        found = bind(*arrays[:count], *rows)
+        found = [tangent.reshape(size, -1, *tangent.shape[1:]) for tangent in found]
+    return found, [0] * len(found)
+
+
+def _refuse(*arguments, **constants):
+    raise NotImplementedError("dpr: error: derivative (dpr.render): got a second one, expected the first: there are no second "
+                              "derivatives")
+
+
+_tangents_p.def_impl(_tangents)
+_tangents_p.def_abstract_eval(
+    lambda *arrays, **constants: [jax.core.ShapedArray(shape.shape, shape.dtype)
+                                  for shape in _shapes_of_tangents(*arrays, **constants)])
+mlir.register_lowering(_tangents_p, mlir.lower_fun(_tangents, multiple_results=True))
+batching.primitive_batchers[_tangents_p] = _batch
+ad.primitive_transposes[_tangents_p] = _pull_back
+ad.primitive_jvps[_tangents_p] = _refuse
 
 
 def render(spec, leaves):

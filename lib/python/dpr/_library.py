@@ -59,6 +59,7 @@ _SIGNATURES = {
     "dpr_frame_render": [ctypes.POINTER(Options), *_ARRAYS, ctypes.POINTER(_HANDLE)],
     "dpr_frame_read": [_HANDLE, *_ARRAYS],
     "dpr_frame_backward": [_HANDLE, *_ARRAYS, *_ARRAYS],
+    "dpr_frame_tangent": [_HANDLE, _SIZE, *_ARRAYS, ctypes.c_void_p, _SIZE],
     "dpr_frame_is_empty": [_HANDLE, ctypes.POINTER(ctypes.c_int)],
     "dpr_frames_release": [],
     "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],

@@ -1,4 +1,4 @@
-"""Gradients of arrays that have none of their own."""
+"""Derivatives of arrays that have none of their own."""
 import numpy as np
 
 from . import _arrays, _frames
@@ -25,13 +25,63 @@ def _nested(paths, found):
     return {name: listed(place) for name, place in root.items()}
 
 
+def _require_given(argument, names, plan):
+    given = {path[0] for path in plan.paths}
+    for name in names:
+        if name not in given:
+            _arrays.fail(ValueError, argument, repr(name), "names of arrays that are given: " + ", ".join(sorted(given)))
+
+
+def _at(path, place):
+    """What nested lists and dictionaries have there; None for nothing."""
+    for key in path:
+        if isinstance(place, dict):
+            place = place.get(key)
+        elif isinstance(place, (list, tuple)):
+            place = place[key] if key < len(place) else None
+    return place
+
+
+def _tangents_of_leaves(plan, tangents):
+    """{number of a leaf: [K, ...]}"""
+    _require_given("tangents", tangents, plan)
+    for name, inner in tangents.items():
+        for key in inner if isinstance(inner, dict) else ():
+            if not any(path[0] == name and path[-1] == key for path in plan.paths):
+                _arrays.fail(ValueError, f"tangents of {name}", repr(key), "names of arrays that are given")
+    found, count = {}, None
+    for number, (path, given, leaf) in enumerate(zip(plan.paths, plan.given, plan.leaves)):
+        tangent = _arrays.from_numbers(_at(path, tangents))
+        if tangent is None:
+            continue
+        name = "tangents of " + ".".join(map(str, path))
+        if _arrays.type_of(leaf) != "float32":
+            _arrays.fail(ValueError, name, "some", "none: indices stay")
+        tangent = _arrays.to_numpy(_arrays.converted(name, tangent))
+        count = count if tangent.ndim == 0 or count is not None else len(tangent)
+        if tangent.shape != (count, *given.shape) or not count:
+            _arrays.fail(ValueError, name, list(tangent.shape), [count or "K", *given.shape])
+        if leaf.shape != given.shape:
+            tangent = np.repeat(tangent, leaf.shape[0], 1)
+        found[number] = tangent * plan.slopes[number]() if number in plan.slopes else tangent
+    if not found:
+        _arrays.fail(ValueError, "tangents", "none", "those of one array at least")
+    return found
+
+
+def jvp(spec, plan, tangents):
+    """(outputs, tangents of the images, warning)"""
+    moved = _tangents_of_leaves(plan, tangents)
+    rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in plan.leaves], tuple(moved))
+    home = plan.given[0]
+    return ([_arrays.like(home, output) for output in rendered.outputs], _arrays.like(home, rendered.tangents(moved)),
+            rendered.warning)
+
+
 def vjp(spec, plan, wrt):
     """(outputs, pullback, warning)"""
     leaves, paths = plan.leaves, plan.paths
-    names = {path[0] for path in paths}
-    for name in wrt or ():
-        if name not in names:
-            _arrays.fail(ValueError, "wrt", repr(name), "names of arrays that are given: " + ", ".join(sorted(names)))
+    _require_given("wrt", wrt or (), plan)
     wanted = tuple(i for i, (leaf, path) in enumerate(zip(leaves, paths))
                    if _arrays.type_of(leaf) == "float32" and (wrt is None or path[0] in wrt))
     rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)

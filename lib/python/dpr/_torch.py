@@ -5,11 +5,13 @@ import weakref
 
 import numpy as np
 import torch
+from torch.autograd import forward_ad
 
 from . import _arrays, _frames
 from ._frames import Rendered, Spec
 
 _COMPILES = hasattr(torch.library, "register_autograd")  # from 2.4 on
+_HAS_CONTEXT = hasattr(torch.autograd.Function, "setup_context")  # from 2.0 on, for torch.func
 
 
 def is_compiling():
@@ -20,37 +22,123 @@ def _tensor(array):
     return torch.from_dlpack(array)
 
 
-def _require_first_derivative():
-    if torch.is_grad_enabled():
-        raise RuntimeError(
-            "dpr: error: create_graph (dpr.render): got true, expected false: there are no second derivatives")
-
-
 def _gradients(rendered, grads, tensors, wanted):
     """Gradient of each tensor, None where not wanted."""
     found = rendered.gradients([None if grad is None else _arrays.to_numpy(grad) for grad in grads], wanted)
     return [_tensor(found[i]) if i in found else None for i in range(len(tensors))]
 
 
-class _Render(torch.autograd.Function):
+class _Call:
+    """What a forward pass leaves to its derivatives; for torch.func no tree of tensors."""
+
+    def __init__(self, spec, wanted):
+        self.spec, self.wanted, self.rendered = spec, wanted, None
+
+
+def _one_forward(function):
+    """For PyTorch whose forward() does what setup_context() does later."""
+    if _HAS_CONTEXT:
+        return function
+    apart, keep = function.forward, function.setup_context
+
+    def forward(ctx, *inputs):
+        outputs = apart(*inputs)
+        keep(ctx, inputs, outputs)
+        return outputs
+
+    function.forward = staticmethod(forward)
+    return function
+
+
+class _Derivative(torch.autograd.Function):
+    """One that has none itself. The tensors by which it was taken are among its arguments: a second one is refused, not
+    dropped."""
+
     @staticmethod
-    def forward(ctx, spec, wanted, told, *tensors):
-        rendered = Rendered(spec, [_arrays.to_numpy(tensor) for tensor in tensors], wanted)
-        told.append(rendered.warning)
-        outputs = [_tensor(array) for array in rendered.outputs]
-        ctx.rendered, ctx.wanted, ctx.count = rendered, wanted, len(tensors)
-        ctx.set_materialize_grads(False)
-        ctx.save_for_backward(*tensors)  # so that a change in place is noticed
-        ctx.mark_non_differentiable(*(outputs[i] for i in rendered.constants(wanted)))
-        return tuple(outputs)
+    def setup_context(ctx, inputs, outputs):
+        pass
 
     @staticmethod
     def backward(ctx, *grads):
-        _require_first_derivative()
+        raise RuntimeError("dpr: error: derivative (dpr.render): got a second one, expected the first: there are no second "
+                           "derivatives")
+
+    jvp = backward
+
+
+@_one_forward
+class _Gradients(_Derivative):
+    """(gradients of `count` outputs, all tensors) to gradients of the wanted tensors."""
+
+    @staticmethod
+    def forward(call, count, *tensors):
+        found = _gradients(call.rendered, tensors[:count], tensors[count:], call.wanted)
+        return tuple(gradient for gradient in found if gradient is not None)
+
+    @staticmethod
+    def vmap(info, dimensions, call, count, *tensors):
+        found = [_Gradients.apply(call, count, *(tensor if dimension is None else tensor.select(dimension, i)
+                                                 for tensor, dimension in zip(tensors, dimensions[2:])))
+                 for i in range(info.batch_size)]
+        return tuple(torch.stack(rows) for rows in zip(*found)), (0,) * len(call.wanted)
+
+
+@_one_forward
+class _Tangents(_Derivative):
+    """(tangents [K, ...] of the tensors with these numbers, all tensors) to the images' tangents, [K, ...]."""
+
+    @staticmethod
+    def forward(call, numbers, *tensors):
+        return _tensor(call.rendered.tangents({i: _arrays.to_numpy(tensor) for i, tensor in zip(numbers, tensors)}))
+
+    @staticmethod
+    def vmap(info, dimensions, call, numbers, *tensors):
+        rows = [tensor.expand(info.batch_size, *tensor.shape) if dimension is None else tensor.movedim(dimension, 0)
+                for tensor, dimension in zip(tensors[:len(numbers)], dimensions[2:])]
+        images = _Tangents.apply(call, numbers, *(row.flatten(0, 1) for row in rows), *tensors[len(numbers):])
+        return images.unflatten(0, (info.batch_size, -1)), 0
+
+
+@_one_forward
+class _Render(torch.autograd.Function):
+    @staticmethod
+    def forward(call, *tensors):
+        call.rendered = Rendered(call.spec, [_arrays.to_numpy(tensor) for tensor in tensors], call.wanted)
+        return tuple(_tensor(array) for array in call.rendered.outputs)
+
+    @staticmethod
+    def setup_context(ctx, inputs, outputs):
+        ctx.call, *tensors = inputs
+        ctx.set_materialize_grads(False)
+        ctx.save_for_backward(*tensors)  # so that a change in place is noticed
+        ctx.save_for_forward(*tensors)
+        ctx.mark_non_differentiable(*(outputs[i] for i in ctx.call.rendered.constants(ctx.call.wanted)))
+
+    @staticmethod
+    def backward(ctx, *grads):
         tensors = ctx.saved_tensors
         if all(grad is None for grad in grads):
-            return (None,) * (3 + len(tensors))
-        return (None, None, None, *_gradients(ctx.rendered, grads, tensors, ctx.wanted))
+            return (None,) * (1 + len(tensors))
+        found = dict(zip(ctx.call.wanted, _Gradients.apply(ctx.call, len(grads), *grads, *tensors)))
+        return (None, *(found.get(i) for i in range(len(tensors))))
+
+    @staticmethod
+    def jvp(ctx, _, *tangents):
+        if ctx.call.spec.outputs and not _HAS_CONTEXT:
+            _arrays.fail(ValueError, "outputs", repr(ctx.call.spec.outputs[0]), "none in forward mode with PyTorch before 2.0, "
+                         "which has no outputs without tangents")
+        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        images = _Tangents.apply(ctx.call, numbers, *(tangents[i][None] for i in numbers), *ctx.saved_tensors)
+        return (images[0], *(None for _ in ctx.call.spec.outputs))
+
+    @staticmethod
+    def vmap(info, dimensions, *inputs):
+        raise NotImplementedError("dpr: error: torch.func.vmap (dpr.render): got a batch of arguments, expected a batch of "
+                                  "directions or gradients: a call takes N views, shapes or meshes")
+
+
+def _is_wanted(tensor):
+    return tensor.requires_grad or forward_ad.unpack_dual(tensor).tangent is not None
 
 
 def render(spec, leaves, copy):
@@ -59,13 +147,13 @@ def render(spec, leaves, copy):
     tensors = [leaf if isinstance(leaf, torch.Tensor) else torch.from_dlpack(_arrays.to_numpy(leaf)) for leaf in leaves]
     if copy:
         tensors = [tensor.cpu() for tensor in tensors]
-    wanted = [i for i, tensor in enumerate(tensors) if tensor.requires_grad]
     if is_compiling():
+        wanted = [i for i, tensor in enumerate(tensors) if tensor.requires_grad]
         outputs, warning = torch.ops.dpr.render(tensors, wanted, _text_of(spec))[:-1], None
     else:
-        told = []
-        outputs = _Render.apply(spec, tuple(wanted), told, *tensors)
-        (warning,) = told
+        call = _Call(spec, tuple(i for i, tensor in enumerate(tensors) if _is_wanted(tensor)))
+        outputs = _Render.apply(call, *tensors)
+        warning = call.rendered.warning
     if copy:
         outputs = [tensor.to(home) for tensor in outputs]
     return list(outputs), warning
