@@ -1,11 +1,10 @@
-// Tangents of the samples that contours blend: what antialias_cross.cl, antialias_fade.cl, antialias.cl and
-// antialias_second.cl do, forward, in one direction.
+// Forward mode of antialias_cross.cl, antialias_fade.cl, antialias.cl and antialias_second.cl, along one
+// direction: tangents of the samples that contours blend.
 #include "blended.h"
 #include "faded.h"
 #include "second.h"
 
-/// The tangent of where an end of an edge is seen, NDC: that of a vertex, or of a cut. Cuts are the outline's
-/// last two corners.
+/// Tangent, NDC, of an end of an edge: a vertex, or a cut. Cuts are the outline's last two corners.
 static inline float2 end_tangent(const EdgeScene s, const ViewEdge e, uint end, global const float4* vertices,
                                  global const float4* outlines) {
   const uint cut = end == 0 ? e.cut[0] : e.cut[1];
@@ -186,8 +185,8 @@ static inline float4 moved_jump(const FrameParams p, const Steps steps, const Se
   return linear + turn_of(r.step) * cut_tangents[r.place].x * changes;
 }
 
-/// Adds what the seconds' jumps do. One work-item per DPR_ROWS of a tile. Deterministic. Inputs as
-/// antialias_second_forward, and
+/// Adds the tangents of what the seconds' jumps have added. One work-item per DPR_ROWS of a tile. Deterministic.
+/// Inputs as antialias_second_forward, and
 /// in      cut_tangents     as antialias_cross_tangent leaves them
 /// in      faded_tangents   float4[pixel]
 /// in out  tangents         float4[pixel]

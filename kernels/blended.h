@@ -1,4 +1,4 @@
-// What a sample takes of the colours beyond a contour.
+// Colours that a sample takes from beyond a contour.
 #ifndef DPR_BLENDED_H
 #define DPR_BLENDED_H
 

@@ -1,8 +1,7 @@
-// Tangents of the fragments of faces that cross the near plane, by way of the cuts that they get there: those
-// of clip.cl, forward.
+// Forward mode of clip.cl: tangents of the fragments of faces that cross the near plane, by way of their cuts.
 #include "clipped_view.h"
 
-/// Tangents of an outline: x, y (NDC) and depth of its corners, whose w have those of the two cuts' parts.
+/// Tangents of an outline: x, y (NDC) and depth of its corners; the first two have those of the cuts' parts in w.
 #define DPR_OUTLINE_CORNERS 4
 
 /// Finds the tangents of the outlines of clipped faces. One work-item per (view, face).

@@ -1,4 +1,4 @@
-// How much of a sample beside contours fades (antialias_fade.cl), and what takes its place.
+// Share of a sample beside contours that fades (antialias_fade.cl), and the colour that takes its place.
 #ifndef DPR_FADED_H
 #define DPR_FADED_H
 
@@ -15,7 +15,7 @@ static inline float share_faded(Cut cut, float turn) {
   return weight_of_slope(cut.y) * near * near * near;
 }
 
-/// Its gradient by the cut.
+/// Derivative of share_faded() with respect to the cut.
 static inline Cut share_faded_gradient(Cut cut, float turn) {
   const float near = nearness(cut, turn), near2 = near * near;
   return (Cut)(near < 1.0f ? 3.0f * turn * weight_of_slope(cut.y) * near2 : 0.0f,

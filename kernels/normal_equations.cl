@@ -1,6 +1,6 @@
 // Normal equations of hypotheses about an object's pose, and the light that explains each best: sums over the
-// pixels, from which the host makes the next light and the next step; and the images that these are of.
-// reduce.cl adds the slots.
+// pixels, from which the host makes the next light and the next step; and means of samples. reduce.cl adds the
+// slots.
 //
 // A pixel of coverage a, colour c and unit normal n is modelled in each channel as
 //
@@ -122,13 +122,13 @@ static inline void store_sum(realn sum, uint number, const Slots s, uint views, 
 }
 
 #if DPR_TERMS > 0
-/// The part of a light that is a term's, by channel.
+/// Coefficient of a term of a light, by channel.
 static inline Vec3n light_at(global const float* light, uint term) {
   return make_vec3n((realn)(light[term]), (realn)(light[DPR_TERMS + term]),
                     (realn)(light[2 * DPR_TERMS + term]));
 }
 
-/// Where pixels' surfaces face, 0 where there is none, and what the light multiplies.
+/// Normals that pixels show, 0 without any, and the polynomials that the light multiplies.
 typedef struct {
   Vec3n normal;
   realn inverse_length;  // of the normal in the image
@@ -210,7 +210,7 @@ kernel void normal_loss(const uint pixels, const uint views, const uint slots, c
 #define DPR_FIT_OTHERS DPR_LIGHT_PRODUCTS
 #endif
 
-/// Least squares of the light, which are summed behind the loss. Each channel sums w t t^T, its lower triangle;
+/// Sums of the light's least squares, behind the loss. Each channel sums w t t^T, its lower triangle;
 /// w t; and w t y, y being the target less the background that shows. Parts are the first of the channels, then
 /// the others, on a GPU, else all are one.
 kernel void normal_light(const uint pixels, const uint views, const uint slots, const float4 background,
@@ -349,8 +349,8 @@ kernel void normal_lit(const uint pixels, const uint views, const float4 backgro
 }
 
 #if DPR_TERMS > 0
-/// Products w t J, from which follows what of a direction the light makes up for. Parts are the directions;
-/// those sum [channel][term].
+/// Products w t J, from which the host finds the part of a direction that the light makes up for. Parts are the
+/// directions; each sums [channel][term].
 kernel void normal_cross(const uint pixels, const uint views, const uint slots,
                          global const float4* restrict colors, global const float4* restrict normals,
                          global const float* restrict residuals, global const float* restrict lit,
@@ -382,8 +382,8 @@ kernel void normal_cross(const uint pixels, const uint views, const uint slots,
   }
 }
 
-/// Takes from the derivatives what the light makes up for: the light being at its best, those of the residuals
-/// are left (variable projection: Golub and Pereyra 1973, in the approximation of Kaufman 1975). One work-item
+/// Takes the part that the light makes up for from the derivatives, which leaves those of the residuals in the
+/// best light (variable projection: Golub and Pereyra 1973, in the approximation of Kaufman 1975). One work-item
 /// per vector of pixels, view and direction.
 /// in   taken  float[direction][view][channel][term]  change of the light
 /// out  left

@@ -1,5 +1,5 @@
-// Tangents of lit colours: each channel by all that it is made of, times the tangents of that. Options as
-// shade_lit.cl has them.
+// Forward mode of shade_lit.cl, with its options: the derivatives of each channel of the colour with respect to
+// all that it is made of, times the tangents of these.
 #include "face_normal.h"
 #include "lit_backward.h"
 
@@ -113,7 +113,7 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
   }
 }
 
-/// Adds what comes by where the surface lies: by the light at barycentrics, corners and the eye. One work-item per
+/// Adds the part of the place of the surface: of barycentrics, corners and the eye, by the light. One work-item per
 /// pair, up to p.last_pair; one launch for each channel of the colour, for want of registers. Deterministic.
 /// Inputs as shade_lit_tangent, and
 /// in   world_tangents  as transform_tangent and normals.cl leave them

@@ -287,7 +287,7 @@ kernel void surface_place(const FrameParams p, global const uint* restrict fragm
   if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
 }
 
-/// What the base colours change by their levels of detail, behind the last direction's tangents.
+/// Derivatives of base colours with respect to their levels of detail, behind the last direction's tangents.
 static inline global float* details_of(const FrameParams p, const TangentParams q, global float* tangents) {
   return tangents + (size_t)q.directions * q.planes * p.grad_fragments;
 }
@@ -296,7 +296,7 @@ static inline global float* details_of(const FrameParams p, const TangentParams 
 /// pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
 /// in   color_tangents  as shade_tangent has them
 /// in out  tangents     float[direction][planes][fragment]  of the base colours by BARY; then, where textures have
-///                      levels, float[3][fragment]  what the base colours change by these
+///                      levels, float[3][fragment]  derivatives of the base colours with respect to these
 kernel void surface_tangent(const FrameParams p, const TangentParams q, global const uint* restrict pair_face,
                             global const uint* restrict fragment_starts, global const uint4* restrict faces,
                             global const float4* restrict colors, global const float4* restrict texcoords,
@@ -356,8 +356,8 @@ static inline DetailRow detail_row(const FrameParams p, const TexturedFace* f, c
   return row;
 }
 
-/// Adds to the tangents of base colours what comes by the levels of detail: the barycentrics' and the corners'. One
-/// work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_tangent, and
+/// Adds the part of levels of detail, which depend on barycentrics and corners, to the tangents of base colours.
+/// One work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_tangent, and
 /// in   vertices        float4[direction][view][vertex]  tangents of x, y (NDC) and view depth
 /// in   clip_vertices   the same of homogeneous coordinates, read where p.clips is set
 /// in out  tangents     float[direction][planes][fragment]  the base colours, and BARY

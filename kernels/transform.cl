@@ -1,4 +1,4 @@
-// Vertices: object space -> world -> camera -> NDC and view depth; and back.
+// Vertices: object space -> world -> camera -> NDC and view depth; and back; and forward mode.
 #include "affine.h"
 #include "compensated.h"
 #include "lens.h"
@@ -191,7 +191,8 @@ kernel void transform_backward_positions(const FrameParams p, global const float
   grad_positions[first_view * p.position_stride + position] = (float4)(sum, 0.0f);
 }
 
-/// The tangent of where a tangent of camera space is shown: by its own, and by that of the lens.
+/// Tangent of the place behind the lens at which (x, y) / depth, `tangent`, is seen: by its own tangent, `moved`,
+/// and by that of the lens.
 static inline float2 move_seen(global const ViewParams* camera, float2 tangent, float2 moved,
                                global const ViewTangent* by) {
   if (!camera->distorts) return moved;
@@ -217,10 +218,10 @@ static inline float2 move_seen(global const ViewParams* camera, float2 tangent, 
 /// in   model_tangents  ModelTangent[direction][view][mesh]
 /// in   position_tangents  float4[direction][position] or, with a stride, float4[direction][view][position]
 /// out  ndc_tangents    float4[direction][view][vertex]  of x, y (NDC) and view depth
-/// out  world_tangents  float4[direction][view][vertex], then [view][normal] and [view]: of world positions and the
-///                      eyes; those of normals are left. Where q.lit is set
-/// out  clip_tangents   float4[direction][view][vertex]  where p.clips is set: of homogeneous coordinates without distortion: x and
-///                      y in NDC, times depth, and depth; orthographic: x, y, depth
+/// out  world_tangents  where q.lit is set: float4[direction][...], [view][vertex] of world positions, then
+///                      [view][normal], which normals.cl fills, then [view] of eyes
+/// out  clip_tangents   where p.clips is set: float4[direction][view][vertex]  of homogeneous coordinates without
+///                      distortion: x and y in NDC, times depth, and depth; orthographic: x, y, depth
 kernel void transform_tangent(const FrameParams p, const TangentParams q,
                               global const ViewParams* restrict views, global const float4* restrict models,
                               global const uint* restrict vertex_mesh,

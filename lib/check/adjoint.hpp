@@ -51,7 +51,7 @@ inline std::vector<Way> random_ways(SceneGradient& gradient, bool by_sigma, Rand
   return ways;
 }
 
-/// The error of <u, J v>, relative to the sum of the sizes of what it is a sum of.
+/// Errors of <u, J v>, relative to the sum of the sizes of its terms.
 inline std::vector<double> errors_of(Renderer& renderer, const std::vector<Image>& weights,
                                      const std::vector<Way>& ways) {
   std::vector<SceneTangent> directions;

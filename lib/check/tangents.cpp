@@ -7,7 +7,7 @@ namespace {
 
 constexpr double k_adjoint = 1e-5;
 
-/// Of all kinds of directions but gamma's, whose sum cancels.
+/// Compares directions of all kinds but gamma's, whose sum cancels.
 void log_adjoint(const Device& device, const Scene& scene, const char* compared, CheckLog& log) {
   Renderer renderer(device);
   renderer.set_scene(scene);

@@ -33,7 +33,7 @@ struct Frame : FrameImages {
 Frame last_frame(const Renderer& renderer, const char* caller);
 
 /// Tangents of the images of a frame, [direction][view][height][width] RGBA; valid until the renderer's next
-/// frame or tangents. Directions that images do not follow are not found. Throws as last_frame().
+/// frame or tangents. Directions are not checked. Throws as last_frame().
 const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const SceneTangent> directions,
                                        const char* caller);
 

@@ -1,4 +1,4 @@
-// What forward mode knows of.
+// Rows of the gradient table along which forward mode has tangents.
 #pragma once
 
 #include "scene/gradient_table.hpp"

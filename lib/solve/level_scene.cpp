@@ -84,7 +84,7 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   }
   result.smoothing = level_smoothing(result, space, options, shape.blur);
   result.gradients = no_gradients();
-  if (light != PoseLight::fixed) {  // without light, over black: LightFit adds both
+  if (light != PoseLight::fixed) {  // unlit over black: NormalSums adds both
     result.lights.reset();
     result.background = glm::vec3(0);
   }

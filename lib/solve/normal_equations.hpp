@@ -27,7 +27,7 @@ struct NormalEquations {
 /// Images of hypotheses.
 struct HypothesisImages {
   std::size_t views;
-  const Buffer<cl_float4>& colors;   ///< [view][pixel] RGBA; where light is found, without any, over black
+  const Buffer<cl_float4>& colors;   ///< [view][pixel] RGBA; where light is found, unlit over black
   const Buffer<cl_float4>& normals;  ///< [view][pixel] object space, over black; where harmonics are found
 };
 
@@ -50,7 +50,7 @@ class NormalSums {
   /// `directions`: number of parameters of a hypothesis.
   NormalSums(const Device& device, const WeighedTarget& target, PoseLight light, std::size_t directions);
 
-  /// Of every view. `scale`: of the robust loss, a colour difference; 0: squares.
+  /// Losses of every view. `scale`: of the robust loss, a colour difference; 0: squares.
   std::vector<double> losses(const HypothesisImages& images, float scale);
   std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,
                                          float scale);
@@ -92,9 +92,9 @@ class NormalSums {
   std::size_t light_sums() const;  ///< of a channel
   /// Lights of the active view at that place.
   void solve(const Sums& sums, std::size_t place, Lights& lights) const;
-  /// Makes `left_` of `lit_`.
+  /// Finds `left_` from `lit_`.
   void project(const HypothesisImages& images);
-  /// Of the sizes of the residuals where a view shows the object.
+  /// Medians of the residuals' sizes where a view shows the object.
   std::vector<std::optional<float>> medians(const HypothesisImages& images);
 
   std::size_t pixels_, terms_, directions_, slots_, width_;

@@ -57,8 +57,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
                 const BufferRef<cl_float4>& grad_image, bool with_channels = true);
 
   /// From the tangents of the band's fragments to those of the images, of the group's directions from `first`
-  /// on. Uses the fragments' gradients as scratch.
-  /// Only with the exact estimator.
+  /// on. Uses the fragments' gradients as scratch. Only with the exact estimator.
   void tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
                std::size_t first, Buffer<cl_float4>& images);
 

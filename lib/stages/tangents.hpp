@@ -1,4 +1,4 @@
-// Directions of tangents on the device, and what the stages leave of them for those behind.
+// Directions of forward mode on the device, and the tangents that each stage leaves for the next.
 #pragma once
 
 #include "device/buffer.hpp"

@@ -1,4 +1,4 @@
-// Vertices to world and NDC, and gradients back to object space and to the poses.
+// Vertices to world and NDC, gradients back to object space and to the poses, and tangents.
 #pragma once
 
 #include "kernels/transform.hpp"

@@ -3,9 +3,10 @@
     image = dpr.render(vertices, faces, views, intrinsics, width=256, height=256)
 
 render() does all of it in one call; a Renderer keeps what stays the same from call to call. Both take arrays, tensors and
-lists, read float32 in its memory and convert the rest, and differentiate with respect to vertices, colours, textures,
-materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and by
-render_with_vjp() and render_with_jvp() for all others. look_at(), perspective() and cameras make views and intrinsics.
+lists, read those of float32 where they are and convert the rest, and differentiate with respect to vertices, colours,
+textures, materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and
+by render_with_vjp() and render_with_jvp() for all others. look_at(), perspective() and cameras make views and
+intrinsics.
 """
 from . import cameras
 from ._least_squares import normal_equations

@@ -36,8 +36,8 @@ class Renderer:
         cull        "none", "back" or "front"
         shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
 
-    What is given may be changed later, as an attribute: renderer.blur = 0.5. A name that there is not is refused, and
-    so is a setting without a part in the smoothing: sigma of the preset "rigid", alpha of the joint composition,
+    Settings may be changed later, as attributes: renderer.blur = 0.5. Unknown names are refused, and so is a
+    setting without a part in the smoothing: sigma of the preset "rigid", alpha of the joint composition,
     samples of an exact estimator. A Renderer is pickled with its settings. Devices are opened, and kernels built, by
     the first call in a process. Several threads may render with it at once. OpenCL does not survive fork(): a process
     forked after that gets an error from a call; start it with "spawn", or render in the parent later. Frames of a graph
@@ -272,7 +272,7 @@ def _result(spec, found, warning):
 
 
 def _spec_of(device, width, height, texts):
-    """Of no call."""
+    """Spec without arrays of a call."""
     return _frames.Spec(device, width, height, 0, tuple(texts), (), ())
 
 
