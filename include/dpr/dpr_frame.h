@@ -105,7 +105,7 @@ DPR_API dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, 
  * arrays of which `gradients` of the options names as well, and are float32 [directions, ...], a row how fast
  * each number of the array changes; other arrays stay. Fills pixels, RGBA [direction][view][height][width][4],
  * `pixel_count` floats. The transpose of dpr_frame_backward(), views included. Directions share most of the
- * work: one costs one to two frames, six two to three. Waits for the device. Images have tangents along
+ * work: one costs up to two frames, six up to four. Waits for the device. Images have tangents along
  * vertices, colors, face_colors, views, intrinsics, background, sigma, gamma and alpha, other outputs none:
  * textures, texcoords, materials and lights are refused, and so are Monte Carlo and, with noise on the pixel
  * (preset "pixel"), a sigma that changes. */

@@ -188,7 +188,7 @@ class Renderer:
         [K, *the argument's shape], K the same in all; lists and dictionaries as the argument. Other arguments stay.
 
         Returns (result, tangents [K, N, height, width, 4]), exact, and the transpose of vjp(). Directions share most of
-        the work: with the image, one costs two to three images, six cost four. Images have tangents along vertices,
+        the work: with the image, one costs up to three images, six up to five. Images have tangents along vertices,
         colors, face_colors, views, intrinsics, background, sigma, blur, gamma and alpha; with noise on the pixel (the
         preset "pixel") not along sigma and blur. Raises ValueError (dpr.InvalidArgument) for other arrays, Monte Carlo,
         outputs with gradients, and other shapes. PyTorch and JAX take their own tangents by torch.func.jvp,
