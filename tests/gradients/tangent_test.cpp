@@ -96,6 +96,22 @@ TEST_SUITE("tangents") {
     }
   }
 
+  TEST_CASE("an empty frame follows the background alone") {
+    for (const char* preset : {"gaussian", "joint_gaussian", "pixel"}) {
+      Scene scene = cube_scene(12, 9);
+      scene.smoothing = smoothing_preset(preset);
+      scene.meshes[0].transform[3] = glm::vec4(0, 0, 1000, 1);
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      renderer.forward();
+      SceneTangent direction = moved_along_x(renderer);
+      direction.background = {1, 2, 3};
+      const Image tangent = renderer.tangent({&direction, 1})[0];
+      for (const glm::vec4& pixel : tangent.pixels)
+        CHECK(glm::distance(pixel, glm::vec4(1, 2, 3, 0)) < 1e-6F);
+    }
+  }
+
   TEST_CASE("what images do not follow is refused") {
     Scene scene =
         textured_scene(make_icosphere(1), random_texture(4, 4, Wrap::clamp, Filter::bilinear), 16, 16);
