@@ -15,6 +15,7 @@
 
 #include "lanes.h"
 #include "pixel.h"
+#include "planes.h"
 #include "priors.h"
 #include "quadrature.h"
 
@@ -40,20 +41,6 @@ typedef struct {
   float background_weight;
   float3 background_beta;
 } SlotRows;
-
-static inline void add_to_planes(float3 v, uint i, uint plane, global float* values) {
-  values[i] += v.x;
-  values[i + plane] += v.y;
-  values[i + 2 * plane] += v.z;
-}
-static inline float3 load_planes(uint i, uint plane, global const float* values) {
-  return (float3)(values[i], values[i + plane], values[i + 2 * plane]);
-}
-static inline void store_planes(float3 v, uint i, uint plane, global float* values) {
-  values[i] = v.x;
-  values[i + plane] = v.y;
-  values[i + 2 * plane] = v.z;
-}
 
 #ifndef DPR_JOINT
 

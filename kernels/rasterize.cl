@@ -347,7 +347,8 @@ kernel void rasterize_tangent(const FrameParams p, const uint2 range, const uint
         store_run((1.0f - c1 - c2) * move.corner[0].z + c1 * move.corner[1].z + c2 * move.corner[2].z +
                       b1 * (t.z1 - t.z0) + b2 * (t.z2 - t.z0),
                   i, end, out + DPR_GRAD_PLANE(p, DEPTH));
-        store_run(along_corners(by_distance, move), i, end, out + DPR_GRAD_PLANE(p, LOG_OCCUPANCY));
+        store_run(p.sharp ? (realn)(0.0f) : along_corners(by_distance, move), i, end,
+                  out + DPR_GRAD_PLANE(p, LOG_OCCUPANCY));
       }
     }
   }

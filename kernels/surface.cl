@@ -1,5 +1,6 @@
 // Base colours of the fragments of textured scenes: the corners' colours, interpolated, times the texture.
 // Shading interpolates the colours itself where no mesh has a texture.
+#include "planes.h"
 #include "texture.h"
 
 /// One work-item per pair, up to p.last_pair. Deterministic.
@@ -78,16 +79,6 @@ static inline uint base_plane(const FrameParams p) {
   return (p.has_base ? DPR_GRAD_PLANE_BASE : DPR_PLANE_COLOR) * p.grad_fragments;
 }
 
-/// A fragment's values of three planes: the first is at `i`.
-static inline float3 load_plane3(uint i, uint plane, global const float* values) {
-  return (float3)(values[i], values[i + plane], values[i + 2 * plane]);
-}
-static inline void store_plane3(float3 v, uint i, uint plane, global float* values) {
-  values[i] = v.x;
-  values[i + plane] = v.y;
-  values[i + 2 * plane] = v.z;
-}
-
 /// One work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
 /// in out  grads  float[plane][fragment]  of BARY by that of the base colours; where p.has_base is set, added
 ///                to what the light has left
@@ -115,7 +106,7 @@ kernel void surface_backward(const FrameParams p, global const uint* restrict pa
                 c0 = 1.0f - c1 - c2;
     const Detail detail = find_detail(p, &face, c1, c2);
     const Sample sample = sample_face(&face, detail, c1, c2, texels);
-    const float3 grad = load_plane3(i + base_plane(p), p.grad_fragments, grads);
+    const float3 grad = load_planes(i + base_plane(p), p.grad_fragments, grads);
     const float3 grad_color = grad * sample.color.xyz,
                  grad_sample = grad * base_of_corners(&face, c1, c2).xyz;
     const float2 grad_place = (float2)(dot(grad_sample, sample.by_x.xyz), dot(grad_sample, sample.by_y.xyz));
@@ -156,7 +147,7 @@ kernel void surface_backward(const FrameParams p, global const uint* restrict pa
 /// From the q_k along an axis to the corners of a whole triangle on the screen, whose depths have their own.
 static inline void add_to_corners(const Triangle t, float3 depth, int along_y, float3 grad_q,
                                   float3 corner[3]) {
-  const float inverse_area = 1.0f / doubled_area(t);
+  const float inverse_area = is_sliver(t) ? 0.0f : 1.0f / doubled_area(t);
   const float3 of_step = grad_q * inverse_area / depth;
   const float of_area = -inverse_area * dot(of_step, screen_steps(t, along_y));
   const float3 turned = of_step.zxy - of_step.yzx, by_x = screen_steps(t, 0), by_y = screen_steps(t, 1);
@@ -255,7 +246,7 @@ kernel void surface_list(const FrameParams p, global const uint* restrict pairs,
     const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
     const Detail detail = find_detail(p, &face, c1, c2);
     const float3 grad =
-        load_plane3(i + base_plane(p), p.grad_fragments, grads) * base_of_corners(&face, c1, c2).xyz;
+        load_planes(i + base_plane(p), p.grad_fragments, grads) * base_of_corners(&face, c1, c2).xyz;
     const Footprint footprint = find_footprint(face.texture, (uint)detail.level, place_at(&face, c1, c2));
     const uint2 cell = footprint_cells(footprint);
     for (uint k = 0; k < p.levels; ++k) {
@@ -319,7 +310,7 @@ kernel void surface_tangent(const FrameParams p, const TangentParams q, global c
     const Sample sample = sample_face(&face, detail, c1, c2, texels);
     const float3 base = base_of_corners(&face, c1, c2).xyz, by_corners = sample.color.xyz;
     if (face.texture.levels > 1)
-      store_plane3(base * sample.by_detail.xyz, i, p.grad_fragments, details_of(p, q, tangents));
+      store_planes(base * sample.by_detail.xyz, i, p.grad_fragments, details_of(p, q, tangents));
     const float3 by_x = base * sample.by_x.xyz, by_y = base * sample.by_y.xyz;
     const float3 by_b1 = by_corners * face.color1.xyz + face.place1.x * by_x + face.place1.y * by_y;
     const float3 by_b2 = by_corners * face.color2.xyz + face.place2.x * by_x + face.place2.y * by_y;
@@ -332,7 +323,7 @@ kernel void surface_tangent(const FrameParams p, const TangentParams q, global c
         moved += by_corners *
                  ((1.0f - c1 - c2) * colored[color.x] + c1 * colored[color.y] + c2 * colored[color.z]).xyz;
       }
-      store_plane3(moved, q.base_plane * p.grad_fragments, p.grad_fragments, of);
+      store_planes(moved, q.base_plane * p.grad_fragments, p.grad_fragments, of);
     }
   }
 }
@@ -382,7 +373,7 @@ kernel void surface_detail_tangent(
     const Detail detail = find_detail(p, &face, c1, c2);
     if (!detail.varies) continue;
     const DetailRow row = detail_row(p, &face, detail, c1, c2, view_face, triangles, clipped);
-    const float3 by_detail = load_plane3(i, p.grad_fragments, details_of(p, q, tangents));
+    const float3 by_detail = load_planes(i, p.grad_fragments, details_of(p, q, tangents));
 #pragma unroll 1
     for (uint d = 0; d < q.directions; ++d) {
       global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments + i;
@@ -392,7 +383,7 @@ kernel void surface_detail_tangent(
                           dot(row.corner[0], move[corner.x].xyz) + dot(row.corner[1], move[corner.y].xyz) +
                           dot(row.corner[2], move[corner.z].xyz);
       const uint red = q.base_plane * p.grad_fragments;
-      store_plane3(load_plane3(red, p.grad_fragments, of) + moved * by_detail, red, p.grad_fragments, of);
+      store_planes(load_planes(red, p.grad_fragments, of) + moved * by_detail, red, p.grad_fragments, of);
     }
   }
 }

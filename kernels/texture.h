@@ -56,7 +56,7 @@ static inline float determinant(const ClippedFace c) { return dot(c.corner[0].xy
 /// steps where it passes the camera.
 static inline Steps triangle_steps(const FrameParams p, const Triangle t) {
   const float3 depth = p.perspective_correct ? (float3)(t.z0, t.z1, t.z2) : (float3)(1.0f);
-  const float3 scale = 1.0f / (doubled_area(t) * depth);
+  const float3 scale = is_sliver(t) ? (float3)(0.0f) : 1.0f / (doubled_area(t) * depth);
   const Steps s = {depth, screen_steps(t, 0) * scale, screen_steps(t, 1) * scale};
   return s;
 }

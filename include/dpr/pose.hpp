@@ -39,8 +39,7 @@ enum class PoseLight {
 };
 
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
-/// difference between render and target, with Jacobians from differences of images rendered in the same
-/// launches. The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
+/// difference between render and target, with exact Jacobians (forward mode). The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
 /// composition with a blur that follows the pixels; of the scene's nothing is used. Levels whose pixels are
 /// larger than the mesh's triangles work on a coarser mesh.
 struct LeastSquares {

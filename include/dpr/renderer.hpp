@@ -218,10 +218,12 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
 
   /// Forward mode: the derivatives of the images along directions, RGBA, [direction][view]. After forward(), and
   /// throws as image() does where a setter came between. Exact, and the transpose of backward(): <u, J v> =
-  /// <J^T u, v> up to rounding (relative error 1e-5). Scene::gradients has no part in it. All directions share
-  /// most of the work. Memory: 28 bytes a fragment and direction, of as many directions at a time as half the
-  /// device's budget holds. Throws InvalidArgument with sampled depths or triangles, and for directions that change
-  /// texels, texture coordinates, normals, materials or lights, or sigma of noise on the pixel.
+  /// <J^T u, v> up to rounding (relative error 1e-5; along gamma, whose terms cancel, 2e-4). Scene::gradients has no
+  /// part in it. All directions share most of the work. Memory: of each direction its images, 28 bytes a fragment (40
+  /// in lit scenes with textures) and 16 to 64 a vertex and view, of as many at a time as half the device's budget
+  /// holds. Throws InvalidArgument with sampled depths or triangles, for directions that change texels, texture
+  /// coordinates, normals, materials or lights, or sigma of noise on the pixel, and for those that move the camera of a
+  /// lit scene whose view matrices came from a buffer.
   std::vector<Image> tangent(std::span<const SceneTangent> directions);
 
   /// Statistics of the last forward(). Throws as image() does.

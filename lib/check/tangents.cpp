@@ -17,7 +17,9 @@ void log_adjoint(const Device& device, const Scene& scene, const char* compared,
   SceneGradient gradient = renderer.backward(weights);
   std::vector<Way> ways = random_ways(gradient, scene.smoothing.noise != Noise::pixel, random);
   std::erase_if(ways, [](const Way& way) { return way.name == "gamma"; });
-  log.add("tangents", compared, std::ranges::max(errors_of(renderer, weights, ways)), k_adjoint);
+  Largest worst;
+  for (const double error : errors_of(renderer, weights, ways)) worst.add(error);
+  log.add("tangents", compared, worst.value(), k_adjoint);
 }
 
 Scene with(Scene scene, const char* preset, const std::optional<Lights>& lights) {

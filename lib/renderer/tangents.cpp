@@ -157,8 +157,15 @@ void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) 
   if (aggregate.is_sampled() || occupancy.is_sampled())
     throw InvalidArgument("tangent", "Monte Carlo", "the exact estimators");
   if (geometry_colors) throw InvalidArgument("tangent", "colours by geometry", "colours of the scene");
+  const auto moves_camera = [](const ViewGradient& view) {
+    return view.camera.view.rotation != dvec3(0) || view.camera.view.translation != dvec3(0);
+  };
   for (const SceneTangent& direction : directions) {
     validate(direction, scene, views.size(), *geometry, frame);
+    if (has_device_cameras && shade.lit() && std::ranges::any_of(direction.views, moves_camera)) {
+      throw InvalidArgument("camera (tangent)", "a lit scene, with view matrices from a buffer",
+                            "Renderer::set_views(): the eye's part of it needs their inverses");
+    }
     if (pixel_noise && direction.sigma != 0)
       throw InvalidArgument("sigma (tangent)", checks::text(direction.sigma), "0 with noise on the pixel");
   }
@@ -168,9 +175,12 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   Device::Impl& on = impl_of(device);
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(on, directions.size() * image().size());
-  const std::size_t bytes_each = (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) *
-                                     std::max<std::size_t>(rasterize.frame_fragments, 1) +
-                                 (pixel_noise ? samples * sizeof(cl_float4) : 0);
+  const std::size_t of_vertices = std::size_t{frame.views} * frame.vertices,
+                    of_faces = frame.clips != 0 ? std::size_t{frame.views} * frame.faces : 0;
+  const std::size_t bytes_each =
+      (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) * rasterize.frame_fragments +
+      sizeof(cl_float4) * (2 * of_vertices + (frame.clips != 0 ? of_vertices : 0) + 4 * of_faces +
+                           (shade.lit() ? transform.world.size() : 0) + (pixel_noise ? samples : 0));
   const std::size_t together = std::max<std::size_t>(device.memory_budget() / 2 / bytes_each, 1);
   for (std::size_t first = 0; first < directions.size(); first += together) {
     const auto group = directions.subspan(first, std::min(together, directions.size() - first));

@@ -2,6 +2,7 @@
 // bands; and what is refused.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -109,6 +110,28 @@ TEST_SUITE("tangents") {
       const Image tangent = renderer.tangent({&direction, 1})[0];
       for (const glm::vec4& pixel : tangent.pixels)
         CHECK(glm::distance(pixel, glm::vec4(1, 2, 3, 0)) < 1e-6F);
+    }
+  }
+
+  TEST_CASE("tangents are finite where a vertex lies in the camera's plane") {
+    for (const char* preset : {"pixel", "rigid", "joint_gaussian"}) {
+      CAPTURE(std::string(preset));
+      Scene scene = cube_scene(32, 32);
+      Mesh floor;
+      floor.positions = {{-3, -1, 4}, {3, -1, 4}, {3, -1, -6}, {-3, -1, -6}};
+      floor.faces = {{0, 1, 2}, {0, 2, 3}};
+      scene.meshes = {{floor}};
+      scene.camera = Camera{};
+      scene.camera.view[3] = glm::vec4(0, 0, -4, 1);
+      scene.smoothing = smoothing_preset(preset);
+      Renderer renderer(open_device());
+      renderer.set_scene(scene);
+      renderer.forward();
+      const SceneTangent direction = moved_along_x(renderer);
+      const Image tangent = renderer.tangent({&direction, 1})[0];
+      const auto is_finite = [](const glm::vec4& p) { return std::isfinite(p.x + p.y + p.z + p.w); };
+      CHECK(std::ranges::all_of(tangent.pixels, is_finite));
+      CHECK(std::ranges::any_of(renderer.image().pixels, [](const glm::vec4& p) { return p.w > 0; }));
     }
   }
 

@@ -319,4 +319,24 @@ TEST_SUITE("gradient") {
     check(
         gradient.meshes[0].texcoords, [](Mesh & m) -> auto& { return m.texcoords; }, 1e-3F, 5e-3);
   }
+  TEST_CASE("texture: the gradient is finite where a face is seen edge-on") {
+    Mesh mesh;
+    mesh.positions = {{-1, -0.5F, 3}, {-0.5F, 1, 0}, {0, 2.5F, 1}};  // on one line, as the camera sees them
+    mesh.faces = {{0, 1, 2}};
+    mesh.texcoords = {{0.1F, 0.2F}, {2.5F, 0.4F}, {1, 2}};
+    mesh.face_texcoords = mesh.faces;
+    mesh.textures = {check::random_texture(8, 8, Wrap::repeat, Filter::trilinear)};
+    Scene scene;
+    scene.width = 20;
+    scene.height = 16;
+    scene.meshes = {{mesh}};
+    scene.camera.view[3] = glm::vec4(0, 0, -4, 1);
+    scene.camera.orthographic_height = 6.0F;
+    scene.smoothing = smoothing_preset("gaussian");
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    renderer.forward();
+    const SceneGradient gradient = renderer.backward(std::vector{Image(20, 16, glm::vec4(1))});
+    for (const glm::vec3& g : gradient.meshes[0].positions) CHECK(std::isfinite(g.x + g.y + g.z));
+  }
 }

@@ -44,6 +44,8 @@ def _at(path, place):
 
 def _tangents_of_leaves(plan, tangents):
     """{number of a leaf: [K, ...]}"""
+    if not isinstance(tangents, dict):
+        _arrays.fail(TypeError, "tangents", type(tangents).__name__, "a dictionary by names of arrays")
     _require_given("tangents", tangents, plan)
     for name, inner in tangents.items():
         for key in inner if isinstance(inner, dict) else ():
