@@ -1,7 +1,7 @@
 // Normals in world space: of vertices, the faces' area-weighted normals, summed in order and normalised;
 // those that meshes give, turned with the mesh; and back. A view has those of all vertices, then those given.
 #include "face_normal.h"
-#include "shared_types.h"
+#include "world_tangents.h"
 
 /// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
 #define DPR_MIN_NORMAL 1e-20f
@@ -148,11 +148,6 @@ kernel void normals_given_backward(const FrameParams p, global const float4* res
     }
   }
   grad_values[value] = (float4)(sum, 0.0f);
-}
-
-/// Place of a direction's tangents of world positions and normals, which lie as those do; the eyes' follow.
-static inline size_t world_tangents_at(const FrameParams p, uint direction) {
-  return (size_t)direction * p.views * (p.vertices + p.normals + 1);
 }
 
 /// Tangents of the normals of vertices. One work-item per (view, vertex).

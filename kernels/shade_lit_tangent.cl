@@ -2,6 +2,7 @@
 // all that it is made of, times the tangents of these.
 #include "face_normal.h"
 #include "lit_backward.h"
+#include "world_tangents.h"
 
 /// The gradient of one channel of the colour, on all lanes.
 static inline Vec3n unit_gradient(int channel) {
@@ -38,7 +39,7 @@ static inline PlaceTangent load_place_tangent(const FrameParams p, uint directio
   faces += view_face - view * p.faces;
   const uint4 f = faces[0], n = faces[p.normal_faces];
   const uint vertex[3] = {f.x, f.y, f.z}, normal[3] = {n.x, n.y, n.z};
-  world_tangents += (size_t)direction * p.views * (p.vertices + p.normals + 1);
+  world_tangents += world_tangents_at(p, direction);
   global const float4 *positions = world_tangents + view * p.vertices,
                       *normals = world_tangents + p.views * p.vertices + view * p.normals;
   float4 flat = 0.0f;
@@ -49,7 +50,7 @@ static inline PlaceTangent load_place_tangent(const FrameParams p, uint directio
     if (unit.w > DPR_MIN_LENGTH) flat = (float4)((moved - unit.xyz * dot(unit.xyz, moved)) / unit.w, 0.0f);
   }
   PlaceTangent t;
-  t.eye = splat3(world_tangents[p.views * (p.vertices + p.normals) + view]);
+  t.eye = splat3(world_tangents[eyes_at(p) + view]);
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     t.position[k] = splat3(positions[vertex[k]]);

@@ -2,7 +2,7 @@
 #include "affine.h"
 #include "compensated.h"
 #include "lens.h"
-#include "shared_types.h"
+#include "world_tangents.h"
 
 DPR_COMPENSATED_ADD(add_channels, float8)
 
@@ -262,9 +262,9 @@ kernel void transform_tangent(const FrameParams p, const TangentParams q,
                        seen * of_view->projection.xy + of_view->projection.zw;
     ndc_tangents[(size_t)d * count + i] = (float4)(ndc.x, ndc.y, depth, 0.0f);
     if (q.lit) {
-      global float4* const of = world_tangents + (size_t)d * p.views * (p.vertices + p.normals + 1);
+      global float4* const of = world_tangents + world_tangents_at(p, d);
       of[i] = (float4)(move, 0.0f);
-      if (vertex == 0) of[p.views * (p.vertices + p.normals) + view] = of_view->eye;
+      if (vertex == 0) of[eyes_at(p) + view] = of_view->eye;
     }
     if (!p.clips) continue;
     const float w_clip = p.orthographic ? 1.0f : -c.z, w_moved = p.orthographic ? 0.0f : depth;

@@ -191,41 +191,14 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
                                                       .tangents = tangents.world});
 }
 
-/// What the kernels of lit tangents take, by the names of their arguments.
-struct LitTangentArguments {
-  const shared::FrameParams& p;
-  const shared::LightingParams& lp;
-  shared::TangentParams q;
-  const Buffer<cl_uint>&pair_face, &fragment_starts;
-  const Buffer<shared::ViewParams>& views;
-  const Buffer<shared::Light>& lights;
-  const Buffer<cl_uint4>& faces;
-  const Buffer<cl_float4>&colors, &world, &materials, &color_tangents, &world_tangents;
-  const Buffer<float>& fragments;
-  Buffer<float>& tangents;
-};
-
 void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
   const bool is_textured = !in.geometry.textures.empty();
   const Range pairs = in.rasterize.pairs(in.bin);
-  if (is_textured) surface->tangent(arguments(in), pairs, tangents);
+  SurfaceTangentArguments all{arguments(in), tangents.params, tangents.colors,   tangents.world,
+                              tangents.ndc,  tangents.clip,   tangents.fragments};
+  if (is_textured) surface->tangent(all, pairs);
   if (lit()) {
     if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
-    LitTangentArguments all{.p = in.p,
-                            .lp = now_.params,
-                            .q = tangents.params,
-                            .pair_face = in.bin.pair_face,
-                            .fragment_starts = in.rasterize.fragment_starts,
-                            .views = in.views.cameras,
-                            .lights = now_.lights,
-                            .faces = in.geometry.face_vertices,
-                            .colors = in.geometry.colors_of(in.p),
-                            .world = in.transform.world,
-                            .materials = in.geometry.materials.values,
-                            .color_tangents = tangents.colors,
-                            .world_tangents = tangents.world,
-                            .fragments = in.rasterize.values,
-                            .tangents = tangents.fragments};
     (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
     for (all.q.channel = 0; all.q.channel < 3; ++all.q.channel)
       (*now_.kernels->tangent)(pairs, kernel::shade_lit_place_tangent::pick(all));

@@ -45,36 +45,4 @@ void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bi
                                                                   .seen = seen});
 }
 
-void Surface::tangent(const SurfaceArguments& in, const Range& pairs, Tangents& tangents) {
-  launch_(pairs, kernel::surface_tangent{.p = in.p,
-                                         .q = tangents.params,
-                                         .pair_face = in.pair_face,
-                                         .fragment_starts = in.fragment_starts,
-                                         .faces = in.faces,
-                                         .colors = in.colors,
-                                         .texcoords = in.texcoords,
-                                         .textures = in.textures,
-                                         .texels = in.texels,
-                                         .triangles = in.triangles,
-                                         .clipped = in.clipped,
-                                         .color_tangents = tangents.colors,
-                                         .fragments = in.fragments,
-                                         .tangents = tangents.fragments});
-  if (in.p.levels == 1) return;
-  launch_(pairs, kernel::surface_detail_tangent{.p = in.p,
-                                                .q = tangents.params,
-                                                .pair_face = in.pair_face,
-                                                .fragment_starts = in.fragment_starts,
-                                                .faces = in.faces,
-                                                .colors = in.colors,
-                                                .texcoords = in.texcoords,
-                                                .textures = in.textures,
-                                                .triangles = in.triangles,
-                                                .clipped = in.clipped,
-                                                .vertices = tangents.ndc,
-                                                .clip_vertices = tangents.clip,
-                                                .fragments = in.fragments,
-                                                .tangents = tangents.fragments});
-}
-
 }  // namespace dpr

@@ -23,6 +23,13 @@ struct SurfaceArguments {
   Buffer<float>&fragments, &grads, &grad_pairs, &channels;
 };
 
+/// The same for their kernels of tangents.
+struct SurfaceTangentArguments : SurfaceArguments {
+  shared::TangentParams q;
+  const Buffer<cl_float4>&color_tangents, &world_tangents, &vertices, &clip_vertices;
+  Buffer<float>& tangents;
+};
+
 class Surface {
  public:
   explicit Surface(Device::Impl& device) : device_(device), launch_(device) {}
@@ -44,7 +51,10 @@ class Surface {
   void list(const SurfaceArguments& in, const Range& pairs, const Bin& bin, const Rasterize& rasterize);
 
   /// From the tangents of barycentrics, corners and their colours to those of the base colours.
-  void tangent(const SurfaceArguments& in, const Range& pairs, Tangents& tangents);
+  void tangent(const SurfaceTangentArguments& in, const Range& pairs) {
+    launch_(pairs, kernel::surface_tangent::pick(in));
+    if (in.p.levels > 1) launch_(pairs, kernel::surface_detail_tangent::pick(in));
+  }
 
   /// Bytes a fragment of the buffers below, of two levels, and of those that sorting needs.
   static constexpr std::size_t k_fragment_bytes = 2 * (4 * sizeof(cl_uint) + sizeof(shared::SeenTexels));
