@@ -39,9 +39,10 @@ enum class PoseLight {
 };
 
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
-/// difference between render and target, with exact Jacobians (forward mode). The default: it finds poses from anywhere. It brings a smoothing of its own, the exact joint
-/// composition with a blur that follows the pixels; of the scene's nothing is used. Levels whose pixels are
-/// larger than the mesh's triangles work on a coarser mesh.
+/// difference between render and target, with exact Jacobians (forward mode). The default: it finds poses from
+/// anywhere. It brings a smoothing of its own, the exact joint composition with a blur that follows the pixels;
+/// of the scene's nothing is used. Levels whose pixels are larger than the mesh's triangles work on a coarser
+/// mesh.
 struct LeastSquares {
   /// Rotations tried at the coarsest level, spread evenly over all; 0: only the poses that solve() is given.
   unsigned rotations = 1152;
