@@ -9,7 +9,7 @@ static inline uint eyes_at(const FrameParams p) { return p.views * (p.vertices +
 
 /// Where a direction's begin.
 static inline size_t world_tangents_at(const FrameParams p, uint direction) {
-  return (size_t)direction * (eyes_at(p) + p.views);
+  return (size_t)direction * p.views * (p.vertices + p.normals + 1);
 }
 
 #endif
