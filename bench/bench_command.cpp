@@ -93,6 +93,8 @@ void add_measure_options(CLI::App& command, BenchMeasureOptions& options) {
   command
       .add_option("--stage", options.stages, "Print and keep the figures of this stage only, may be repeated")
       ->type_name("NAME");
+  command.add_flag("--tangents", options.each.tangents,
+                   "Measure forward mode too: tangents along one direction and along six");
   command.add_option("--devices", options.devices, "Rank every device on one workload (default: sphere256)")
       ->check(CLI::IsMember({"all"}))
       ->type_name("all");

@@ -93,6 +93,20 @@ struct Row {
     renderer.backward(loss);
   }
 
+  /// The images' tangents on the host, along so many of six directions: the turns and shifts of the first mesh.
+  void tangents(std::size_t count) {
+    std::vector<SceneTangent> directions(count);
+    for (std::size_t d = 0; d < count; ++d) {
+      directions[d].views.resize(renderer.views().size());
+      for (ViewGradient& view : directions[d].views) {
+        view.transforms.resize(renderer.scene().meshes.size());
+        PoseGradient& pose = view.transforms[0];
+        (d < 3 ? pose.rotation : pose.translation)[static_cast<int>(d % 3)] = 1;
+      }
+    }
+    renderer.tangent(directions);
+  }
+
   static std::vector<Image> targets(const Workload& workload) {
     const Image grey(workload.scene.width, workload.scene.height, glm::vec4(0.3F));
     return std::vector<Image>(workload.views.size(), grey);
@@ -120,6 +134,8 @@ class Budget {
   Clock::time_point start_ = Clock::now();
 };
 
+constexpr std::size_t k_one = 1, k_six = 6;  // directions of forward mode
+
 /// Quartiles of the runs, and every run in order.
 Json timing_of(const std::vector<double>& milliseconds) {
   Json timing = quartiles(milliseconds);
@@ -140,6 +156,27 @@ void measure_passes(Row& row, const MeasureOptions& options, Json& result) {
   }
   result["forward_ms"] = timing_of(forward);
   result["backward_ms"] = timing_of(backward);
+}
+
+bool is_exact(const Smoothing& s) {
+  return s.occupancy_estimator == Estimator::exact && s.aggregation_estimator == Estimator::exact;
+}
+
+/// Times along one direction and along six in turn, each after its own forward pass.
+void measure_tangents(Row& row, const MeasureOptions& options, Json& result) {
+  std::map<std::size_t, std::vector<double>> times;
+  for (const std::size_t count : {k_one, k_six}) row.tangents(count);  // kernels are compiled, buffers grow
+  Budget budget(options.repetitions, options.max_seconds);
+  while (budget.next()) {
+    for (const std::size_t count : {k_one, k_six}) {
+      row.forward();
+      const auto start = Clock::now();
+      row.tangents(count);
+      times[count].push_back(milliseconds_since(start));
+    }
+  }
+  for (const auto& [count, milliseconds] : times)
+    result["tangents_ms"][std::to_string(count)] = timing_of(milliseconds);
 }
 
 Json to_json(const TransferCounts& before, const TransferCounts& after) {
@@ -184,7 +221,8 @@ void add_rates(const StageCost& cost, double milliseconds, const Peaks& peaks, J
 
 void measure_stages(Row& row, const Device& device, const Peaks& peaks, const MeasureOptions& options,
                     Json& result) {
-  StageRuns forward, backward;
+  StageRuns forward, backward, tangents;
+  const bool has_tangents = result.contains("tangents_ms");
   {
     Profile profile(device);
     Budget budget(options.repetitions, options.max_seconds / 2);
@@ -193,6 +231,11 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
       append(milliseconds_by_stage(profile.take()), run, forward);
       row.backward();
       append(milliseconds_by_stage(profile.take()), run, backward);
+      if (!has_tangents) continue;
+      row.forward();
+      profile.take();
+      row.tangents(k_six);
+      append(milliseconds_by_stage(profile.take()), run, tangents);
     }
   }
   // In several bands a backward pass renders them again, and only the last one's fragments are there to
@@ -205,6 +248,7 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
     if (!forward.contains(stage) && !backward.contains(stage)) continue;
     const double forward_ms = median(forward[stage]), backward_ms = median(backward[stage]);
     stages[stage] = {{"forward_ms", forward_ms}, {"backward_ms", backward_ms}};
+    if (has_tangents) stages[stage]["tangents_ms"] = median(tangents[stage]);
     const auto cost = stage_cost(stage, work, row.renderer.scene().smoothing);
     if (has_rates && cost) add_rates(*cost, forward_ms + backward_ms, peaks, stages[stage]);
   }
@@ -212,7 +256,7 @@ void measure_stages(Row& row, const Device& device, const Peaks& peaks, const Me
 
 Json describe_row(const Workload& workload, const Variant& variant) {
   const Smoothing& s = variant.smoothing;
-  const bool exact = s.occupancy_estimator == Estimator::exact && s.aggregation_estimator == Estimator::exact;
+  const bool exact = is_exact(s);
   return {{"workload", workload.name},
           {"preset", variant.preset},
           {"composition", to_string(s.composition)},
@@ -236,6 +280,7 @@ void measure_into(Json& result, const Device& device, const Peaks& peaks, const 
   row.forward();  // kernels are compiled, buffers grow
   row.backward();
   measure_passes(row, options, result);
+  if (options.tangents && is_exact(variant.smoothing)) measure_tangents(row, options, result);
   count_transfers(row, result);
   const std::size_t device_bytes = device.peak_allocated_bytes(), resident_bytes = peak_resident_bytes();
   measure_stages(row, device, peaks, options, result);

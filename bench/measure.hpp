@@ -14,6 +14,7 @@ struct MeasureOptions {
   unsigned repetitions = 15;  ///< timed runs of a row, after one to warm up; then as many of its stages
   double max_seconds =
       30;  ///< a slow row stops repeating after that, its stages after half; one run each is timed
+  bool tangents = false;  ///< forward mode as well, along one direction and along six
 };
 
 /// One row of the results. A row that fails or does not fit is a

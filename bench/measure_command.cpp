@@ -38,6 +38,11 @@ void print(const Json& row) {
       name.c_str(), row["forward_ms"]["median"].get<double>(), row["backward_ms"]["median"].get<double>(),
       row["fragments"].get<std::size_t>(), transfers["bytes_to_device"].get<double>() / k_kilo,
       transfers["bytes_from_device"].get<double>() / k_kilo, transfers["host_waits"].get<std::size_t>());
+  if (!row.contains("tangents_ms")) return;
+  for (const auto& [directions, timing] : row["tangents_ms"].items()) {
+    std::printf("   along %s: %10.3f ms", directions.c_str(), timing["median"].get<double>());
+  }
+  std::printf("\n");
 }
 
 void print_stages(const Json& row) {
@@ -45,6 +50,8 @@ void print_stages(const Json& row) {
   for (const auto& [name, stage] : row["stages"].items()) {
     std::printf("   %-10s forward %10.3f ms   backward %10.3f ms", name.c_str(),
                 stage["forward_ms"].get<double>(), stage["backward_ms"].get<double>());
+    if (stage.contains("tangents_ms"))
+      std::printf("   along 6 %10.3f ms", stage["tangents_ms"].get<double>());
     if (stage.contains("gflops")) {
       std::printf("   %8.2f GFLOP/s, %4.1f%% of peak   %7.2f GB/s, %4.1f%%", stage["gflops"].get<double>(),
                   k_percent * stage["fraction_of_peak"].get<double>(), stage["gbytes_per_s"].get<double>(),
