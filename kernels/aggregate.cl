@@ -276,72 +276,57 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
   write_channels(p, pixel, grad_gamma, grad_alpha, background_weight, grad, channels);
 }
 
-/// Tangents of the image. One work-item per pixel. Deterministic.
+/// The first half of forward mode: derivatives of the pixel's colour by its fragments, and the image's tangents by
+/// what the frame has one of. One work-item per pixel. Deterministic.
 /// in   views, starts, list, fragments, slots, slot_counts  as aggregate_backward has them
-/// in   frames    FrameTangent[direction]
-/// in   tangents  float[direction][planes][fragment]  of DEPTH, LOG_OCCUPANCY, COLOR
-/// out  rows      float[4][fragment]  derivatives of the pixel's colour by its fragments: the weight; by beta,
-///                RGB
-/// out  image_tangents  float4[direction][pixel]  from `first_direction` on
-kernel void aggregate_tangent(const AggregateParams p, const uint first_direction, const uint directions,
-                              const uint planes, global const ViewParams* restrict views,
-                              global const uint* restrict starts, global const uint* restrict list,
-                              global const float* restrict fragments, global Slot* restrict slots,
-                              global const uint* restrict slot_counts,
-                              global const FrameTangent* restrict frames,
-                              global const float* restrict tangents, global float* restrict rows,
-                              global float4* restrict image_tangents) {
+/// in   frames  FrameTangent[direction]
+/// out  rows    float[DPR_FRAGMENT_ROWS][fragment]  DPR_ROW_...
+/// out  image_tangents  float4[direction][pixel]  from q.first on
+kernel void aggregate_rows(const AggregateParams p, const TangentParams q,
+                           global const ViewParams* restrict views, global const uint* restrict starts,
+                           global const uint* restrict list, global const float* restrict fragments,
+                           global Slot* restrict slots, global const uint* restrict slot_counts,
+                           global const FrameTangent* restrict frames, global float* restrict rows,
+                           global float4* restrict image_tangents) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
   const uint first = starts[pixel], last = starts[pixel + 1], plane = p.grad_fragments;
   if (first == last) {
-    for (uint d = 0; d < directions; ++d)
-      image_tangents[(size_t)(first_direction + d) * p.pixels + pixel] =
-          (float4)(frames[d].background.xyz, 0.0f);
+    store_frame_tangents(p, q, pixel, 1.0f, 0.0f, 0.0f, frames, image_tangents);
     return;
   }
   const Fragments f = make_fragments(p, list, fragments);
   const Slots run = {slots + first + pixel, slot_counts[pixel], 0.0f};
-  SlotRows out = {rows, rows + plane, 0, plane, 0.0f, 0.0f};
-  for (uint i = 0; i < run.count; ++i) {
-    const uint k = run.slot[i].fragment;
-    if (k == DPR_BACKGROUND_SLOT) continue;
-    out.weight[k] = 0.0f;
-    store_planes(0.0f, k, plane, out.beta);
-  }
+  const float transparency = run_transparency(f, first, last);
+  for (uint i = first; i < last; ++i)
+    clear_rows(list[i], plane, alpha_sensitivity(f, list[i], transparency), rows);
+  SlotRows out = {rows, rows + DPR_ROW_DEPTH * plane, 0, plane, 0.0f, 0.0f};
   float total = 1.0f;
   if (run.count > 1) {
     total = weigh_rows(run, f, p.background.xyz, &out);
   } else {
     add_row(run.slot[0].fragment, 1.0f, 0.0f, &out);
   }
+  const float scale = 1.0f / total;
   global const ViewParams* view = views + pixel / p.pixels_per_view;
   const float depth_scale = view->inverse_range / p.gamma, inverse_alpha = 1.0f / p.alpha;
   const float background_depth = view->zfar - p.background_depth / view->inverse_range;
   const float depth_origin = slot_depth(run.slot[0], f, background_depth),
               log_origin = slot_log(run.slot[0], f);
-  const float transparency = run_transparency(f, first, last);
-  for (uint d = 0; d < directions; ++d) {
-    const FragmentTangents t = make_tangents(p, d, planes, frames, tangents);
-    const float by_gamma = depth_scale / p.gamma * t.frame->gamma,
-                by_alpha = -inverse_alpha * inverse_alpha * t.frame->alpha;
-    float3 sum = out.background_weight * t.frame->background.xyz;
-    for (uint i = 0; i < run.count; ++i) {
-      const Slot s = run.slot[i];
-      const uint k = s.fragment;
-      // Shifting all betas changes nothing: they count from the largest, as in the backward pass.
-      const float by_frame = (slot_depth(s, f, background_depth) - depth_origin) * by_gamma +
-                             (slot_log(s, f) - log_origin) * by_alpha;
-      if (k == DPR_BACKGROUND_SLOT) {
-        sum += by_frame * out.background_beta;
-        continue;
-      }
-      const float beta = by_frame - depth_scale * t.depth[k] + inverse_alpha * t.log_occupancy[k];
-      sum += out.weight[k] * load_planes(k, plane, t.color) + beta * load_planes(k, plane, out.beta);
-    }
-    float coverage = 0.0f;
-    for (uint i = first; i < last; ++i)
-      coverage += alpha_sensitivity(f, list[i], transparency) * t.log_occupancy[list[i]];
-    image_tangents[(size_t)(first_direction + d) * p.pixels + pixel] = (float4)(sum / total, coverage);
+  float3 by_gamma = 0.0f, by_alpha = 0.0f;
+  for (uint i = 0; i < run.count; ++i) {
+    const Slot s = run.slot[i];
+    const uint k = s.fragment;
+    const int is_background = k == DPR_BACKGROUND_SLOT;
+    const float3 by_beta = scale * (is_background ? out.background_beta : load_planes(k, plane, out.beta));
+    // Shifting all betas changes nothing: they count from the largest, as in the backward pass.
+    by_gamma += (slot_depth(s, f, background_depth) - depth_origin) * by_beta;
+    by_alpha += (slot_log(s, f) - log_origin) * by_beta;
+    if (is_background) continue;
+    out.weight[k] *= scale;
+    store_planes(-depth_scale * by_beta, k, plane, out.beta);
+    store_planes(inverse_alpha * by_beta, k, plane, rows + DPR_ROW_LOG_OCCUPANCY * plane);
   }
+  store_frame_tangents(p, q, pixel, scale * out.background_weight, depth_scale / p.gamma * by_gamma,
+                       -inverse_alpha * inverse_alpha * by_alpha, frames, image_tangents);
 }

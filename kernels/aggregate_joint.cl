@@ -301,84 +301,58 @@ static inline float3 cluster_rows(Slots run, const Fragments f, float3 behind, S
   return transparency * behind + integrate_rows(run, f, (float3)(0.0f), out).xyz;
 }
 
-/// Tangents of the image. One work-item per pixel. Deterministic.
-/// in   views, starts, list, fragments, slots, slot_counts  as aggregate_joint_backward has them
-/// in   frames    FrameTangent[direction]
-/// in   tangents  float[direction][planes][fragment]  of DEPTH, LOG_OCCUPANCY, COLOR
-/// out  rows      float[7][fragment]  derivatives of the pixel's colour by its fragments: the weight; by depth
-///                and by ln p, RGB each
-/// out  image_tangents  float4[direction][pixel]  from `first_direction` on
-kernel void aggregate_joint_tangent(const AggregateParams p, const uint first_direction,
-                                    const uint directions, const uint planes,
-                                    global const ViewParams* restrict views,
-                                    global const uint* restrict starts, global const uint* restrict list,
-                                    global const float* restrict fragments, global Slot* restrict slots,
-                                    global const uint* restrict slot_counts,
-                                    global const FrameTangent* restrict frames,
-                                    global const float* restrict tangents, global float* restrict rows,
-                                    global float4* restrict image_tangents) {
+/// The first half of forward mode, as aggregate_rows, for the joint composition: `slots` and `slot_counts` as
+/// aggregate_joint_backward has them.
+kernel void aggregate_joint_rows(const AggregateParams p, const TangentParams q,
+                                 global const ViewParams* restrict views, global const uint* restrict starts,
+                                 global const uint* restrict list, global const float* restrict fragments,
+                                 global Slot* restrict slots, global const uint* restrict slot_counts,
+                                 global const FrameTangent* restrict frames, global float* restrict rows,
+                                 global float4* restrict image_tangents) {
   const uint pixel = (uint)get_global_id(0);
   if (pixel >= p.last_pixel) return;
-  const uint first = starts[pixel], last = starts[pixel + 1];
+  const uint first = starts[pixel], last = starts[pixel + 1], plane = p.grad_fragments;
   const Fragments f = make_fragments(p, list, fragments);
+  global float *const by_depth = rows + DPR_ROW_DEPTH * plane,
+                      *const by_log = rows + DPR_ROW_LOG_OCCUPANCY * plane;
   if (last - first < 2) {
-    const uint k = first < last ? list[first] : 0;
-    const float weight = first < last ? f.occupancy[k] : 0.0f;
-    const float transparency = first < last ? fragment_transparency(f, k) : 1.0f;
-    for (uint d = 0; d < directions; ++d) {
-      const FragmentTangents t = make_tangents(p, d, planes, frames, tangents);
-      float4 sum = (float4)(transparency * t.frame->background.xyz, 0.0f);
-      if (first < last) {
-        const float moved = weight * t.log_occupancy[k];
-        sum += (float4)(moved * (fragment_color(f, k) - p.background.xyz) +
-                            weight * load_planes(k, p.grad_fragments, t.color),
-                        moved);
-      }
-      image_tangents[(size_t)(first_direction + d) * p.pixels + pixel] = sum;
+    float transparency = 1.0f;
+    if (first < last) {
+      const uint k = list[first];
+      transparency = fragment_transparency(f, k);
+      clear_rows(k, plane, f.occupancy[k], rows);
+      rows[k] = f.occupancy[k];
+      store_planes(f.occupancy[k] * (fragment_color(f, k) - p.background.xyz), k, plane, by_log);
     }
+    store_frame_tangents(p, q, pixel, transparency, 0.0f, 0.0f, frames, image_tangents);
     return;
   }
   const float inverse_range = views[pixel / p.pixels_per_view].inverse_range;
   const float depth_scale = inverse_range / p.gamma;
   global Slot* pixel_slots = slots + first;
-  const uint seen = slot_counts[pixel], plane = p.grad_fragments;
-  SlotRows out = {rows, rows + plane, rows + 4 * plane, plane, 0.0f, 0.0f};
+  const uint seen = slot_counts[pixel];
   float transparency = 1.0f;
-  for (uint i = 0; i < seen; ++i) {
-    const uint k = pixel_slots[i].fragment;
-    transparency *= slot_transparency(pixel_slots[i]);
-    out.weight[k] = 0.0f;
-    store_planes(0.0f, k, plane, out.beta);
-  }
+  for (uint i = 0; i < seen; ++i) transparency *= slot_transparency(pixel_slots[i]);
+  for (uint i = first; i < last; ++i) clear_rows(list[i], plane, 0.0f, rows);
+  SlotRows out = {rows, by_depth, by_log, plane, 0.0f, 0.0f};
   // Back to front, as the backward pass.
-  float3 behind = p.background.xyz;
+  float3 behind = p.background.xyz, by_gamma = 0.0f;
   for (uint end = seen; end > 0;) {
     float in_front;
     const Slots run = cluster_before(pixel_slots, end, &in_front);
     behind = cluster_rows(run, f, behind, &out);
     for (uint i = 0; i < run.count; ++i) {
-      const uint k = run.slot[i].fragment;
-      const float weight = run.slot[i].occupancy * in_front;
-      out.weight[k] *= weight;
-      store_planes(-in_front * depth_scale * load_planes(k, plane, out.beta), k, plane, out.beta);
-      store_planes(weight * load_planes(k, plane, out.occupancy), k, plane, out.occupancy);
+      const Slot s = run.slot[i];
+      const uint k = s.fragment;
+      const float weight = s.occupancy * in_front;
+      const float3 by_beta = in_front * load_planes(k, plane, by_depth);
+      by_gamma -= s.beta * by_beta;  // d beta / d gamma = -beta / gamma
+      rows[k] *= weight;
+      store_planes(-depth_scale * by_beta, k, plane, by_depth);
+      store_planes(weight * load_planes(k, plane, by_log), k, plane, by_log);
+      rows[k + DPR_ROW_COVERAGE * plane] = s.occupancy * transparency / slot_transparency(s);
     }
     end -= run.count;
   }
-  for (uint d = 0; d < directions; ++d) {
-    const FragmentTangents t = make_tangents(p, d, planes, frames, tangents);
-    // d beta / d gamma = -beta / gamma, and a depth changes beta by -depth_scale.
-    const float by_gamma = t.frame->gamma / inverse_range;
-    float4 sum = (float4)(transparency * t.frame->background.xyz, 0.0f);
-    for (uint i = 0; i < seen; ++i) {
-      const Slot s = pixel_slots[i];
-      const uint k = s.fragment;
-      const float log_p = t.log_occupancy[k];
-      sum.xyz += out.weight[k] * load_planes(k, plane, t.color) +
-                 (t.depth[k] + s.beta * by_gamma) * load_planes(k, plane, out.beta) +
-                 log_p * load_planes(k, plane, out.occupancy);
-      sum.w += s.occupancy * transparency / slot_transparency(s) * log_p;
-    }
-    image_tangents[(size_t)(first_direction + d) * p.pixels + pixel] = sum;
-  }
+  store_frame_tangents(p, q, pixel, transparency, by_gamma / p.gamma, 0.0f, frames, image_tangents);
 }

@@ -12,7 +12,7 @@
 /// in   clip_vertices   float4[direction][view][vertex]  of homogeneous coordinates
 /// out  outlines        float4[direction][view][face][DPR_OUTLINE_CORNERS]  those of other faces are not written
 kernel void clip_outline_tangent(
-    const FrameParams p, const uint directions, global const ViewParams* restrict views,
+    const FrameParams p, const TangentParams q, global const ViewParams* restrict views,
     global const ClippedFace* restrict clipped, global const uint4* restrict faces,
     global const ViewTangent* restrict view_tangents, global const float4* restrict vertices,
     global const float4* restrict clip_vertices, global float4* restrict outlines) {
@@ -21,7 +21,7 @@ kernel void clip_outline_tangent(
   const uint view = i / p.faces;
   const ClippedFace c = clipped[i];
   global const uint4* const face = faces + (i - view * p.faces);
-  for (uint d = 0; d < directions; ++d) {
+  for (uint d = 0; d < q.directions; ++d) {
     const size_t of_view = (size_t)d * p.views + view;
     global const float4 *ndc = vertices + of_view * p.vertices, *clip = clip_vertices + of_view * p.vertices;
     float3 cut[2];
@@ -123,7 +123,7 @@ static inline void outer_tangents(const FrameParams p, const ClippedTriangles t,
 /// in   fragments  float[plane][fragment]  DISTANCE
 /// in   outlines   as clip_outline_tangent leaves them
 /// in out  tangents  as rasterize_tangent leaves them; of clipped faces replaced
-kernel void clip_tangent(const FrameParams p, const uint directions, const uint planes,
+kernel void clip_tangent(const FrameParams p, const TangentParams q,
                          global const uint* restrict pairs, global const ClippedFace* restrict clipped,
                          global const Triangle* restrict triangles, global const uint* restrict pair_face,
                          global const uint* restrict fragment_starts, global const uint* restrict pixels,
@@ -136,7 +136,7 @@ kernel void clip_tangent(const FrameParams p, const uint directions, const uint 
   const ClippedFace c = clipped[face];
   const ClippedTriangles t = load_clipped(triangles[face], c);
   const ClippedRun run = {fragment_starts[pair], last, pixels};
-  const PairTangents at = {directions, planes, last, outlines + DPR_OUTLINE_CORNERS * (size_t)face, tangents};
+  const PairTangents at = {q.directions, q.planes, last, outlines + DPR_OUTLINE_CORNERS * (size_t)face, tangents};
   // One thing after the other: together they would need too many registers.
   for (uint i = run.first; !p.sharp && i < last; i += DPR_WIDTH) {
     const intn in_run = lanes_before(last, i);

@@ -153,7 +153,7 @@ kernel void normals_given_backward(const FrameParams p, global const float4* res
 /// Tangents of the normals of vertices. One work-item per (view, vertex).
 /// in   faces, corner_starts, corners, world  as normals_forward left them
 /// in out  tangents  float4[direction][...]  of vertices' normals by those of world positions
-kernel void normals_tangent(const FrameParams p, const uint directions, global const uint4* restrict faces,
+kernel void normals_tangent(const FrameParams p, const TangentParams q, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
                             global const float4* restrict world, global float4* restrict tangents) {
   const uint i = (uint)get_global_id(0);
@@ -161,7 +161,7 @@ kernel void normals_tangent(const FrameParams p, const uint directions, global c
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
   global const float4* positions = world + view * p.vertices;
   const float4 n = world[normal_at(p, view, vertex)];
-  for (uint d = 0; d < directions; ++d) {
+  for (uint d = 0; d < q.directions; ++d) {
     global float4* const moved = tangents + world_tangents_at(p, d);
     float3 sum = 0.0f;
     for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k)
@@ -174,14 +174,14 @@ kernel void normals_tangent(const FrameParams p, const uint directions, global c
 /// in   given_mesh, world  as normals_given_forward
 /// in   model_tangents  ModelTangent[direction][view][mesh]
 /// out  tangents        float4[direction][...]  those of given normals
-kernel void normals_given_tangent(const FrameParams p, const uint directions,
+kernel void normals_given_tangent(const FrameParams p, const TangentParams q,
                                   global const uint* restrict given_mesh,
                                   global const ModelTangent* restrict model_tangents,
                                   global const float4* restrict world, global float4* restrict tangents) {
   const uint i = (uint)get_global_id(0), count = p.normals - p.vertices;
   if (i >= p.views * count) return;
   const uint view = i / count, g = i - view * count, at = normal_at(p, view, p.vertices + g);
-  for (uint d = 0; d < directions; ++d) {
+  for (uint d = 0; d < q.directions; ++d) {
     const float4 turn = model_tangents[((size_t)d * p.views + view) * p.meshes + given_mesh[g]].rotation;
     tangents[world_tangents_at(p, d) + at] = (float4)(cross(turn.xyz, world[at].xyz), 0.0f);
   }

@@ -112,17 +112,17 @@ kernel void occupancy_backward(const OccupancyParams p, const uint2 range, globa
 /// Deterministic.
 /// in   fragment_starts, fragments  as occupancy_forward
 /// in   frames       FrameTangent[direction]
-/// in out  tangents  float[direction][planes][fragment]  LOG_OCCUPANCY, where those of distances are
-kernel void occupancy_tangent(const OccupancyParams p, const uint last_pair, const uint directions,
-                              const uint planes, global const uint* restrict fragment_starts,
+/// in out  tangents  float[direction][q.planes][fragment]  LOG_OCCUPANCY, where those of distances are
+kernel void occupancy_tangent(const OccupancyParams p, const uint last_pair, const TangentParams q,
+                              global const uint* restrict fragment_starts,
                               global const float* restrict fragments,
                               global const FrameTangent* restrict frames, global float* restrict tangents) {
   const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
   for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
     const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
-    for (uint d = 0; d < directions; ++d) {
+    for (uint d = 0; d < q.directions; ++d) {
       global float* const out =
-          tangents + (size_t)d * planes * p.grad_fragments + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
+          tangents + (size_t)d * q.planes * p.grad_fragments + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
       store_n(v.slope * (load_n(i, out) - v.ratio * frames[d].sigma), i, out);
     }
   }

@@ -46,24 +46,6 @@ static inline FragmentGradients make_gradients(const AggregateParams p, global f
   return g;
 }
 
-/// The tangents of a pixel's fragments in a direction, and of what the frame has one of.
-typedef struct {
-  global const float *depth, *log_occupancy, *color;
-  global const FrameTangent* frame;
-} FragmentTangents;
-
-static inline FragmentTangents make_tangents(const AggregateParams p, uint direction, uint planes,
-                                             global const FrameTangent* frames,
-                                             global const float* tangents) {
-  global const float* const of = tangents + (size_t)direction * planes * p.grad_fragments;
-  FragmentTangents t;
-  t.depth = of + DPR_GRAD_PLANE(p, DEPTH);
-  t.log_occupancy = of + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
-  t.color = of + DPR_GRAD_PLANE(p, COLOR);
-  t.frame = frames + direction;
-  return t;
-}
-
 /// Stores the gradient of a fragment's colour, which has that weight in its pixel.
 static inline void store_color(const FragmentGradients to, uint fragment, float weight, float4 grad) {
   to.red[fragment] = weight * grad.x;
@@ -91,6 +73,23 @@ static inline float run_transparency(const Fragments f, uint first, uint last) {
 /// d alpha / d ln p of one fragment: p prod of the others' transparencies.
 static inline float alpha_sensitivity(const Fragments f, uint fragment, float transparency) {
   return f.occupancy[fragment] * transparency / fragment_transparency(f, fragment);
+}
+
+/// Clears a fragment's rows, but for what its ln p adds to alpha.
+static inline void clear_rows(uint fragment, uint plane, float coverage, global float* rows) {
+  for (uint row = 0; row < DPR_ROW_COVERAGE; ++row) rows[fragment + row * plane] = 0.0f;
+  rows[fragment + DPR_ROW_COVERAGE * plane] = coverage;
+}
+
+/// A pixel's tangents by what the frame has one of: background colour, gamma, alpha.
+static inline void store_frame_tangents(const AggregateParams p, const TangentParams q, uint pixel,
+                                        float background_weight, float3 by_gamma, float3 by_alpha,
+                                        global const FrameTangent* frames, global float4* image_tangents) {
+  for (uint d = 0; d < q.directions; ++d) {
+    const FrameTangent t = frames[d];
+    image_tangents[(size_t)(q.first + d) * p.pixels + pixel] = (float4)(
+        background_weight * t.background.xyz + t.gamma * by_gamma + t.alpha * by_alpha, 0.0f);
+  }
 }
 
 /// State shared by the slots of a pixel in the barrier composition.

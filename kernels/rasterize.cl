@@ -305,9 +305,9 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
 /// in   faces     uint4[face]  vertex indices
 /// in   vertices  float4[direction][view][vertex]  of x, y (NDC) and view depth
 /// in   fragments  float[plane][fragment]  DISTANCE, whose sign says on which side the sample lies, and BARY
-/// out  tangents  float[direction][planes][fragment]  of DEPTH, BARY; of DISTANCE in place of LOG_OCCUPANCY
-kernel void rasterize_tangent(const FrameParams p, const uint2 range, const uint directions,
-                              const uint planes, global const uint* restrict pairs,
+/// out  tangents  float[direction][q.planes][fragment]  of DEPTH, BARY; of DISTANCE in place of LOG_OCCUPANCY
+kernel void rasterize_tangent(const FrameParams p, const uint2 range, const TangentParams q,
+                              global const uint* restrict pairs,
                               global const Triangle* restrict triangles,
                               global const uint* restrict pair_face,
                               global const uint* restrict fragment_starts, global const uint* restrict pixels,
@@ -337,11 +337,11 @@ kernel void rasterize_tangent(const FrameParams p, const uint2 range, const uint
       add_barycentric_gradient(v, t, scale, (realn)(0.0f), (realn)(0.0f), (realn)(1.0f), &by_c2);
       const realn c1 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY));
       const realn c2 = load_run(in_run, i, fragments + DPR_PLANE(p, BARY) + p.fragments);
-      for (uint d = 0; d < directions; ++d) {
+      for (uint d = 0; d < q.directions; ++d) {
         global const float4* const of_view = vertices + (size_t)(d * p.views + view) * p.vertices;
         const CornerTangents move = {{of_view[face.x].xyz, of_view[face.y].xyz, of_view[face.z].xyz}};
         const realn b1 = along_corners(by_c1, move), b2 = along_corners(by_c2, move);
-        global float* const out = tangents + (size_t)d * planes * p.grad_fragments;
+        global float* const out = tangents + (size_t)d * q.planes * p.grad_fragments;
         store_run(b1, i, end, out + DPR_GRAD_PLANE(p, BARY));
         store_run(b2, i, end, out + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments);
         store_run((1.0f - c1 - c2) * move.corner[0].z + c1 * move.corner[1].z + c2 * move.corner[2].z +

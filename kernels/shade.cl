@@ -96,11 +96,10 @@ kernel void shade_backward(const FrameParams p, const uint2 range, global const 
 
 /// Tangents of colours by those of barycentrics and of the corners' colours. One work-item per group of pairs
 /// in `range`. Deterministic. Inputs as shade_forward, and
-/// in   moved_colors    how many colours there are of a direction; 0: none changes, color_tangents is not read
 /// in   color_tangents  float4[direction][color] or, with a stride, float4[direction][view][color]
-/// in out  tangents     float[direction][planes][fragment]  COLOR by BARY
-kernel void shade_tangent(const FrameParams p, const uint2 range, const uint directions, const uint planes,
-                          const uint moved_colors, global const uint* restrict pairs,
+/// in out  tangents     float[direction][q.planes][fragment]  COLOR by BARY
+kernel void shade_tangent(const FrameParams p, const uint2 range, const TangentParams q,
+                          global const uint* restrict pairs,
                           global const uint* restrict pair_face, global const uint* restrict fragment_starts,
                           global const uint4* restrict faces, global const float4* restrict colors,
                           global const float4* restrict color_tangents,
@@ -112,11 +111,11 @@ kernel void shade_tangent(const FrameParams p, const uint2 range, const uint dir
     const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
     if (first == last) continue;
     const CornerColors c = load_colors(p, pair_face[pair], faces, colors);
-    for (uint d = 0; d < directions; ++d) {
+    for (uint d = 0; d < q.directions; ++d) {
       CornerColors m = {0.0f, 0.0f, 0.0f};
-      if (moved_colors != 0)
-        m = load_colors(p, pair_face[pair], faces, color_tangents + (size_t)d * moved_colors);
-      global float* const of = tangents + (size_t)d * planes * p.grad_fragments;
+      if (q.colors != 0)
+        m = load_colors(p, pair_face[pair], faces, color_tangents + (size_t)d * q.colors);
+      global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments;
       for (uint i = first; i < last; i += DPR_WIDTH) {
         const intn in_run = lanes_before(last, i);
         const realn b1 = load_run(in_run, i, of + DPR_GRAD_PLANE(p, BARY));

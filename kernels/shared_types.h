@@ -105,6 +105,12 @@ using float4 = cl_float4;
 /// colours after them.
 #define DPR_TANGENT_PLANES DPR_PLANE_DISTANCE
 #define DPR_TANGENT_PLANE_BASE DPR_TANGENT_PLANES
+/// Rows of fragments: derivatives of their pixels' colour, in place of gradients; of alpha by ln p.
+#define DPR_ROW_WEIGHT 0 /* by the fragment's own colour, of each channel */
+#define DPR_ROW_DEPTH 1  /* RGB */
+#define DPR_ROW_LOG_OCCUPANCY 4 /* RGB */
+#define DPR_ROW_COVERAGE 7
+#define DPR_FRAGMENT_ROWS DPR_GRAD_PLANE_BASE
 #define DPR_PLANE(p, name) (DPR_PLANE_##name * (p).fragments)
 #define DPR_GRAD_PLANE(p, name) (DPR_PLANE_##name * (p).grad_fragments)
 
@@ -394,7 +400,7 @@ typedef struct TangentParams {
   uint lit;               /* tangents of world positions, normals and eyes are found, for the light */
   uint base_plane;        /* of base colours where light falls on them, else of colours */
   uint channel;           /* of the colour */
-  uint unused;
+  uint first;             /* of the directions, among the images' */
 } TangentParams;
 
 /// Weights of the terms of a mesh's own loss, each with the number it is averaged over divided out, and its

@@ -17,12 +17,6 @@ bool is_geometric(const GradientRequest& wanted) {
   return wanted.positions || wanted.transform || wanted.camera || wanted.distortion || wanted.normals;
 }
 
-/// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
-std::size_t fragment_bytes(const Geometry& geometry) {
-  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
-  return k_always + (geometry.textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
-}
-
 }  // namespace
 
 std::uint64_t next_frame_number() {
@@ -131,9 +125,15 @@ void Renderer::Impl::set_up() {
   bin.start();
 }
 
+/// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
+std::size_t Renderer::Impl::fragment_bytes() const {
+  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
+  return k_always + (geometry->textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
+}
+
 /// Memory for fragments: no more of them than kernels can index.
 std::size_t Renderer::Impl::fragment_budget() const {
-  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes(*geometry));
+  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes());
 }
 
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
@@ -142,7 +142,7 @@ std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
   const FrameCounts expected{std::min(with_headroom(counts.pairs), k_most_pairs),
                              with_headroom(counts.fragments), with_headroom(counts.contours)};
-  if (with_headroom(expected.fragments) * fragment_bytes(*geometry) >= fragment_budget()) return std::nullopt;
+  if (with_headroom(expected.fragments) * fragment_bytes() >= fragment_budget()) return std::nullopt;
   return expected;
 }
 
@@ -203,7 +203,8 @@ void Renderer::Impl::forward_measured() {
   find_contours(std::nullopt);
   bin.forward(frame, setup);
   rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, bin, fragment_budget(), fragment_bytes(*geometry));
+  bands = rasterize.cut(frame, bin, fragment_budget(), fragment_bytes());
+  Rasterize::require_fits(bands, fragment_budget(), fragment_bytes());
   for (const Band& band : bands) render(band);
   finish_image();
   if (bands.size() > 1) return;

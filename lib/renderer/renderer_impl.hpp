@@ -120,6 +120,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Fills `tangents.images` with the derivatives of the last frame's images. After require_forward() and
   /// require_tangents().
   void tangent(std::span<const SceneTangent> directions);
+  std::size_t tangent_bytes() const;
+  void cut_for_tangents(std::size_t directions);
   /// Room for at least so much in all frames of the scene.
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
@@ -223,6 +225,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void find_edges();
   void hide_back_faces();
   void set_up();
+  std::size_t fragment_bytes() const;
   std::size_t fragment_budget() const;
   std::optional<FrameCounts> expected_capacity() const;
   FrameCounts likely_counts(const FrameCounts& room) const;

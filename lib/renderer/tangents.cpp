@@ -171,22 +171,40 @@ void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) 
   }
 }
 
+/// Device memory of a direction's numbers but those of fragments.
+std::size_t Renderer::Impl::tangent_bytes() const {
+  const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height,
+                    of_vertices = std::size_t{frame.views} * frame.vertices;
+  const std::size_t clipped = frame.clips != 0 ? of_vertices + 4 * std::size_t{frame.views} * frame.faces : 0;
+  return sizeof(cl_float4) * (2 * of_vertices + clipped + (shade.lit() ? transform.world.size() : 0) +
+                              (pixel_noise ? samples : 0));
+}
+
+/// Bands whose fragments have memory for tangents along so many directions: the frame's own, or smaller ones.
+void Renderer::Impl::cut_for_tangents(std::size_t directions) {
+  const std::size_t budget = fragment_budget();
+  const std::size_t planes = DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base};
+  const std::size_t bytes =
+      2 * directions * (planes * sizeof(float) + sizeof(cl_float4));  // half of the budget
+  std::size_t largest = 0;
+  for (const Band& band : bands) largest = std::max(largest, band.fragments.count);
+  if (largest * bytes <= budget) return;
+  if (bands.size() == 1) rasterize.read_rows(frame);
+  bands = rasterize.cut(frame, bin, budget, std::max(bytes, fragment_bytes()));
+}
+
 void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
-  Device::Impl& on = impl_of(device);
+  constexpr std::size_t k_most = 16;  // at a time
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
-  tangents.images.resize(on, directions.size() * image().size());
-  const std::size_t of_vertices = std::size_t{frame.views} * frame.vertices,
-                    of_faces = frame.clips != 0 ? std::size_t{frame.views} * frame.faces : 0;
-  const std::size_t bytes_each =
-      (DPR_TANGENT_PLANES + 3 * std::size_t{frame.has_base}) * sizeof(float) * rasterize.frame_fragments +
-      sizeof(cl_float4) * (2 * of_vertices + (frame.clips != 0 ? of_vertices : 0) + 4 * of_faces +
-                           (shade.lit() ? transform.world.size() : 0) + (pixel_noise ? samples : 0));
-  const std::size_t together = std::max<std::size_t>(device.memory_budget() / 2 / bytes_each, 1);
+  tangents.images.resize(impl_of(device), directions.size() * image().size());
+  const std::size_t fitting = std::max<std::size_t>(device.memory_budget() / 2 / tangent_bytes(), 1);
+  const std::size_t together = std::min({directions.size(), fitting, k_most});
+  cut_for_tangents(together);
   for (std::size_t first = 0; first < directions.size(); first += together) {
     const auto group = directions.subspan(first, std::min(together, directions.size() - first));
     upload_directions(group);
     tangents.first = to_uint(first);
-    if (pixel_noise) tangents.rasters.resize(on, group.size() * samples);
+    if (pixel_noise) tangents.rasters.resize(impl_of(device), group.size() * samples);
     transform.tangent(frame, device_views, *geometry, tangents);
     if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);

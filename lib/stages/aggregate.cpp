@@ -62,13 +62,13 @@ struct AggregateArguments {
   Buffer<float>&grads, &grad_sigma, &channels;
 };
 
-/// What the kernels of tangents take, by the names of their arguments.
-struct AggregateTangentArguments {
+/// What the kernels of rows take, by the names of their arguments.
+struct AggregateRowsArguments {
   shared::AggregateParams p;
-  cl_uint first_direction, directions, planes;
+  shared::TangentParams q;
   const Buffer<shared::ViewParams>& views;
   const Buffer<cl_uint>&starts, &list, &slot_counts;
-  const Buffer<float>&fragments, &tangents;
+  const Buffer<float>& fragments;
   const Buffer<shared::FrameTangent>& frames;
   Buffer<shared::Slot>& slots;
   Buffer<float>& rows;
@@ -126,28 +126,45 @@ void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
          kernel::aggregate_joint_sampled_backward>(in, background, grad_image, with_channels);
 }
 
-void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
+void Aggregate::tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents,
                         std::size_t first, Buffer<cl_float4>& images) {
   Rasterize& r = in.rasterize;
   r.start_gradients(in.p);
-  AggregateTangentArguments all{.p = params(in.p, background, false),
-                                .first_direction = to_uint(first),
-                                .directions = tangents.params.directions,
-                                .planes = tangents.params.planes,
-                                .views = in.views.cameras,
-                                .starts = r.pixel_starts,
-                                .list = r.list,
-                                .slot_counts = slot_counts_,
-                                .fragments = r.values,
-                                .tangents = tangents.fragments,
-                                .frames = tangents.frames,
-                                .slots = slots_,
-                                .rows = r.grads,
-                                .image_tangents = images};
+  tangents.params.first = to_uint(first);
+  const shared::TangentParams& q = tangents.params;
+  tangents.shares.resize(device_, std::size_t{q.directions} * in.p.grad_fragments);
+  if (!tangent_) tangent_.emplace(device_);
+  AggregateRowsArguments all{.p = params(in.p, background, false),
+                             .q = q,
+                             .views = in.views.cameras,
+                             .starts = r.pixel_starts,
+                             .list = r.list,
+                             .slot_counts = slot_counts_,
+                             .fragments = r.values,
+                             .frames = tangents.frames,
+                             .slots = slots_,
+                             .rows = r.grads,
+                             .image_tangents = images};
   for (const Range& pixels : r.pixels(in.p)) {
     all.p.last_pixel = pixels.last();
-    if (now_.kernels->barrier) (*now_.kernels->barrier)(pixels, kernel::aggregate_tangent::pick(all));
-    if (now_.kernels->joint) (*now_.kernels->joint)(pixels, kernel::aggregate_joint_tangent::pick(all));
+    if (now_.kernels->barrier) (*now_.kernels->barrier)(pixels, kernel::aggregate_rows::pick(all));
+    if (now_.kernels->joint) (*now_.kernels->joint)(pixels, kernel::aggregate_joint_rows::pick(all));
+  }
+  (*tangent_)(r.vectors(), kernel::aggregate_share_tangent{.p = all.p,
+                                                           .q = q,
+                                                           .last_pair = in.p.last_pair,
+                                                           .fragment_starts = r.fragment_starts,
+                                                           .rows = r.grads,
+                                                           .tangents = tangents.fragments,
+                                                           .shares = tangents.shares});
+  for (const Range& pixels : r.pixels(in.p)) {
+    all.p.last_pixel = pixels.last();
+    (*tangent_)(pixels, kernel::aggregate_sum_tangent{.p = all.p,
+                                                      .q = q,
+                                                      .starts = r.pixel_starts,
+                                                      .list = r.list,
+                                                      .shares = tangents.shares,
+                                                      .image_tangents = images});
   }
 }
 

@@ -9,6 +9,7 @@
 #include "kernels/aggregate_joint.hpp"
 #include "kernels/aggregate_joint_sampled.hpp"
 #include "kernels/aggregate_sampled.hpp"
+#include "kernels/aggregate_tangent.hpp"
 #include "stages/occupancy.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/shade.hpp"
@@ -29,10 +30,10 @@ struct AggregateInputs {
 struct AggregateKernels {
   std::string built;
   /// Exact. The forward pass leaves the pixels' slots for the backward pass.
-  std::optional<Launcher<kernel::aggregate_forward, kernel::aggregate_backward, kernel::aggregate_tangent>>
+  std::optional<Launcher<kernel::aggregate_forward, kernel::aggregate_backward, kernel::aggregate_rows>>
       barrier;
   std::optional<Launcher<kernel::aggregate_joint_forward, kernel::aggregate_joint_backward,
-                         kernel::aggregate_joint_tangent>>
+                         kernel::aggregate_joint_rows>>
       joint;
   std::optional<Launcher<kernel::aggregate_sampled_forward, kernel::aggregate_sampled_backward>> sampled;
   /// Perturbs distances too, and so takes the place of the occupancy stage.
@@ -58,7 +59,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   /// From the tangents of the band's fragments to those of the images, of the group's directions from `first`
   /// on. Uses the fragments' gradients as scratch. Only with the exact estimator.
-  void tangent(const AggregateInputs& in, const glm::vec3& background, const Tangents& tangents,
+  void tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents,
                std::size_t first, Buffer<cl_float4>& images);
 
   /// Number of `channels`: the joint composition has none of alpha.
@@ -90,6 +91,7 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   Buffer<shared::Slot> slots_;   // [fragment], and in the barrier composition [pixel] more
   Buffer<cl_uint> slot_counts_;  // [pixel]
+  std::optional<Launcher<kernel::aggregate_share_tangent, kernel::aggregate_sum_tangent>> tangent_;
 };
 
 }  // namespace dpr

@@ -82,7 +82,7 @@ void Clip::tangent_of_outlines(const shared::FrameParams& p, const Geometry& geo
   const std::size_t count = std::size_t{p.views} * p.faces;
   tangents.outlines.resize(device_, 4 * tangents.params.directions * count);
   (*tangent_)(count, kernel::clip_outline_tangent{.p = p,
-                                                  .directions = tangents.params.directions,
+                                                  .q = tangents.params,
                                                   .views = views_->cameras,
                                                   .clipped = faces,
                                                   .faces = geometry.face_vertices,
@@ -95,8 +95,7 @@ void Clip::tangent_of_outlines(const shared::FrameParams& p, const Geometry& geo
 void Clip::tangent(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                    const Rasterize& rasterize, Tangents& tangents) {
   (*tangent_)(rasterize.pairs(bin), kernel::clip_tangent{.p = p,
-                                                         .directions = tangents.params.directions,
-                                                         .planes = tangents.params.planes,
+                                                         .q = tangents.params,
                                                          .pairs = bin.pair_count,
                                                          .clipped = faces,
                                                          .triangles = triangles,

@@ -49,15 +49,9 @@ shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   return o;
 }
 
-/// Vectors of fragments to launch for.
-std::size_t Occupancy::vectors_of(const Rasterize& rasterize) const {
-  const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
-  return (rasterize.launched_fragments() + width - 1) / width;
-}
-
 void Occupancy::forward(const shared::FrameParams& p, const Bin& bin, Rasterize& rasterize) {
   if (now_.kernels->exact) {
-    (*now_.kernels->exact)(vectors_of(rasterize),
+    (*now_.kernels->exact)(rasterize.vectors(),
                            kernel::occupancy_forward{.p = params(p),
                                                      .last_pair = p.last_pair,
                                                      .fragment_starts = rasterize.fragment_starts,
@@ -102,11 +96,10 @@ void Occupancy::backward(const shared::FrameParams& p, const Bin& bin, Rasterize
 }
 
 void Occupancy::tangent(const shared::FrameParams& p, const Rasterize& rasterize, Tangents& tangents) {
-  (*now_.kernels->exact)(vectors_of(rasterize),
+  (*now_.kernels->exact)(rasterize.vectors(),
                          kernel::occupancy_tangent{.p = params(p),
                                                    .last_pair = p.last_pair,
-                                                   .directions = tangents.params.directions,
-                                                   .planes = tangents.params.planes,
+                                                   .q = tangents.params,
                                                    .fragment_starts = rasterize.fragment_starts,
                                                    .fragments = rasterize.values,
                                                    .frames = tangents.frames,

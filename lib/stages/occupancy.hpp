@@ -44,7 +44,6 @@ class Occupancy : public SmoothedStage<OccupancyKernels> {
 
  private:
   shared::OccupancyParams params(const shared::FrameParams& p) const;
-  std::size_t vectors_of(const Rasterize& rasterize) const;
 };
 
 /// The build option that chooses a prior.

@@ -38,6 +38,10 @@ ContourCount no_contours(Bin& bin) { return {0, bin.pair_starts}; }
 /// From a plane to the next: what is loaded behind the last fragment belongs to none.
 cl_uint plane_size(std::size_t fragments) { return to_uint(fragments + k_widest_vector); }
 
+std::size_t bytes_of_band(std::size_t fragments, std::size_t bytes_each) {
+  return with_headroom(fragments + k_widest_vector) * bytes_each;
+}
+
 std::vector<float> read_plane(const Buffer<float>& planes, std::size_t first, std::size_t fragments) {
   std::vector<float> values(fragments);
   planes.download(values, first);
@@ -108,12 +112,16 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
 void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
   counted_ = true;
   count(p, triangles, bin, no_contours(bin));
+  read_rows(p);
+  check_total(row_starts_.back().fragment, "fragments (frame)");
+  frame_fragments = likely_fragments_ = row_starts_.back().fragment;
+}
+
+void Rasterize::read_rows(const shared::FrameParams& p) {
   row_starts_.clear();
   for (const cl_uint4& row : device_rows_.download()) {
     row_starts_.push_back({row_starts_.size() * p.tiles_x, row.s[0], row.s[1]});
   }
-  check_total(row_starts_.back().fragment, "fragments (frame)");
-  frame_fragments = likely_fragments_ = row_starts_.back().fragment;
 }
 
 FrameCounts Rasterize::counted() const { return {row_starts_.back().pair, row_starts_.back().fragment}; }
@@ -123,7 +131,7 @@ std::vector<Rasterize::TileStart> Rasterize::tile_starts(const shared::FramePara
   const TileStart &begin = row_starts_[row], &end = row_starts_[row + 1];
   std::vector<cl_uint> first_pairs(p.tiles_x), first_fragments(end.pair - begin.pair + 1);
   bin.tile_starts.download(first_pairs, begin.tile);
-  fragment_starts.download(first_fragments, begin.pair);
+  (in_bands_ ? frame_fragment_starts_ : fragment_starts).download(first_fragments, begin.pair);
   std::vector<TileStart> starts;
   for (std::size_t x = 0; x < first_pairs.size(); ++x) {
     starts.push_back({begin.tile + x, first_pairs[x], first_fragments[first_pairs[x] - begin.pair]});
@@ -133,9 +141,7 @@ std::vector<Rasterize::TileStart> Rasterize::tile_starts(const shared::FramePara
 
 std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
                                  std::size_t fragment_bytes) const {
-  const auto bytes_of = [&](std::size_t number) {
-    return with_headroom(number + k_widest_vector) * fragment_bytes;
-  };
+  const auto bytes_of = [&](std::size_t number) { return bytes_of_band(number, fragment_bytes); };
   std::vector<TileStart> cuts;
   for (std::size_t row = 0; row + 1 < row_starts_.size(); ++row) {
     const bool fits = bytes_of(row_starts_[row + 1].fragment - row_starts_[row].fragment) <= budget;
@@ -148,11 +154,6 @@ std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, s
   };
   std::size_t largest = 0;
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) largest = std::max(largest, count(i, i + 1));
-  if (bytes_of(largest) > budget) {
-    throw InvalidArgument(
-        "memory budget (frame)", std::to_string(budget) + " bytes",
-        "at least " + std::to_string(bytes_of(largest)) + " for the fragments of one tile of 8x8 pixels");
-  }
   const auto row_of = [&](std::size_t i) { return cuts[i].tile / p.tiles_x; };
   const auto is_row = [&](std::size_t i) { return cuts[i + 1].tile - cuts[i].tile == p.tiles_x; };
   const auto may_join = [&](std::size_t first, std::size_t next) {
@@ -170,6 +171,15 @@ std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, s
     most = std::max(bands.front().fragments.count, largest);
   }
   return bands;
+}
+
+void Rasterize::require_fits(std::span<const Band> bands, std::size_t budget, std::size_t fragment_bytes) {
+  std::size_t largest = 0;
+  for (const Band& band : bands) largest = std::max(largest, band.fragments.count);
+  const std::size_t bytes = bytes_of_band(largest, fragment_bytes);
+  if (bytes <= budget) return;
+  throw InvalidArgument("memory budget (frame)", std::to_string(budget) + " bytes",
+                        "at least " + std::to_string(bytes) + " for the fragments of one tile of 8x8 pixels");
 }
 
 std::vector<Range> Rasterize::pixels(const shared::FrameParams& p) const {
@@ -372,8 +382,7 @@ void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Trian
   const PairGroups groups = pair_groups(bin);
   launch_(groups.count, kernel::rasterize_tangent{.p = p,
                                                   .range = groups.pairs,
-                                                  .directions = tangents.params.directions,
-                                                  .planes = tangents.params.planes,
+                                                  .q = tangents.params,
                                                   .pairs = bin.pair_count,
                                                   .triangles = triangles,
                                                   .pair_face = bin.pair_face,
@@ -384,6 +393,11 @@ void Rasterize::tangent(const shared::FrameParams& p, const Buffer<shared::Trian
                                                   .fragments = values,
                                                   .tangents = tangents.fragments});
   if (clip != nullptr) clip->tangent(p, triangles, bin, *this, tangents);
+}
+
+std::size_t Rasterize::vectors() const {
+  const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
+  return (launched_fragments() + width - 1) / width;
 }
 
 std::size_t Rasterize::bytes() const {

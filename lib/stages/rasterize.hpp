@@ -103,10 +103,15 @@ class Rasterize {
   Band settle(shared::FrameParams& p, const FrameCounts& counts);
   /// Counts of a frame that cover() counted.
   FrameCounts counted() const;
-  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover(). Blocks
-  /// where a row of tiles has to be cut. Throws InvalidArgument if one tile does not fit.
+  /// Reads where each row of tiles begins, of a frame that forward_within() rendered. Blocks.
+  void read_rows(const shared::FrameParams& p);
+  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover() or
+  /// read_rows(). Blocks where a row of tiles has to be cut. A band is no less than a tile, even if that does
+  /// not fit.
   std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
                         std::size_t fragment_bytes) const;
+  /// Throws InvalidArgument if a band does not fit.
+  static void require_fits(std::span<const Band> bands, std::size_t budget, std::size_t fragment_bytes);
   /// The fragments of a band; their numbers count from the band's first. `p` gets what it says of them, and of
   /// the pairs.
   void forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
@@ -134,6 +139,9 @@ class Rasterize {
 
   /// Fragments to launch for, by kernels that take more where there are more.
   std::size_t launched_fragments() const { return std::min(fragments, likely_fragments_); }
+
+  /// Vectors of fragments to launch for (kernels/tile_lanes.h).
+  std::size_t vectors() const;
 
   /// Length of the buffers that later stages hold of every fragment.
   Length fragment_length() const { return length(fragments); }

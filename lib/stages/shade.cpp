@@ -175,7 +175,7 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
   if (is_flat()) return;
   now_.kernels->normals(std::size_t{in.p.views} * in.p.vertices,
                         kernel::normals_tangent{.p = in.p,
-                                                .directions = tangents.params.directions,
+                                                .q = tangents.params,
                                                 .faces = in.geometry.face_vertices,
                                                 .corner_starts = in.geometry.vertex_corners.starts,
                                                 .corners = in.geometry.vertex_corners.corners,
@@ -184,7 +184,7 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
   if (given.empty()) return;
   now_.kernels->normals(in.p.views * given.count,
                         kernel::normals_given_tangent{.p = in.p,
-                                                      .directions = tangents.params.directions,
+                                                      .q = tangents.params,
                                                       .given_mesh = given.mesh,
                                                       .model_tangents = tangents.models,
                                                       .world = in.transform.world,
@@ -206,9 +206,7 @@ void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_tangent{.p = in.p,
                                                 .range = groups.pairs,
-                                                .directions = tangents.params.directions,
-                                                .planes = tangents.params.planes,
-                                                .moved_colors = tangents.params.colors,
+                                                .q = tangents.params,
                                                 .pairs = in.bin.pair_count,
                                                 .pair_face = in.bin.pair_face,
                                                 .fragment_starts = in.rasterize.fragment_starts,

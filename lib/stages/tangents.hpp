@@ -20,6 +20,7 @@ struct Tangents {
   Buffer<cl_float4> clip;      ///< [direction][view][vertex] homogeneous, where p.clips is set
   Buffer<cl_float4> outlines;  ///< [direction][view][face][4] of clipped faces (kernels/clip_tangent.cl)
   Buffer<float> fragments;     ///< [direction][planes][p.grad_fragments], and what is the same for all
+  Buffer<cl_float4> shares;    ///< [p.grad_fragments][direction] RGBA of their pixels
   Buffer<cl_float4>
       rasters;               ///< [direction][view][sample] of noise on the pixel, before contours are blended
   Buffer<cl_float4> images;  ///< [direction][view][height][width] RGBA, of all directions
@@ -28,7 +29,7 @@ struct Tangents {
     return views.capacity_bytes() + models.capacity_bytes() + frames.capacity_bytes() +
            positions.capacity_bytes() + colors.capacity_bytes() + ndc.capacity_bytes() +
            world.capacity_bytes() + clip.capacity_bytes() + outlines.capacity_bytes() +
-           fragments.capacity_bytes() + rasters.capacity_bytes() + images.capacity_bytes();
+           fragments.capacity_bytes() + shares.capacity_bytes() + rasters.capacity_bytes() + images.capacity_bytes();
   }
 };
 
