@@ -5,6 +5,7 @@
 #include <array>
 #include <compare>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -147,8 +148,26 @@ class ArraySetters {
   }
 };
 
+/// What the rigid image's samples show, for shading of the caller's own: a raster of `supersampling` samples a pixel
+/// and axis, with a margin of samples around the image, from the top left.
+struct Samples {
+  int width = 0, height = 0;  ///< samples of a view
+  int supersampling = 1, margin = 0;
+  std::vector<std::int32_t>
+      faces;  ///< [view][height][width] of the scene, the meshes' one after the other; -1: none
+  std::vector<vec2> barycentrics;  ///< [view][height][width] of the face's corners 1 and 2; 0 without a face
+  std::vector<float>
+      depths;  ///< [view][height][width] along the view direction, world units; 0 without a face
+};
+
 class ImageLoss;
 class MeshLoss;
+
+/// Gradients of Renderer::resolve().
+struct ResolveGradient {
+  std::vector<float> samples;
+  SceneGradient scene;
+};
 
 /// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
 /// Every setter but set_gradients() ends the last frame: what reads it (image(), read_pixels(), a loss,
@@ -225,6 +244,24 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// coordinates, normals, materials or lights, or sigma of noise on the pixel, and for those that move the camera of a
   /// lit scene whose view matrices came from a buffer.
   std::vector<Image> tangent(std::span<const SceneTangent> directions);
+
+  /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or
+  /// textures, which have no part in it. The nearest surface alone counts, whatever gamma is. Blocks. Throws as image()
+  /// does, and InvalidArgument without noise on the pixel.
+  Samples samples();
+  /// Gradients of <grad_barycentrics, barycentrics> + <grad_depths, depths> by positions, transforms and cameras, as
+  /// far as Scene::gradients asks for these. At contours, where samples jump from face to face, resolve_backward() has
+  /// the rest.
+  SceneGradient samples_backward(std::span<const vec2> grad_barycentrics, std::span<const float> grad_depths);
+  /// Images of the caller's own shading with noise on the pixel: samples of any number of channels, [view][height]
+  /// [width][channel] of samples(), blended across contours and blurred to pixels, [view][height][width][channel].
+  /// Linear in the samples, which need a value where no face is too. Blocks; costs what forward() does from the samples
+  /// on, for every four channels.
+  std::vector<float> resolve(std::span<const float> samples, std::size_t channels);
+  /// The gradients of <grad_pixels, resolve(samples)>: of the samples, and of the scene by way of the contours, by
+  /// positions, transforms and cameras.
+  ResolveGradient resolve_backward(std::span<const float> samples, std::size_t channels,
+                                   std::span<const float> grad_pixels);
 
   /// Statistics of the last forward(). Throws as image() does.
   RenderStatistics statistics() const;

@@ -65,6 +65,18 @@ void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, con
   blur_holds_image_ = false;
 }
 
+void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
+                                 const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples) {
+  antialias.forward(in.p, contour, samples, other_kept_);
+  if (sampled) {
+    sampled->backward(grad_image, grad_samples);
+  } else {
+    blur.backward(size, grad_image, grad_samples, false);
+  }
+  blur_holds_image_ = false;
+  antialias.backward(in, contour, other_kept_, grad_samples);
+}
+
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                           const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole) {
   if (by_scale && !raster_is_gradient_) {

@@ -60,6 +60,11 @@ class PixelNoise {
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
               Buffer<cl_float4>& pixels);
 
+  /// From the gradient of what smooth() made of samples to theirs, and to the contours' ends. `samples` are as smooth()
+  /// took them, and are blended again.
+  void smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
+                       const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples);
+
   /// From the tangents of the samples, `tangents.rasters`, to those of the image, along a group's directions.
   void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents);
 

@@ -376,7 +376,9 @@ std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
          (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
-         (aov ? aov->bytes() : 0) + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
+         (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
+         own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_group_.capacity_bytes() +
+         own_image_.capacity_bytes() + grad_group_.capacity_bytes() + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
          hidden_.capacity_bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
          spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
          grad_images_.capacity_bytes() + grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() +

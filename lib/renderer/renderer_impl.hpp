@@ -24,6 +24,7 @@
 #include "stages/occupancy.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/reduce.hpp"
+#include "stages/samples.hpp"
 #include "stages/setup.hpp"
 #include "stages/shade.hpp"
 #include "stages/texels.hpp"
@@ -122,6 +123,13 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void tangent(std::span<const SceneTangent> directions);
   std::size_t tangent_bytes() const;
   void cut_for_tangents(std::size_t directions);
+  /// Throws InvalidArgument unless the last frame has samples for shading of the caller's own.
+  void require_samples(const char* caller);
+  void find_samples();
+  SceneGradient samples_backward(std::span<const cl_float4> grad_places);
+  void resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels);
+  ResolveGradient resolve_backward(std::span<const float> samples, std::size_t channels,
+                                   std::span<const float> grad_pixels);
   /// Room for at least so much in all frames of the scene.
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
@@ -174,6 +182,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Gather gather;
   Reduce reduce;
   Tangents tangents;
+  std::optional<SampledSurface> surface_samples;      // made when first asked for
   std::optional<Exchange> exchange;                   // made when first asked for
   Raster raster;                                      // around the frame
   std::shared_ptr<PixelNoise> pixel_noise;            // made when first asked for; none: the triangles' noise
@@ -242,6 +251,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void shade_and_aggregate();
   void differentiate(const BufferRef<cl_float4>& grad_images);
 
+  SceneGradient finish_geometric_gradient();
   void upload_directions(std::span<const SceneTangent> directions);
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
@@ -253,6 +263,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void join_material_gradients();
 
   std::size_t found_emptied_ = 0;
+  Buffer<float> own_samples_, own_pixels_;                // of the caller's shading, packed
+  Buffer<cl_float4> own_group_, own_image_, grad_group_;  // four of their channels
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
   Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;

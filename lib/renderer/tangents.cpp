@@ -66,7 +66,7 @@ void validate(const SceneTangent& direction, const Scene& scene, std::size_t vie
   });
 }
 
-cl_float4 to_cl(const dvec3& v) { return dpr::to_cl(glm::vec3(v)); }
+cl_float4 float4_of(const dvec3& v) { return to_cl(glm::vec3(v)); }
 
 shared::ViewTangent view_tangent(const CameraGradient& by, const Camera& camera, int width, int height) {
   const ProjectionSlopes slopes = projection_slopes(camera, width, height);
@@ -81,12 +81,12 @@ shared::ViewTangent view_tangent(const CameraGradient& by, const Camera& camera,
   const dvec3 from = is_distant ? dvec3(0, 0, -1) : dvec3(view[3]);
   const dvec3 moved = glm::cross(by.view.rotation, from) - (is_distant ? dvec3(0) : by.view.translation);
   shared::ViewTangent t{};
-  t.rotation = to_cl(by.view.rotation);
-  t.translation = to_cl(by.view.translation);
+  t.rotation = float4_of(by.view.rotation);
+  t.translation = float4_of(by.view.translation);
   for (std::size_t k = 0; k < 4; ++k) t.projection.s[k] = static_cast<float>(projection[k]);
   for (std::size_t k = 0; k < by.distortion.size(); ++k)
     t.lens[k / 4].s[k % 4] = static_cast<float>(by.distortion[k]);
-  t.eye = to_cl(glm::inverse(dmat3(view)) * moved);
+  t.eye = float4_of(glm::inverse(dmat3(view)) * moved);
   return t;
 }
 
@@ -103,7 +103,7 @@ std::vector<cl_float4> joined(std::span<const SceneTangent> directions, std::siz
   std::vector<cl_float4> values(any ? directions.size() * count : 0);
   for (std::size_t d = 0; any && d < directions.size(); ++d) {
     const auto copy = [&](const std::vector<glm::vec3>& from, std::size_t begin) {
-      for (std::size_t i = 0; i < from.size(); ++i) values[d * count + begin + i] = dpr::to_cl(from[i]);
+      for (std::size_t i = 0; i < from.size(); ++i) values[d * count + begin + i] = to_cl(from[i]);
     };
     copy(directions[d].shapes.*of_shapes, 0);
     for (std::size_t m = 0; m < directions[d].meshes.size(); ++m)
@@ -121,14 +121,14 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
   std::vector<shared::FrameTangent> of_frames(count);
   for (std::size_t d = 0; d < count; ++d) {
     const SceneTangent& by = directions[d];
-    of_frames[d] = {to_cl(by.background), static_cast<float>(by.sigma), static_cast<float>(by.gamma),
+    of_frames[d] = {float4_of(by.background), static_cast<float>(by.sigma), static_cast<float>(by.gamma),
                     static_cast<float>(by.alpha), 0};
     for (std::size_t v = 0; v < by.views.size(); ++v) {
       const std::size_t view = d * views.size() + v;
       of_views[view] = view_tangent(by.views[v].camera, views[v].camera, scene.width, scene.height);
       for (std::size_t m = 0; m < by.views[v].transforms.size(); ++m) {
         const PoseGradient& pose = by.views[v].transforms[m];
-        of_models[view * meshes + m] = {to_cl(pose.rotation), to_cl(pose.translation)};
+        of_models[view * meshes + m] = {float4_of(pose.rotation), float4_of(pose.translation)};
       }
     }
   }

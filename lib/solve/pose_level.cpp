@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
-constexpr double k_channels = 3;
+constexpr double k_color_channels = 3;
 
 std::size_t pixels_of(const Scene& scene) {
   return static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
@@ -153,7 +153,7 @@ double PoseLevel::blank_loss() const {
       const double squared = glm::dot(residual, residual);
       sum += static_cast<double>(target_.weights[i]) * squared / (1 + squared * inverse);
     }
-    return sum / (k_channels * weight_);
+    return sum / (k_color_channels * weight_);
   };
   return std::min(loss_of(target_.background), loss_of(mean));
 }

@@ -1,0 +1,201 @@
+// Noise on the pixel around shading of the caller's own: what the samples show, and images of their colours.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/checks.hpp"
+#include "renderer/renderer_impl.hpp"
+#include "scene/gradient_table.hpp"
+
+namespace dpr {
+namespace {
+
+/// The scene's request without what depends on the library's own shading, while it lives.
+class GeometricRequest {
+ public:
+  explicit GeometricRequest(GradientRequest& of) : of_(of), whole_(of) {
+    of = no_gradients();
+    of.positions = whole_.positions;
+    of.transform = whole_.transform;
+    of.camera = whole_.camera;
+    of.distortion = whole_.distortion;
+  }
+  ~GeometricRequest() { of_ = whole_; }
+  GeometricRequest(const GeometricRequest&) = delete;
+  GeometricRequest& operator=(const GeometricRequest&) = delete;
+
+ private:
+  GradientRequest& of_;
+  GradientRequest whole_;
+};
+
+void require_numbers(std::span<const float> numbers, std::size_t count, const std::string& name) {
+  if (numbers.size() != count)
+    throw InvalidArgument(name, std::to_string(numbers.size()) + " numbers", std::to_string(count));
+  const auto bad = std::ranges::find_if_not(numbers, [](float v) { return std::isfinite(v); });
+  if (bad != numbers.end()) throw InvalidArgument(name, checks::text(*bad), "finite numbers");
+}
+
+/// Four channels of packed vectors, or those that are left, from `first` on.
+FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_t channels) {
+  return {packed.cl_buffer()(), first, channels, std::min<std::size_t>(channels - first, 4)};
+}
+
+}  // namespace
+
+void Renderer::Impl::require_samples(const char* caller) {
+  require_forward(caller);
+  const char* const got = !pixel_noise      ? "noise of the triangles"
+                          : scene.lights    ? "a scene with lights"
+                          : geometry_colors ? "colours by geometry"
+                                            : nullptr;
+  if (got)
+    throw InvalidArgument(caller, got, "noise on the pixel (preset \"pixel\") and a scene without lights");
+}
+
+void Renderer::Impl::find_samples() {
+  if (!surface_samples) surface_samples.emplace(impl_of(device));
+  for (const Band& band : bands) {
+    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+    surface_samples->forward(frame, bin, rasterize);
+  }
+}
+
+/// From `grad_vertices` and, of clipped faces, `clip.grad` to the host's.
+SceneGradient Renderer::Impl::finish_geometric_gradient() {
+  transform.backward(frame, device_views, false, clip.grad, grad_lit, grad_vertices);
+  gather_mesh_gradients({});
+  sum_gradients();
+  return read_gradient();
+}
+
+SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_places) {
+  const GeometricRequest request(scene.gradients);
+  own_group_.upload(impl_of(device), grad_places);
+  if (!surface_samples) surface_samples.emplace(impl_of(device));
+  for (const Band& band : bands) {
+    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+    surface_samples->backward(frame, own_group_, rasterize);
+    rasterize.backward(frame, setup.triangles, bin);
+  }
+  gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
+                  grad_vertices);
+  if (frame.clips != 0)
+    gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, clip.grad_corners, clip.grad);
+  if (frame.clips != 0 && frame.distorts != 0) {
+    pixel_noise->contour.grad_cuts.resize(impl_of(device), DPR_CUT_CHANNELS * transform.ndc.size());
+    pixel_noise->contour.grad_cuts.fill(0);
+  }
+  return finish_geometric_gradient();
+}
+
+void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels) {
+  Device::Impl& on = impl_of(device);
+  own_samples_.upload(on, samples);
+  own_pixels_.resize(on, pixels.size());
+  const std::size_t sample_count = samples.size() / channels, pixel_count = pixels.size() / channels;
+  own_group_.resize(on, sample_count);
+  for (std::size_t first = 0; first < channels; first += 4) {
+    made_exchange().give(group_of(own_samples_, first, channels), sample_count, vectors_of(own_group_, 0, 4));
+    pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
+    const FloatVectors to = group_of(own_pixels_, first, channels);
+    made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
+  }
+  own_pixels_.download(pixels);
+}
+
+ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples, std::size_t channels,
+                                                 std::span<const float> grad_pixels) {
+  const GeometricRequest request(scene.gradients);
+  Device::Impl& on = impl_of(device);
+  const std::size_t sample_count = samples.size() / channels, pixel_count = grad_pixels.size() / channels;
+  const std::size_t vertices = views.size() * frame.vertices;
+  own_samples_.upload(on, samples);
+  own_pixels_.upload(on, grad_pixels);
+  own_group_.resize(on, sample_count);
+  own_image_.resize(on, pixel_count);
+  ResolveGradient total{std::vector<float>(samples.size()), {}};
+  for (std::size_t first = 0; first < channels; first += 4) {
+    const FloatVectors group = group_of(own_samples_, first, channels);
+    made_exchange().give(group, sample_count, vectors_of(own_group_, 0, 4));
+    made_exchange().give(group_of(own_pixels_, first, channels), pixel_count, vectors_of(own_image_, 0, 4));
+    pixel_noise->smooth_backward(contour_inputs(), own_group_, image_size(), own_image_, grad_group_);
+    made_exchange().give(vectors_of(grad_group_, 0, 4), sample_count, group);
+    grad_vertices.resize(on, vertices);
+    grad_vertices.fill({});
+    if (frame.clips != 0) {
+      clip.grad.resize(on, vertices);
+      clip.grad.fill({});
+      if (frame.distorts != 0) {
+        clip.grad_cuts.resize(on, DPR_CUT_CHANNELS * bin.pairs);
+        clip.grad_cuts.fill(0);
+      }
+    }
+    pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_vertices, clip.grad);
+    SceneGradient of_group = finish_geometric_gradient();
+    if (first == 0) {
+      total.scene = std::move(of_group);
+    } else {
+      add(total.scene, of_group);
+    }
+  }
+  own_samples_.download(total.samples);
+  return total;
+}
+
+Samples Renderer::samples() {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::samples");
+  m.find_samples();
+  Samples found{static_cast<int>(m.frame.width),
+                static_cast<int>(m.frame.height),
+                m.raster.supersampling,
+                m.raster.margin,
+                {},
+                {},
+                {}};
+  for (const cl_uint face : m.surface_samples->faces.download())
+    found.faces.push_back(face == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(face));
+  for (const cl_float4& place : m.surface_samples->places.download()) {
+    found.barycentrics.emplace_back(place.s[0], place.s[1]);
+    found.depths.push_back(place.s[2]);
+  }
+  return found;
+}
+
+SceneGradient Renderer::samples_backward(std::span<const glm::vec2> grad_barycentrics,
+                                         std::span<const float> grad_depths) {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::samples_backward");
+  const std::size_t count = m.views.size() * m.frame.width * m.frame.height;
+  require_numbers(
+      std::span(reinterpret_cast<const float*>(grad_barycentrics.data()), 2 * grad_barycentrics.size()),
+      2 * count, "grad_barycentrics");
+  require_numbers(grad_depths, count, "grad_depths");
+  std::vector<cl_float4> places(count);
+  for (std::size_t i = 0; i < count; ++i)
+    places[i] = {{grad_barycentrics[i].x, grad_barycentrics[i].y, grad_depths[i], 0}};
+  return m.samples_backward(places);
+}
+
+std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t channels) {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::resolve");
+  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
+  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  std::vector<float> pixels(channels * m.image().size());
+  m.resolve(samples, channels, pixels);
+  return pixels;
+}
+
+ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::size_t channels,
+                                           std::span<const float> grad_pixels) {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::resolve_backward");
+  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
+  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
+  return m.resolve_backward(samples, channels, grad_pixels);
+}
+
+}  // namespace dpr

@@ -1,0 +1,36 @@
+#include "stages/samples.hpp"
+
+namespace dpr {
+
+void SampledSurface::forward(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize) {
+  const std::size_t samples = std::size_t{p.views} * p.width * p.height;
+  places.resize(device_, samples);
+  faces.resize(device_, samples);
+  for (const Range& pixels : rasterize.pixels(p)) {
+    launch_(pixels, kernel::samples_forward{.p = p,
+                                            .last_pixel = pixels.last(),
+                                            .starts = rasterize.pixel_starts,
+                                            .list = rasterize.list,
+                                            .fragments = rasterize.values,
+                                            .fragment_pair = rasterize.fragment_pair,
+                                            .pair_face = bin.pair_face,
+                                            .places = places,
+                                            .face = faces});
+  }
+}
+
+void SampledSurface::backward(const shared::FrameParams& p, const Buffer<cl_float4>& grad_places,
+                              Rasterize& rasterize) {
+  rasterize.start_gradients(p);
+  for (const Range& pixels : rasterize.pixels(p)) {
+    launch_(pixels, kernel::samples_backward{.p = p,
+                                             .last_pixel = pixels.last(),
+                                             .starts = rasterize.pixel_starts,
+                                             .list = rasterize.list,
+                                             .fragments = rasterize.values,
+                                             .grad_places = grad_places,
+                                             .grads = rasterize.grads});
+  }
+}
+
+}  // namespace dpr
