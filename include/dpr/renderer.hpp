@@ -238,11 +238,12 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// Forward mode: the derivatives of the images along directions, RGBA, [direction][view]. After forward(), and
   /// throws as image() does where a setter came between. Exact, and the transpose of backward(): <u, J v> =
   /// <J^T u, v> up to rounding (relative error 1e-5; along gamma, whose terms cancel, 2e-4). Scene::gradients has no
-  /// part in it. All directions share most of the work. Memory: of each direction its images, 28 bytes a fragment (40
-  /// in lit scenes with textures) and 16 to 64 a vertex and view, of as many at a time as half the device's budget
-  /// holds. Throws InvalidArgument with sampled depths or triangles, for directions that change texels, texture
-  /// coordinates, normals, materials or lights, or sigma of noise on the pixel, and for those that move the camera of a
-  /// lit scene whose view matrices came from a buffer.
+  /// part in it. All directions share most of the work. Memory: of each direction its images and, up to 16 at a time,
+  /// 44 bytes a fragment (56 in lit scenes with textures) and 16 to 64 a vertex and view. Where half the device's
+  /// budget does not hold the fragments', the frame is rendered again in smaller bands. Throws InvalidArgument with
+  /// sampled depths or triangles, for directions that change texels, texture coordinates, normals, materials or lights,
+  /// or sigma of noise on the pixel, and for those that move the camera of a lit scene whose view matrices came from a
+  /// buffer.
   std::vector<Image> tangent(std::span<const SceneTangent> directions);
 
   /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or

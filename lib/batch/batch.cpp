@@ -59,16 +59,6 @@ std::vector<glm::vec3> repeated(std::span<const glm::vec3> vectors, bool is_own,
   return all;
 }
 
-/// Gradients that the renderer computes for these arrays.
-GradientRequest request_of(std::span<const std::string> names, bool with_affine_views) {
-  GradientRequest request = no_gradients();
-  for (const std::string& name : names) {
-    if (name == "views") (with_affine_views ? request.positions : request.camera) = true;
-    for (const GradientRow* const row : gradient_rows_of(name)) request.*row->wanted = true;
-  }
-  return request;
-}
-
 /// Gradients of an attribute's images, which depend on nothing else.
 GradientRequest request_of_attribute(std::span<const std::string> names, Attribute attribute) {
   GradientRequest request = request_of(names, false);
@@ -113,6 +103,15 @@ std::size_t channels_of(const std::string& output) {
 }
 
 }  // namespace
+
+GradientRequest request_of(std::span<const std::string> names, bool with_affine_views) {
+  GradientRequest request = no_gradients();
+  for (const std::string& name : names) {
+    if (name == "views") (with_affine_views ? request.positions : request.camera) = true;
+    for (const GradientRow* const row : gradient_rows_of(name)) request.*row->wanted = true;
+  }
+  return request;
+}
 
 Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const BatchOptions& options)
     : frame_(std::move(pool), make_topology(arrays, options.settings)), wanted_(options.gradients) {
@@ -186,8 +185,7 @@ void Batch::read(NamedArrays outputs) {
   }
 }
 
-void Batch::backward(NamedArrays grads, NamedArrays gradients) {
-  Renderer& renderer = frame_.renderer();
+void Batch::start_gradients(NamedArrays gradients) {
   for (const NamedArray& gradient : gradients) {
     if (std::ranges::find(wanted_, gradient.name) == wanted_.end())
       throw InvalidArgument(argument(gradient), "a gradient that was not asked for when it was rendered",
@@ -195,6 +193,11 @@ void Batch::backward(NamedArrays grads, NamedArrays gradients) {
     if (gradient.element != Element::float32) throw InvalidArgument(argument(gradient), "indices", "float32");
     std::ranges::fill(gradient.rows<float>(), 0.0F);
   }
+}
+
+void Batch::backward(NamedArrays grads, NamedArrays gradients) {
+  Renderer& renderer = frame_.renderer();
+  start_gradients(gradients);
   for (const NamedArray& grad : grads) {
     require_image(grad, channels_of(grad.name));
     const auto pixels = grad.rows<const glm::vec4>();
@@ -341,6 +344,44 @@ dpr_status dpr_frame_tangent(dpr_frame* frame, std::size_t directions, const dpr
                                  "at least 1, with images in memory");
     batch.tangent(directions, dpr::batch::to_arrays(tangents, tangent_count, "tangents"),
                   to_pixels(pixels, pixel_count, directions * floats));
+  });
+}
+
+dpr_status dpr_frame_raster(dpr_frame* frame, dpr_raster* raster) {
+  return guarded([&] { deref(raster, "raster") = deref(frame, "frame").batch->raster(); });
+}
+
+dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples, std::size_t count) {
+  return guarded(
+      [&] { deref(frame, "frame").batch->read_samples(dpr::batch::to_arrays(samples, count, "samples")); });
+}
+
+dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, std::size_t grad_count,
+                                      const dpr_array* gradients, std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->samples_backward(dpr::batch::to_arrays(grads, grad_count, "grads"),
+                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
+dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->resolve(dpr::batch::to_arrays(values, 1, "values")[0],
+                        dpr::batch::to_arrays(images, 1, "images")[0]);
+  });
+}
+
+dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values, const dpr_array* grad_images,
+                                      const dpr_array* grad_values, const dpr_array* gradients,
+                                      std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->resolve_backward(dpr::batch::to_arrays(values, 1, "values")[0],
+                                 dpr::batch::to_arrays(grad_images, 1, "grad_images")[0],
+                                 dpr::batch::to_arrays(grad_values, 1, "grad_values")[0],
+                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
   });
 }
 

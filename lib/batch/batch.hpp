@@ -11,6 +11,7 @@
 #include "batch/named_arrays.hpp"
 #include "batch/render_settings.hpp"
 #include "batch/renderer_pool.hpp"
+#include "dpr/dpr.h"
 #include "dpr/light.hpp"
 
 namespace dpr::batch {
@@ -26,6 +27,10 @@ struct BatchOptions {
   std::vector<std::string> gradients = {};
 };
 
+/// Gradients that the renderer computes for these arrays; those of views' matrices by way of the positions where any
+/// affine ones may move.
+GradientRequest request_of(std::span<const std::string> names, bool with_affine_views);
+
 /// A rendered batch: the renderer whose buffers hold what the backward pass differentiates, until it is
 /// destroyed. Its arrays are those of dpr/dpr_frame.h.
 class Batch {
@@ -40,6 +45,13 @@ class Batch {
   /// Derivatives of the images along directions, at least one: [direction][view][height][width]. `tangents` are
   /// [directions, ...] of the arrays that they name.
   void tangent(std::size_t directions, NamedArrays tangents, std::span<glm::vec4> images);
+  /// Shading of the caller's own, as dpr/dpr_frame.h has it.
+  dpr_raster raster();
+  void read_samples(NamedArrays samples);
+  void samples_backward(NamedArrays grads, NamedArrays gradients);
+  void resolve(const NamedArray& values, const NamedArray& images);
+  void resolve_backward(const NamedArray& values, const NamedArray& grad_images,
+                        const NamedArray& grad_values, NamedArrays gradients);
   /// Numbers of all images.
   std::size_t image_floats();
   /// True if no triangle of any view was rendered.
@@ -49,6 +61,10 @@ class Batch {
   /// Throws InvalidArgument for another shape than the output's, whose pixels have so many channels; 0: a
   /// number.
   void require_image(const NamedArray& array, std::size_t channels);
+  /// Throws InvalidArgument for gradients that backward passes were not announced for; all others become 0.
+  void start_gradients(NamedArrays gradients);
+  /// Throws InvalidArgument unless an array is floats by sample or pixel, of the same channels as `like` where given.
+  void require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like);
   /// `is_affine`: whether the gradients of the views' matrices are those of any affine ones, which come from
   /// those of every view's vertices, where nothing else depends on the views. Lights, and what is measured in
   /// world space, stay where they are: with them the gradients are those of rigid motions.

@@ -807,6 +807,85 @@ static void test_frame_tangents(void) {
   dpr_frame_destroy(frame);
 }
 
+/* Shading of the caller's own: white samples make the frame's own image and its gradients. */
+static void test_frame_samples(void) {
+  static float pixels[FLOATS], images[FLOATS], weights[FLOATS], other[2 * FLOATS];
+  float view[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3, 0, 0, 0, 1}, intrinsics[] = {20, 20, 8.2f, 7.9f};
+  float vertices[9], wanted_gradient[9], by_contours[9], inside[9];
+  int32_t of_faces[] = {0, 1, 2};
+  const char* const settings[] = {"preset=pixel", "sigma=1e-2"};
+  const char* const wanted[] = {"vertices", "sigma"};
+  const dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 2, {3, 3}},
+                              {"faces", of_faces, DPR_INT32, 2, {1, 3}},
+                              {"views", view, DPR_FLOAT32, 3, {1, 4, 4}},
+                              {"intrinsics", intrinsics, DPR_FLOAT32, 2, {1, 4}}};
+  const dpr_array image = {"image", pixels, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array grad = {"image", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array resolved = {"images", images, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  dpr_array gradient = {"vertices", wanted_gradient, DPR_FLOAT32, 2, {3, 3}};
+  dpr_frame_options options = DPR_FRAME_OPTIONS_INIT;
+  dpr_raster raster;
+  dpr_frame* frame = NULL;
+  size_t count, k, seen = 0;
+  int i;
+  memcpy(vertices, positions, sizeof vertices);
+  for (i = 0; i < FLOATS; ++i) weights[i] = sinf(0.7f * (float)i);
+  options.width = options.height = SIDE;
+  options.settings = settings, options.setting_count = 2;
+  options.gradients = wanted, options.gradient_count = 2;
+  OK(dpr_frame_render(&options, arrays, 4, &frame));
+  OK(dpr_frame_read(frame, &image, 1));
+  OK(dpr_frame_backward(frame, &grad, 1, &gradient, 1));
+  OK(dpr_frame_raster(frame, &raster));
+  EXPECT(raster.width == raster.supersampling * SIDE + 2 * raster.margin && raster.height == raster.width);
+  count = (size_t)raster.width * (size_t)raster.height;
+  {
+    int64_t* const faces_seen = malloc(count * sizeof *faces_seen);
+    float *const barycentrics = malloc(3 * count * sizeof(float)), *const depth =
+                                                                       malloc(count * sizeof(float));
+    float *const values = calloc(4 * count, sizeof(float)), *const grad_values =
+                                                                malloc(4 * count * sizeof(float));
+    const size_t h = (size_t)raster.height, w = (size_t)raster.width;
+    const dpr_array samples[] = {{"face_id", faces_seen, DPR_INT64, 3, {1, h, w}},
+                                 {"barycentrics", barycentrics, DPR_FLOAT32, 4, {1, h, w, 3}},
+                                 {"depth", depth, DPR_FLOAT32, 3, {1, h, w}}};
+    const dpr_array shaded = {"values", values, DPR_FLOAT32, 4, {1, h, w, 4}};
+    const dpr_array grad_shaded = {"grad_values", grad_values, DPR_FLOAT32, 4, {1, h, w, 4}};
+    dpr_array wrong = shaded;
+    OK(dpr_frame_samples(frame, samples, 3));
+    for (k = 0; k < count; ++k) {
+      const float sum = barycentrics[3 * k] + barycentrics[3 * k + 1] + barycentrics[3 * k + 2];
+      EXPECT(faces_seen[k] == 0 ? fabsf(sum - 1) < 1e-5f && depth[k] > 0 : sum == 0 && depth[k] == 0);
+      for (i = 0; i < 4; ++i) values[4 * k + (size_t)i] = faces_seen[k] == 0 ? 1 : 0;
+      seen += faces_seen[k] == 0;
+    }
+    EXPECT(seen > 0 && seen < count);
+    OK(dpr_frame_resolve(frame, &shaded, &resolved));
+    for (i = 0; i < FLOATS; ++i) EXPECT(fabsf(images[i] - pixels[i]) < 1e-5f);
+    gradient.data = by_contours;
+    OK(dpr_frame_resolve_backward(frame, &shaded, &grad, &grad_shaded, &gradient, 1));
+    for (i = 0; i < 9; ++i) EXPECT(fabsf(by_contours[i] - wanted_gradient[i]) < 1e-4f);
+    for (k = 0; k < count; ++k) depth[k] = 0;
+    gradient.data = inside;
+    OK(dpr_frame_samples_backward(frame, samples + 2, 1, &gradient, 1)); /* a gradient of nothing */
+    for (i = 0; i < 9; ++i) EXPECT(inside[i] == 0);
+    REFUSED(dpr_frame_samples(frame, &image, 1), "face_id");
+    REFUSED(dpr_frame_samples_backward(frame, samples, 1, &gradient, 1), "barycentrics or depth");
+    wrong.shape[2] = SIDE;
+    REFUSED(dpr_frame_resolve(frame, &wrong, &resolved), "values");
+    wrong = (dpr_array){"images", other, DPR_FLOAT32, 4, {1, SIDE, SIDE, 8}};
+    REFUSED(dpr_frame_resolve(frame, &shaded, &wrong), "images");
+    gradient = (dpr_array){"sigma", inside, DPR_FLOAT32, 1, {1}};
+    REFUSED(dpr_frame_resolve_backward(frame, &shaded, &grad, &grad_shaded, &gradient, 1), "sigma");
+    values[0] = NAN;
+    REFUSED(dpr_frame_resolve(frame, &shaded, &resolved), "finite");
+    REFUSED(dpr_frame_resolve(frame, NULL, &resolved), "values");
+    REFUSED(dpr_frame_raster(frame, NULL), "raster");
+    free(faces_seen), free(barycentrics), free(depth), free(values), free(grad_values);
+  }
+  dpr_frame_destroy(frame);
+}
+
 /* An image of the renderer's last frame that differs from another. */
 static int differs(const dpr_renderer* renderer, const float* image) {
   float pixels[FLOATS];
@@ -1429,6 +1508,7 @@ int main(void) {
   test_own_opencl(scene);
   test_cameras(device);
   test_frame_tangents();
+  test_frame_samples();
   test_setters(device);
   test_mesh_loss(device, scene);
   test_attributes(device, scene);

@@ -1,5 +1,5 @@
-// Noise on the pixel around the caller's own shading: colours that the caller finds at the samples make the library's own
-// image, and its gradients.
+// Noise on the pixel around the caller's own shading: colours that the caller finds at the samples make the library's
+// own image, and its gradients.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -144,7 +144,7 @@ Shaded render_own(Renderer& renderer, const Scene& scene, const Weights& weights
 
 }  // namespace
 
-TEST_SUITE("own shading") {
+TEST_SUITE("pipeline") {
   TEST_CASE("the library's own shading by the caller: its image and gradients, over random scenes") {
     Renderer renderer(open_device());
     unsigned tried = 0;

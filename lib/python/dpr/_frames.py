@@ -15,7 +15,7 @@ _NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer
                      "area")
 _OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
 """Arrays that outputs beside the image depend on."""
-_NO_MESH = [("vertices", np.zeros((1, 3), np.float32)), ("faces", np.zeros((1, 3), np.int64))]
+NO_MESH = [("vertices", np.zeros((1, 3), np.float32)), ("faces", np.zeros((1, 3), np.int64))]
 """Triangle without area, which is dropped: shows the background of a mesh without faces."""
 _LEAST_WEIGHT, _ROUNDING = 1e-12, 1e-6
 _ELEMENTS = {np.dtype(np.float32): 0, np.dtype(np.int32): 1, np.dtype(np.int64): 2}
@@ -37,7 +37,7 @@ class Part(collections.namedtuple("Part", "name leaf row count")):
 
 
 @functools.lru_cache(maxsize=256)
-def _frames_of(parts):
+def frames_of(parts):
     """((settings, parts of a frame), ...)"""
     frames = {}
     for text in parts:
@@ -73,7 +73,7 @@ def c_arrays(named):
     return slots, len(named)
 
 
-class _Frame:
+class Frame:
     """A dpr_frame, destroyed with this; not as the process ends, when the driver may be gone."""
 
     def __init__(self, options, named):
@@ -163,7 +163,7 @@ class Rendered:
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
         self.spec, self._shapes, self._frames, self.warning = spec, [array.shape for array in arrays], [], None
         zfar = next((float(text[5:]) for text in reversed(spec.settings) if text.startswith("zfar=")), None)
-        frames = _frames_of(spec.parts)
+        frames = frames_of(spec.parts)
         views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
         shapes = shapes_of(spec, len(views) if views.ndim else 0)
         raw = {name: np.empty(shape[:3] + (4,) if name in WITH_GRADIENTS else shape, dtype)
@@ -174,7 +174,7 @@ class Rendered:
             named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
             has_mesh = any(part.name == "faces" for part in parts)
             try:
-                frame = _Frame(options_of(spec, settings, i, gradients), named if has_mesh else named + _NO_MESH)
+                frame = Frame(options_of(spec, settings, i, gradients), named if has_mesh else named + NO_MESH)
             except _library.InvalidArgument as error:
                 if len(frames) == 1:
                     raise

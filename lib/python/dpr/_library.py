@@ -42,6 +42,11 @@ class Options(ctypes.Structure):
                 ("gradients", ctypes.POINTER(ctypes.c_char_p)), ("gradient_count", ctypes.c_size_t)]
 
 
+class Raster(ctypes.Structure):
+    """dpr_raster"""
+    _fields_ = [(name, ctypes.c_int) for name in ("width", "height", "supersampling", "margin")]
+
+
 class DeviceInfo(ctypes.Structure):
     """dpr_device_info"""
     _fields_ = [("size", ctypes.c_size_t),
@@ -60,6 +65,11 @@ _SIGNATURES = {
     "dpr_frame_read": [_HANDLE, *_ARRAYS],
     "dpr_frame_backward": [_HANDLE, *_ARRAYS, *_ARRAYS],
     "dpr_frame_tangent": [_HANDLE, _SIZE, *_ARRAYS, ctypes.c_void_p, _SIZE],
+    "dpr_frame_raster": [_HANDLE, ctypes.POINTER(Raster)],
+    "dpr_frame_samples": [_HANDLE, *_ARRAYS],
+    "dpr_frame_samples_backward": [_HANDLE, *_ARRAYS, *_ARRAYS],
+    "dpr_frame_resolve": [_HANDLE, ctypes.POINTER(Array), ctypes.POINTER(Array)],
+    "dpr_frame_resolve_backward": [_HANDLE, *[ctypes.POINTER(Array)] * 3, *_ARRAYS],
     "dpr_frame_is_empty": [_HANDLE, ctypes.POINTER(ctypes.c_int)],
     "dpr_frames_release": [],
     "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],

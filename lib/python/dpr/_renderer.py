@@ -9,7 +9,8 @@ from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, T
 
 import numpy as np
 
-from . import _arrays, _frames, _library, _numpy, _plan
+from . import _arrays, _frames, _library, _numpy, _plan, _samples
+from ._samples import Samples
 from ._subdivision import Subdivision, corner_texcoords
 
 Array = Any
@@ -223,6 +224,25 @@ class Renderer:
         found, pullback, warning = _numpy.vjp(spec, plan, wrt)
         return _result(spec, found, warning), pullback
 
+    def rasterize(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
+                  copy: bool = False) -> Samples:
+        """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
+
+        The arguments are those of a call, of one mesh or N shapes of it; of NumPy, PyTorch, or any library with DLPack.
+
+        Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
+        values of any number of channels that are made of them become images by resolve(), which follow the contours: with
+        derivatives by vertices, views and intrinsics, as the library's own images have them. Of the surfaces at a sample
+        the nearest alone counts; where two cut through one another, their line has no contour, and no gradient. sigma has
+        none either. Raises ValueError (dpr.InvalidArgument) for another preset than "pixel".
+
+            samples = renderer.rasterize(vertices, faces, views, intrinsics)
+            normals = samples.interpolate(vertex_normals)
+            image = samples.resolve(my_shader(normals))  # [N, height, width, C]
+        """
+        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy})
+        return _samples.rasterize(spec, plan, copy)
+
     def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
                   texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,
                   copy: bool = False) -> Subdivision:
@@ -331,6 +351,12 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
     return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
 
 
+def rasterize(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
+              copy: bool = False, **settings: Setting) -> Samples:
+    """Renderer(width, height, **settings).rasterize(): see there."""
+    return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, copy=copy)
+
+
 def subdivide(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
               texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,
               copy: bool = False, **settings: Setting) -> Subdivision:
@@ -364,5 +390,6 @@ _all_keywords = {parameter.name: parameter for parameter in (*_setting_keywords,
 _sign(render, *_all_keywords.values())
 _sign(render_with_jvp, *_all_keywords.values())
 _sign(render_with_vjp, *_all_keywords.values())
+_sign(rasterize, *_keywords_of(Renderer.__init__))
 _sign(subdivide, *_keywords_of(Renderer.__init__))
 render.__doc__ += Renderer.__doc__ + "\n    The call:\n\n" + Renderer.__call__.__doc__

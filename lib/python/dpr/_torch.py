@@ -6,9 +6,11 @@ import weakref
 import numpy as np
 import torch
 from torch.autograd import forward_ad
+from torch.autograd.function import once_differentiable
 
 from . import _arrays, _frames
 from ._frames import Rendered, Spec
+from ._samples import Rasterized
 
 _COMPILES = hasattr(torch.library, "register_autograd")  # from 2.4 on
 _HAS_CONTEXT = hasattr(torch.autograd.Function, "setup_context")  # from 2.0 on, for torch.func
@@ -135,6 +137,64 @@ class _Render(torch.autograd.Function):
     def vmap(info, dimensions, *inputs):
         raise NotImplementedError("dpr: error: torch.func.vmap (dpr.render): got a batch of arguments, expected a batch of "
                                   "directions or gradients: a call takes N views, shapes or meshes")
+
+
+@_one_forward
+class _Rasterize(torch.autograd.Function):
+    """(tensors of a call) to face_id, barycentrics and depth."""
+
+    @staticmethod
+    def forward(call, *tensors):
+        call.rendered = Rasterized(call.spec, [_arrays.to_numpy(tensor) for tensor in tensors], call.wanted)
+        return tuple(_tensor(array) for array in call.rendered.outputs)
+
+    @staticmethod
+    def setup_context(ctx, inputs, outputs):
+        ctx.call, *tensors = inputs
+        ctx.count = len(tensors)
+        ctx.mark_non_differentiable(outputs[0])
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, _, grad_barycentrics, grad_depth):
+        found = ctx.call.rendered.gradients({"barycentrics": grad_barycentrics, "depth": grad_depth})
+        return (None, *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
+
+
+@_one_forward
+class _Resolve(torch.autograd.Function):
+    """(values of the samples, tensors of the call) to images."""
+
+    @staticmethod
+    def forward(rasterized, values, *tensors):
+        return _tensor(rasterized.resolve(_arrays.to_numpy(values)))
+
+    @staticmethod
+    def setup_context(ctx, inputs, outputs):
+        ctx.rasterized, values, *tensors = inputs
+        ctx.count = len(tensors)
+        ctx.save_for_backward(values)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, grad_images):
+        values, = ctx.saved_tensors
+        grad_values, found = ctx.rasterized.resolve_gradients(_arrays.to_numpy(values), _arrays.to_numpy(grad_images))
+        return (None, _tensor(grad_values), *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
+
+
+def rasterize(spec, leaves, copy):
+    """(Rasterized, its outputs, the tensors that resolve() depends on)"""
+    tensors = [leaf if isinstance(leaf, torch.Tensor) else torch.from_dlpack(_arrays.to_numpy(leaf)) for leaf in leaves]
+    if copy:
+        tensors = [tensor.cpu() for tensor in tensors]
+    call = _Call(spec, tuple(i for i, tensor in enumerate(tensors) if tensor.requires_grad))
+    outputs = _Rasterize.apply(call, *tensors)
+    return call.rendered, outputs, tensors
+
+
+def resolve(rasterized, values, tensors):
+    return _Resolve.apply(rasterized, values, *tensors)
 
 
 def _is_wanted(tensor):

@@ -1,0 +1,118 @@
+// Shading of the caller's own around a batch: samples out, values in, images out, and the gradients of both.
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "batch/batch.hpp"
+#include "dpr/error.hpp"
+#include "renderer/renderer_impl.hpp"
+
+namespace dpr::batch {
+namespace {
+
+constexpr int k_corners = 3;
+
+void require_one_of(const NamedArray& array, std::initializer_list<std::string_view> names,
+                    const char* expected) {
+  if (std::ranges::find(names, array.name) == names.end())
+    throw InvalidArgument("samples (batch)", "'" + array.name + "'", expected);
+}
+
+}  // namespace
+
+dpr_raster Batch::raster() {
+  Renderer::Impl& m = impl_of(frame_.renderer());
+  m.require_samples("dpr_frame_raster");
+  return {static_cast<int>(m.frame.width), static_cast<int>(m.frame.height), m.raster.supersampling,
+          m.raster.margin};
+}
+
+void Batch::require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like) {
+  const Renderer& renderer = frame_.renderer();
+  const dpr_raster samples = raster();
+  const Scene& scene = renderer.scene();
+  const auto height = static_cast<std::size_t>(is_by_sample ? samples.height : scene.height),
+             width = static_cast<std::size_t>(is_by_sample ? samples.width : scene.width);
+  const std::size_t views = renderer.views().size(), channels = like ? like->shape.back() : k_any;
+  const std::string expected = "[" + std::to_string(views) + ", " + std::to_string(height) + ", " +
+                               std::to_string(width) + ", " + (like ? std::to_string(channels) : "C") + "]";
+  require_floats(array, {views, height, width, channels}, expected);
+  if (array.count() == 0) throw InvalidArgument(argument(array), text_of(array.shape), expected);
+}
+
+void Batch::read_samples(NamedArrays samples) {
+  const dpr_raster size = raster();
+  const std::size_t views = frame_.renderer().views().size(), height = static_cast<std::size_t>(size.height),
+                    width = static_cast<std::size_t>(size.width);
+  const std::string form =
+      "[" + std::to_string(views) + ", " + std::to_string(height) + ", " + std::to_string(width);
+  for (const NamedArray& array : samples) {
+    require_one_of(array, {"face_id", "barycentrics", "depth"}, "face_id, barycentrics or depth");
+    if (array.name == "face_id") require_form(array, Element::int64, {{views, height, width}}, form + "]");
+    if (array.name == "barycentrics") require_floats(array, {views, height, width, k_corners}, form + ", 3]");
+    if (array.name == "depth") require_floats(array, {views, height, width}, form + "]");
+  }
+  const Samples found = frame_.renderer().samples();
+  for (const NamedArray& array : samples) {
+    if (array.name == "face_id") std::ranges::copy(found.faces, static_cast<std::int64_t*>(array.data));
+    if (array.name == "depth") std::ranges::copy(found.depths, array.rows<float>().begin());
+    if (array.name != "barycentrics") continue;
+    const std::span<glm::vec3> out = array.rows<glm::vec3>();
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const glm::vec2 b = found.barycentrics[i];
+      out[i] = found.faces[i] < 0 ? glm::vec3(0.0F) : glm::vec3(1 - b.x - b.y, b.x, b.y);
+    }
+  }
+}
+
+void Batch::samples_backward(NamedArrays grads, NamedArrays gradients) {
+  Renderer& renderer = frame_.renderer();
+  start_gradients(gradients);
+  const dpr_raster size = raster();
+  const std::size_t count =
+      renderer.views().size() * static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
+  std::vector<glm::vec2> barycentrics(count);
+  std::vector<float> depths(count);
+  for (const NamedArray& grad : grads) {
+    require_one_of(grad, {"barycentrics", "depth"}, "barycentrics or depth: the others have no gradients");
+    const std::size_t numbers = grad.name == "depth" ? count : k_corners * count;
+    if (grad.element != Element::float32 || grad.count() != numbers)
+      throw InvalidArgument(argument(grad), text_of(grad.shape), std::to_string(numbers) + " floats");
+    if (grad.name == "depth") {
+      std::ranges::copy(grad.rows<const float>(), depths.begin());
+      continue;
+    }
+    std::ranges::transform(grad.rows<const glm::vec3>(), barycentrics.begin(),
+                           [](const glm::vec3& g) { return glm::vec2(g.y - g.x, g.z - g.x); });
+  }
+  renderer.set_gradients(request_of(wanted_, true));
+  SceneGradient found = renderer.samples_backward(barycentrics, depths);
+  add_gradients(found, true, gradients);
+}
+
+void Batch::resolve(const NamedArray& values, const NamedArray& images) {
+  require_values(values, true, nullptr);
+  require_values(images, false, &values);
+  const std::vector<float> pixels =
+      frame_.renderer().resolve(values.rows<const float>(), values.shape.back());
+  std::ranges::copy(pixels, images.rows<float>().begin());
+}
+
+void Batch::resolve_backward(const NamedArray& values, const NamedArray& grad_images,
+                             const NamedArray& grad_values, NamedArrays gradients) {
+  Renderer& renderer = frame_.renderer();
+  start_gradients(gradients);
+  require_values(values, true, nullptr);
+  require_values(grad_images, false, &values);
+  require_values(grad_values, true, &values);
+  if (find(gradients, "sigma"))
+    throw InvalidArgument("sigma (batch)", "its gradient",
+                          "that of vertices, views or intrinsics, with own shading");
+  renderer.set_gradients(request_of(wanted_, true));
+  ResolveGradient found = renderer.resolve_backward(values.rows<const float>(), values.shape.back(),
+                                                    grad_images.rows<const float>());
+  std::ranges::copy(found.samples, grad_values.rows<float>().begin());
+  add_gradients(found.scene, true, gradients);
+}
+
+}  // namespace dpr::batch

@@ -1,0 +1,169 @@
+"""Shading of the caller's own, with noise on the pixel around it."""
+import ctypes
+import sys
+from typing import Any, Callable, Dict, Optional, Tuple
+
+import numpy as np
+
+from . import _arrays, _frames, _library
+
+Array = Any
+_NAMES = ("face_id", "barycentrics", "depth")
+
+
+class Rasterized:
+    """A frame, and what its samples show.
+
+    outputs  [face_id, barycentrics, depth]
+    """
+
+    def __init__(self, spec, arrays, wanted):
+        """arrays, wanted: as Rendered has them."""
+        (settings, parts), = _frames.frames_of(spec.parts)
+        arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
+        self._parts = [part for part in parts if part.leaf in wanted]
+        self._shapes = [array.shape for array in arrays]
+        named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
+        if not any(part.name == "faces" for part in parts):
+            named += _frames.NO_MESH
+        options = _frames.options_of(spec, settings, 0, [part.name for part in self._parts])
+        self._frame = _frames.Frame(options, named)
+        self.raster = _library.Raster()
+        _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
+        count = next(len(array) for name, array in named if name == "views")
+        self.size, self._image_size = (count, self.raster.height, self.raster.width), (count, spec.height, spec.width)
+        self.outputs = [np.empty(self.size, np.int64), np.empty(self.size + (3,), np.float32), np.empty(self.size, np.float32)]
+        _library.call("dpr_frame_samples", self._frame.handle, *_frames.c_arrays(list(zip(_NAMES, self.outputs))))
+
+    def _room(self):
+        """({leaf: gradient}, the same as arrays of the library)"""
+        found = {part.leaf: np.zeros(self._shapes[part.leaf], np.float32) for part in self._parts}
+        return found, _frames.c_arrays([(part.name, found[part.leaf]) for part in self._parts])
+
+    def gradients(self, grads):
+        """{leaf: gradient} of sum <grad, output>, by the outputs' names."""
+        shapes = dict(zip(_NAMES, (output.shape for output in self.outputs)))
+        named = [(name, _checked(name, grad, shapes[name])) for name, grad in grads.items() if grad is not None]
+        found, room = self._room()
+        _library.call("dpr_frame_samples_backward", self._frame.handle, *_frames.c_arrays(named), *room)
+        return found
+
+    def resolve(self, values):
+        values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim else 0))
+        images = np.empty((*self._image_size, values.shape[-1]), np.float32)
+        _library.call("dpr_frame_resolve", self._frame.handle, _one("values", values), _one("images", images))
+        return images
+
+    def resolve_gradients(self, values, grad_images):
+        """(gradient of the values, {leaf: gradient})"""
+        values = _checked("values", values, (*self.size, values.shape[-1]))
+        grad_images = _checked("grad_images", grad_images, (*self._image_size, values.shape[-1]))
+        grad_values = np.empty(values.shape, np.float32)
+        found, room = self._room()
+        _library.call("dpr_frame_resolve_backward", self._frame.handle, _one("values", values),
+                      _one("grad_images", grad_images), _one("grad_values", grad_values), *room)
+        return grad_values, found
+
+
+def _one(name, array):
+    return _frames.c_arrays([(name, array)])[0]
+
+
+def _checked(name, array, shape):
+    """Packed floats. Fails for another shape."""
+    array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
+    if array.shape != shape or not array.size:
+        _arrays.fail(ValueError, name, list(array.shape), [*shape[:3], *("C" if size == 0 else size for size in shape[3:])],
+                     "dpr.Samples")
+    return array
+
+
+class Samples:
+    """What the samples of the rigid image show, for shading of the caller's own: see Renderer.rasterize().
+
+    face_id        [N, h, w], int64: the nearest face, -1 where nothing is
+    barycentrics   [N, h, w, 3] of that face's corners, with perspective; 0 where nothing is
+    depth          [N, h, w] along the view direction, world units; 0 where nothing is
+    supersampling  samples a pixel and axis; margin: samples around the image, so that h = height supersampling + 2 margin
+
+    With PyTorch barycentrics, depth and what is made of them have derivatives by vertices, views and intrinsics; with other
+    arrays pullback() and resolve_with_vjp() have them.
+    """
+
+    face_id: Array
+    barycentrics: Array
+    depth: Array
+    supersampling: int
+    margin: int
+
+    def __init__(self, rasterized, outputs, faces, plan, tensors):
+        self._rasterized, self._faces, self._plan, self._tensors = rasterized, faces, plan, tensors
+        self.face_id, self.barycentrics, self.depth = outputs
+        self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
+
+    @property
+    def mask(self) -> Array:
+        """[N, h, w]: whether there is a face."""
+        return self.face_id >= 0
+
+    def interpolate(self, attributes: Array, faces: Optional[Array] = None) -> Array:
+        """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3]
+        indices of the attributes for the corners of the mesh's faces, where they have some of their own."""
+        faces = self._faces if faces is None else faces
+        corners = faces[self.face_id.clip(0)]
+        if len(attributes.shape) == 2:
+            values = attributes[corners]
+        elif len(attributes.shape) == 3:
+            values = attributes[np.arange(len(attributes))[:, None, None, None], corners]
+        else:
+            _arrays.fail(ValueError, "attributes", list(attributes.shape), "[V, C] or [N, V, C]", "dpr.Samples")
+        return (self.barycentrics[..., None] * values).sum(-2)
+
+    def resolve(self, values: Array) -> Array:
+        """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
+        contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
+        the background's. Raises ValueError for another shape, and what is not finite."""
+        if self._tensors is not None:
+            from . import _torch
+            return _torch.resolve(self._rasterized, values, self._tensors)
+        return _arrays.like(values, self._rasterized.resolve(_arrays.to_numpy(values)))
+
+    def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
+        """(resolve(values), pullback). pullback(grad_images) returns the gradient of the values and, by way of the
+        contours, those of vertices, views and intrinsics, by name."""
+        kept = np.array(_arrays.to_numpy(values), np.float32)
+
+        def pullback(grad_images):
+            grad_values, found = self._rasterized.resolve_gradients(kept, _arrays.to_numpy(grad_images))
+            return _arrays.like(values, grad_values), self._by_name(found)
+
+        return _arrays.like(values, self._rasterized.resolve(kept)), pullback
+
+    def pullback(self, barycentrics: Optional[Array] = None, depth: Optional[Array] = None) -> Dict[str, Array]:
+        """Gradients of vertices, views and intrinsics, by name, from those of barycentrics and depth. They leave out how
+        contours move, which resolve_with_vjp() has: add up both."""
+        return self._by_name(self._rasterized.gradients({"barycentrics": barycentrics, "depth": depth}))
+
+    def _by_name(self, found):
+        plan = self._plan
+        return {plan.paths[leaf][0]: _arrays.restored(plan.given[leaf], gradient) for leaf, gradient in found.items()}
+
+
+def rasterize(spec, plan, copy):
+    """Samples of a call's only mesh."""
+    count = len(_frames.frames_of(spec.parts))
+    if count > 1:
+        _arrays.fail(ValueError, "faces", f"{count} meshes", "one mesh, or N shapes of one topology", "dpr.rasterize")
+    leaves = plan.leaves
+    kinds = {_arrays.module_of(leaf) for leaf in leaves}
+    if "jax" in kinds:
+        _arrays.fail(TypeError, "vertices", "an array of JAX", "arrays of NumPy or PyTorch", "dpr.rasterize")
+    faces = next(leaf for path, leaf in zip(plan.paths, leaves) if path == ("faces",))
+    if "torch" in kinds:
+        from . import _torch
+        rasterized, outputs, tensors = _torch.rasterize(spec, leaves, copy)
+        return Samples(rasterized, outputs, sys.modules["torch"].as_tensor(faces).long(), plan, tensors)
+    wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
+    rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
+    outputs = [_arrays.like(plan.given[0], output) for output in rasterized.outputs]
+    return Samples(rasterized, outputs, faces, plan, None)
