@@ -126,8 +126,9 @@ struct PoseResult : PoseHypothesis {
   std::vector<PoseHypothesis> equals;
   /// Row-major covariance of a small motion: rotation vector on the left (world axes, radians), then, if
   /// solved for, the translation (world), the logarithm of the focal length, and k1 and k2. From the
-  /// final Hessian and the residuals at edges, as if pixels erred independently: it knows nothing of errors
-  /// of the scene or of another valley. Empty where the image leaves a parameter open. LeastSquares only.
+  /// final Hessian, from residuals that go together in space, and from a share for what is wrong about the
+  /// scene's light, surface and outline, sized by errors in pictures by other software and in photographs
+  /// (bench/experiments/pose/uncertainty.py). It knows nothing of another valley. Empty where the image leaves a parameter open. LeastSquares only.
   std::vector<double> covariance;
   unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose

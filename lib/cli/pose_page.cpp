@@ -30,7 +30,7 @@ std::string uncertainty_text(const PoseResult& result) {
   if (c.empty()) return "";
   const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(c.size()))));
   const double variance = c[0] + c[size + 1] + c[2 * size + 2];
-  return format("%.2g degrees, one standard deviation, if the scene is right",
+  return format("%.2g degrees, one standard deviation",
                 glm::degrees(std::sqrt(variance)));
 }
 

@@ -12,7 +12,7 @@ namespace dpr {
 namespace {
 
 constexpr std::size_t k_channels = 3;
-constexpr std::size_t k_thresholds = 16;  // as the kernel has them
+constexpr std::size_t k_thresholds = 16, k_cell_sums = 6;  // as the kernel has them
 
 // Weighing and solving in turn: until the loss falls by no more than a part, but no more often than that. The
 // loss of a hypothesis must be at its least for its derivatives to hold.
@@ -250,6 +250,47 @@ std::vector<NormalEquations> NormalSums::linearize(const HypothesisImages& image
       }
     }
   }
+  return result;
+}
+
+ScoreCells NormalSums::score_cells(const HypothesisImages& images, const HypothesisTangents& tangents,
+                                   float scale, std::size_t width) {
+  constexpr std::size_t k_least_side = 4, k_most_cells = 64;  // pixels; along an axis
+  Device::Impl& d = impl_of(device_);
+  const std::size_t height = pixels_ / width, n = directions_;
+  ScoreCells result;
+  result.equations = linearize(images, tangents, scale).front();
+  result.weight = 1 / (static_cast<double>(k_channels) * weight_);
+  result.side = std::max(k_least_side, (std::max(width, height) + k_most_cells - 1) / k_most_cells);
+  result.columns = (width + result.side - 1) / result.side;
+  const std::size_t cells = result.columns * ((height + result.side - 1) / result.side);
+  std::vector<float> units;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double h = result.equations.hessian[k * (n + 1)];
+    units.push_back(h > 0 ? static_cast<float>(result.weight / h) : 0.0F);
+  }
+  units_.upload(d, units);
+  slot_sums_.resize(d, (n + k_cell_sums) * cells);
+  launch_(slot_sums_.size(), kernel::normal_cells{.pixels = to_uint(pixels_),
+                                                  .width = to_uint(width),
+                                                  .side = to_uint(result.side),
+                                                  .cells = to_uint(cells),
+                                                  .units = units_,
+                                                  .weights = weights_,
+                                                  .residuals = residuals_,
+                                                  .left = terms_ > 0 ? left_ : lit_,
+                                                  .sums = slot_sums_});
+  const std::vector<float> sums = slot_sums_.download();
+  const auto of = [&](std::size_t number) {
+    return sums.begin() + static_cast<std::ptrdiff_t>(number * cells);
+  };
+  for (auto sum = of(0); sum != of(n); ++sum)
+    result.scores.push_back(result.weight * static_cast<double>(*sum));
+  const double whole = std::accumulate(of(n + 1), of(n + 2), 0.0);
+  if (whole > 0) result.kept = std::accumulate(of(n), of(n + 1), 0.0) / whole;
+  result.residuals.assign(of(n + 2), of(n + 5));
+  result.squares = std::accumulate(of(n + 5), of(n + 6), 0.0);
+  result.median = medians(images).front().value_or(0.0F);
   return result;
 }
 

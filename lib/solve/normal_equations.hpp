@@ -43,6 +43,20 @@ struct WeighedTarget {
   glm::vec3 background{0.0F};
 };
 
+/// What the uncertainty of a hypothesis is judged from.
+struct ScoreCells {
+  NormalEquations equations;
+  std::size_t columns = 0;  ///< of cells: squares of `side` pixels, row by row
+  std::size_t side = 0;
+  std::vector<double> scores;  ///< [direction][cell] what the cell adds to the gradient
+  double weight = 0;           ///< of a squared residual in the loss
+  double kept =
+      1;  ///< the robust weights' mean over pixels, each counted as much as its derivatives say of the pose
+  std::vector<double> residuals;  ///< [channel][cell] weighed sums
+  double squares = 0;             ///< of the weighed residuals, summed over pixels and channels
+  float median = 0;               ///< of the residuals' sizes where the object shows
+};
+
 /// The loss is the mean over colour channels and pixels of squares, or of their robust version (Geman and McClure
 /// 1985), the light being the best one (pose_light.hpp).
 class NormalSums {
@@ -54,6 +68,9 @@ class NormalSums {
   std::vector<double> losses(const HypothesisImages& images, float scale);
   std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,
                                          float scale);
+  /// Of a single view, in images of that width. 4 n + 24 bytes a cell come back; there are at most 64 x 64.
+  ScoreCells score_cells(const HypothesisImages& images, const HypothesisTangents& tangents, float scale,
+                         std::size_t width);
   /// Scales for the robust loss, one a view, from the residuals that it leaves where it shows the object; 0 of a
   /// view that shows nothing.
   std::vector<float> scales(const HypothesisImages& images);
@@ -102,13 +119,13 @@ class NormalSums {
   cl_float4 background_;
   Device device_;
   Launcher<kernel::normal_loss, kernel::normal_counts, kernel::normal_lit, kernel::normal_equations,
-           kernel::normal_means>
+           kernel::normal_cells, kernel::normal_means>
       launch_;
   std::optional<Launcher<kernel::normal_light, kernel::normal_cross, kernel::normal_left>> launch_light_;
   Reduce reduce_;
   std::vector<Lights> lights_;  // [view]
   Buffer<cl_float4> target_;
-  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, slot_sums_;
+  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, slot_sums_, units_;
   Buffer<cl_uint> active_, starts_;
 };
 

@@ -140,6 +140,11 @@ std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hy
   return result;
 }
 
+ScoreCells PoseLevel::score_cells(const Hypothesis& hypothesis) {
+  const auto [images, tangents] = render_tangents({&hypothesis, 1});
+  return sums_->score_cells(images, tangents, scale_, static_cast<std::size_t>(width()));
+}
+
 double PoseLevel::blank_loss() const {
   const std::size_t pixels = target_.colors.size();
   glm::dvec3 mean(0.0);

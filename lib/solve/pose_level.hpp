@@ -27,6 +27,9 @@ class PoseLevel {
   /// The same with derivatives.
   std::vector<NormalEquations> linearize(std::span<const Hypothesis> hypotheses);
 
+  /// The same of one, with what its uncertainty is judged from.
+  ScoreCells score_cells(const Hypothesis& hypothesis);
+
   /// Makes the loss robust: Geman and McClure's with a scale from the residuals that the best of the
   /// hypotheses leave at the object, beyond which a pixel hardly counts. Without any hypothesis that shows
   /// the object, squares stay.

@@ -12,6 +12,7 @@
 #include "solve/polar.hpp"
 #include "solve/pose_candidates.hpp"
 #include "solve/pose_pyramid.hpp"
+#include "solve/pose_scatter.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {
@@ -78,7 +79,7 @@ class Fit {
   void turn(PoseLevel& level, Turns turns);
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope);
-  void finish(bool anywhere);
+  void finish(PoseLevel& level, bool anywhere);
   void choose_equals(bool anywhere);
   double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
@@ -117,7 +118,7 @@ PoseResult Fit::run(bool anywhere) {
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scale(level.scale());
   wrong_ = wrong_loss(sampled);
-  finish(anywhere);
+  finish(level, anywhere);
   const double unexplained = std::min(wrong_, sampled.blank_loss());
   result_.explained = result_.loss < static_cast<double>(options_.explained) * unexplained;
   return result_;
@@ -299,10 +300,13 @@ bool Fit::report(const PoseLevel& level) {
   return !callback_ || callback_(result_.history.back());
 }
 
-void Fit::finish(bool anywhere) {
+void Fit::finish(PoseLevel& level, bool anywhere) {
   choose_equals(anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
-  result_.covariance = covariance(candidates_.front().equations, space_.size());
+  const ScoreCells cells = level.score_cells(candidates_.front().hypothesis);
+  NormalEquations equations = cells.equations;
+  equations.scatter = score_scatter(cells, space_.size(), level.scale());
+  result_.covariance = covariance(equations, space_.size());
   if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
   result_.light = light_;
 }

@@ -64,7 +64,7 @@ def make_mesh(mi, mesh, rotation, glossy):
     return result
 
 
-def path_trace(mi, scene, rotation, random, samples, seed):
+def path_trace(mi, scene, rotation, random, samples, seed, pixel_format="rgb"):
     camera_to_world = np.linalg.inv(scene["camera"]["view"])
 
     def place(distance):
@@ -86,7 +86,7 @@ def path_trace(mi, scene, rotation, random, samples, seed):
         "type": "perspective", "fov": scene["camera"]["fov_y_degrees"], "fov_axis": "y",
         "to_world": mi.ScalarTransform4f(camera_to_world),
         "sampler": {"type": "independent", "sample_count": samples},
-        "film": {"type": "hdrfilm", "width": scene["width"], "height": scene["height"], "pixel_format": "rgb",
+        "film": {"type": "hdrfilm", "width": scene["width"], "height": scene["height"], "pixel_format": pixel_format,
                  "rfilter": {"type": "box"}}}
     return mi.render(mi.load_dict(description), seed=seed)
 
