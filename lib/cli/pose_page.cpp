@@ -30,8 +30,7 @@ std::string uncertainty_text(const PoseResult& result) {
   if (c.empty()) return "";
   const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(c.size()))));
   const double variance = c[0] + c[size + 1] + c[2 * size + 2];
-  return format("%.2g degrees, one standard deviation",
-                glm::degrees(std::sqrt(variance)));
+  return format("%.2g degrees, one standard deviation", glm::degrees(std::sqrt(variance)));
 }
 
 void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
