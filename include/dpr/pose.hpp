@@ -128,7 +128,8 @@ struct PoseResult : PoseHypothesis {
   /// solved for, the translation (world), the logarithm of the focal length, and k1 and k2. From the
   /// final Hessian, from residuals that go together in space, and from a share for what is wrong about the
   /// scene's light, surface and outline, sized by errors in pictures by other software and in photographs
-  /// (bench/experiments/pose/uncertainty.py). It knows nothing of another valley. Empty where the image leaves a parameter open. LeastSquares only.
+  /// (bench/experiments/pose/uncertainty.py). It knows nothing of another valley. Empty where the image leaves a
+  /// parameter open. LeastSquares only.
   std::vector<double> covariance;
   unsigned iterations = 0;  ///< of all descents or levels
   unsigned descent = 0;     ///< the one that found the pose

@@ -271,15 +271,17 @@ ScoreCells NormalSums::score_cells(const HypothesisImages& images, const Hypothe
   }
   units_.upload(d, units);
   slot_sums_.resize(d, (n + k_cell_sums) * cells);
-  launch_(slot_sums_.size(), kernel::normal_cells{.pixels = to_uint(pixels_),
-                                                  .width = to_uint(width),
-                                                  .side = to_uint(result.side),
-                                                  .cells = to_uint(cells),
-                                                  .units = units_,
-                                                  .weights = weights_,
-                                                  .residuals = residuals_,
-                                                  .left = terms_ > 0 ? left_ : lit_,
-                                                  .sums = slot_sums_});
+  if (!launch_cells_) launch_cells_.emplace(d);
+  (*launch_cells_)(slot_sums_.size(), kernel::normal_cells{.directions = to_uint(n),
+                                                           .pixels = to_uint(pixels_),
+                                                           .width = to_uint(width),
+                                                           .side = to_uint(result.side),
+                                                           .cells = to_uint(cells),
+                                                           .units = units_,
+                                                           .weights = weights_,
+                                                           .residuals = residuals_,
+                                                           .left = terms_ > 0 ? left_ : lit_,
+                                                           .sums = slot_sums_});
   const std::vector<float> sums = slot_sums_.download();
   const auto of = [&](std::size_t number) {
     return sums.begin() + static_cast<std::ptrdiff_t>(number * cells);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/normal_cells.hpp"
 #include "kernels/normal_equations.hpp"
 #include "solve/pose_light.hpp"
 #include "solve/pose_space.hpp"
@@ -119,8 +120,9 @@ class NormalSums {
   cl_float4 background_;
   Device device_;
   Launcher<kernel::normal_loss, kernel::normal_counts, kernel::normal_lit, kernel::normal_equations,
-           kernel::normal_cells, kernel::normal_means>
+           kernel::normal_means>
       launch_;
+  std::optional<Launcher<kernel::normal_cells>> launch_cells_;  // made when first asked for
   std::optional<Launcher<kernel::normal_light, kernel::normal_cross, kernel::normal_left>> launch_light_;
   Reduce reduce_;
   std::vector<Lights> lights_;  // [view]

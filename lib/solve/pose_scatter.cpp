@@ -9,11 +9,12 @@
 namespace dpr {
 namespace {
 
-// Deviations of poses that the model's error makes, in those of the residuals' scatter by pixels.
+// Deviations of poses that the model's error makes, in those of the residuals' scatter by pixels: as pictures by other
+// software have it (bench/results/notes.md).
 constexpr double k_model = 7.5, k_robust_model = 30;
 // Part of the weight of pixels that tell of the pose which a robust loss takes where there is clutter.
 constexpr double k_cluttered = 0.15;
-// Derivatives of pixels' samples are rougher than those of their means: the Hessian seems larger than it is.
+// Of the noise's scatter, as errors of poses in pictures with independent noise are (pose_uncertainty_test.cpp).
 constexpr double k_rough = 2;
 constexpr double k_normal =
     1.4826;  // a normal distribution's standard deviation over the median of the sizes

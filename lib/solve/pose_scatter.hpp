@@ -10,8 +10,8 @@ namespace dpr {
 /// - Noise. Neighbours' residuals go together: scores are added up over blocks before their outer products are
 ///   (Liang and Zeger 1986; Conley 1999 for pixels), over blocks of one, two and four cells on a side, each corrected
 ///   for the parameters that were fitted to so few blocks; or the scatter by pixels counts as often as squares of
-///   the residuals' sums over blocks say that pixels go together. Whichever is largest holds, twice, since
-///   derivatives of samples are rougher than those of their means.
+///   the residuals' sums over blocks say that pixels go together. Whichever is largest holds, twice, which is
+///   what errors of poses in pictures with independent noise say (tests/solve/pose_uncertainty_test.cpp).
 /// - The model's error. What is wrong about light, surface and outline repeats from block to block, and the fit has
 ///   taken up most of what speaks of the pose before residuals show the rest. Its part of the scatter is what the
 ///   residuals' median does not explain as noise, or with a robust loss what has lost its weight; it counts as

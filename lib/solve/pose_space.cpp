@@ -112,7 +112,8 @@ double PoseSpace::distance(const Hypothesis& a, const Hypothesis& b) const {
 
 View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
   Camera seen = calibrated(camera, hypothesis.focal_scale, hypothesis.radial);
-  if (distortion_ && !seen.distortion) seen.distortion.emplace();  // a perfect lens, whose tangents are asked for
+  if (distortion_ && !seen.distortion)
+    seen.distortion.emplace();  // a perfect lens, whose tangents are asked for
   return {seen, {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
 }
 
