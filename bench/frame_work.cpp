@@ -33,7 +33,7 @@ struct Rule {
   double joint_reach = of_prior("DPR_JOINT_BELOW") + of_prior("DPR_JOINT_ABOVE");
   double crowd = of_any("DPR_JOINT_CROWD"), crowd_reach = of_any("DPR_JOINT_CROWD_REACH");
   double step = of_prior("DPR_JOINT_STEP"), crowd_step = of_prior("DPR_JOINT_CROWD_STEP");
-  double opaque = of_joint("DPR_OPAQUE"), negligible = of_joint("DPR_NEGLIGIBLE");
+  double opaque = of_joint("DPR_OPAQUE"), negligible = kernel_constant("sorted_slots.h", "DPR_NEGLIGIBLE");
   double min_transparency = kernel_constant("pixel.h", "DPR_MIN_TRANSPARENCY");
   double block = 16;  // DPR_WIDTH of aggregate_joint.cl on vectors
 };

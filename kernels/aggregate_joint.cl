@@ -18,82 +18,9 @@
 #endif
 #define DPR_JOINT
 #include "integrate.h"
+#include "sorted_slots.h"
 
 #define DPR_OPAQUE 1e-12f
-
-/// Fragments that cover less than this of what the pixel's most covering one does are left out.
-#define DPR_NEGLIGIBLE 1e-8f
-
-/// Up to so many slots are few.
-#if DPR_LANES == 1
-#define DPR_FEW_SLOTS 24
-#else
-#define DPR_FEW_SLOTS 64
-#endif
-
-/// By view depth, which a slot's beta holds until it is in a cluster; equal depths by fragment.
-static inline int comes_before(const Slot a, const Slot b) {
-  return a.beta < b.beta || (a.beta == b.beta && a.fragment < b.fragment);
-}
-
-static inline void sift_down(global Slot* slots, uint root, uint count) {
-  const Slot moved = slots[root];
-  for (uint child; (child = 2 * root + 1) < count; root = child) {
-    if (child + 1 < count && comes_before(slots[child], slots[child + 1])) ++child;
-    if (!comes_before(moved, slots[child])) break;
-    slots[root] = slots[child];
-  }
-  slots[root] = moved;
-}
-
-#if DPR_LANES == 1
-
-/// By insertion.
-static inline void sort_few_slots(global Slot* slots, uint count) {
-  for (uint i = 1; i < count; ++i) {
-    const Slot moved = slots[i];
-    uint k = i;
-    for (; k > 0 && comes_before(moved, slots[k - 1]); --k) slots[k] = slots[k - 1];
-    slots[k] = moved;
-  }
-}
-
-#else
-
-/// Each goes where as many come before it as there are: counted on lanes, without a branch to mispredict.
-/// Slots come in the order of their fragments.
-static inline void sort_few_slots(global Slot* slots, uint count) {
-  Slot moved[DPR_FEW_SLOTS];
-  float depths[DPR_FEW_SLOTS];
-  int ranks[DPR_FEW_SLOTS];
-  for (uint i = 0; i < count; ++i) {
-    moved[i] = slots[i];
-    depths[i] = moved[i].beta;
-  }
-  for (uint first = 0; first < count; first += DPR_WIDTH) {
-    const realn depth = load_n(first, depths);
-    const intn place = (int)first + DPR_LANE_INDEX;
-    intn before = 0;
-    for (uint k = 0; k < count; ++k) before -= depths[k] < depth || (depths[k] == depth && (int)k < place);
-    store_n(before, first, ranks);
-  }
-  for (uint i = 0; i < count; ++i) slots[ranks[i]] = moved[i];
-}
-
-#endif
-
-/// Heap sort for many.
-static inline void sort_slots(global Slot* slots, uint count) {
-  if (count <= DPR_FEW_SLOTS) {
-    sort_few_slots(slots, count);
-    return;
-  }
-  for (uint root = count / 2; root-- > 0;) sift_down(slots, root, count);
-  for (uint end = count - 1; end > 0; --end) {
-    swap_slots(slots, slots + end);  // the furthest
-    sift_down(slots, 0, end);
-  }
-}
 
 /// A run of a pixel's slots whose noise overlaps.
 typedef struct {
@@ -101,24 +28,6 @@ typedef struct {
   float transparency;  // prod (1 - p)
   float coverage;      // 1 - that, added up so that coverages far below 1 keep their digits
 } Cluster;
-
-/// The fragments that cover, as slots sorted by depth, with their view depths in place of the betas. Left out
-/// are those that cover less than DPR_NEGLIGIBLE of what another does: an error of at most that, relative to
-/// the pixel's coverage, so that the smallest difference to the background keeps its sign. Returns how many
-/// are left.
-static inline uint gather_slots(const Fragments f, uint first, uint last, global Slot* slots) {
-  float largest = 0.0f;
-  for (uint i = first; i < last; ++i) largest = max(largest, f.occupancy[f.list[i]]);
-  uint count = 0;
-  for (uint i = first; i < last; ++i) {
-    const uint k = f.list[i];
-    const Slot s = {f.depth[k], f.occupancy[k], -1.0f, k};
-    slots[count] = s;
-    count += s.occupancy > DPR_NEGLIGIBLE * largest;
-  }
-  sort_slots(slots, count);
-  return count;
-}
 
 /// The cluster that begins with the first of `count` slots that hold view depths, which become betas relative
 /// to the first's. It ends where the noise of two neighbours in depth does not overlap: the nearer one is

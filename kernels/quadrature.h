@@ -32,6 +32,7 @@ typedef struct {
   float head;    // tails: the cluster's largest beta
   float next;    // tails: the next cluster's, or -INFINITY
   int is_upper;  // tails: this is the cluster's upper half
+  uint passed;   // tails: slots before the last head that was found; joint
 } Stretch;
 
 /// Inputs of the lower end of the barrier's integral, where its rule needs one: how many slots lie no
@@ -176,21 +177,32 @@ static inline void stretch_nodes(const Stretch s, uint block, realn* t, realn* w
   *weight *= radius * 0.5f * (e + inverse);
 }
 
-/// The largest beta below `limit`, or -INFINITY.
-static inline float next_head(const Slots run, float limit) {
+/// The largest beta below `limit`, or -INFINITY. Limits fall from call to call.
+static inline float next_head(const Slots run, float limit, uint* passed) {
+#ifdef DPR_JOINT
+  // Betas fall from slot to slot: the search goes on behind those that it has passed.
+  for (; *passed < run.count; ++*passed) {
+    const float beta = run.slot[*passed].beta;
+    if (beta < limit) return beta;
+  }
+  return -INFINITY;
+#else
+  (void)passed;
   float head = -INFINITY;
   for (uint i = 0; i < run.count; ++i) {
     const float beta = run.slot[i].beta;
     if (beta < limit && beta > head) head = beta;
   }
   return head;
+#endif
 }
 
 static inline Stretch first_stretch(const Slots run) {
   Stretch s;
   s.blocks = 32 / DPR_WIDTH;
-  s.centre = s.head = next_head(run, INFINITY);
-  s.next = next_head(run, s.head - DPR_HEAD_WIDTH);
+  s.passed = 0;
+  s.centre = s.head = next_head(run, INFINITY, &s.passed);
+  s.next = next_head(run, s.head - DPR_HEAD_WIDTH, &s.passed);
   s.low = 0.0f;
   s.high = asinh(DPR_TAIL_REACH);
   s.is_upper = 1;
@@ -211,7 +223,7 @@ static inline int next_stretch(const Slots run, Stretch* s) {
   s->low = 0.0f;
   s->high = asinh(half_way);
   s->centre = s->head = s->next;
-  s->next = next_head(run, s->head - DPR_HEAD_WIDTH);
+  s->next = next_head(run, s->head - DPR_HEAD_WIDTH, &s->passed);
   s->is_upper = 1;
   return 1;
 }

@@ -114,7 +114,8 @@ TEST_SUITE("gradient") {
 TEST_SUITE("unit") {
   TEST_CASE("joint aggregation: fragments in any order give the same image, bit by bit") {
     dpr::test::RandomFloat random(3);
-    for (const int count : {2, 3, reduced(23, 4), reduced(24, 5), reduced(25, 26), reduced(300, 27)}) {
+    // Registers hold 8; up to 64 are counted, more are in heaps.
+    for (const int count : {2, 3, 8, 9, reduced(17, 10), reduced(64, 11), 65, reduced(300, 66)}) {
       SyntheticPixel pixel = dpr::test::make_pixel(count, 50, 1e-2F, dpr::test::Occupancies::any, random);
       std::ranges::sort(pixel, {}, &SyntheticFragment::depth);
       SyntheticPixel turned(pixel.rbegin(), pixel.rend()), mixed(pixel);
