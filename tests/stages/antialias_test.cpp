@@ -23,16 +23,16 @@ namespace {
 constexpr float k_nothing = std::numeric_limits<float>::infinity();
 
 /// Samples of the nearest triangle: its colour, its depth and which it is.
-struct Samples {
+struct SampleGrid {
   std::vector<cl_float4> colors;
   std::vector<float> front;
   std::vector<cl_uint> face;
 };
 
 /// By brute force in double precision; no sample lies on an edge.
-Samples rigid_samples(const ContourFrame& frame, const Mesh& mesh) {
-  Samples samples{std::vector<cl_float4>(frame.samples()), std::vector<float>(frame.samples(), k_nothing),
-                  std::vector<cl_uint>(frame.samples(), DPR_NO_FACE)};
+SampleGrid rigid_samples(const ContourFrame& frame, const Mesh& mesh) {
+  SampleGrid samples{std::vector<cl_float4>(frame.samples()), std::vector<float>(frame.samples(), k_nothing),
+                     std::vector<cl_uint>(frame.samples(), DPR_NO_FACE)};
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     const glm::dvec3 a(mesh.positions[mesh.faces[f].x]), b(mesh.positions[mesh.faces[f].y]),
         c(mesh.positions[mesh.faces[f].z]);
@@ -63,7 +63,7 @@ struct Blended {
 };
 
 /// `unknown` is in the steps before they are looked at.
-Blended blend_and_keep(ContourFrame& frame, const Samples& samples, cl_uint unknown = 0xdeadbeefU) {
+Blended blend_and_keep(ContourFrame& frame, const SampleGrid& samples, cl_uint unknown = 0xdeadbeefU) {
   frame.contour.forward(frame.inputs());
   frame.antialias.front.upload(device_impl(), samples.front);
   frame.antialias.front_face.upload(device_impl(), samples.face);
@@ -78,7 +78,7 @@ Blended blend_and_keep(ContourFrame& frame, const Samples& samples, cl_uint unkn
   return {raster.download(), std::move(kept)};
 }
 
-std::vector<cl_float4> blend(ContourFrame& frame, const Samples& samples) {
+std::vector<cl_float4> blend(ContourFrame& frame, const SampleGrid& samples) {
   return blend_and_keep(frame, samples).image;
 }
 
@@ -220,7 +220,7 @@ TEST_SUITE("unit") {
         const Mesh mesh = axis == 0 ? fan({{-5, -3}, {edge, -3}, {edge, 3}, {-5, 3}}, 5)
                                     : fan({{-3, -5}, {3, -5}, {3, edge}, {-3, edge}}, 5);
         ContourFrame frame(mesh, 16, 16);
-        Samples samples = rigid_samples(frame, mesh);
+        SampleGrid samples = rigid_samples(frame, mesh);
         for (std::size_t i = 0; i < samples.colors.size(); ++i) {
           const std::size_t place = axis == 0 ? i % 16 : 15 - i / 16;
           const float at = (static_cast<float>(place) + 0.5F) / 8 - 1;
@@ -241,7 +241,7 @@ TEST_SUITE("unit") {
     const float edge = 0.33F;
     const Mesh mesh = fan({{-3, -3}, {edge, -3}, {edge, 3}, {-3, 3}}, 5);
     ContourFrame frame(mesh, 16, 16);
-    Samples samples = rigid_samples(frame, mesh);
+    SampleGrid samples = rigid_samples(frame, mesh);
     const auto within = [](float x) { return 1 + 0.3F * x; };
     const auto beyond = [](float x) { return 0.2F - 0.1F * x; };
     for (std::size_t i = 0; i < samples.colors.size(); ++i) {
@@ -343,7 +343,7 @@ TEST_SUITE("unit") {
       const glm::vec2 middle(random(-1.1F, 1.1F), random(-0.9F, 0.9F));
       const Mesh mesh = fan(circle(middle, random(0.02F, 0.3F), 5), 5);
       ContourFrame frame(mesh, 75, 60);
-      const Samples samples = rigid_samples(frame, mesh);
+      const SampleGrid samples = rigid_samples(frame, mesh);
       const auto passes = [&](cl_uint unknown) {
         const Blended blended = blend_and_keep(frame, samples, unknown);
         std::vector<std::vector<cl_float4>> results{blended.image};
@@ -374,7 +374,7 @@ TEST_SUITE("gradient") {
     const Mesh mesh = sphere_of_edges();
     const int size = reduced(48, 16);
     ContourFrame frame(mesh, size, size - 5);
-    Samples samples = rigid_samples(frame, mesh);
+    SampleGrid samples = rigid_samples(frame, mesh);
     samples.colors = smooth_values(frame, 0);
     for (std::size_t i = 0; i < samples.colors.size(); ++i) {
       if (samples.face[i] % 2 != 0) continue;
@@ -393,7 +393,7 @@ TEST_SUITE("gradient") {
     const Mesh mesh = sphere_of_edges();
     const int size = reduced(48, 16);
     ContourFrame frame(mesh, size, size - 5);
-    const Samples samples = rigid_samples(frame, mesh);
+    const SampleGrid samples = rigid_samples(frame, mesh);
     const std::vector<cl_float4> grad = smooth_values(frame, 1);
     const Blended blended = blend_and_keep(frame, samples);
     Buffer<cl_float4> grad_raster(device_impl(), grad), grad_ndc, no_clip;
