@@ -80,7 +80,7 @@ std::vector<Shape> make_shapes(bool smoke) {
   return shapes;
 }
 
-/// A way to fit, all with the same views and iterations.
+/// A way to fit, all with the same views and, but for one, the same iterations.
 struct Method {
   std::string name;
   ShapeOptions options;
@@ -97,6 +97,11 @@ std::vector<Method> make_methods(bool smoke) {
   }
   ShapeOptions adaptive = options;
   adaptive.schedule = ShapeSchedule::adaptive;
+  ShapeOptions large = options;  // the reach of Nicolet et al., and the steps that it takes
+  large.lambda = 16;
+  large.iterations = smoke ? 40 : 400;
+  large.batch = 8;
+  large.remesh_interval = large.iterations / 8;
   ShapeOptions paper = options;  // its weights (74) and regulariser (77), Adam on the positions
   paper.steps = ShapeSteps::direct;
   paper.loss = {.l1 = 1, .silhouette = 1};
@@ -106,6 +111,7 @@ std::vector<Method> make_methods(bool smoke) {
   narrow.blur = 0.5F;
   narrow.blur_end = 0.1F;
   return {{"default", options, ""},
+          {"reach 16", large, ""},
           {"barrier", narrow, "gaussian"},
           {"joint", narrow, "joint_gaussian"},
           {"softras", narrow, "softras"},

@@ -63,20 +63,20 @@ enum class ShapeSchedule { annealed, adaptive };
 
 struct ShapeOptions {
   unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
-  unsigned iterations = 400;  ///< > 0: of a level
-  unsigned batch = 8;         ///< > 0: views that an iteration renders, in turn
+  unsigned iterations = 160;  ///< > 0: of a level
+  unsigned batch = 6;         ///< > 0: views that an iteration renders, in turn
   /// Number that a device renders together, as MultiDeviceRenderer::set_chunk(). 0: all on one device, a
   /// twelfth on several.
   unsigned chunk = 0;
   float edge_pixels = 2.0F;  ///< > 0: length of edges to which a level begins to remesh, in its pixels
   /// Iterations between two remeshings, in the first half of a level; 0: the mesh keeps its faces.
-  unsigned remesh_interval = 50;
+  unsigned remesh_interval = 20;
   /// > 0: of the edges, in pixels of the level, at its beginning and at its end. Where the views have a
   /// smoothing of their own, that is the end, and it begins blur / blur_end times as wide.
   float blur = 1.0F, blur_end = 0.2F;
   ShapeSchedule schedule = ShapeSchedule::annealed;
   ShapeSteps steps = ShapeSteps::large_steps;
-  float lambda = 16.0F;         ///< >= 0: how far a vertex takes its neighbours along
+  float lambda = 2.0F;          ///< >= 0: how far a vertex takes its neighbours along
   double learning_rate = 0.05;  ///< > 0: of the positions, in radii of the sphere in the common view
   double learning_rate_end =
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning

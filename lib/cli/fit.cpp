@@ -133,6 +133,8 @@ void bend_template(const CLI::App& command, FitCommandOptions& options) {
   const auto take = [&](const char* name, auto ShapeOptions::*member) {
     if (command.count(name) == 0) options.solver.*member = bending.*member;
   };
+  take("--iterations", &ShapeOptions::iterations);
+  take("--batch", &ShapeOptions::batch);
   take("--remesh-interval", &ShapeOptions::remesh_interval);
   take("--rigidity", &ShapeOptions::rigidity);
   take("--color-learning-rate", &ShapeOptions::color_learning_rate);

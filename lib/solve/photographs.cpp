@@ -166,6 +166,8 @@ PoseResult find_camera(const Device& device, ShapeViews& views, std::size_t view
 
 ShapeOptions template_shape_options() {
   ShapeOptions options;
+  options.iterations = 400;  // small steps against a rigidity
+  options.batch = 8;
   options.remesh_interval = 0;
   options.rigidity = 0.5F;
   options.lambda = 1;  // what rigidity holds together may move alone
