@@ -15,6 +15,7 @@
 // the contour on that side alone has a contour of its own in the same step, which is nearer.
 //
 // What crosses a step that another contour wins is left to antialias_second.cl.
+#include "nearest.h"
 #include "visibility.h"
 
 /// The front-most fragment of samples near contours, its depth INFINITY where there is none. One work-item
@@ -36,14 +37,8 @@ kernel void antialias_front(const FrameParams p, const uint last_tile,
   for (uint row = rows.first; row < rows.last; ++row) {
     const uint first = (rows.view * p.height + row) * p.width + rows.first_column;
     for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
-      float nearest = INFINITY;
-      uint fragment = DPR_NO_FACE;
-      for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
-        if (!(depth[list[i]] < nearest)) continue;
-        fragment = list[i];
-        nearest = depth[fragment];
-      }
-      front[pixel] = nearest;
+      const uint fragment = nearest_fragment(pixel, starts, list, depth);
+      front[pixel] = fragment == DPR_NO_FACE ? INFINITY : depth[fragment];
       front_face[pixel] = fragment == DPR_NO_FACE ? DPR_NO_FACE : pair_face[fragment_pair[fragment]];
     }
   }

@@ -1,18 +1,5 @@
 // What the samples of a rigid image show, for shading outside of the library, and the gradients that come back.
-#include "shared_types.h"
-
-/// The nearest of a sample's fragments, DPR_NO_FACE where there is none.
-static inline uint nearest_fragment(uint pixel, global const uint* starts, global const uint* list,
-                                    global const float* depth) {
-  float nearest = INFINITY;
-  uint fragment = DPR_NO_FACE;
-  for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
-    if (!(depth[list[i]] < nearest)) continue;
-    fragment = list[i];
-    nearest = depth[fragment];
-  }
-  return fragment;
-}
+#include "nearest.h"
 
 /// One work-item per sample, up to `last_pixel`. Deterministic.
 /// in   starts         uint[pixel + 1]         runs of `list`
