@@ -1,0 +1,356 @@
+"""The operations of nvdiffrast 0.4's module nvdiffrast.torch, on tensors of the CPU: a script imports this instead.
+
+    import dpr.nvdiffrast as dr
+
+    rast, rast_db = dr.rasterize(dr.RasterizeCudaContext(), pos, tri, resolution=[256, 256])
+    color, _ = dr.interpolate(attr, rast, tri)
+    image = dr.antialias(color, rast, pos, tri)
+
+Names, arguments, shapes and conventions are nvdiffrast's: positions in OpenGL's clip space, row 0 of images at the bottom,
+u and v the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64. What differs: antialias()
+is the library's, which blends the samples at contours a little otherwise, and finds contours in pos and tri alone; its
+images have the gradients of Samples.resolve(). DepthPeeler is not there.
+"""
+from __future__ import annotations
+
+import numbers
+from typing import Any, List, Optional, Sequence, Tuple, Union
+
+import torch
+from torch import Tensor
+
+from . import _arrays, _clip_space, _rows, _torch
+from ._renderer import Renderer
+from ._texture import Mip, check_floats, texture, texture_construct_mip
+
+__all__ = ["DepthPeeler", "RasterizeCudaContext", "RasterizeGLContext", "antialias", "antialias_construct_topology_hash",
+           "get_log_level", "interpolate", "rasterize", "set_log_level", "texture", "texture_construct_mip"]
+
+_SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
+"""Samples are blended across contours over a pixel and not blurred further; the nearest alone is seen."""
+_MOST_FACES = 1 << 24
+"""Numbers of triangles are float32 in rast."""
+_PLANE_ROUNDING = 1e-6
+_log_level = 1
+
+
+def _fail(name, got, expected, call, error=ValueError):
+    _arrays.fail(error, name, got, expected, "dpr.nvdiffrast." + call)
+
+
+def get_log_level() -> int:
+    """What set_log_level() has set, 1 at first."""
+    return _log_level
+
+
+def set_log_level(level: int) -> None:
+    """0 (info) to 3 (fatal). It is kept, and changes nothing: there are no log messages."""
+    global _log_level
+    if level not in (0, 1, 2, 3):
+        _fail("level", repr(level), "0, 1, 2 or 3", "set_log_level")
+    _log_level = level
+
+
+class _Context:
+    """What rasterize() takes first. device: an OpenCL device as dpr.Renderer takes it, or one of PyTorch's, which stands for
+    the default."""
+
+    def __init__(self, device: Any = None):
+        is_torch = device is None or isinstance(device, (torch.device, int)) or str(device).startswith("cuda")
+        self.device = "" if is_torch else device
+
+
+class RasterizeCudaContext(_Context):
+    """Handle for rasterize()."""
+
+
+class RasterizeGLContext(_Context):
+    """Handle for rasterize(). Without output_db that returns an empty rast_db. There is nothing to be activated by hand:
+    mode may be "automatic" or "manual", and set_context() and release_context() do nothing."""
+
+    def __init__(self, output_db: bool = True, mode: str = "automatic", device: Any = None):
+        super().__init__(device)
+        if mode not in ("automatic", "manual"):
+            _fail("mode", repr(mode), "'automatic' or 'manual'", "RasterizeGLContext")
+        self.output_db, self.mode = bool(output_db), mode
+
+    def set_context(self) -> None:
+        """Does nothing."""
+
+    def release_context(self) -> None:
+        """Does nothing."""
+
+
+class DepthPeeler:
+    """Refused: the library's samples have the nearest surface alone."""
+
+    def __init__(self, *arguments: Any, **keywords: Any):
+        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: rasterize() finds the "
+                                  "nearest surface alone, not the layers behind it")
+
+
+class _TopologyHash:
+    """What antialias_construct_topology_hash() returns."""
+
+
+def antialias_construct_topology_hash(tri: Tensor) -> _TopologyHash:
+    """For antialias(), which needs none: edges are found again and kept by the library."""
+    _check_tri(tri, None, "antialias_construct_topology_hash")
+    return _TopologyHash()
+
+
+def _check_tri(tri, count, call):
+    if not isinstance(tri, Tensor) or tri.dtype not in (torch.int32, torch.int64):
+        _fail("tri", str(getattr(tri, "dtype", type(tri).__name__)), "a tensor of torch.int32 or torch.int64", call, TypeError)
+    if tri.ndim != 2 or tri.shape[1] != 3 or not 0 < len(tri) < _MOST_FACES:
+        _fail("tri", list(tri.shape), f"[T, 3] with T from 1 to {_MOST_FACES - 1}", call)
+    if count is not None and not (0 <= int(tri.min()) and int(tri.max()) < count):
+        _fail("tri", f"indices from {int(tri.min())} to {int(tri.max())}", f"indices below {count}, the vertices", call)
+
+
+def _check_pos(pos, call):
+    check_floats("pos", pos, (2, 3), "[N, V, 4], or [V, 4] with ranges", call)
+    if pos.shape[-1] != 4:
+        _fail("pos", list(pos.shape), "[N, V, 4], or [V, 4] with ranges", call)
+    if not bool(torch.isfinite(pos).all()):
+        _fail("pos", "infinity or NaN", "finite numbers", call)
+
+
+def _check_rast(rast, call):
+    check_floats("rast", rast, (4,), "[N, H, W, 4]", call)
+    if rast.shape[-1] != 4:
+        _fail("rast", list(rast.shape), "[N, H, W, 4], what rasterize() returns", call)
+
+
+class _Frame:
+    """Samples of one call of the renderer's, of N shapes of one topology.
+
+    faces, first  the triangles, and the number of the first in tri
+    """
+
+    def __init__(self, device, pos, faces, first, height, width, call):
+        """pos: [N, V, 4]"""
+        self.faces, self.first, self._height, self._width, self._call = faces, first, height, width, call
+        camera, self.vertices = self._placed(pos)
+        renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
+        self._camera = camera
+        self._samples = renderer.rasterize(self.vertices, faces, *camera.views_and_intrinsics(len(pos), width, height))
+        self._has_gradient = self.vertices.requires_grad
+
+    def _placed(self, pos):
+        used = torch.zeros(pos.shape[1], dtype=torch.bool)
+        used[self.faces.long().reshape(-1)] = True
+        camera = _clip_space.camera_of(pos, used, "dpr.nvdiffrast." + self._call)
+        return camera, camera.vertices(pos, used, self._width, self._height)
+
+    def _inner(self, samples):
+        margin = self._samples.margin
+        return samples[:, margin:margin + self._height, margin:margin + self._width]
+
+    def rast(self, pos, grad_db):
+        """([N, H, W, 4], [N, H, W, 4])"""
+        faces, barycentrics, depth = map(self._inner, (self._samples.face_id, self._samples.barycentrics, self._samples.depth))
+        count = faces.numel()
+        covered = (faces >= 0).reshape(-1).nonzero()[:, 0]
+        rows = self.faces.long().index_select(0, faces.reshape(-1).index_select(0, covered))
+        shape = covered.div(self._height * self._width, rounding_mode="floor")
+        corners = _rows.rows(pos.reshape(-1, 4), (rows + (shape * pos.shape[1])[:, None]).reshape(-1)).reshape(-1, 3, 4)
+        weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
+        if self._camera.is_perspective:
+            places = (corners.detach()[..., 2:] * weights.detach()[..., None]).sum(1)
+            of_depth = places[:, 0] / places[:, 1]
+        else:  # the renderer's are not corrected for perspective
+            of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
+            weights = weights / corners[..., 3]
+            weights = weights / weights.sum(1, keepdim=True)
+        is_seen = of_depth.abs() <= 1 + _PLANE_ROUNDING
+        numbers_of = (faces.reshape(-1).index_select(0, covered) + (1 + self.first)).to(pos.dtype)
+        found = torch.cat([weights[:, :2], of_depth[:, None], numbers_of[:, None]], 1) * is_seen[:, None]
+        derivatives = _derivatives(corners if grad_db else corners.detach(), covered, self._height, self._width)
+        return tuple(_rows.spread(table, covered, count).reshape(*faces.shape, 4)
+                     for table in (found, derivatives * is_seen[:, None]))
+
+    def vertices_of(self, pos):
+        """Vertices of positions [N, V, 4], with derivatives; None where samples, or derivatives that are wanted, are not those
+        of these positions."""
+        is_wanted = pos.requires_grad and torch.is_grad_enabled()
+        if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self._has_gradient:
+            return None
+        vertices = self._placed(pos)[1]
+        return vertices if torch.equal(vertices, self.vertices) else None
+
+    def antialias(self, color, vertices, boost):
+        margin = self._samples.margin
+        if boost != 1:
+            vertices = vertices.detach() + boost * (vertices - vertices.detach())
+        tensors = [vertices if tensor is self.vertices else tensor for tensor in self._samples._tensors]
+        around = torch.nn.functional.pad(color.permute(0, 3, 1, 2), (margin,) * 4, mode="replicate").permute(0, 2, 3, 1)
+        return _torch.resolve(self._samples._rasterized, around, tensors)
+
+
+def _derivatives(corners, covered, height, width):
+    """[K, 4]: du/dX, du/dY, dv/dX, dv/dY by pixels, of corners [K, 3, 4] in clip space."""
+    column, row = covered % width, covered.div(width, rounding_mode="floor") % height
+    center = torch.stack([(2 * column + 1) / width - 1, (2 * row + 1) / height - 1], 1)[:, None]
+    w = corners[..., 3:]
+    # The pixel is moved to the origin, where areas of small triangles are exact.
+    places = torch.cat([corners[..., :2] - center * w, w], -1)
+    # Weights are lines' distances, over their sum: (a X + b Y + c) / sum.
+    lines = torch.cross(places.roll(-1, 1), places.roll(-2, 1), dim=-1)
+    total = lines.sum(1, keepdim=True)
+    divisor = torch.where(total[..., 2:] == 0, torch.ones_like(total[..., 2:]), total[..., 2:])
+    slopes = (lines[..., :2] - lines[..., 2:] / divisor * total[..., :2]) / divisor
+    return (slopes[:, :2] * slopes.new_tensor([2 / width, 2 / height])).reshape(-1, 4)
+
+
+class _Frames:
+    """Frames of one rasterize(), each of one or all of the images; None for an image without triangles."""
+
+    def __init__(self, device, pos, tri, ranges, height, width, call):
+        self.device, self.tri, self.ranges, self._size = device, tri, ranges, (height, width)
+        self._frames = [_Frame(device, _shapes(pos), tri[first:first + count], first, height, width, call) if count else None
+                        for first, count in ([(0, len(tri))] if ranges is None else ranges)]
+
+    def rast(self, pos, grad_db):
+        empty = pos.new_zeros(1, *self._size, 4)
+        parts = [(empty, empty) if frame is None else frame.rast(_shapes(pos), grad_db) for frame in self._frames]
+        return tuple(torch.cat(images) if len(images) > 1 else images[0] for images in zip(*parts))
+
+    def vertices_of(self, pos, tri):
+        """Vertices of each frame; None where any has other ones."""
+        if tri is not self.tri and not torch.equal(tri.long(), self.tri.long()):
+            return None
+        found = [None if frame is None else frame.vertices_of(_shapes(pos)) for frame in self._frames]
+        return None if any(frame is not None and own is None for frame, own in zip(self._frames, found)) else found
+
+    def antialias(self, color, vertices, boost):
+        colors = [color] if self.ranges is None else color.split(1)
+        images = [part if frame is None else frame.antialias(part, own, boost)
+                  for frame, part, own in zip(self._frames, colors, vertices)]
+        return torch.cat(images) if len(images) > 1 else images[0]
+
+
+def _shapes(pos):
+    return pos if pos.ndim == 3 else pos[None]
+
+
+def _pixels(resolution):
+    if not isinstance(resolution, (list, tuple)) or len(resolution) != 2 or \
+            not all(isinstance(side, numbers.Integral) for side in resolution):
+        _fail("resolution", repr(resolution), "(height, width) in pixels", "rasterize")
+    return int(resolution[0]), int(resolution[1])
+
+
+def _checked_ranges(ranges, pos, tri):
+    """[(first, count), ...]; None without."""
+    if pos.ndim == 3:
+        if ranges is not None:
+            _fail("ranges", "some with pos [N, V, 4]", "none, or pos [V, 4]", "rasterize")
+        return None
+    if ranges is None:
+        _fail("ranges", "None", "[N, 2] with pos [V, 4]: each image's first triangle, and how many", "rasterize")
+    if not isinstance(ranges, Tensor) or ranges.dtype not in (torch.int32, torch.int64) or ranges.ndim != 2 or \
+            ranges.shape[1] != 2 or len(ranges) == 0:
+        _fail("ranges", getattr(ranges, "shape", type(ranges).__name__), "integers [N, 2]", "rasterize")
+    pairs: List[Tuple[int, int]] = [tuple(pair) for pair in ranges.tolist()]
+    for first, count in pairs:
+        if first < 0 or count < 0 or first + count > len(tri):
+            _fail("ranges", f"({first}, {count})", f"a part of {len(tri)} triangles", "rasterize")
+    return pairs
+
+
+def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tensor, tri: Tensor, resolution: Sequence[int],
+              ranges: Optional[Tensor] = None, grad_db: bool = True) -> Tuple[Tensor, Tensor]:
+    """What pixels' centres show.
+
+    pos         [N, V, 4], clip space; or [V, 4] with ranges. Triangles are clipped at the near plane z = -w, and pixels
+                beyond the far one, z = w, show nothing. Where positions lie behind the camera, z is to be affine in w, as
+                every projection matrix makes it
+    tri         [T, 3], int32 or int64
+    resolution  (height, width)
+    ranges      [N, 2], each image's first triangle, and how many there are; images are rendered one after the other
+    grad_db     whether rast_db has gradients
+
+    Returns rast [N, H, W, 4], u, v, z/w, and the triangle's number plus 1, all 0 where nothing is; and rast_db
+    [N, H, W, 4], du/dX, du/dY, dv/dX, dv/dY by pixels. u, v and rast_db have derivatives by pos."""
+    if not isinstance(glctx, _Context):
+        _fail("glctx", type(glctx).__name__, "RasterizeCudaContext() or RasterizeGLContext()", "rasterize", TypeError)
+    _check_pos(pos, "rasterize")
+    _check_tri(tri, pos.shape[-2], "rasterize")
+    height, width = _pixels(resolution)
+    frames = _Frames(glctx.device, pos, tri, _checked_ranges(ranges, pos, tri), height, width, "rasterize")
+    rast, rast_db = frames.rast(pos, grad_db)
+    rast._dpr_frames = frames
+    return rast, rast_db if getattr(glctx, "output_db", True) else rast_db[..., :0]
+
+
+def _chosen(diff_attrs, channels):
+    """Numbers of the attributes whose derivatives are wanted."""
+    if isinstance(diff_attrs, str) and diff_attrs == "all":
+        return list(range(channels))
+    if not isinstance(diff_attrs, (list, tuple)) or not all(isinstance(i, numbers.Integral) for i in diff_attrs) or \
+            not all(-channels <= i < channels for i in diff_attrs):
+        _fail("diff_attrs", repr(diff_attrs), f"'all', or a list of numbers below {channels}, the attributes", "interpolate")
+    return [int(i) % channels for i in diff_attrs]
+
+
+def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tensor] = None,
+                diff_attrs: Union[str, Sequence[int], None] = None) -> Tuple[Tensor, Tensor]:
+    """Attributes of vertices, [V, A], [1, V, A] or [N, V, A], at pixels: [N, H, W, A], 0 where nothing is; and of those in
+    diff_attrs, a list of numbers or "all", the derivatives by pixels [N, H, W, 2 D], dA/dX and dA/dY in turn, which need
+    rast_db. Differentiable by attr, rast and rast_db."""
+    check_floats("attr", attr, (2, 3), "[V, A] or [N, V, A]", "interpolate")
+    _check_rast(rast, "interpolate")
+    table = attr if attr.ndim == 3 else attr[None]
+    _check_tri(tri, table.shape[1], "interpolate")
+    shape, channels = rast.shape[:3], attr.shape[-1]
+    if len(table) not in (1, shape[0]):
+        _fail("attr", list(attr.shape), f"[V, A], or 1 or {shape[0]} in the first dimension", "interpolate")
+    flat = rast.reshape(-1, 4)
+    covered = (flat[:, 3] > 0).nonzero()[:, 0]
+    faces = flat.detach()[:, 3].index_select(0, covered).long() - 1
+    if len(faces) and int(faces.max()) >= len(tri):
+        _fail("tri", list(tri.shape), f"the triangles of rast, at least {int(faces.max()) + 1}", "interpolate")
+    corners = tri.long().index_select(0, faces)
+    if len(table) > 1:
+        corners = corners + (covered.div(shape[1] * shape[2], rounding_mode="floor") * table.shape[1])[:, None]
+    a, b, c = (_rows.rows(table.reshape(-1, channels), index.contiguous()) for index in corners.unbind(1))
+    along_u, along_v = a - c, b - c
+    u, v = _rows.rows(flat, covered)[:, :2].split(1, 1)
+    found = _rows.spread(torch.addcmul(torch.addcmul(c, u, along_u), v, along_v), covered, len(flat)).reshape(*shape, channels)
+    if diff_attrs is None or len(diff_attrs) == 0:
+        return found, rast.new_empty(*shape, 0)
+    chosen = _chosen(diff_attrs, channels)
+    if rast_db is None or rast_db.shape != rast.shape:
+        _fail("rast_db", None if rast_db is None else list(rast_db.shape), f"{list(rast.shape)} with diff_attrs", "interpolate")
+    of_u, of_v = _rows.rows(rast_db.reshape(-1, 4), covered).reshape(-1, 2, 1, 2).unbind(1)
+    derivatives = (of_u * along_u[:, chosen, None] + of_v * along_v[:, chosen, None]).reshape(-1, 2 * len(chosen))
+    return found, _rows.spread(derivatives, covered, len(flat)).reshape(*shape, 2 * len(chosen))
+
+
+def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_hash: Optional[_TopologyHash] = None,
+              pos_gradient_boost: float = 1.0) -> Tensor:
+    """Colours [N, H, W, C] blended over a pixel's width across the contours of rast's triangles, as the image of
+    Samples.resolve() without a blur. Differentiable by color and, times pos_gradient_boost, pos. Where pos and tri are not
+    rasterize()'s, or rast not the tensor that it returned, they are rasterized again."""
+    check_floats("color", color, (4,), "[N, H, W, C]", "antialias")
+    _check_rast(rast, "antialias")
+    if color.shape[:3] != rast.shape[:3]:
+        _fail("color", list(color.shape), [*rast.shape[:3], "C"], "antialias")
+    if not bool(torch.isfinite(color).all()):
+        _fail("color", "infinity or NaN", "finite numbers", "antialias")
+    if not isinstance(topology_hash, (_TopologyHash, type(None))):
+        _fail("topology_hash", type(topology_hash).__name__, "what antialias_construct_topology_hash() returns", "antialias",
+              TypeError)
+    _check_pos(pos, "antialias")
+    _check_tri(tri, pos.shape[-2], "antialias")
+    known = getattr(rast, "_dpr_frames", None)
+    if known is None and (pos.ndim == 2 and len(rast) > 1 or pos.ndim == 3 and len(pos) != len(rast)):
+        _fail("rast", f"{len(rast)} images that rasterize() did not return, with pos {list(pos.shape)}",
+              "the tensor that rasterize() returned, or as many shapes in pos", "antialias")
+    vertices = known.vertices_of(pos, tri) if known else None
+    if vertices is None:
+        device, ranges = (known.device, known.ranges) if known else ("", None)
+        known = _Frames(device, pos, tri, ranges, *rast.shape[1:3], "antialias")
+        vertices = known.vertices_of(pos, tri)
+    return known.antialias(color, vertices, float(pos_gradient_boost))
