@@ -104,6 +104,7 @@ class NvdiffrastTest(unittest.TestCase):
 
     def test_rasterize_through_the_camera_and_beyond_the_far_plane(self):
         self.check_rast(clip(FLOOR, turned(0.0, 0.0, 0), turned(0.3, 0.2, 1)), FLOOR_FACES, 0.2)
+        self.check_rast(clip(FLOOR * [1, 0.2, 1], turned(0.0, 0.0, 0)), FLOOR_FACES, 0.2)  # the near plane is seen
         self.check_rast(clip(CUBE, turned(0.5, 0.4, 1.2)), CUBE_FACES, 0.5)  # from within
 
     def test_rasterize_orthographic(self):
@@ -112,6 +113,7 @@ class NvdiffrastTest(unittest.TestCase):
 
     def test_rasterize_no_projection(self):
         pos = clip(CUBE, turned(0.5, 0.4, 4))
+        self.check_rast(pos * torch.tensor([1.0, 1, -1, 1]), CUBE_FACES, 0.05)  # the furthest is seen
         pos[..., 2] = pos[..., 3] * (1.2 - 0.2 * pos[..., 3] - 0.1 * pos[..., 0])
         self.check_rast(pos, CUBE_FACES, 0.05)
         pos[:, 0, 3] = -1
@@ -219,6 +221,13 @@ class NvdiffrastTest(unittest.TestCase):
         moved = pos + torch.tensor([0.5, 0, 0, 0])
         other = dr.antialias(mask, rast, moved, tri)
         self.assertTrue(torch.equal(other, dr.antialias(mask, dr.rasterize(CONTEXT, moved, tri, [H, W])[0], moved, tri)))
+
+    def test_antialias_leaves_out_what_lies_beside_the_image(self):
+        right = 2 * (W - 0.2) / W - 1  # beyond the centres of the last column
+        pos = torch.tensor([[[-3, -3, 0, 1], [right, -3, 0, 1], [right, 3, 0, 1], [-3, 3, 0, 1]]])
+        tri = torch.from_numpy(FLOOR_FACES)
+        rast, _ = dr.rasterize(CONTEXT, pos, tri, [H, W])
+        self.check_close(dr.antialias((rast[..., 3:] > 0).float(), rast, pos, tri), torch.ones(1, H, W, 1), 1e-6)
 
     def test_antialiased_gradient_is_the_images_change(self):
         """Gradients by a shift, summed over several pixels of motion."""

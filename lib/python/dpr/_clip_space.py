@@ -10,10 +10,10 @@ _FLAT, _ROUNDING, _LEAST_NEAR = 1e-4, 1e-4, 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """Camera of all shapes of a call. Its images have row 0 at the bottom.
+    """Camera of all shapes in a call. Its images have row 0 at the bottom.
 
-    is_perspective  whether depth is w, in units of 1 / scale, or z / w + 2 as an orthographic camera sees it
-    scale           [N, 1, 1], factors of positions: scaling x, y, z and w together changes no image
+    is_perspective  True: depth is w times scale. False: depth is z / w + 2, and the camera is orthographic
+    scale           [N, 1, 1], factors of positions; the same factor for x, y, z and w changes no image
     """
 
     is_perspective: bool
@@ -36,7 +36,7 @@ class Camera:
 
 
 def _fit(z, w):
-    """(a, b) of z = a w + b per row, and whether every z is that but for rounding. A row of equal w has no such a."""
+    """(a, b, is_affine) of each row's least-squares fit z = a w + b; is_affine: the fit is exact but for rounding."""
     mean_w, mean_z = w.mean(1, keepdim=True), z.mean(1, keepdim=True)
     a = ((w - mean_w) * (z - mean_z)).sum(1, keepdim=True) / (w - mean_w).square().sum(1, keepdim=True).clamp(min=1e-300)
     b = mean_z - a * mean_w
@@ -45,11 +45,11 @@ def _fit(z, w):
 
 
 def camera_of(pos, used, where):
-    """Camera of positions [N, V, 4], of which `used` [V] says what triangles use.
+    """Camera of positions [N, V, 4]. used [V]: vertices that triangles use.
 
-    A projection matrix has z = a w + b. Then depth is w, more exact than z / w, and triangles may pass through the
-    camera: the near plane z = -w is w = -b / (a + 1), and the smallest z / w is the smallest w where b is not positive.
-    Without such a matrix depth is z / w, of positions in front of the camera."""
+    A projection matrix makes z = a w + b. Then w serves as depth: it is more precise than z / w, and triangles may reach
+    behind the camera. The near plane z = -w is the plane w = -b / (a + 1), and z / w grows with w unless b is positive.
+    Otherwise z / w serves as depth, which needs all positions in front of the camera."""
     z, w = pos.detach()[:, used, 2:].double().unbind(-1)
     if not z.shape[1]:
         return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
@@ -59,7 +59,7 @@ def camera_of(pos, used, where):
     near = torch.maximum(near, _LEAST_NEAR * most.abs())
     is_clipped = least < near
     scale = 1 / torch.where(is_clipped, near, least)
-    # How far z / w falls where w grows: not at all in the order of depths of a projection.
+    # Drop of z / w from the nearest to the furthest vertex. Positive: z / w orders depths the other way round.
     fall = b * (scale - 1 / most)
     is_flat = most - least <= _FLAT * most.abs()
     if bool(((is_affine & (fall <= _ROUNDING) & ~is_flat) | (most <= 0)).all()):

@@ -1,4 +1,4 @@
-"""Rows of tables by their numbers: what PyTorch has, with faster derivatives on the CPU."""
+"""Gathers and scatters of table rows, with faster gradients on the CPU than PyTorch's own."""
 import torch
 from torch.autograd.function import once_differentiable
 
@@ -8,7 +8,7 @@ def _flat(index, channels):
 
 
 def _summed(rows, index, count):
-    """[count, C] with each row [K, C] added where its index says."""
+    """Sums rows [K, C] into a table [count, C] at their indices [K]."""
     table = rows.new_zeros(count * rows.shape[1])
     return table.scatter_add_(0, _flat(index, rows.shape[1]), rows.reshape(-1)).reshape(count, -1)
 
@@ -67,16 +67,16 @@ class _Bilinear(torch.autograd.Function):
 
 
 def rows(table, index):
-    """[K, C] of a table [R, C] and numbers [K]."""
+    """Rows [K, C] of a table [R, C] at indices [K]."""
     return _Rows.apply(table, index)
 
 
 def spread(values, index, count):
-    """Table [count, C] of rows [K, C] with these numbers; 0 elsewhere."""
+    """Table [count, C] with rows [K, C] at different indices [K], and 0 elsewhere."""
     return _Spread.apply(values, index, count)
 
 
 def bilinear(table, index, x, y):
-    """[K, C] between four rows, whose numbers are [4, K]: at x and y, [K, 1], from the first to the second, and from them
-    to the last two."""
+    """Bilinear mix [K, C] of four rows with indices [4, K]: x [K, 1] leads from the first to the second and from the third
+    to the fourth row, y from the first to the second pair."""
     return _Bilinear.apply(table, index, x, y)

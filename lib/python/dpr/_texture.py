@@ -17,7 +17,7 @@ def _fail(name, got, expected, error=ValueError, call="texture"):
 
 
 def check_floats(name, array, dimensions, shape, call):
-    """Fails for what is no float32 tensor on the CPU with so many dimensions; `shape` names them."""
+    """Raises unless the array is a float32 CPU tensor with one of these numbers of dimensions. shape: text for errors."""
     if not isinstance(array, Tensor):
         _fail(name, type(array).__name__, "a tensor of PyTorch", TypeError, call)
     if array.device.type != "cpu":
@@ -29,14 +29,14 @@ def check_floats(name, array, dimensions, shape, call):
 
 
 class Mip:
-    """Smaller images of a texture: what texture_construct_mip() makes. Not to be used but as an argument of texture()."""
+    """Mip levels of a texture, from texture_construct_mip() for texture()."""
 
     def __init__(self, levels: List[Tensor], is_cube: bool):
         self.levels, self.is_cube = levels, is_cube
 
 
 def _halved(image, level):
-    """Means of 2 x 2 texels, or of 2 along the only row or column."""
+    """The next mip level: means of 2 x 2 texels, or of 2 in a single row or column."""
     for axis in (-3, -2):
         size = image.shape[axis]
         if size == 1:
@@ -63,15 +63,15 @@ def _check_texture(tex, is_cube):
 
 
 def texture_construct_mip(tex: Tensor, max_mip_level: Optional[int] = None, cube_mode: bool = False) -> Mip:
-    """Smaller images of a texture, to be used again while the texture does not change: see texture()."""
+    """Mip levels for texture(), to be reused as long as the texture does not change."""
     _check_texture(tex, cube_mode)
     return Mip(_smaller(tex, max_mip_level), cube_mode)
 
 
 @functools.lru_cache(maxsize=64)
 def _cube_places(size):
-    """(places, corners): the texel of [6, size + 2, size + 2], faces with what surrounds them, as rows of 6 size^2 texels
-    and then 24 means, of `corners` [24, 3]."""
+    """(places, corners) of faces with a border one texel wide. places [6 (size + 2)^2]: rows of a table that holds the
+    6 size^2 texels and then 24 means for the borders' corners. corners [24, 3]: the texels of each mean."""
     line = (torch.arange(size + 2, dtype=torch.float64) - 0.5) / size
     t, s = torch.meshgrid(line, line, indexing="ij")
     x, y, one = 2 * s - 1, 2 * t - 1, torch.ones_like(s)
@@ -88,8 +88,8 @@ def _cube_places(size):
 
 
 def _on_cube(direction, footprint=None):
-    """(face [K], (s, t) there [K, 2], their footprints [K, 2, 2]) of directions [K, 3], and of how these change by a pixel to
-    the right and up, [K, 3, 2]: faces as OpenGL has them. Differentiable."""
+    """(face [K], (s, t) on that face [K, 2], footprint of (s, t) [K, 2, 2]) of directions [K, 3] with the footprint
+    [K, 3, 2], their change per pixel to the right and up. Faces are OpenGL's. Differentiable."""
     size = direction.detach().abs()
     axis = torch.where(size[:, 2] > size[:, :2].amax(1), 2, torch.where(size[:, 1] > size[:, 0], 1, 0))
     sign = torch.where(direction.detach().gather(1, axis[:, None])[:, 0] < 0, -1, 1)
@@ -107,7 +107,7 @@ def _on_cube(direction, footprint=None):
 
 
 class _Texels:
-    """Levels of a texture as one table of texels."""
+    """All mip levels of a texture in one table of texels."""
 
     def __init__(self, levels, boundary):
         channels = levels[0].shape[-1]
@@ -140,7 +140,7 @@ class _Texels:
         return numbers[0] if self._count == 1 else torch.tensor(numbers).index_select(0, level)
 
     def _within(self, place, size):
-        """(place, whether it is one) of the texels -1 to size along an axis; of cube maps, places are counted from -1."""
+        """(texel, whether it exists, None for always) for texels -1 to size along an axis. Cube maps count from their border."""
         if self.boundary == "cube":
             return place + 1, None
         last = size - 1
@@ -150,7 +150,7 @@ class _Texels:
         return torch.where(place < 0, 0, torch.where(place > last, last, place)), is_inside
 
     def _rows(self, level, batch, face, columns, rows):
-        """Numbers of the texels at each of `rows` and `columns`."""
+        """Table rows of the texels in these rows and columns, row by row."""
         height, width, first = (self._of(numbers, level) for numbers in (self._heights, self._widths, self._first))
         columns, rows = ([self._within(place, size) for place in places] for places, size in ((columns, width), (rows, height)))
         if self.boundary == "cube":
@@ -164,7 +164,7 @@ class _Texels:
                 for line, of_line in lines for column, of_column in columns]
 
     def _places_of(self, level, coords):
-        """coords in texels, [K] each."""
+        """(x, y) in texels, [K] each."""
         if self.boundary == "wrap":
             coords = coords - coords.detach().floor()
         elif self.boundary in ("clamp", "cube"):
@@ -187,7 +187,7 @@ class _Texels:
         return _rows.bilinear(self.table, index, x, y)
 
     def level_of(self, footprint, bias):
-        """[K], real numbers: of the longer axis of the ellipse that a pixel covers."""
+        """Fractional mip levels [K], by the longer axis of the ellipse that a pixel covers."""
         level = 0.0
         if footprint is not None:
             area = footprint * footprint.new_tensor([[self._widths[0]], [self._heights[0]]])
@@ -220,20 +220,20 @@ def _levels(tex, mip, most, is_cube):
 def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_bias: Optional[Tensor] = None,
             mip: Union[Mip, Sequence[Tensor], None] = None, filter_mode: str = "auto", boundary_mode: str = "wrap",
             max_mip_level: Optional[int] = None) -> Tensor:
-    """Texels [N, H, W, C] at coordinates.
+    """Samples a texture. Returns [N, H, W, C].
 
     tex             [N or 1, TH, TW, C], row 0 at v = 0; with boundary_mode="cube" [N or 1, 6, T, T, C], OpenGL's faces
                     +x, -x, +y, -y, +z, -z
     uv              [N, H, W, 2]; of cube maps directions [N, H, W, 3]
-    uv_da           [N, H, W, 4] or [N, H, W, 6], du/dX, du/dY, dv/dX, ... by pixels, as interpolate() has them
-    mip_level_bias  [N, H, W], added to the levels that uv_da says, or all there is of them
-    mip             of texture_construct_mip(), or a list of levels 1, 2, ...; made from tex where it is left out
-    filter_mode     "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"; "auto" is the last one where
-                    there are uv_da or mip_level_bias, and "linear" otherwise
+    uv_da           [N, H, W, 4], or of cube maps [N, H, W, 6]: du/dX, du/dY, dv/dX, ... per pixel, from interpolate()
+    mip_level_bias  [N, H, W], added to the mip level; without uv_da it is the mip level
+    mip             result of texture_construct_mip(), or a list of levels 1, 2, ...; by default built from tex
+    filter_mode     "nearest", "linear", "linear-mipmap-nearest" or "linear-mipmap-linear"; "auto" is
+                    "linear-mipmap-linear" with uv_da or mip_level_bias, else "linear"
     boundary_mode   "wrap", "clamp", "zero" or "cube"
+    max_mip_level   the last mip level that is used
 
-    Derivatives are those by tex and mip, and but for "nearest" by uv; those by uv_da and mip_level_bias with
-    "linear-mipmap-linear"."""
+    Gradients reach tex and mip; uv unless the filter is "nearest"; uv_da and mip_level_bias with "linear-mipmap-linear"."""
     for name, word, words in (("filter_mode", filter_mode, _FILTERS), ("boundary_mode", boundary_mode, _BOUNDARIES)):
         if word not in words:
             _fail(name, repr(word), "one of " + ", ".join(words))

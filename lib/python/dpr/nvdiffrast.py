@@ -1,4 +1,4 @@
-"""The operations of nvdiffrast 0.4's module nvdiffrast.torch, on tensors of the CPU: a script imports this instead.
+"""The operations of nvdiffrast 0.4's module nvdiffrast.torch on CPU tensors. A script imports this module instead.
 
     import dpr.nvdiffrast as dr
 
@@ -6,10 +6,11 @@
     color, _ = dr.interpolate(attr, rast, tri)
     image = dr.antialias(color, rast, pos, tri)
 
-Names, arguments, shapes and conventions are nvdiffrast's: positions in OpenGL's clip space, row 0 of images at the bottom,
-u and v the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64. What differs: antialias()
-is the library's, which blends the samples at contours a little otherwise, and finds contours in pos and tri alone; its
-images have the gradients of Samples.resolve(). DepthPeeler is not there.
+Names, arguments, shapes and conventions are nvdiffrast's: positions are in OpenGL's clip space, row 0 of an image is at the
+bottom, u and v are the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64.
+
+Differences: antialias() is the library's own, Samples.resolve() without a blur, so blended pixels have slightly other
+colours, and gradients of positions are those of the library. DepthPeeler raises NotImplementedError.
 """
 from __future__ import annotations
 
@@ -27,9 +28,9 @@ __all__ = ["DepthPeeler", "RasterizeCudaContext", "RasterizeGLContext", "antiali
            "get_log_level", "interpolate", "rasterize", "set_log_level", "texture", "texture_construct_mip"]
 
 _SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
-"""Samples are blended across contours over a pixel and not blurred further; the nearest alone is seen."""
+"""Blends samples across contours over one pixel without a further blur. Only the nearest surface is visible."""
 _MOST_FACES = 1 << 24
-"""Numbers of triangles are float32 in rast."""
+"""rast holds triangle numbers as float32, which is exact below this."""
 _PLANE_ROUNDING = 1e-6
 _log_level = 1
 
@@ -39,12 +40,12 @@ def _fail(name, got, expected, call, error=ValueError):
 
 
 def get_log_level() -> int:
-    """What set_log_level() has set, 1 at first."""
+    """The level that set_log_level() stored; 1 by default."""
     return _log_level
 
 
 def set_log_level(level: int) -> None:
-    """0 (info) to 3 (fatal). It is kept, and changes nothing: there are no log messages."""
+    """Stores a level from 0 (info) to 3 (fatal). It has no effect, because this module logs nothing."""
     global _log_level
     if level not in (0, 1, 2, 3):
         _fail("level", repr(level), "0, 1, 2 or 3", "set_log_level")
@@ -52,8 +53,8 @@ def set_log_level(level: int) -> None:
 
 
 class _Context:
-    """What rasterize() takes first. device: an OpenCL device as dpr.Renderer takes it, or one of PyTorch's, which stands for
-    the default."""
+    """First argument of rasterize(). device: an OpenCL device as dpr.Renderer takes it; a device of PyTorch selects the
+    default."""
 
     def __init__(self, device: Any = None):
         is_torch = device is None or isinstance(device, (torch.device, int)) or str(device).startswith("cuda")
@@ -65,8 +66,8 @@ class RasterizeCudaContext(_Context):
 
 
 class RasterizeGLContext(_Context):
-    """Handle for rasterize(). Without output_db that returns an empty rast_db. There is nothing to be activated by hand:
-    mode may be "automatic" or "manual", and set_context() and release_context() do nothing."""
+    """Handle for rasterize(), which returns an empty rast_db with output_db=False. No context needs activating, so mode
+    ("automatic" or "manual"), set_context() and release_context() have no effect."""
 
     def __init__(self, output_db: bool = True, mode: str = "automatic", device: Any = None):
         super().__init__(device)
@@ -82,19 +83,19 @@ class RasterizeGLContext(_Context):
 
 
 class DepthPeeler:
-    """Refused: the library's samples have the nearest surface alone."""
+    """Not available: the library's samples hold only the nearest surface."""
 
     def __init__(self, *arguments: Any, **keywords: Any):
-        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: rasterize() finds the "
-                                  "nearest surface alone, not the layers behind it")
+        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: not implemented, "
+                                  "because the library's samples hold only the nearest surface")
 
 
 class _TopologyHash:
-    """What antialias_construct_topology_hash() returns."""
+    """Result of antialias_construct_topology_hash()."""
 
 
 def antialias_construct_topology_hash(tri: Tensor) -> _TopologyHash:
-    """For antialias(), which needs none: edges are found again and kept by the library."""
+    """A placeholder for antialias(), which needs no such table: the library finds and caches edges itself."""
     _check_tri(tri, None, "antialias_construct_topology_hash")
     return _TopologyHash()
 
@@ -123,9 +124,9 @@ def _check_rast(rast, call):
 
 
 class _Frame:
-    """Samples of one call of the renderer's, of N shapes of one topology.
+    """Samples of N shapes of one topology.
 
-    faces, first  the triangles, and the number of the first in tri
+    faces, first  the triangles, and the index of the first one in tri
     """
 
     def __init__(self, device, pos, faces, first, height, width, call):
@@ -159,7 +160,7 @@ class _Frame:
         if self._camera.is_perspective:
             places = (corners.detach()[..., 2:] * weights.detach()[..., None]).sum(1)
             of_depth = places[:, 0] / places[:, 1]
-        else:  # the renderer's are not corrected for perspective
+        else:  # an orthographic camera's weights are linear on the screen
             of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
             weights = weights / corners[..., 3]
             weights = weights / weights.sum(1, keepdim=True)
@@ -171,8 +172,8 @@ class _Frame:
                      for table in (found, derivatives * is_seen[:, None]))
 
     def vertices_of(self, pos):
-        """Vertices of positions [N, V, 4], with derivatives; None where samples, or derivatives that are wanted, are not those
-        of these positions."""
+        """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions, or
+        lack gradients that are wanted."""
         is_wanted = pos.requires_grad and torch.is_grad_enabled()
         if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self._has_gradient:
             return None
@@ -193,9 +194,9 @@ def _derivatives(corners, covered, height, width):
     column, row = covered % width, covered.div(width, rounding_mode="floor") % height
     center = torch.stack([(2 * column + 1) / width - 1, (2 * row + 1) / height - 1], 1)[:, None]
     w = corners[..., 3:]
-    # The pixel is moved to the origin, where areas of small triangles are exact.
+    # With the pixel at the origin the products below do not cancel, even for small triangles.
     places = torch.cat([corners[..., :2] - center * w, w], -1)
-    # Weights are lines' distances, over their sum: (a X + b Y + c) / sum.
+    # A weight is the distance to the opposite edge's line, a X + b Y + c, over the sum of all three.
     lines = torch.cross(places.roll(-1, 1), places.roll(-2, 1), dim=-1)
     total = lines.sum(1, keepdim=True)
     divisor = torch.where(total[..., 2:] == 0, torch.ones_like(total[..., 2:]), total[..., 2:])
@@ -204,7 +205,7 @@ def _derivatives(corners, covered, height, width):
 
 
 class _Frames:
-    """Frames of one rasterize(), each of one or all of the images; None for an image without triangles."""
+    """Frames of one rasterize() call: one for all images, or with ranges one for each image; None for an empty range."""
 
     def __init__(self, device, pos, tri, ranges, height, width, call):
         self.device, self.tri, self.ranges, self._size = device, tri, ranges, (height, width)
@@ -217,7 +218,7 @@ class _Frames:
         return tuple(torch.cat(images) if len(images) > 1 else images[0] for images in zip(*parts))
 
     def vertices_of(self, pos, tri):
-        """Vertices of each frame; None where any has other ones."""
+        """Each frame's vertices; None if any frame belongs to other positions."""
         if tri is not self.tri and not torch.equal(tri.long(), self.tri.long()):
             return None
         found = [None if frame is None else frame.vertices_of(_shapes(pos)) for frame in self._frames]
@@ -242,7 +243,7 @@ def _pixels(resolution):
 
 
 def _checked_ranges(ranges, pos, tri):
-    """[(first, count), ...]; None without."""
+    """[(first, count), ...], or None without ranges."""
     if pos.ndim == 3:
         if ranges is not None:
             _fail("ranges", "some with pos [N, V, 4]", "none, or pos [V, 4]", "rasterize")
@@ -251,7 +252,7 @@ def _checked_ranges(ranges, pos, tri):
         _fail("ranges", "None", "[N, 2] with pos [V, 4]: each image's first triangle, and how many", "rasterize")
     if not isinstance(ranges, Tensor) or ranges.dtype not in (torch.int32, torch.int64) or ranges.ndim != 2 or \
             ranges.shape[1] != 2 or len(ranges) == 0:
-        _fail("ranges", getattr(ranges, "shape", type(ranges).__name__), "integers [N, 2]", "rasterize")
+        _fail("ranges", getattr(ranges, "shape", type(ranges).__name__), "a tensor of integers [N, 2]", "rasterize")
     pairs: List[Tuple[int, int]] = [tuple(pair) for pair in ranges.tolist()]
     for first, count in pairs:
         if first < 0 or count < 0 or first + count > len(tri):
@@ -261,18 +262,18 @@ def _checked_ranges(ranges, pos, tri):
 
 def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tensor, tri: Tensor, resolution: Sequence[int],
               ranges: Optional[Tensor] = None, grad_db: bool = True) -> Tuple[Tensor, Tensor]:
-    """What pixels' centres show.
+    """Finds the triangle at each pixel's centre.
 
-    pos         [N, V, 4], clip space; or [V, 4] with ranges. Triangles are clipped at the near plane z = -w, and pixels
-                beyond the far one, z = w, show nothing. Where positions lie behind the camera, z is to be affine in w, as
-                every projection matrix makes it
+    pos         [N, V, 4] in clip space, or [V, 4] with ranges. Triangles are cut at the near plane z = -w and at the far
+                plane z = w. If any position is behind the camera (w <= 0), z must be an affine function of w, as every
+                projection matrix makes it; other positions raise ValueError
     tri         [T, 3], int32 or int64
     resolution  (height, width)
-    ranges      [N, 2], each image's first triangle, and how many there are; images are rendered one after the other
+    ranges      [N, 2], the first triangle of each image and the number of its triangles. Images are rendered in turn
     grad_db     whether rast_db has gradients
 
-    Returns rast [N, H, W, 4], u, v, z/w, and the triangle's number plus 1, all 0 where nothing is; and rast_db
-    [N, H, W, 4], du/dX, du/dY, dv/dX, dv/dY by pixels. u, v and rast_db have derivatives by pos."""
+    Returns rast [N, H, W, 4] with u, v, z/w and the triangle's index plus 1, all 0 in empty pixels, and rast_db [N, H, W, 4]
+    with du/dX, du/dY, dv/dX, dv/dY per pixel. Gradients of u, v and rast_db reach pos; z/w has none, as in nvdiffrast."""
     if not isinstance(glctx, _Context):
         _fail("glctx", type(glctx).__name__, "RasterizeCudaContext() or RasterizeGLContext()", "rasterize", TypeError)
     _check_pos(pos, "rasterize")
@@ -285,7 +286,7 @@ def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tenso
 
 
 def _chosen(diff_attrs, channels):
-    """Numbers of the attributes whose derivatives are wanted."""
+    """Indices of the attributes that need derivatives."""
     if isinstance(diff_attrs, str) and diff_attrs == "all":
         return list(range(channels))
     if not isinstance(diff_attrs, (list, tuple)) or not all(isinstance(i, numbers.Integral) for i in diff_attrs) or \
@@ -296,9 +297,11 @@ def _chosen(diff_attrs, channels):
 
 def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tensor] = None,
                 diff_attrs: Union[str, Sequence[int], None] = None) -> Tuple[Tensor, Tensor]:
-    """Attributes of vertices, [V, A], [1, V, A] or [N, V, A], at pixels: [N, H, W, A], 0 where nothing is; and of those in
-    diff_attrs, a list of numbers or "all", the derivatives by pixels [N, H, W, 2 D], dA/dX and dA/dY in turn, which need
-    rast_db. Differentiable by attr, rast and rast_db."""
+    """Interpolates attributes of vertices, attr [V, A], [1, V, A] or [N, V, A].
+
+    Returns the attributes [N, H, W, A], 0 in empty pixels, and derivatives [N, H, W, 2 D] of the D attributes in diff_attrs,
+    a list of indices or "all": dA/dX and dA/dY per pixel, in turn. diff_attrs needs rast_db. Gradients reach attr, rast and
+    rast_db."""
     check_floats("attr", attr, (2, 3), "[V, A] or [N, V, A]", "interpolate")
     _check_rast(rast, "interpolate")
     table = attr if attr.ndim == 3 else attr[None]
@@ -330,9 +333,11 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
 
 def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_hash: Optional[_TopologyHash] = None,
               pos_gradient_boost: float = 1.0) -> Tensor:
-    """Colours [N, H, W, C] blended over a pixel's width across the contours of rast's triangles, as the image of
-    Samples.resolve() without a blur. Differentiable by color and, times pos_gradient_boost, pos. Where pos and tri are not
-    rasterize()'s, or rast not the tensor that it returned, they are rasterized again."""
+    """Blends colours [N, H, W, C] across contours, one pixel wide: Samples.resolve() without a blur. Gradients reach color
+    and, multiplied by pos_gradient_boost, pos. The far plane's cut is no contour.
+
+    If rast is not the very tensor that rasterize() returned, or pos and tri differ from rasterize()'s, the triangles are
+    rasterized again. topology_hash has no effect."""
     check_floats("color", color, (4,), "[N, H, W, C]", "antialias")
     _check_rast(rast, "antialias")
     if color.shape[:3] != rast.shape[:3]:
