@@ -6,7 +6,8 @@ render() does all of it in one call; a Renderer keeps what stays the same from c
 lists, read those of float32 where they are and convert the rest, and differentiate with respect to vertices, colours,
 textures, materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and
 by render_with_vjp() and render_with_jvp() for all others. rasterize() puts the edges' noise around shading of one's own.
-look_at(), perspective() and cameras make views and intrinsics.
+look_at(), perspective() and cameras make views and intrinsics. The module dpr.nvdiffrast, imported by itself, has
+nvdiffrast's operations for PyTorch.
 """
 from . import cameras
 from ._least_squares import normal_equations

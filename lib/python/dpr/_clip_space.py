@@ -38,7 +38,8 @@ class Camera:
 def _fit(z, w):
     """(a, b, is_affine) of each row's least-squares fit z = a w + b; is_affine: the fit is exact but for rounding."""
     mean_w, mean_z = w.mean(1, keepdim=True), z.mean(1, keepdim=True)
-    a = ((w - mean_w) * (z - mean_z)).sum(1, keepdim=True) / (w - mean_w).square().sum(1, keepdim=True).clamp(min=1e-300)
+    spread = (w - mean_w).square().sum(1, keepdim=True).clamp(min=1e-300)
+    a = ((w - mean_w) * (z - mean_z)).sum(1, keepdim=True) / spread
     b = mean_z - a * mean_w
     largest = z.abs().amax(1, keepdim=True) + w.abs().amax(1, keepdim=True)
     return a, b, ((z - a * w - b).abs() <= _ROUNDING * largest).all(1, keepdim=True)
@@ -47,9 +48,9 @@ def _fit(z, w):
 def camera_of(pos, used, where):
     """Camera of positions [N, V, 4]. used [V]: vertices that triangles use.
 
-    A projection matrix makes z = a w + b. Then w serves as depth: it is more precise than z / w, and triangles may reach
-    behind the camera. The near plane z = -w is the plane w = -b / (a + 1), and z / w grows with w unless b is positive.
-    Otherwise z / w serves as depth, which needs all positions in front of the camera."""
+    A projection matrix makes z = a w + b. Then w serves as depth: it is more precise than z / w, and triangles may
+    reach behind the camera. The near plane z = -w is the plane w = -b / (a + 1), and z / w grows with w unless b is
+    positive. Otherwise z / w serves as depth, which needs all positions in front of the camera."""
     z, w = pos.detach()[:, used, 2:].double().unbind(-1)
     if not z.shape[1]:
         return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
@@ -63,9 +64,9 @@ def camera_of(pos, used, where):
     fall = b * (scale - 1 / most)
     is_flat = most - least <= _FLAT * most.abs()
     if bool(((is_affine & (fall <= _ROUNDING) & ~is_flat) | (most <= 0)).all()):
-        furthest = float((scale * most).max())
-        return Camera(True, scale[..., None].to(pos.dtype), 1.0 if bool(is_clipped.any()) else 0.999, max(1.01 * furthest, 2.0))
+        znear, furthest = 1.0 if bool(is_clipped.any()) else 0.999, float((scale * most).max())
+        return Camera(True, scale[..., None].to(pos.dtype), znear, max(1.01 * furthest, 2.0))
     if bool((least > _LEAST_NEAR * most.abs()).all()):
         return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
-    _arrays.fail(ValueError, "pos", "positions behind the camera (w <= 0) whose z is no affine function of w that orders "
-                 "depths", "positions of one projection matrix a shape, or all in front of the camera", where)
+    _arrays.fail(ValueError, "pos", "positions behind the camera (w <= 0) whose z is no affine function of w that "
+                 "orders depths", "positions of one projection matrix a shape, or all in front of the camera", where)

@@ -77,6 +77,6 @@ def spread(values, index, count):
 
 
 def bilinear(table, index, x, y):
-    """Bilinear mix [K, C] of four rows with indices [4, K]: x [K, 1] leads from the first to the second and from the third
-    to the fourth row, y from the first to the second pair."""
+    """Bilinear mix [K, C] of four rows with indices [4, K]: x [K, 1] leads from the first to the second and from the
+    third to the fourth row, y from the first to the second pair."""
     return _Bilinear.apply(table, index, x, y)

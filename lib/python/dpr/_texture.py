@@ -17,7 +17,7 @@ def _fail(name, got, expected, error=ValueError, call="texture"):
 
 
 def check_floats(name, array, dimensions, shape, call):
-    """Raises unless the array is a float32 CPU tensor with one of these numbers of dimensions. shape: text for errors."""
+    """Raises unless the array is a float32 CPU tensor with one of these numbers of dimensions. shape: for errors."""
     if not isinstance(array, Tensor):
         _fail(name, type(array).__name__, "a tensor of PyTorch", TypeError, call)
     if array.device.type != "cpu":
@@ -140,7 +140,8 @@ class _Texels:
         return numbers[0] if self._count == 1 else torch.tensor(numbers).index_select(0, level)
 
     def _within(self, place, size):
-        """(texel, whether it exists, None for always) for texels -1 to size along an axis. Cube maps count from their border."""
+        """(texel, whether it exists, None for always) for texels -1 to size along an axis. Cube maps count from their
+        border."""
         if self.boundary == "cube":
             return place + 1, None
         last = size - 1
@@ -152,7 +153,8 @@ class _Texels:
     def _rows(self, level, batch, face, columns, rows):
         """Table rows of the texels in these rows and columns, row by row."""
         height, width, first = (self._of(numbers, level) for numbers in (self._heights, self._widths, self._first))
-        columns, rows = ([self._within(place, size) for place in places] for places, size in ((columns, width), (rows, height)))
+        columns = [self._within(place, width) for place in columns]
+        rows = [self._within(place, height) for place in rows]
         if self.boundary == "cube":
             first, of_batch = self._of(self._places_first, level), first + batch * (6 * width * width + 24)
             lines = [first + (face * (width + 2) + row) * (width + 2) for row, _ in rows]
@@ -233,7 +235,8 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
     boundary_mode   "wrap", "clamp", "zero" or "cube"
     max_mip_level   the last mip level that is used
 
-    Gradients reach tex and mip; uv unless the filter is "nearest"; uv_da and mip_level_bias with "linear-mipmap-linear"."""
+    Gradients reach tex and mip; uv unless the filter is "nearest"; and with "linear-mipmap-linear" uv_da and
+    mip_level_bias."""
     for name, word, words in (("filter_mode", filter_mode, _FILTERS), ("boundary_mode", boundary_mode, _BOUNDARIES)):
         if word not in words:
             _fail(name, repr(word), "one of " + ", ".join(words))
@@ -275,6 +278,6 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
         else:
             lower = level.detach().floor().long().clamp(max=max(len(texels) - 2, 0))
             part = (level - lower)[:, None]
-            upper = (lower + 1).clamp(max=len(texels) - 1)
-            found = _rows.between(texels.linear(lower, batch, face, coords), texels.linear(upper, batch, face, coords), part)
+            found = _rows.between(*(texels.linear(number, batch, face, coords) for number in (
+                lower, (lower + 1).clamp(max=len(texels) - 1))), part)
     return found.reshape(*shape, -1)

@@ -6,8 +6,8 @@
     color, _ = dr.interpolate(attr, rast, tri)
     image = dr.antialias(color, rast, pos, tri)
 
-Names, arguments, shapes and conventions are nvdiffrast's: positions are in OpenGL's clip space, row 0 of an image is at the
-bottom, u and v are the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64.
+Names, arguments, shapes and conventions are nvdiffrast's: positions are in OpenGL's clip space, row 0 of an image is
+at the bottom, u and v are the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64.
 
 Differences: antialias() is the library's own, Samples.resolve() without a blur, so blended pixels have slightly other
 colours, and gradients of positions are those of the library. DepthPeeler raises NotImplementedError.
@@ -24,8 +24,9 @@ from . import _arrays, _clip_space, _rows, _torch
 from ._renderer import Renderer
 from ._texture import Mip, check_floats, texture, texture_construct_mip
 
-__all__ = ["DepthPeeler", "RasterizeCudaContext", "RasterizeGLContext", "antialias", "antialias_construct_topology_hash",
-           "get_log_level", "interpolate", "rasterize", "set_log_level", "texture", "texture_construct_mip"]
+__all__ = ["DepthPeeler", "RasterizeCudaContext", "RasterizeGLContext", "antialias",
+           "antialias_construct_topology_hash", "get_log_level", "interpolate", "rasterize", "set_log_level", "texture",
+           "texture_construct_mip"]
 
 _SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
 """Blends samples across contours over one pixel without a further blur. Only the nearest surface is visible."""
@@ -86,8 +87,8 @@ class DepthPeeler:
     """Not available: the library's samples hold only the nearest surface."""
 
     def __init__(self, *arguments: Any, **keywords: Any):
-        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: not implemented, "
-                                  "because the library's samples hold only the nearest surface")
+        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: not "
+                                  "implemented, because the library's samples hold only the nearest surface")
 
 
 class _TopologyHash:
@@ -102,7 +103,8 @@ def antialias_construct_topology_hash(tri: Tensor) -> _TopologyHash:
 
 def _check_tri(tri, count, call):
     if not isinstance(tri, Tensor) or tri.dtype not in (torch.int32, torch.int64):
-        _fail("tri", str(getattr(tri, "dtype", type(tri).__name__)), "a tensor of torch.int32 or torch.int64", call, TypeError)
+        got = str(getattr(tri, "dtype", type(tri).__name__))
+        _fail("tri", got, "a tensor of torch.int32 or torch.int64", call, TypeError)
     if tri.ndim != 2 or tri.shape[1] != 3 or not 0 < len(tri) < _MOST_FACES:
         _fail("tri", list(tri.shape), f"[T, 3] with T from 1 to {_MOST_FACES - 1}", call)
     if count is not None and not (0 <= int(tri.min()) and int(tri.max()) < count):
@@ -150,7 +152,8 @@ class _Frame:
 
     def rast(self, pos, grad_db):
         """([N, H, W, 4], [N, H, W, 4])"""
-        faces, barycentrics, depth = map(self._inner, (self._samples.face_id, self._samples.barycentrics, self._samples.depth))
+        samples = self._samples
+        faces, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
         count = faces.numel()
         covered = (faces >= 0).reshape(-1).nonzero()[:, 0]
         rows = self.faces.long().index_select(0, faces.reshape(-1).index_select(0, covered))
@@ -172,8 +175,8 @@ class _Frame:
                      for table in (found, derivatives * is_seen[:, None]))
 
     def vertices_of(self, pos):
-        """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions, or
-        lack gradients that are wanted."""
+        """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions,
+        or lack gradients that are wanted."""
         is_wanted = pos.requires_grad and torch.is_grad_enabled()
         if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self._has_gradient:
             return None
@@ -205,12 +208,13 @@ def _derivatives(corners, covered, height, width):
 
 
 class _Frames:
-    """Frames of one rasterize() call: one for all images, or with ranges one for each image; None for an empty range."""
+    """Frames of one rasterize() call: one for all images, or with ranges one for each; None for an empty range."""
 
     def __init__(self, device, pos, tri, ranges, height, width, call):
         self.device, self.tri, self.ranges, self._size = device, tri, ranges, (height, width)
-        self._frames = [_Frame(device, _shapes(pos), tri[first:first + count], first, height, width, call) if count else None
-                        for first, count in ([(0, len(tri))] if ranges is None else ranges)]
+        pos, ranges = _shapes(pos), [(0, len(tri))] if ranges is None else ranges
+        self._frames = [_Frame(device, pos, tri[first:first + count], first, height, width, call) if count else None
+                        for first, count in ranges]
 
     def rast(self, pos, grad_db):
         empty = pos.new_zeros(1, *self._size, 4)
@@ -260,20 +264,22 @@ def _checked_ranges(ranges, pos, tri):
     return pairs
 
 
-def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tensor, tri: Tensor, resolution: Sequence[int],
-              ranges: Optional[Tensor] = None, grad_db: bool = True) -> Tuple[Tensor, Tensor]:
+def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tensor, tri: Tensor,
+              resolution: Sequence[int], ranges: Optional[Tensor] = None,
+              grad_db: bool = True) -> Tuple[Tensor, Tensor]:
     """Finds the triangle at each pixel's centre.
 
-    pos         [N, V, 4] in clip space, or [V, 4] with ranges. Triangles are cut at the near plane z = -w and at the far
-                plane z = w. If any position is behind the camera (w <= 0), z must be an affine function of w, as every
-                projection matrix makes it; other positions raise ValueError
+    pos         [N, V, 4] in clip space, or [V, 4] with ranges. Triangles are cut at the near plane z = -w and at the
+                far plane z = w. If any position is behind the camera (w <= 0), z must be an affine function of w, as
+                every projection matrix makes it; other positions raise ValueError
     tri         [T, 3], int32 or int64
     resolution  (height, width)
     ranges      [N, 2], the first triangle of each image and the number of its triangles. Images are rendered in turn
     grad_db     whether rast_db has gradients
 
-    Returns rast [N, H, W, 4] with u, v, z/w and the triangle's index plus 1, all 0 in empty pixels, and rast_db [N, H, W, 4]
-    with du/dX, du/dY, dv/dX, dv/dY per pixel. Gradients of u, v and rast_db reach pos; z/w has none, as in nvdiffrast."""
+    Returns rast [N, H, W, 4] with u, v, z/w and the triangle's index plus 1, all 0 in empty pixels, and rast_db
+    [N, H, W, 4] with du/dX, du/dY, dv/dX, dv/dY per pixel. Gradients of u, v and rast_db reach pos; z/w has none, as in
+    nvdiffrast."""
     if not isinstance(glctx, _Context):
         _fail("glctx", type(glctx).__name__, "RasterizeCudaContext() or RasterizeGLContext()", "rasterize", TypeError)
     _check_pos(pos, "rasterize")
@@ -291,7 +297,8 @@ def _chosen(diff_attrs, channels):
         return list(range(channels))
     if not isinstance(diff_attrs, (list, tuple)) or not all(isinstance(i, numbers.Integral) for i in diff_attrs) or \
             not all(-channels <= i < channels for i in diff_attrs):
-        _fail("diff_attrs", repr(diff_attrs), f"'all', or a list of numbers below {channels}, the attributes", "interpolate")
+        _fail("diff_attrs", repr(diff_attrs), f"'all', or a list of numbers below {channels}, the attributes",
+              "interpolate")
     return [int(i) % channels for i in diff_attrs]
 
 
@@ -299,9 +306,9 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
                 diff_attrs: Union[str, Sequence[int], None] = None) -> Tuple[Tensor, Tensor]:
     """Interpolates attributes of vertices, attr [V, A], [1, V, A] or [N, V, A].
 
-    Returns the attributes [N, H, W, A], 0 in empty pixels, and derivatives [N, H, W, 2 D] of the D attributes in diff_attrs,
-    a list of indices or "all": dA/dX and dA/dY per pixel, in turn. diff_attrs needs rast_db. Gradients reach attr, rast and
-    rast_db."""
+    Returns the attributes [N, H, W, A], 0 in empty pixels, and derivatives [N, H, W, 2 D] of the D attributes in
+    diff_attrs, a list of indices or "all": dA/dX and dA/dY per pixel, in turn. diff_attrs needs rast_db. Gradients
+    reach attr, rast and rast_db."""
     check_floats("attr", attr, (2, 3), "[V, A] or [N, V, A]", "interpolate")
     _check_rast(rast, "interpolate")
     table = attr if attr.ndim == 3 else attr[None]
@@ -320,12 +327,14 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
     a, b, c = (_rows.rows(table.reshape(-1, channels), index.contiguous()) for index in corners.unbind(1))
     along_u, along_v = a - c, b - c
     u, v = _rows.rows(flat, covered)[:, :2].split(1, 1)
-    found = _rows.spread(torch.addcmul(torch.addcmul(c, u, along_u), v, along_v), covered, len(flat)).reshape(*shape, channels)
+    values = torch.addcmul(torch.addcmul(c, u, along_u), v, along_v)
+    found = _rows.spread(values, covered, len(flat)).reshape(*shape, channels)
     if diff_attrs is None or len(diff_attrs) == 0:
         return found, rast.new_empty(*shape, 0)
     chosen = _chosen(diff_attrs, channels)
     if rast_db is None or rast_db.shape != rast.shape:
-        _fail("rast_db", None if rast_db is None else list(rast_db.shape), f"{list(rast.shape)} with diff_attrs", "interpolate")
+        got = None if rast_db is None else list(rast_db.shape)
+        _fail("rast_db", got, f"{list(rast.shape)} with diff_attrs", "interpolate")
     of_u, of_v = _rows.rows(rast_db.reshape(-1, 4), covered).reshape(-1, 2, 1, 2).unbind(1)
     derivatives = (of_u * along_u[:, chosen, None] + of_v * along_v[:, chosen, None]).reshape(-1, 2 * len(chosen))
     return found, _rows.spread(derivatives, covered, len(flat)).reshape(*shape, 2 * len(chosen))
@@ -333,11 +342,11 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
 
 def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_hash: Optional[_TopologyHash] = None,
               pos_gradient_boost: float = 1.0) -> Tensor:
-    """Blends colours [N, H, W, C] across contours, one pixel wide: Samples.resolve() without a blur. Gradients reach color
-    and, multiplied by pos_gradient_boost, pos. The far plane's cut is no contour.
+    """Blends colours [N, H, W, C] across contours, one pixel wide: Samples.resolve() without a blur. Gradients reach
+    color and, multiplied by pos_gradient_boost, pos. The far plane's cut is no contour.
 
-    If rast is not the very tensor that rasterize() returned, or pos and tri differ from rasterize()'s, the triangles are
-    rasterized again. topology_hash has no effect."""
+    If rast is not the very tensor that rasterize() returned, or pos and tri differ from rasterize()'s, the triangles
+    are rasterized again. topology_hash has no effect."""
     check_floats("color", color, (4,), "[N, H, W, C]", "antialias")
     _check_rast(rast, "antialias")
     if color.shape[:3] != rast.shape[:3]:
@@ -345,8 +354,8 @@ def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_ha
     if not bool(torch.isfinite(color).all()):
         _fail("color", "infinity or NaN", "finite numbers", "antialias")
     if not isinstance(topology_hash, (_TopologyHash, type(None))):
-        _fail("topology_hash", type(topology_hash).__name__, "what antialias_construct_topology_hash() returns", "antialias",
-              TypeError)
+        _fail("topology_hash", type(topology_hash).__name__, "what antialias_construct_topology_hash() returns",
+              "antialias", TypeError)
     _check_pos(pos, "antialias")
     _check_tri(tri, pos.shape[-2], "antialias")
     known = getattr(rast, "_dpr_frames", None)
