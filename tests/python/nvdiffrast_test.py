@@ -1,4 +1,5 @@
 """dpr.nvdiffrast against references of its own: pixel centres in triangles, textures by hand, differences of images."""
+import io
 import sys
 import unittest
 
@@ -262,6 +263,16 @@ class NvdiffrastTest(unittest.TestCase):
                 ends = [float(loss(sign * 0.5 * length * direction)) for sign in (1, -1)]
                 self.assertLess(abs(total - (ends[0] - ends[1])), 0.01 * abs(ends[0] - ends[1]) + 0.1)
 
+    def test_files_of_rast(self):
+        pos, tri = clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES)
+        rast, _ = dr.rasterize(CONTEXT, pos, tri, [H, W])
+        file = io.BytesIO()
+        torch.save(rast, file)
+        file.seek(0)
+        loaded, color = torch.load(file), random(1, H, W, 3)
+        self.assertTrue(torch.equal(loaded, rast))
+        self.assertTrue(torch.equal(dr.antialias(color, loaded, pos, tri), dr.antialias(color, rast, pos, tri)))
+
     def test_other_names(self):
         self.assertEqual(dr.get_log_level(), 1)
         dr.set_log_level(2)
@@ -277,7 +288,11 @@ class NvdiffrastTest(unittest.TestCase):
         rast, rast_db = dr.rasterize(CONTEXT, pos, tri, (H, W), grad_db=False)
         self.assertTrue(rast.requires_grad and not rast_db.requires_grad)
         behind = pos.detach() * torch.tensor([1.0, 1, 1, -1])
-        self.assertTrue((dr.rasterize(CONTEXT, behind, tri, (H, W))[0] == 0).all())
+        for unseen in (behind, torch.zeros_like(behind)):
+            rast, rast_db = dr.rasterize(CONTEXT, unseen, tri, (H, W))
+            color, derivatives = dr.interpolate(random(8, 3), rast, tri, rast_db, "all")
+            image = dr.antialias(color, rast, unseen, tri)
+            self.assertTrue(all((array == 0).all() for array in (rast, rast_db, color, derivatives, image)))
 
     def test_what_is_refused(self):
         pos, tri = clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES)

@@ -59,7 +59,7 @@ def camera_of(pos, used, where):
     near = torch.where(a > -1, -b / (a + 1).clamp(min=1e-30), torch.zeros_like(b))
     near = torch.maximum(near, _LEAST_NEAR * most.abs())
     is_clipped = least < near
-    scale = 1 / torch.where(is_clipped, near, least)
+    scale = 1 / torch.where(is_clipped, near, least).clamp(min=1e-30)
     # Drop of z / w from the nearest to the furthest vertex. Positive: z / w orders depths the other way round.
     fall = b * (scale - 1 / most)
     is_flat = most - least <= _FLAT * most.abs()

@@ -14,6 +14,7 @@ colours, and gradients of positions are those of the library. DepthPeeler raises
 """
 from __future__ import annotations
 
+import collections
 import numbers
 from typing import Any, List, Optional, Sequence, Tuple, Union
 
@@ -216,6 +217,10 @@ class _Frames:
         self._frames = [_Frame(device, pos, tri[first:first + count], first, height, width, call) if count else None
                         for first, count in ranges]
 
+    def __reduce__(self):
+        """Copies and pickles of rast have no frames, and are rasterized again."""
+        return collections.OrderedDict, ()
+
     def rast(self, pos, grad_db):
         empty = pos.new_zeros(1, *self._size, 4)
         parts = [(empty, empty) if frame is None else frame.rast(_shapes(pos), grad_db) for frame in self._frames]
@@ -358,7 +363,7 @@ def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_ha
               "antialias", TypeError)
     _check_pos(pos, "antialias")
     _check_tri(tri, pos.shape[-2], "antialias")
-    known = getattr(rast, "_dpr_frames", None)
+    known = getattr(rast, "_dpr_frames", None) or None
     if known is None and (pos.ndim == 2 and len(rast) > 1 or pos.ndim == 3 and len(pos) != len(rast)):
         _fail("rast", f"{len(rast)} images that rasterize() did not return, with pos {list(pos.shape)}",
               "the tensor that rasterize() returned, or as many shapes in pos", "antialias")
