@@ -13,11 +13,6 @@ def _summed(rows, index, count):
     return table.scatter_add_(0, _flat(index, rows.shape[1]), rows.reshape(-1)).reshape(count, -1)
 
 
-def between(a, b, part):
-    """a + part (b - a): faster than torch.lerp()."""
-    return a + part * (b - a)
-
-
 class _Rows(torch.autograd.Function):
     @staticmethod
     def forward(ctx, table, index):
@@ -43,27 +38,24 @@ class _Spread(torch.autograd.Function):
         return grad.index_select(0, *ctx.saved_tensors), None, None
 
 
-class _Bilinear(torch.autograd.Function):
+class _Mixed(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, table, index, x, y):
-        ctx.save_for_backward(table, index, x, y)
-        a, b, c, d = (table.index_select(0, corner) for corner in index)
-        return between(between(a, b, x), between(c, d, x), y)
+    def forward(ctx, table, index, weights):
+        ctx.save_for_backward(table, index, weights)
+        return sum(table.index_select(0, of_row) * weight[:, None] for of_row, weight in zip(index, weights))
 
     @staticmethod
     @once_differentiable
     def backward(ctx, grad):
-        table, index, x, y = ctx.saved_tensors
-        grad_table = grad_x = grad_y = None
+        table, index, weights = ctx.saved_tensors
+        grad_table = grad_weights = None
         if ctx.needs_input_grad[0]:
-            low, high = grad * (1 - y), grad * y
-            rows = torch.cat([low * (1 - x), low * x, high * (1 - x), high * x])
-            grad_table = _summed(rows, index.reshape(-1), len(table))
-        if ctx.needs_input_grad[2] or ctx.needs_input_grad[3]:
-            a, b, c, d = (table.index_select(0, corner) for corner in index)
-            grad_x = (grad * between(b - a, d - c, y)).sum(1, keepdim=True)
-            grad_y = (grad * between(c - a, d - b, x)).sum(1, keepdim=True)
-        return grad_table, None, grad_x, grad_y
+            parts = torch.cat([grad * weight[:, None] for weight in weights])
+            grad_table = _summed(parts, index.reshape(-1), len(table))
+        if ctx.needs_input_grad[2]:
+            ones = grad.new_ones(grad.shape[1])  # a product of matrices is the fastest sum of short rows
+            grad_weights = torch.stack([(table.index_select(0, of_row) * grad) @ ones for of_row in index])
+        return grad_table, None, grad_weights
 
 
 def rows(table, index):
@@ -76,7 +68,6 @@ def spread(values, index, count):
     return _Spread.apply(values, index, count)
 
 
-def bilinear(table, index, x, y):
-    """Bilinear mix [K, C] of four rows with indices [4, K]: x [K, 1] leads from the first to the second and from the
-    third to the fourth row, y from the first to the second pair."""
-    return _Bilinear.apply(table, index, x, y)
+def mixed(table, index, weights):
+    """Sums [K, C] of R rows each, with indices [R, K] and weights [R, K]."""
+    return _Mixed.apply(table, index, weights)

@@ -182,11 +182,12 @@ class _Texels:
         return _rows.rows(self.table, self._rows(0, batch, face, [x], [y])[0])
 
     def linear(self, level, batch, face, coords):
+        """(indices [4, K], weights [4, K]) of the four texels around each place."""
         x, y = (place - 0.5 for place in self._places_of(level, coords))
         column, row = x.detach().floor(), y.detach().floor()
-        x, y, column, row = (x - column)[:, None], (y - row)[:, None], column.long(), row.long()
-        index = torch.stack(self._rows(level, batch, face, [column, column + 1], [row, row + 1]))
-        return _rows.bilinear(self.table, index, x, y)
+        x, y, column, row = x - column, y - row, column.long(), row.long()
+        index = self._rows(level, batch, face, [column, column + 1], [row, row + 1])
+        return torch.stack(index), torch.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y])
 
     def level_of(self, footprint, bias):
         """Fractional mip levels [K], by the longer axis of the ellipse that a pixel covers."""
@@ -194,7 +195,8 @@ class _Texels:
         if footprint is not None:
             area = footprint * footprint.new_tensor([[self._widths[0]], [self._heights[0]]])
             across, up = area[..., 0], area[..., 1]
-            a, b, c = ((left * right).sum(1) for left, right in ((across, across), (up, up), (across, up)))
+            a, b, c = (left[:, 0] * right[:, 0] + left[:, 1] * right[:, 1]
+                       for left, right in ((across, across), (up, up), (across, up)))
             root = (0.25 * (a - b).square() + c.square()).clamp(min=_LEAST_AREA ** 2).sqrt()
             level = 0.5 * torch.log2((0.5 * (a + b) + root).clamp(min=_LEAST_AREA))
         if bias is not None:
@@ -268,16 +270,17 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
     if is_cube:
         face, coords, footprint = _on_cube(coords, footprint)
     if filter_mode == "nearest":
-        found = texels.nearest(batch, face, coords)
-    elif not is_mipmap:
-        found = texels.linear(0, batch, face, coords)
+        return texels.nearest(batch, face, coords).reshape(*shape, -1)
+    if not is_mipmap:
+        taps = [texels.linear(0, batch, face, coords)]
     else:
         level = texels.level_of(footprint, mip_level_bias)
         if filter_mode == "linear-mipmap-nearest":
-            found = texels.linear((level.detach() + 0.5).floor().long(), batch, face, coords)
+            taps = [texels.linear((level.detach() + 0.5).floor().long(), batch, face, coords)]
         else:
             lower = level.detach().floor().long().clamp(max=max(len(texels) - 2, 0))
-            part = (level - lower)[:, None]
-            found = _rows.between(*(texels.linear(number, batch, face, coords) for number in (
-                lower, (lower + 1).clamp(max=len(texels) - 1))), part)
-    return found.reshape(*shape, -1)
+            upper, part = (lower + 1).clamp(max=len(texels) - 1), level - lower
+            taps = [(index, weights * of_level) for (index, weights), of_level in (
+                (texels.linear(lower, batch, face, coords), 1 - part),
+                (texels.linear(upper, batch, face, coords), part))]
+    return _rows.mixed(texels.table, *(torch.cat(parts) for parts in zip(*taps))).reshape(*shape, -1)

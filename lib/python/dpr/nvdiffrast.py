@@ -153,27 +153,46 @@ class _Frame:
 
     def rast(self, pos, grad_db):
         """([N, H, W, 4], [N, H, W, 4])"""
-        samples = self._samples
-        faces, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
-        count = faces.numel()
-        covered = (faces >= 0).reshape(-1).nonzero()[:, 0]
-        rows = self.faces.long().index_select(0, faces.reshape(-1).index_select(0, covered))
+        samples, faces = self._samples, self.faces.long()
+        face_id, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
+        count = face_id.numel()
+        covered = (face_id >= 0).reshape(-1).nonzero()[:, 0]
+        face = face_id.reshape(-1).index_select(0, covered)
         shape = covered.div(self._height * self._width, rounding_mode="floor")
-        corners = _rows.rows(pos.reshape(-1, 4), (rows + (shape * pos.shape[1])[:, None]).reshape(-1)).reshape(-1, 3, 4)
+        corners = [corner.contiguous() for corner in
+                   (faces.index_select(0, face) + (shape * pos.shape[1])[:, None]).unbind(1)]
         weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
+        of_w = pos[..., 3].reshape(-1)
         if self._camera.is_perspective:
-            places = (corners.detach()[..., 2:] * weights.detach()[..., None]).sum(1)
-            of_depth = places[:, 0] / places[:, 1]
+            of_z, weights_now = pos[..., 2].detach().reshape(-1), weights.detach()
+            z, w = (sum(table.index_select(0, corner) * weight for corner, weight in zip(corners, weights_now.unbind(1)))
+                    for table in (of_z, of_w.detach()))
+            of_depth = z / w
         else:  # an orthographic camera's weights are linear on the screen
             of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
-            weights = weights / corners[..., 3]
+            weights = weights / torch.stack([of_w.index_select(0, corner) for corner in corners], 1)
             weights = weights / weights.sum(1, keepdim=True)
         is_seen = of_depth.abs() <= 1 + _PLANE_ROUNDING
-        numbers_of = (faces.reshape(-1).index_select(0, covered) + (1 + self.first)).to(pos.dtype)
-        found = torch.cat([weights[:, :2], of_depth[:, None], numbers_of[:, None]], 1) * is_seen[:, None]
-        derivatives = _derivatives(corners if grad_db else corners.detach(), covered, self._height, self._width)
-        return tuple(_rows.spread(table, covered, count).reshape(*faces.shape, 4)
+        number = (face + (1 + self.first)).to(pos.dtype)
+        found = torch.cat([weights[:, :2], of_depth[:, None], number[:, None]], 1) * is_seen[:, None]
+        derivatives = self._derivatives(*((pos, weights) if grad_db else (pos.detach(), weights.detach())), corners,
+                                        shape * len(faces) + face)
+        return tuple(_rows.spread(table, covered, count).reshape(*face_id.shape, 4)
                      for table in (found, derivatives * is_seen[:, None]))
+
+    def _derivatives(self, pos, weights, corners, place):
+        """[K, 4]: du/dX, du/dY, dv/dX, dv/dY per pixel, of weights [K, 3]. place: shape times faces plus face."""
+        table = pos.reshape(-1, 4)
+        if len(pos) * len(self.faces) <= len(place):
+            shapes = torch.arange(len(pos))[:, None, None] * pos.shape[1]
+            slopes = _slopes(_rows.rows(table, (self.faces.long() + shapes).reshape(-1)).reshape(-1, 3, 4))
+            slopes = _rows.rows(slopes, place)
+        else:
+            slopes = _slopes(torch.stack([_rows.rows(table, corner) for corner in corners], 1))
+        of_u, of_v, of_all = slopes.split(2, 1)
+        w = sum(table[:, 3].index_select(0, corner) * weight for corner, weight in zip(corners, weights.unbind(1)))
+        scale = w[:, None] * w.new_tensor([2 / self._width, 2 / self._height])
+        return torch.cat([(own - weight * of_all) * scale for own, weight in zip((of_u, of_v), weights.split(1, 1))], 1)
 
     def vertices_of(self, pos):
         """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions,
@@ -193,19 +212,13 @@ class _Frame:
         return _torch.resolve(self._samples._rasterized, around, tensors)
 
 
-def _derivatives(corners, covered, height, width):
-    """[K, 4]: du/dX, du/dY, dv/dX, dv/dY by pixels, of corners [K, 3, 4] in clip space."""
-    column, row = covered % width, covered.div(width, rounding_mode="floor") % height
-    center = torch.stack([(2 * column + 1) / width - 1, (2 * row + 1) / height - 1], 1)[:, None]
-    w = corners[..., 3:]
-    # With the pixel at the origin the products below do not cancel, even for small triangles.
-    places = torch.cat([corners[..., :2] - center * w, w], -1)
-    # A weight is the distance to the opposite edge's line, a X + b Y + c, over the sum of all three.
+def _slopes(corners):
+    """[R, 6] of corners [R, 3, 4] in clip space: d/dX and d/dY in NDC of u / w, v / w and 1 / w."""
+    places = corners[..., (0, 1, 3)].double()
     lines = torch.cross(places.roll(-1, 1), places.roll(-2, 1), dim=-1)
-    total = lines.sum(1, keepdim=True)
-    divisor = torch.where(total[..., 2:] == 0, torch.ones_like(total[..., 2:]), total[..., 2:])
-    slopes = (lines[..., :2] - lines[..., 2:] / divisor * total[..., :2]) / divisor
-    return (slopes[:, :2] * slopes.new_tensor([2 / width, 2 / height])).reshape(-1, 4)
+    area = (lines[:, 0] * places[:, 0]).sum(1)
+    slopes = lines[..., :2] / torch.where(area == 0, torch.ones_like(area), area)[:, None, None]
+    return torch.cat([slopes[:, 0], slopes[:, 1], slopes.sum(1)], 1).to(corners.dtype)
 
 
 class _Frames:
@@ -329,10 +342,9 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
     corners = tri.long().index_select(0, faces)
     if len(table) > 1:
         corners = corners + (covered.div(shape[1] * shape[2], rounding_mode="floor") * table.shape[1])[:, None]
-    a, b, c = (_rows.rows(table.reshape(-1, channels), index.contiguous()) for index in corners.unbind(1))
-    along_u, along_v = a - c, b - c
-    u, v = _rows.rows(flat, covered)[:, :2].split(1, 1)
-    values = torch.addcmul(torch.addcmul(c, u, along_u), v, along_v)
+    table, corners = table.reshape(-1, channels), corners.t().contiguous()
+    u, v = (flat[:, i].index_select(0, covered) for i in (0, 1))
+    values = _rows.mixed(table, corners, torch.stack([u, v, 1 - u - v]))
     found = _rows.spread(values, covered, len(flat)).reshape(*shape, channels)
     if diff_attrs is None or len(diff_attrs) == 0:
         return found, rast.new_empty(*shape, 0)
@@ -340,8 +352,12 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
     if rast_db is None or rast_db.shape != rast.shape:
         got = None if rast_db is None else list(rast_db.shape)
         _fail("rast_db", got, f"{list(rast.shape)} with diff_attrs", "interpolate")
-    of_u, of_v = _rows.rows(rast_db.reshape(-1, 4), covered).reshape(-1, 2, 1, 2).unbind(1)
-    derivatives = (of_u * along_u[:, chosen, None] + of_v * along_v[:, chosen, None]).reshape(-1, 2 * len(chosen))
+    chosen_table = table if chosen == list(range(channels)) else table[:, chosen]
+    derivatives = []
+    for axis in (0, 1):  # X, Y
+        of_u, of_v = (rast_db.reshape(-1, 4)[:, i].index_select(0, covered) for i in (axis, axis + 2))
+        derivatives.append(_rows.mixed(chosen_table, corners, torch.stack([of_u, of_v, -of_u - of_v])))
+    derivatives = torch.stack(derivatives, 2).reshape(-1, 2 * len(chosen))
     return found, _rows.spread(derivatives, covered, len(flat)).reshape(*shape, 2 * len(chosen))
 
 
