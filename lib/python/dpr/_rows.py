@@ -7,10 +7,12 @@ def _flat(index, channels):
     return (index[:, None] * channels + torch.arange(channels)).reshape(-1)
 
 
-def _summed(rows, index, count):
-    """Sums rows [K, C] into a table [count, C] at their indices [K]."""
-    table = rows.new_zeros(count * rows.shape[1])
-    return table.scatter_add_(0, _flat(index, rows.shape[1]), rows.reshape(-1)).reshape(count, -1)
+def _summed(parts, count, channels):
+    """Table [count, C] with the rows of each part, (rows [K, C], indices [K]), added at their indices."""
+    table = torch.zeros(count * channels, dtype=torch.float32)
+    for rows_of, index in parts:
+        table.scatter_add_(0, _flat(index, channels), rows_of.reshape(-1))
+    return table.reshape(count, channels)
 
 
 class _Rows(torch.autograd.Function):
@@ -23,14 +25,14 @@ class _Rows(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx, grad):
-        return _summed(grad, *ctx.saved_tensors, ctx.count), None
+        return _summed([(grad, *ctx.saved_tensors)], ctx.count, grad.shape[1]), None
 
 
 class _Spread(torch.autograd.Function):
     @staticmethod
     def forward(ctx, rows, index, count):
         ctx.save_for_backward(index)
-        return _summed(rows, index, count)
+        return _summed([(rows, index)], count, rows.shape[1])
 
     @staticmethod
     @once_differentiable
@@ -50,8 +52,8 @@ class _Mixed(torch.autograd.Function):
         table, index, weights = ctx.saved_tensors
         grad_table = grad_weights = None
         if ctx.needs_input_grad[0]:
-            parts = torch.cat([grad * weight[:, None] for weight in weights])
-            grad_table = _summed(parts, index.reshape(-1), len(table))
+            parts = ((grad * weight[:, None], of_row) for of_row, weight in zip(index, weights))
+            grad_table = _summed(parts, len(table), table.shape[1])
         if ctx.needs_input_grad[2]:
             ones = grad.new_ones(grad.shape[1])  # a product of matrices is the fastest sum of short rows
             grad_weights = torch.stack([(table.index_select(0, of_row) * grad) @ ones for of_row in index])
