@@ -164,9 +164,9 @@ class _Frame:
         weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
         of_w = pos[..., 3].reshape(-1)
         if self._camera.is_perspective:
-            of_z, weights_now = pos[..., 2].detach().reshape(-1), weights.detach()
-            z, w = (sum(table.index_select(0, corner) * weight for corner, weight in zip(corners, weights_now.unbind(1)))
-                    for table in (of_z, of_w.detach()))
+            own = weights.detach().unbind(1)
+            z, w = (sum(table.index_select(0, corner) * weight for corner, weight in zip(corners, own))
+                    for table in (pos[..., 2].detach().reshape(-1), of_w.detach()))
             of_depth = z / w
         else:  # an orthographic camera's weights are linear on the screen
             of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
