@@ -1,8 +1,11 @@
 #include "cli/commands.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <vector>
 
@@ -28,14 +31,25 @@ Device open_for_trial(const std::string& name) {
   throw InvalidArgument("--trial", "'" + name + "'", "the name of a device's trial");
 }
 
+/// The longest that a kernel may take, its compilation included; DPR_TRIAL_SECONDS says otherwise.
+unsigned seconds_of_a_kernel() {
+  constexpr unsigned k_default = 300;  // a slow machine's compiler takes a minute
+  const char* const wanted = std::getenv("DPR_TRIAL_SECONDS");
+  const long seconds = wanted == nullptr ? 0 : std::strtol(wanted, nullptr, 10);
+  return seconds > 0 ? static_cast<unsigned>(seconds) : k_default;
+}
+
 }  // namespace
 
 void run_trial(const std::string& name) {
   constexpr int k_size = 128, k_frames = 3;
+  const unsigned seconds = seconds_of_a_kernel();
+  alarm(seconds);  // ends this process
   const Device device = open_for_trial(name);
   Device::Impl& impl = impl_of(device);
-  impl.before_work = [&impl](std::string_view work) {
+  impl.before_work = [&impl, seconds](std::string_view work) {
     impl.queue.finish();
+    alarm(seconds);
     std::printf("begins %.*s\n", static_cast<int>(work.size()), work.data());
     std::fflush(stdout);
   };
@@ -46,6 +60,7 @@ void run_trial(const std::string& name) {
   renderer.set_scene(scene);
   frame_milliseconds(renderer, gradient);
   impl.before_work = nullptr;
+  alarm(seconds);
   double least = std::numeric_limits<double>::infinity();
   for (int frame = 0; frame < k_frames; ++frame)
     least = std::min(least, frame_milliseconds(renderer, gradient));

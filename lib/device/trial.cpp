@@ -26,10 +26,10 @@ bool is_switched_off() {
 
 std::string key_of(const DeviceInfo& info) { return "trial " + trial_name(info) + "\n" + device_key(info); }
 
-/// True if a process crashed by itself, rather than being ended by a user or for want of memory.
-bool is_crash(int signal) {
-  constexpr std::array k_crashes{SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE};
-  return std::ranges::find(k_crashes, signal) != k_crashes.end();
+/// True if a process crashed by itself or took too long, rather than being ended by a user or for want of memory.
+bool is_failure(int signal) {
+  constexpr std::array k_failures{SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGALRM};
+  return std::ranges::find(k_failures, signal) != k_failures.end();
 }
 
 /// This process' environment for the trial, which opens the device with these lanes, and without a trial.
@@ -69,10 +69,12 @@ Ending run_trial(const DeviceInfo& info, const std::filesystem::path& command) {
 
 std::string describe(const DeviceInfo& info, const Ending& ending) {
   constexpr std::size_t k_most_characters = 160;  // of a line that may be a stack trace's
+  const int signal = WTERMSIG(ending.status);
   std::string failure = info.name + " (" + info.platform + ", driver " + info.driver + ") is not used with " +
-                        std::to_string(info.lanes) + " lanes: its driver ends the process at " +
-                        (ending.kernel.empty() ? std::string(k_frame_file) : ending.kernel) + ", " +
-                        strsignal(WTERMSIG(ending.status));
+                        std::to_string(info.lanes) + " lanes: its driver " +
+                        (signal == SIGALRM ? "does not finish " : "ends the process at ") +
+                        (ending.kernel.empty() ? std::string(k_frame_file) : ending.kernel);
+  if (signal != SIGALRM) failure += std::string(", ") + strsignal(signal);
   if (!ending.text.empty()) failure += " (" + ending.text.substr(0, k_most_characters) + ")";
   return failure;
 }
@@ -105,7 +107,7 @@ std::optional<Trial> try_device(const DeviceInfo& info, const Store& store) {
   } catch (const IoError&) {
     return std::nullopt;
   }
-  if (WIFSIGNALED(ending.status) && is_crash(WTERMSIG(ending.status))) {
+  if (WIFSIGNALED(ending.status) && is_failure(WTERMSIG(ending.status))) {
     store.save(key, std::string(k_fails) + describe(info, ending));
   } else if (WIFEXITED(ending.status) && WEXITSTATUS(ending.status) == 0 && ending.milliseconds > 0) {
     store.save(key, std::string(k_runs) + std::to_string(ending.milliseconds));

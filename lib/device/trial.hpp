@@ -1,5 +1,5 @@
 // Trial of a device with the kernels of a frame, once in a process of its own: a driver that aborts
-// ends that one. The process is the dpr command, which is executed anew: a fork of a process whose OpenCL
+// ends that one, and one that hangs is left after DPR_TRIAL_SECONDS (300) at one kernel. The process is the dpr command, which is executed anew: a fork of a process whose OpenCL
 // implementation has threads and locks could hang, or crash where the driver is without fault.
 #pragma once
 
@@ -13,7 +13,7 @@ namespace dpr {
 
 struct Trial {
   double milliseconds = 0;  ///< of a small frame and its gradients
-  std::string failure;      ///< the kernel that ended the process, and how; empty: all ran
+  std::string failure;      ///< the kernel that failed, and how; empty: all ran
 };
 
 /// Names the device, its driver, its lanes and the kernels: what the trial's process looks for.

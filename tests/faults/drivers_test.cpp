@@ -87,6 +87,18 @@ TEST_SUITE("robustness") {
     }
   }
 
+  TEST_CASE("drivers: one that hangs in a kernel is left there, once, and used otherwise") {
+    if (is_skipped_here()) return;
+    const Machine machine;
+    for (int start = 0; start < 2; ++start) {
+      const Outcome outcome = machine.render_with("hang=3", {"DPR_TRIAL_SECONDS=2", "DPR_LANES=8"});
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 2);
+      CHECK(is_error_line(outcome.err));
+      CHECK(contains(outcome.err, "with 8 lanes: its driver does not finish "));
+    }
+  }
+
   TEST_CASE("drivers: the width that the environment wants is the only one that is tried") {
     if (is_skipped_here()) return;
     const Outcome outcome = Machine().render_with("abort=3:8", {"DPR_LANES=8"});

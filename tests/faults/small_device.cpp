@@ -10,11 +10,13 @@
 //   fp64=0        no double precision
 //   abort=N:L     the driver aborts when the N-th kernel (from 1) is launched for the first time, of programs
 //                 that are built for L lanes; L left out: for any
+//   hang=N:L      the same, but the driver never comes back
 //   watchdog=S    a launch that runs for more than S seconds ends, and takes its queue with it
 //
 // A call beyond a limit fails as drivers fail, and is told on stderr.
 #include <CL/cl.h>
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -30,8 +32,9 @@ namespace {
 struct Limits {
   std::size_t group = 0, few = 0, local = 0, allocation = 0;  // 0: none
   std::string few_kernel;
-  std::size_t abort = 0;
-  std::string abort_lanes;
+  std::size_t failing = 0;  // the kernel's place, from 1
+  std::string failing_lanes;
+  bool hangs = false;
   bool has_fp64 = true;
   double watchdog = 0;
 
@@ -51,9 +54,11 @@ struct Limits {
     if (name == "local") local = number;
     if (name == "allocation") allocation = number;
     if (name == "fp64") has_fp64 = number != 0;
-    if (name == "abort") abort = number;
-    if (name == "abort" && value.find(':') != std::string::npos)
-      abort_lanes = value.substr(value.find(':') + 1);
+    if (name == "abort" || name == "hang") {
+      failing = number;
+      hangs = name == "hang";
+      if (value.find(':') != std::string::npos) failing_lanes = value.substr(value.find(':') + 1);
+    }
     if (name == "watchdog") watchdog = std::strtod(value.c_str(), nullptr);
     if (name != "few") return;
     few = number;
@@ -127,21 +132,22 @@ int check_launch(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, c
   return CL_SUCCESS;
 }
 
-/// Aborts at the kernel that the environment names.
-void abort_at(cl_kernel kernel) {
-  if (limits().abort == 0) return;
+/// Aborts or hangs at the kernel that the environment names.
+void fail_at(cl_kernel kernel) {
+  if (limits().failing == 0) return;
   cl_program program = nullptr;
   cl_device_id device = nullptr;
   char options[512] = {};
   clGetKernelInfo(kernel, CL_KERNEL_PROGRAM, sizeof program, static_cast<void*>(&program), nullptr);
   clGetProgramInfo(program, CL_PROGRAM_DEVICES, sizeof device, static_cast<void*>(&device), nullptr);
   clGetProgramBuildInfo(program, device, CL_PROGRAM_BUILD_OPTIONS, sizeof options - 1, options, nullptr);
-  const std::string wanted = "-DDPR_LANES=" + limits().abort_lanes;
-  if (!limits().abort_lanes.empty() && (std::string(options) + " ").find(wanted + " ") == std::string::npos)
+  const std::string wanted = "-DDPR_LANES=" + limits().failing_lanes;
+  if (!limits().failing_lanes.empty() && (std::string(options) + " ").find(wanted + " ") == std::string::npos)
     return;
   const std::scoped_lock lock(mutex);
   launched.insert(name_of(kernel));
-  if (launched.size() < limits().abort) return;
+  if (launched.size() < limits().failing) return;
+  while (limits().hangs) sleep(1);
   std::fprintf(stderr, "LLVM ERROR: a pass did not reach a fixpoint\n");
   std::abort();
 }
@@ -230,7 +236,7 @@ extern "C" cl_int CL_API_CALL clEnqueueNDRangeKernel(cl_command_queue queue, cl_
     const std::scoped_lock lock(mutex);
     if (ended.contains(queue)) return CL_OUT_OF_RESOURCES;
   }
-  abort_at(kernel);
+  fail_at(kernel);
   if (const int error = check_launch(queue, kernel, dimensions, local)) return error;
   cl_event launch = nullptr;
   if (const int error = real(queue, kernel, dimensions, offset, global, local, waits, wait_list, &launch))
