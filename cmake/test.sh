@@ -11,14 +11,14 @@ sets=(demo tests)
 for preset in "${presets[@]}"; do
   case $preset in
     release | ci) sets+=(learning) ;;
-    oclgrind) sets+=(oclgrind) ;;
+    oclgrind*) sets+=(oclgrind) ;;
     fuzz) sets+=(fuzzing) ;;
   esac
 done
 install_packages "${sets[@]}"
 
 # Packages of some presets that not every release has.
-declare -A needed=([oclgrind]=oclgrind [fuzz]=clang++-14)
+declare -A needed=([oclgrind]=oclgrind [oclgrind-stages]=oclgrind [fuzz]=clang++-14)
 
 summary=()
 status=0
@@ -26,7 +26,7 @@ for preset in "${presets[@]}"; do
   echo "== $preset"
   tool=${needed[$preset]:-}
   if [[ $tool ]] && ! command -v "$tool" >/dev/null; then
-    summary+=("$(printf '%-12s skipped: there is no %s' "$preset" "$tool")")
+    summary+=("$(printf '%-15s skipped: there is no %s' "$preset" "$tool")")
     continue
   fi
   start=$SECONDS
@@ -37,7 +37,7 @@ for preset in "${presets[@]}"; do
     result=FAILED
     status=1
   fi
-  summary+=("$(printf '%-12s %s in %d s' "$preset" "$result" $((SECONDS - start)))")
+  summary+=("$(printf '%-15s %s in %d s' "$preset" "$result" $((SECONDS - start)))")
 done
 
 echo "== summary"
