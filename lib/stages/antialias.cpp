@@ -7,10 +7,6 @@ namespace {
 
 constexpr std::size_t k_tile_bytes = 2 * DPR_TILE;  // as kernels/visibility.h has them
 
-std::size_t samples_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.width * p.height; }
-
-std::size_t tiles_of(const shared::FrameParams& p) { return std::size_t{p.views} * p.tiles_x * p.tiles_y; }
-
 /// Work-items of a tile, as kernels/tile_rows.h has them.
 std::size_t row_items(const Device::Impl& device) { return device.info.lanes == 1 ? DPR_TILE : 1; }
 
@@ -18,8 +14,8 @@ std::size_t row_items(const Device::Impl& device) { return device.info.lanes == 
 
 void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                            const Contour& contour) {
-  front.resize(device_, samples_of(p));
-  front_face.resize(device_, samples_of(p));
+  front.resize(device_, pixels_of(p));
+  front_face.resize(device_, pixels_of(p));
   const Range tiles = rasterize.tiles(p);
   const std::size_t rows = row_items(device_);
   launch_(Range{tiles.first * rows, tiles.count * rows},
@@ -36,8 +32,8 @@ void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const R
 }
 
 void Antialias::cross(const ContourInputs& in, const Contour& contour) {
-  winner.resize(device_, 2 * samples_of(in.p));
-  cut.resize(device_, 2 * samples_of(in.p));
+  winner.resize(device_, 2 * pixels_of(in.p));
+  cut.resize(device_, 2 * pixels_of(in.p));
   const std::size_t tiles = tiles_of(in.p), items = tiles * row_items(device_);
   crowded_.resize(device_, k_tile_bytes * tiles);
   second_counts.resize(device_, items);
@@ -73,9 +69,9 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour) {
 void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
                         KeptSamples& kept) {
   const std::size_t rows = tiles_of(p) * row_items(device_);
-  kept.samples.resize(device_, samples_of(p));
-  kept.faded.resize(device_, samples_of(p));
-  kept.shares.resize(device_, samples_of(p));
+  kept.samples.resize(device_, pixels_of(p));
+  kept.faded.resize(device_, pixels_of(p));
+  kept.shares.resize(device_, pixels_of(p));
   launch_(rows, kernel::antialias_fade{.p = p,
                                        .tile_starts = contour.tile_starts,
                                        .winner = winner,
@@ -101,13 +97,13 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
 }
 
 Buffer<cl_float4>& Antialias::scratch(const shared::FrameParams& p, std::size_t count) {
-  kept_grad_.resize(device_, std::max(samples_of(p), count));
+  kept_grad_.resize(device_, std::max(pixels_of(p), count));
   return kept_grad_;
 }
 
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                          Buffer<cl_float4>& grad) {
-  const std::size_t samples = samples_of(in.p), rows = tiles_of(in.p) * row_items(device_);
+  const std::size_t samples = pixels_of(in.p), rows = tiles_of(in.p) * row_items(device_);
   grad_cut_.resize(device_, 2 * samples);
   grad_seconds_.resize(device_, seconds.size());
   kept_grad_.resize(device_, samples);
@@ -165,8 +161,8 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
   if (!tangent_) tangent_.emplace(device_);
   // What the backward pass has of cuts and samples holds their tangents; seconds follow the cuts.
   const std::size_t rows = tiles_of(in.p) * row_items(device_);
-  grad_cut_.resize(device_, 2 * samples_of(in.p) + seconds.size());
-  kept_grad_.resize(device_, samples_of(in.p));
+  grad_cut_.resize(device_, 2 * pixels_of(in.p) + seconds.size());
+  kept_grad_.resize(device_, pixels_of(in.p));
   (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{
                                  .p = in.p,
                                  .direction_pairs = cl_uint2{{to_uint(direction), to_uint(contour.pairs)}},

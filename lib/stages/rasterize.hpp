@@ -16,6 +16,14 @@
 
 namespace dpr {
 
+/// Of all views.
+inline std::size_t pixels_of(const shared::FrameParams& p) {
+  return std::size_t{p.views} * p.width * p.height;
+}
+inline std::size_t tiles_of(const shared::FrameParams& p) {
+  return std::size_t{p.views} * p.tiles_x * p.tiles_y;
+}
+
 /// Pairs and fragments that a frame holds, or its buffers can hold; and, with noise on the pixel, pairs
 /// of tiles and contours.
 struct FrameCounts {

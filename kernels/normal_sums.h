@@ -1,0 +1,129 @@
+// What the sums of normal_equations.cl share: vectors of an image's pixels, the slots that add them up, and the
+// light that multiplies an object's colours.
+#include "tile_lanes.h"
+
+#include "harmonics.h"
+
+#ifndef DPR_TERMS
+#define DPR_TERMS 10 /* of a channel's light: 0; gain and offset; harmonics and offset */
+#endif
+#ifndef DPR_DIRECTIONS
+#define DPR_DIRECTIONS 6 /* in which hypotheses move */
+#endif
+
+#define DPR_FACTORS (DPR_TERMS - 1) /* terms that the colour multiplies */
+#define DPR_FIT_LENGTH (1 + 3 * DPR_TERMS)
+#define DPR_TRIANGLE(n) ((n) * ((n) + 1) / 2)
+
+/// A vector of pixels, RGBA.
+typedef struct {
+  Vec3n color;
+  realn alpha;
+} PixelsN;
+
+/// Those from `first` on; lanes from `last` on repeat the pixel before.
+static inline PixelsN load_pixels(uint first, uint last, global const float4* image) {
+  PixelsN p;
+#if DPR_WIDTH == 1
+  (void)last;
+  p.color = splat3(image[first]);
+  p.alpha = image[first].w;
+#else
+  float16 a, b;
+  if (last - first >= DPR_WIDTH) {
+    a = vload16(0, (global const float*)(image + first));
+    b = vload16(1, (global const float*)(image + first));
+  } else {
+    float4 lanes[DPR_WIDTH];
+    for (uint lane = 0; lane < DPR_WIDTH; ++lane) lanes[lane] = image[min(first + lane, last - 1)];
+    a = vload16(0, (const float*)lanes);
+    b = vload16(1, (const float*)lanes);
+  }
+  p.color = make_vec3n((realn)(a.s048c, b.s048c), (realn)(a.s159d, b.s159d), (realn)(a.s26ae, b.s26ae));
+  p.alpha = (realn)(a.s37bf, b.s37bf);
+#endif
+  return p;
+}
+
+/// Three planes; lanes from `last` on are 0.
+static inline Vec3n load_planes(uint first, uint last, uint pixels, global const float* planes) {
+  const intn in_run = lanes_before(last, first);
+  return make_vec3n(load_run(in_run, first, planes), load_run(in_run, first, planes + pixels),
+                    load_run(in_run, first, planes + 2 * (size_t)pixels));
+}
+
+static inline void store_planes(Vec3n v, uint first, uint last, uint pixels, global float* planes) {
+  store_run(v.x, first, last, planes);
+  store_run(v.y, first, last, planes + pixels);
+  store_run(v.z, first, last, planes + 2 * (size_t)pixels);
+}
+
+static inline realn channel_of(Vec3n v, uint channel) {
+  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
+}
+
+/// A vector of slots, and the pixels that it sums.
+typedef struct {
+  uint slot, view, part;
+  uint first, last, step;
+} Slots;
+
+static inline Slots make_slots(uint pixels, uint views, uint slots) {
+  const uint i = (uint)get_global_id(0), vectors = slots / DPR_WIDTH;
+  Slots s;
+  s.slot = i % vectors * DPR_WIDTH;
+  s.view = i / vectors % views;
+  s.part = i / vectors / views;
+#if DPR_WIDTH == 1
+  s.first = s.slot;
+  s.last = pixels;
+  s.step = slots;
+#else
+  const uint run = (pixels + slots - 1) / slots;  // vectors
+  s.first = s.slot * run;
+  s.last = min(pixels, s.first + DPR_WIDTH * run);
+  s.step = DPR_WIDTH;
+#endif
+  return s;
+}
+
+static inline void store_sum(realn sum, uint number, const Slots s, uint views, uint slots,
+                             global float* sums) {
+  store_n(sum, 0, sums + ((size_t)number * views + s.view) * slots + s.slot);
+}
+
+#if DPR_TERMS > 0
+/// Coefficient of a term of a light, by channel.
+static inline Vec3n light_at(global const float* light, uint term) {
+  return make_vec3n((realn)(light[term]), (realn)(light[DPR_TERMS + term]),
+                    (realn)(light[2 * DPR_TERMS + term]));
+}
+
+/// Normals that pixels show, 0 without any, and the polynomials that the light multiplies.
+typedef struct {
+  Vec3n normal;
+  realn inverse_length;  // of the normal in the image
+  realn basis[DPR_FACTORS];
+} Facing;
+
+static inline Facing load_facing(uint first, uint last, global const float4* normals) {
+  Facing f;
+#if DPR_FACTORS == DPR_HARMONICS
+  f.normal = load_pixels(first, last, normals).color;
+  f.inverse_length = normalize3n(&f.normal);
+  harmonic_basis(f.normal, f.basis);
+#else
+  (void)first, (void)last, (void)normals;
+  f.basis[0] = 1.0f;
+#endif
+  return f;
+}
+
+/// Sum of the terms that the colour multiplies, times a light, by channel.
+static inline Vec3n shade(const realn basis[DPR_FACTORS], global const float* light) {
+  Vec3n shading = zero3n();
+  DPR_UNROLL_ON_GPU
+  for (uint k = 0; k < DPR_FACTORS; ++k) shading = mad3n(light_at(light, k), basis[k], shading);
+  return shading;
+}
+#endif
