@@ -113,9 +113,10 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
               result.iterations, result.seconds);
   if (!result.explained) {
     std::printf(
-        "The target is not explained: the loss stayed above a tenth of what wrong poses leave, or a picture "
-        "without the object. The pose may be wrong%s.\n",
-        advice(command, options).c_str());
+        "The target is not explained: the loss stayed above %s of what wrong poses leave, or a picture "
+        "without "
+        "the object, or another pose leaves little more. The pose may be wrong%s.\n",
+        command.count("--robust") == 0 ? "a tenth" : "a third", advice(command, options).c_str());
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }

@@ -32,6 +32,10 @@ struct Hope {
 void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const Hope& hope,
                    double wrong_loss);
 
+/// True if another pose leaves less than a quarter more than the best, the first, yet more than `equal`: either may
+/// be right.
+bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal);
+
 /// Rotations by half a turn about each of the object's axes of inertia, through its origin: what many an
 /// object looks much the same after.
 std::array<glm::dmat3, 3> half_turns(const Instance& object);

@@ -93,4 +93,13 @@ PoseSpace::Matrix score_scatter(const ScoreCells& cells, std::size_t parameters,
   return result;
 }
 
+void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance) {
+  const auto n = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Matrix to = Matrix::Identity(n, n);
+  if (n > 3) to.block<3, 3>(3, 0) << 0, arm.z, -arm.y, -arm.z, 0, arm.x, arm.y, -arm.x, 0;
+  Eigen::Map<Matrix> mapped(covariance.data(), n, n);
+  mapped = (to * mapped * to.transpose()).eval();
+}
+
 }  // namespace dpr

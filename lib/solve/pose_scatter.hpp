@@ -1,6 +1,9 @@
 // How far the score of a pose scatters: what its covariance rests on.
 #pragma once
 
+#include <glm/glm.hpp>
+#include <vector>
+
 #include "solve/normal_equations.hpp"
 
 namespace dpr {
@@ -19,5 +22,9 @@ namespace dpr {
 ///
 /// `scale`: of the robust loss; 0: squares. Row-major [parameters]^2.
 PoseSpace::Matrix score_scatter(const ScoreCells& cells, std::size_t parameters, float scale);
+
+/// Turns a covariance of motions about a point into that of motions about one that lies `arm` away, world: a rotation
+/// moves that by its cross product.
+void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance);
 
 }  // namespace dpr

@@ -1,7 +1,6 @@
 // Hypotheses from a grid of rotations, halved from level to level.
 #include "solve/pose_search.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -65,6 +64,7 @@ class Fit {
   };
 
   std::optional<Found> descend(const std::vector<LevelShape>& shapes, const Found& found);
+  void add_half_turns(std::size_t count);
   void add_others(PoseLevel& level, const std::vector<Candidate>& found);
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
   void choose_normals(const LevelShape& shape);
@@ -79,6 +79,8 @@ class Fit {
   void turn(PoseLevel& level, Turns turns);
   void keep_distinct(const PoseLevel& level, std::size_t count);
   void drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope);
+  void try_half_turns(PoseLevel& level);
+  double enough_to_equal() const;
   void finish(PoseLevel& level, bool anywhere);
   void choose_equals(bool anywhere);
   double wrong_loss(PoseLevel& level) const;
@@ -114,13 +116,17 @@ PoseResult Fit::run(bool anywhere) {
   make_robust(level, hypotheses());
   drop_hopeless_at(level, 0, k_last_hope);
   work(level, beam_.back());
+  if (anywhere) try_half_turns(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scale(level.scale());
   wrong_ = wrong_loss(sampled);
+  const bool is_doubted = anywhere && is_doubtful(candidates_, space_, enough_to_equal());
   finish(level, anywhere);
   const double unexplained = std::min(wrong_, sampled.blank_loss());
-  result_.explained = result_.loss < static_cast<double>(options_.explained) * unexplained;
+  // A robust loss of what is wrong grows with its area alone, no longer with its size.
+  const auto part = static_cast<double>(method_.robust ? std::sqrt(options_.explained) : options_.explained);
+  result_.explained = result_.loss < part * unexplained && !is_doubted;
   return result_;
 }
 
@@ -150,7 +156,13 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
 /// many objects look much the same then, and coarse images in unknown light do not tell the two apart.
 void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
   const std::size_t own = candidates_.size();
-  const std::size_t count = method_.rotations > 0 ? std::min(own, k_turned) : 0;
+  add_half_turns(method_.rotations > 0 ? std::min(own, k_turned) : 0);
+  candidates_.insert(candidates_.end(), found.begin(), found.end());
+  drop_hopeless_at(level, own, k_hope);
+}
+
+/// Of the best `count`.
+void Fit::add_half_turns(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     for (const glm::dmat3& turn : half_turns_) {
       Candidate turned = candidates_[i];
@@ -159,8 +171,14 @@ void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
       candidates_.push_back(turned);
     }
   }
-  candidates_.insert(candidates_.end(), found.begin(), found.end());
+}
+
+/// The best pose after half a turn about each axis, refined where it explains anything.
+void Fit::try_half_turns(PoseLevel& level) {
+  const std::size_t own = candidates_.size();
+  add_half_turns(1);
   drop_hopeless_at(level, own, k_hope);
+  if (candidates_.size() > own) work(level, beam_.back());
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
@@ -311,10 +329,15 @@ void Fit::finish(PoseLevel& level, bool anywhere) {
   result_.light = light_;
 }
 
+/// The largest loss that tells a pose from the best no more.
+double Fit::enough_to_equal() const {
+  const double best = candidates_.front().equations.loss;
+  return best + k_equal_losses * std::max(wrong_ - best, 0.0);
+}
+
 /// The poses that explain the target as well as the best, the one to return first.
 void Fit::choose_equals(bool anywhere) {
-  const double best = candidates_.front().equations.loss;
-  const double enough = best + k_equal_losses * std::max(wrong_ - best, 0.0);
+  const double enough = enough_to_equal();
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > enough; });
   if (!anywhere) {
     const Hypothesis first{initial_.front()};
@@ -333,16 +356,6 @@ double Fit::wrong_loss(PoseLevel& level) const {
   std::vector<double> losses = level.losses(grid(k_enough));
   std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
   return losses[losses.size() / 2];
-}
-
-/// The covariance of motions about a point that lies `arm` away, world: a rotation moves that by its cross product.
-void move_pivot(const glm::dvec3& arm, std::vector<double>& covariance) {
-  const auto n = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Matrix to = Matrix::Identity(n, n);
-  if (n > 3) to.block<3, 3>(3, 0) << 0, arm.z, -arm.y, -arm.z, 0, arm.x, arm.y, -arm.x, 0;
-  Eigen::Map<Matrix> mapped(covariance.data(), n, n);
-  mapped = (to * mapped * to.transpose()).eval();
 }
 
 }  // namespace
