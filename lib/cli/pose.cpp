@@ -114,8 +114,7 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   if (!result.explained) {
     std::printf(
         "The target is not explained: the loss stayed above %s of what wrong poses leave, or a picture "
-        "without "
-        "the object, or another pose leaves little more. The pose may be wrong%s.\n",
+        "without the object, or another pose leaves little more. The pose may be wrong%s.\n",
         command.count("--robust") == 0 ? "a tenth" : "a third", advice(command, options).c_str());
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
