@@ -6,6 +6,7 @@
 #include <atomic>
 #include <utility>
 
+#include "device/context.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::batch {
@@ -115,6 +116,7 @@ void RendererPool::put_back(PooledRenderer renderer) {
 
 void RendererPool::clear() {
   require_own_process();
+  impl_of(state_->device).queue.finish();
   std::list<PooledRenderer> dropped;
   const std::lock_guard lock(mutex_);
   dropped.swap(state_->free);

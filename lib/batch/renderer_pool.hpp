@@ -73,7 +73,7 @@ class RendererPool {
 
   PooledRenderer take(const Topology& topology);
   void put_back(PooledRenderer renderer);
-  /// Forgets the renderers that are kept, with what they hold on the device.
+  /// Waits for what the device is doing, and forgets the renderers that are kept, with what they hold there.
   void clear();
 
  private:

@@ -1,6 +1,9 @@
 """Shading of the caller's own in the Python package: the library's own colours, found by the caller, make its images and
 gradients."""
+import os
+import subprocess
 import sys
+import tempfile
 import unittest
 
 try:
@@ -123,6 +126,18 @@ class OwnShadingTest(unittest.TestCase):
             samples.interpolate(np.zeros(4, np.float32))
         with self.assertRaisesRegex(ValueError, "2 meshes"):
             dpr.rasterize([TETRAHEDRON, TETRAHEDRON], [FACES, FACES], self.views, self.intrinsics, width=SIZE, height=SIZE)
+
+    def test_a_process_ends_while_its_driver_compiles(self):
+        program = ("import numpy as np, dpr\n"
+                   "view = np.eye(4, dtype=np.float32)[None]; view[0, 2, 3] = -4\n"
+                   "lens = np.float32([[16, 16, 8, 8]])\n"
+                   "try: dpr.rasterize(view[0, :3, :3], np.array([[0, 1, 2]]), view, lens, width=16, height=16, preset='gaussian')\n"
+                   "except ValueError as error: print(error)\n")
+        with tempfile.TemporaryDirectory() as folder:  # no kernel has been compiled
+            run = subprocess.run([sys.executable, "-c", program], env={**os.environ, "POCL_CACHE_DIR": folder},
+                                 capture_output=True, text=True)
+        self.assertEqual((run.returncode, run.stderr), (0, ""))
+        self.assertIn("noise on the pixel", run.stdout)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """libdpr: found, loaded, and called by ctypes, which lets other threads of Python run meanwhile."""
+import atexit
 import ctypes
 import glob
 import os
@@ -125,6 +126,7 @@ def _warn_without_driver():
 
 
 library = _load()
+atexit.register(library.dpr_frames_release)  # a driver's thread that still compiles a kernel would crash as the process ends
 _warn_without_driver()
 setting_names = tuple(library.dpr_frame_settings().decode().split(", "))
 
