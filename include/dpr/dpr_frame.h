@@ -141,7 +141,8 @@ DPR_API dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array*
 /* Not 0: no triangle of any view was rendered. */
 DPR_API dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty);
 DPR_API void dpr_frame_destroy(dpr_frame* frame);
-/* Frees what is kept on devices for later calls; what frames hold stays. */
+/* Waits for what devices are doing, and frees what is kept there for later calls; what frames hold stays. To be called
+ * before the process ends where work may be under way that nothing has read. */
 DPR_API dpr_status dpr_frames_release(void);
 
 /* Faces cut smaller where lenses bend their edges (dpr/subdivision.hpp), until no view shows a point further
