@@ -21,10 +21,12 @@
 #include "support/messages.hpp"
 #include "support/priors.hpp"
 #include "support/reduced.hpp"
+#include "support/rigid_image.hpp"
 
 using namespace dpr;
 using namespace dpr::bench;
 using dpr::test::reduced;
+using dpr::test::rigid_image;
 
 namespace {
 
@@ -144,14 +146,6 @@ Scene cube_scene(int size) {
   scene.camera = orbit_camera(6.7F, 30, 120);
   scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
   return scene;
-}
-
-Image rigid_image(const Device& device, Scene scene) {
-  scene.smoothing = rigid_smoothing();
-  Renderer renderer(device);
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
 }
 
 /// The rigid loss along one parameter, tabulated: x at the cells' middles.

@@ -11,6 +11,8 @@ except ImportError:
     sys.exit(0)
 
 import dpr.nvdiffrast as dr
+import tensors
+from tensors import differences, random
 
 H, W = 40, 56
 NEAR, FAR = 0.5, 20.0
@@ -67,29 +69,7 @@ def reference(pos, tri):
             edge.reshape(H, W))
 
 
-def differences(function, values, step):
-    """Central differences of a number by every one of a tensor's."""
-    found = torch.zeros_like(values)
-    for i in range(values.numel()):
-        ahead, behind = values.clone(), values.clone()
-        ahead.view(-1)[i] += step
-        behind.view(-1)[i] -= step
-        found.view(-1)[i] = (function(ahead) - function(behind)) / (ahead.view(-1)[i] - behind.view(-1)[i])
-    return found
-
-
-def random(*shape, seed=1):
-    return torch.rand(*shape, generator=torch.Generator().manual_seed(seed))
-
-
-class NvdiffrastTest(unittest.TestCase):
-    def check_close(self, found, expected, tolerance):
-        found, expected = (np.asarray(array.detach() if isinstance(array, torch.Tensor) else array)
-                           for array in (found, expected))
-        self.assertEqual(found.shape, expected.shape)
-        self.assertGreater(np.abs(expected).max(), 0)
-        self.assertLess(np.abs(found - expected).max() / np.abs(expected).max(), tolerance)
-
+class NvdiffrastTest(tensors.TestCase):
     def check_rast(self, pos, tri, least_seen):
         rast, rast_db = dr.rasterize(CONTEXT, pos, torch.from_numpy(tri), resolution=[H, W])
         self.assertEqual((rast.shape, rast_db.shape), ((len(pos), H, W, 4), (len(pos), H, W, 4)))

@@ -10,15 +10,13 @@ except ImportError:
     sys.exit(0)
 
 import dpr.nvdiffrast as dr
+import tensors
+from tensors import differences, random
 
 H, W = 8, 16
 # Directions at (s, t) on the faces of a cube, as OpenGL's table of cube maps has them, for 2 s - 1 and 2 t - 1.
 OF_FACES = (lambda s, t: (1, -t, -s), lambda s, t: (-1, -t, s), lambda s, t: (s, 1, t), lambda s, t: (s, -1, -t),
             lambda s, t: (s, -t, 1), lambda s, t: (-s, -t, -1))
-
-
-def random(*shape, seed=1):
-    return torch.rand(*shape, generator=torch.Generator().manual_seed(seed))
 
 
 def texel(tex, column, row, boundary):
@@ -63,25 +61,7 @@ def numbered(size, faces=()):
     return levels[0], levels[1:]
 
 
-def differences(function, values, step):
-    """Central differences of a number by every one of a tensor's."""
-    found = torch.zeros_like(values)
-    for i in range(values.numel()):
-        ahead, behind = values.clone(), values.clone()
-        ahead.view(-1)[i] += step
-        behind.view(-1)[i] -= step
-        found.view(-1)[i] = (function(ahead) - function(behind)) / (ahead.view(-1)[i] - behind.view(-1)[i])
-    return found
-
-
-class NvdiffrastTextureTest(unittest.TestCase):
-    def check_close(self, found, expected, tolerance):
-        found, expected = (np.asarray(array.detach() if isinstance(array, torch.Tensor) else array)
-                           for array in (found, expected))
-        self.assertEqual(found.shape, expected.shape)
-        self.assertGreater(np.abs(expected).max(), 0)
-        self.assertLess(np.abs(found - expected).max() / np.abs(expected).max(), tolerance)
-
+class NvdiffrastTextureTest(tensors.TestCase):
     def check_gradients(self, function, named, step):
         """named: values by name."""
         leaves = {name: values.clone().requires_grad_() for name, values in named.items()}

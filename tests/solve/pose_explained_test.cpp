@@ -6,13 +6,14 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <string>
 
-#include "dpr/pose.hpp"
-#include "dpr/renderer.hpp"
 #include "dpr/dpr.hpp"
 #include "support/data.hpp"
 #include "support/reduced.hpp"
+#include "support/rigid_image.hpp"
 
 namespace {
+
+using dpr::test::rigid_image;
 
 /// Half a turn about an axis gives nearly the same picture: opposite faces differ a little.
 dpr::Scene nearly_symmetric(int size) {
@@ -32,14 +33,6 @@ dpr::Scene nearly_symmetric(int size) {
     mesh.face_colors.push_back(color);
   }
   return scene;
-}
-
-dpr::Image rigid_image(const dpr::Device& device, dpr::Scene scene) {
-  scene.smoothing = dpr::rigid_smoothing();
-  dpr::Renderer renderer(device);
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
 }
 
 }  // namespace

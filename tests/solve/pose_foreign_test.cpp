@@ -13,8 +13,11 @@
 #include "dpr/renderer.hpp"
 #include "support/data.hpp"
 #include "support/reduced.hpp"
+#include "support/rigid_image.hpp"
 
 namespace {
+
+using dpr::test::rigid_image;
 
 glm::dmat3 rotation_of(const nlohmann::json& rows) {
   glm::dmat3 rotation;
@@ -30,14 +33,6 @@ dpr::Scene cube_scene(int size) {
   scene.camera = dpr::orbit_camera(6.7F, 30, 120);
   scene.meshes.push_back({dpr::make_cube()});
   return scene;
-}
-
-dpr::Image rigid_image(const dpr::Device& device, dpr::Scene scene) {
-  scene.smoothing = dpr::rigid_smoothing();
-  dpr::Renderer renderer(device);
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
 }
 
 const dpr::Pose k_turned{dpr::rotation_from_vector({0.2, 0.4, -0.2}), {}};

@@ -14,11 +14,13 @@
 #include "dpr/renderer.hpp"
 #include "dpr/subdivision.hpp"
 #include "support/reduced.hpp"
+#include "support/rigid_image.hpp"
 
 namespace {
 
 using dpr::test::is_reduced;
 using dpr::test::reduced;
+using dpr::test::rigid_image;
 
 dpr::Scene cube_scene(int size) {
   dpr::Scene scene;
@@ -27,14 +29,6 @@ dpr::Scene cube_scene(int size) {
   scene.meshes.push_back({dpr::make_cube(), glm::mat4(1.0F)});
   scene.smoothing = dpr::smoothing_preset("joint_gaussian");
   return scene;
-}
-
-dpr::Image rigid_target(const dpr::Device& device, dpr::Scene scene) {
-  scene.smoothing = dpr::rigid_smoothing();
-  dpr::Renderer renderer(device);
-  renderer.set_scene(scene);
-  renderer.forward();
-  return renderer.image();
 }
 
 const glm::dvec3 k_axis = glm::normalize(glm::dvec3(1, 2, -1));
@@ -66,7 +60,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("least squares: the cube's rotation is found from afar, and its error is known") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(reduced(64, 8));
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = least_squares()});
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), {.method = least_squares()});
     unsigned calls = 0;
     const dpr::PoseResult result = solver.solve(turned(110), [&](const dpr::PoseIteration& step) {
       CHECK(step.iteration == calls);
@@ -95,7 +89,7 @@ TEST_SUITE("pipeline") {
     dpr::Scene scene = cube_scene(64);
     for (const double degrees : {70.0, 140.0}) {
       scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(degrees).rotation));
-      const dpr::Image target = rigid_target(device, scene);
+      const dpr::Image target = rigid_image(device, scene);
       scene.meshes.front().transform = glm::mat4(1.0F);
       const dpr::PoseResult result =
           dpr::PoseSolver(device, scene, target, {.method = least_squares()}).search();
@@ -112,7 +106,7 @@ TEST_SUITE("pipeline") {
     transform = glm::translate(glm::mat4(1.0F), glm::vec3(0.3F, -0.2F, 0.1F)) *
                 glm::rotate(glm::mat4(1.0F), 0.4F, glm::vec3(k_axis)) *
                 glm::scale(glm::mat4(1.0F), glm::vec3(0.8F));
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene),
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene),
                                  {.method = least_squares(), .solve_translation = true});
     const dpr::Pose truth = solver.scene_pose();
     CHECK(dpr::angle_degrees(truth.rotation, dpr::rotation_from_vector(0.4 * k_axis)) < 1e-4);
@@ -136,7 +130,7 @@ TEST_SUITE("pipeline") {
     if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
     dpr::Scene scene = cube_scene(64);
-    const dpr::Image target = rigid_target(device, scene);
+    const dpr::Image target = rigid_image(device, scene);
     scene.camera.fov_y_degrees = 66;
     const dpr::PoseSolver solver(device, scene, target, {.method = least_squares(), .solve_focal = true});
     const dpr::PoseResult result = solver.solve(turned(30));
@@ -152,7 +146,7 @@ TEST_SUITE("pipeline") {
     scene.camera = dpr::orbit_camera(3.2F, 30, 120);  // near, so that the picture bends
     scene.camera.fov_y_degrees = 70;
     scene.camera.distortion = dpr::Distortion{-0.2F, 0.05F};
-    const dpr::Image target = rigid_target(device, dpr::subdivide_for_lens(scene).scene);
+    const dpr::Image target = rigid_image(device, dpr::subdivide_for_lens(scene).scene);
     scene.camera.distortion.reset();
     scene.camera.fov_y_degrees = 74;
     const dpr::PoseSolver solver(device, scene, target,
@@ -178,7 +172,7 @@ TEST_SUITE("pipeline") {
     scene.camera.znear = 0.5F;
     scene.camera.distortion = dpr::Distortion{-0.3F, 0.05F};
     const dpr::Image target =
-        rigid_target(device, dpr::subdivide_for_lens(scene, {.tolerance = 0.02F}).scene);
+        rigid_image(device, dpr::subdivide_for_lens(scene, {.tolerance = 0.02F}).scene);
     const dpr::Pose start{turned(3).rotation, {0.03, 0.02, -0.03}};
     dpr::LeastSquares method = least_squares();
     method.rotations = 0;
@@ -199,7 +193,7 @@ TEST_SUITE("pipeline") {
     const glm::dvec3 normal(0, 0, 1);
     const double first = 11;  // no edge along the pixels' grid
     scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(first, normal).rotation));
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene));
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene));
     for (const double degrees : {0.0, 90.0, 180.0, 270.0}) {
       const dpr::PoseResult result = solver.solve(turned(first + degrees + 20, normal));
       CHECK(result.equals.size() == 4);
@@ -221,7 +215,7 @@ TEST_SUITE("pipeline") {
     lights.point = {{.position = {3, 5, -4}, .diffuse = glm::vec3(0.5F)}};
     scene.lights = lights;
     scene.meshes.front().transform = glm::mat4(glm::dmat4(turned(40).rotation));
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene));
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene));
     for (const double degrees : {40.5, 35.0}) {
       const dpr::PoseResult result = solver.solve(turned(degrees));
       CHECK(result.equals.size() > 4);
@@ -233,7 +227,7 @@ TEST_SUITE("pipeline") {
     if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(64);
-    dpr::Image target = rigid_target(device, scene);
+    dpr::Image target = rigid_image(device, scene);
     dpr::Image mask(scene.width, scene.height, glm::vec4(1));
     for (int row = 0; row < scene.height; ++row) {
       for (int column = scene.width * 9 / 16; column < scene.width; ++column) {
@@ -260,7 +254,7 @@ TEST_SUITE("pipeline") {
     dpr::Mesh& mesh = scene.meshes.front().mesh;
     mesh = dpr::make_icosphere(4);
     for (glm::vec3& p : mesh.positions) p *= glm::vec3(1.6F, 1.0F, 0.6F);
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = least_squares()});
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), {.method = least_squares()});
     const dpr::PoseResult result = solver.solve(turned(70));
     // The right valley; the seams between so many triangles move its bottom.
     CHECK(error_degrees(result) < 4);
@@ -272,7 +266,7 @@ TEST_SUITE("pipeline") {
     const dpr::Scene scene = cube_scene(64);
     dpr::LeastSquares local = least_squares();
     local.rotations = 0;
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), {.method = local});
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), {.method = local});
     const std::array<dpr::Pose, 2> poses{turned(150), turned(15)};
     const dpr::PoseResult result = solver.solve(poses);
     CHECK(result.history.front().hypotheses == 2);
@@ -284,7 +278,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("descent: from 30 degrees the cube's rotation is found") {
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(reduced(64, 8));
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), descent(is_reduced() ? 3 : 200));
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), descent(is_reduced() ? 3 : 200));
     const dpr::PoseResult result = solver.solve(turned(30));
     if (!is_reduced()) CHECK(result.explained);  // losses of different smoothing do not compare
     CHECK(result.iterations == result.history.size());
@@ -298,7 +292,7 @@ TEST_SUITE("pipeline") {
     const dpr::Scene scene = cube_scene(64);
     dpr::PoseOptions options = descent(400);
     options.solve_translation = true;
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), options);
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), options);
     dpr::Pose start = turned(15);
     start.translation = glm::dvec3(-0.1, 0.1, 0.1);
     const dpr::PoseResult result = solver.solve(start);
@@ -314,7 +308,7 @@ TEST_SUITE("pipeline") {
     dpr::PoseOptions eager = descent(30);
     std::get<dpr::Descent>(eager.method).schedule = dpr::AdaptiveSchedule{.start = 1, .interval = 1};
     std::get<dpr::Descent>(eager.method).restarts = 0;
-    const dpr::PoseSolver solver(device, scene, rigid_target(device, scene), eager);
+    const dpr::PoseSolver solver(device, scene, rigid_image(device, scene), eager);
     const dpr::PoseResult result = solver.solve(turned(20));
     for (const dpr::PoseIteration& step : result.history) {
       if (step.smoothing.sigma == result.history.back().smoothing.sigma) CHECK(result.loss <= step.loss);
@@ -325,7 +319,7 @@ TEST_SUITE("pipeline") {
     if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
     const dpr::Scene scene = cube_scene(16);
-    const dpr::Image target = rigid_target(device, scene);
+    const dpr::Image target = rigid_image(device, scene);
     const auto stop = [](const dpr::PoseIteration& step) { return step.iteration < 1; };
     const dpr::PoseResult descended =
         dpr::PoseSolver(device, scene, target, descent(10)).solve(turned(20), stop);
@@ -345,7 +339,7 @@ TEST_SUITE("pipeline") {
     if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
     dpr::Scene scene = cube_scene(16);
-    const dpr::Image target = rigid_target(device, scene);
+    const dpr::Image target = rigid_image(device, scene);
     scene.smoothing = dpr::smoothing_preset("paper_gaussian");
     dpr::LeastSquares method = least_squares();
     method.rotations = 16;
@@ -448,7 +442,7 @@ TEST_SUITE("robustness") {
     glm::mat4& transform = scene.meshes.front().transform;
     transform = glm::rotate(glm::mat4(1.0F), glm::radians(100.0F), glm::vec3(k_axis)) *
                 glm::scale(glm::mat4(1.0F), glm::vec3(0.9F, 1.1F, 1.0F));
-    const dpr::Image target = rigid_target(device, scene);
+    const dpr::Image target = rigid_image(device, scene);
     transform = glm::mat4(glm::mat3(glm::scale(glm::mat4(1.0F), glm::vec3(0.9F, 1.1F, 1.0F))));
     const dpr::PoseOptions options{.method = least_squares(), .solve_translation = true};
     const dpr::PoseResult about_origin = dpr::PoseSolver(device, scene, target, options).search();
