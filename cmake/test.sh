@@ -18,13 +18,13 @@ done
 install_packages "${sets[@]}"
 
 # Packages of some presets that not every release has.
-declare -A needed=([oclgrind]=oclgrind [oclgrind-stages]=oclgrind [fuzz]=clang++-14)
+declare -A needed=([oclgrind]=oclgrind [fuzz]=clang++-14)
 
 summary=()
 status=0
 for preset in "${presets[@]}"; do
   echo "== $preset"
-  tool=${needed[$preset]:-}
+  tool=${needed[${preset%-stages}]:-}
   if [[ $tool ]] && ! command -v "$tool" >/dev/null; then
     summary+=("$(printf '%-15s skipped: there is no %s' "$preset" "$tool")")
     continue

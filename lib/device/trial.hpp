@@ -1,6 +1,7 @@
-// Trial of a device with the kernels of a frame, once in a process of its own: a driver that aborts
-// ends that one, and one that hangs is left after DPR_TRIAL_SECONDS (300) at one kernel. The process is the dpr command, which is executed anew: a fork of a process whose OpenCL
-// implementation has threads and locks could hang, or crash where the driver is without fault.
+// Trial of a device with the kernels of a frame, once in a process of its own: a driver that aborts ends that one, and
+// one that hangs is left after DPR_TRIAL_SECONDS (300) at one kernel. The process is the dpr command, which is executed
+// anew: a fork of a process whose OpenCL implementation has threads and locks could hang, or crash where the driver is
+// without fault.
 #pragma once
 
 #include <optional>

@@ -87,7 +87,7 @@ TEST_SUITE("robustness") {
     }
   }
 
-  TEST_CASE("drivers: one that hangs in a kernel is left there, once, and used otherwise") {
+  TEST_CASE("drivers: one that hangs in a kernel is left there, and is an error of one line") {
     if (is_skipped_here()) return;
     const Machine machine;
     for (int start = 0; start < 2; ++start) {

@@ -31,7 +31,9 @@ test_with() {
   read -ra wanted <<<"$(requirements "$1")"
   "$environment/bin/pip" install --quiet --upgrade-strategy only-if-needed "${wanted[@]}"
   local name
-  for name in numpy jax arguments cameras package textures outputs tangents own_shading nvdiffrast nvdiffrast_texture; do "$environment/bin/python" "$root/tests/python/${name}_test.py"; done
+  for name in numpy jax arguments cameras package textures outputs tangents own_shading nvdiffrast nvdiffrast_texture; do
+    "$environment/bin/python" "$root/tests/python/${name}_test.py"
+  done
 }
 
 mkdir -p "$work"
