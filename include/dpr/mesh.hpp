@@ -56,24 +56,31 @@ struct Mesh {
 /// says in the message which mesh it is. O(vertices + faces + texels).
 DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 
-/// Reads OBJ, PLY, OFF or STL; vertices are in the order of the file. Polygons become triangle fans; non-
-/// manifold, duplicate and degenerate faces are kept, and the colours of vertices, else of faces, white where
-/// others have one. The diffuse colours of OBJ materials are face colours, their textures (map_Kd) are the
-/// mesh's, and what they say of highlights (Ks, Ns, illum) its materials, if libraries and textures are
-/// regular files; a PLY's textures (comment TextureFile) take the place of its colours, by its corners' or
-/// else its vertices' coordinates; dpr/notes.hpp tells what is left out. The normals of an OBJ are kept if
-/// every corner has one; a PLY's normals and texture coordinates, if they are floats. Equal positions of an
-/// STL become one, and facets with two equal corners are left out. The texture coordinates of an OBJ (u, v; v
-/// up) are kept if every corner has some, or where there are textures; then faces without coordinates get (0,
-/// 0) and no texture. Throws IoError where the file is missing, malformed, truncated, goes on after its end
-/// or has none; and InvalidArgument where its content cannot be rendered.
+/// Reads OBJ, PLY, OFF, STL, or glTF 2.0 (.gltf, .glb); vertices are in the order of the file. Polygons become
+/// triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices, else of
+/// faces, white where others have one; dpr/notes.hpp tells what is left out.
+///
+/// OBJ: the diffuse colours of materials are face colours, their textures (map_Kd) are the mesh's, and what they
+/// say of highlights (Ks, Ns, illum) its materials, if libraries and textures are regular files. Normals are kept
+/// if every corner has one, texture coordinates (u, v; v up) if every corner has some, or where there are
+/// textures; then faces without coordinates get (0, 0) and no texture.
+/// PLY: textures (comment TextureFile) take the place of colours, by the corners' or else the vertices'
+/// coordinates; normals and texture coordinates are kept if they are floats.
+/// STL: equal positions become one, and facets with two equal corners are left out.
+/// glTF: all meshes of the scene to show, where their nodes place them, as one; equal positions become one
+/// unless there are colours of vertices. Base colours are colours, their textures (PNG and JPEG, also within
+/// the file) the mesh's; of what else a surface is, nothing is read. Normals and texture coordinates are kept if
+/// all triangles have them.
+///
+/// Throws IoError where the file is missing, malformed, truncated, goes on after its end or has none; and
+/// InvalidArgument where its content cannot be rendered.
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
-/// Writes OBJ or PLY, by the extension, through a temporary file that is renamed at the end. OBJ has no face
-/// colours: asking for that is an error, not a silent loss. PLY colours are bytes, as other programs expect
-/// them: clamped to [0, 1] and rounded. Texture coordinates and normals go to OBJ only; materials are not
-/// written, nor textures, see write_texture(). Throws IoError, and InvalidArgument where the mesh is not
-/// valid.
+/// Writes OBJ, PLY or GLB, by the extension, through a temporary file that is renamed at the end. GLB takes all
+/// but materials; textures become PNG within it, sRGB in 8 bits. OBJ has no face colours: asking for that is an
+/// error, not a silent loss. PLY colours are bytes, as other programs expect them: clamped to [0, 1] and rounded;
+/// it has no texture coordinates and normals. Of OBJ and PLY textures are no part, see write_texture(). Throws
+/// IoError, and InvalidArgument where the mesh is not valid.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

@@ -97,8 +97,9 @@ void require_measured(const CLI::App& command, const char* name, float weight, c
 /// Checks the outputs before the work.
 void check_outputs(const FitCommandOptions& options) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
-  if (extension != ".obj" && extension != ".ply") {
-    throw InvalidArgument("--output (command line)", "\"" + options.output + "\"", "a file .obj or .ply");
+  if (extension != ".obj" && extension != ".ply" && extension != ".glb") {
+    throw InvalidArgument("--output (command line)", "\"" + options.output + "\"",
+                          "a file .obj, .ply or .glb");
   }
   require_writable(options.output);
   if (!options.checkpoint.empty()) require_writable(options.checkpoint);
@@ -281,7 +282,7 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
           "harmonics: look for one distant light in which the initial mesh explains the images; fixed: "
           "colours are as they show. By default harmonics where a camera is not known")
       ->type_name("harmonics|fixed");
-  command->add_option("-o,--output", options->output, "Mesh to write, OBJ or PLY")
+  command->add_option("-o,--output", options->output, "Mesh to write, OBJ, PLY or GLB")
       ->required()
       ->type_name("MESH.obj");
   command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")

@@ -196,7 +196,7 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
   const auto options = std::make_shared<RenderOptions>();
   auto* mesh = command->add_option(
       "MESH", options->mesh,
-      "Mesh file (OBJ, PLY, OFF, STL); camera, light and a blur of a quarter of a pixel are fitted to "
+      "Mesh file (OBJ, PLY, OFF, STL, glTF); camera, light and a blur of a quarter of a pixel are fitted to "
       "it");
   mesh->type_name("");
   command->add_option("--scene", options->scene, "Scene file, instead of MESH")

@@ -25,11 +25,13 @@ std::string one_line(std::string reason) {
   return reason.empty() ? "OpenImageIO gives no reason" : reason;
 }
 
-std::unique_ptr<OIIO::ImageInput> open(const std::string& file) {
-  OIIO::ImageSpec configuration;
+std::unique_ptr<OIIO::ImageInput> open(const std::string& file, OIIO::Filesystem::IOProxy* content) {
+  OIIO::ImageSpec configuration, spec;
   configuration.attribute(k_unassociated_alpha, 1);
-  auto input = OIIO::ImageInput::open(file, &configuration);
+  auto input = content ? OIIO::ImageInput::create(file) : OIIO::ImageInput::open(file, &configuration);
   if (!input) throw std::runtime_error("cannot be read: " + one_line(OIIO::geterror()));
+  if (content && (!input->set_ioproxy(content) || !input->open(file, spec, configuration)))
+    throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
   return input;
 }
 
@@ -120,8 +122,10 @@ Image upright(Image stored, int orientation) {
   return image;
 }
 
-Image read(const std::string& file, PixelFacts& facts) {
-  const auto input = open(file);
+Image read(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts) {
+  OIIO::Filesystem::IOMemReader reader(const_cast<unsigned char*>(content.data()),
+                                       content.size());  // read only
+  const auto input = open(file, content.empty() ? nullptr : &reader);
   const OIIO::ImageSpec& spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
       spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dpr/export.h"
 #include "dpr/image.hpp"
+#include "dpr/texture.hpp"
 
 namespace dpr {
 
@@ -28,8 +31,9 @@ struct PixelFacts {
 /// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module
 /// that only writes.
 struct ImageCodec {
-  /// The pixels as they are stored, finite or not; whole numbers from 0 to 1.
-  Image (*read)(const std::string& file, PixelFacts& facts);
+  /// The pixels as they are stored, finite or not; whole numbers from 0 to 1. Without `content` those of a file;
+  /// else `file` is the name of the content's format.
+  Image (*read)(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts);
   /// The content of a file of a valid image, in memory.
   std::vector<unsigned char> (*encode)(const Image& image, const PixelFormat& format);
 };
@@ -40,6 +44,12 @@ using ImageCodecFunction = const ImageCodec*();
 
 /// As the public read_image(), with what the file says of its pixels.
 Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts);
+
+/// As the public read_texture(), of a PNG or JPEG file's content; `name` is what messages call it.
+Texture decode_texture(const std::string& name, std::string_view content);
+
+/// The content of a PNG file of the texture, as write_texture() writes it; an IoError names that file.
+std::string encode_texture(const std::filesystem::path& file, const Texture& texture);
 
 /// Throws IoError unless the extension is of a format that write_image() knows: to be called before the work.
 void require_image_format(const std::filesystem::path& file);

@@ -83,21 +83,66 @@ const ImageCodec& png() {
   return codec;
 }
 
-}  // namespace
-
-Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts) {
-  require_file(file);
+/// As ImageCodec::read. Messages call the file `name`.
+Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
+           Encoding encoding, PixelFacts& facts) {
   Image image;
   try {
-    image = openimageio().read(file.string(), facts);
+    image = openimageio().read(file, content, facts);
   } catch (const std::runtime_error& error) {
-    throw IoError(file, error.what());
+    throw IoError(name, error.what());
   }
-  require_finite(file, image);
+  require_finite(name, image);
   if (encoding == Encoding::srgb && !facts.floats) {
     for (glm::vec4& pixel : image.pixels) pixel = transferred(pixel, decode_srgb);
   }
   return image;
+}
+
+Texture texture_of(const Image& image) {
+  Texture texture;
+  texture.width = image.width;
+  texture.height = image.height;
+  texture.texels.assign(image.pixels.begin(), image.pixels.end());
+  return texture;
+}
+
+Image image_of(const Texture& texture) {
+  Image image(texture.width, texture.height);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = glm::vec4(texture.texels[i], 1);
+  return image;
+}
+
+}  // namespace
+
+Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts) {
+  require_file(file);
+  return read(file, file.string(), {}, encoding, facts);
+}
+
+Texture read_texture(const std::filesystem::path& file) { return texture_of(read_image(file)); }
+
+Texture decode_texture(const std::string& name, std::string_view content) {
+  const bool is_png = content.starts_with("\x89PNG");
+  if (!is_png && !content.starts_with("\xff\xd8")) throw IoError(name, "is neither a PNG nor a JPEG file");
+  PixelFacts facts;
+  return texture_of(read(name, is_png ? "png" : "jpeg",
+                         {reinterpret_cast<const unsigned char*>(content.data()), content.size()},
+                         Encoding::srgb, facts));
+}
+
+void write_texture(const std::filesystem::path& file, const Texture& texture) {
+  validate(texture, "texture for " + file.string());
+  write_image(file, image_of(texture));
+}
+
+std::string encode_texture(const std::filesystem::path& file, const Texture& texture) {
+  try {
+    const std::vector<unsigned char> bytes = png().encode(encoded(image_of(texture)), {.extension = "png"});
+    return {bytes.begin(), bytes.end()};
+  } catch (const std::runtime_error& error) {
+    throw IoError(file, error.what());
+  }
 }
 
 Image read_image(const std::filesystem::path& file, bool* has_alpha, Encoding encoding) {

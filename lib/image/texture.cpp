@@ -1,8 +1,7 @@
-// Textures: what makes one that can be rendered, and its files.
+// Textures: what makes one that can be rendered.
 #include "dpr/texture.hpp"
 
 #include "base/checks.hpp"
-#include "dpr/image.hpp"
 #include "image/texture_words.hpp"
 
 namespace dpr {
@@ -39,22 +38,6 @@ void validate(const Texture& texture, const std::string& name) {
     throw InvalidArgument(checks::in(checks::element("texels", i), name), checks::text(texture.texels[i]),
                           "finite numbers");
   }
-}
-
-Texture read_texture(const std::filesystem::path& file) {
-  const Image image = read_image(file);
-  Texture texture;
-  texture.width = image.width;
-  texture.height = image.height;
-  texture.texels.assign(image.pixels.begin(), image.pixels.end());
-  return texture;
-}
-
-void write_texture(const std::filesystem::path& file, const Texture& texture) {
-  validate(texture, "texture for " + file.string());
-  Image image(texture.width, texture.height);
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = glm::vec4(texture.texels[i], 1);
-  write_image(file, image);
 }
 
 }  // namespace dpr

@@ -1,4 +1,7 @@
-// Mesh files: their content goes to the reader of its format. Writing needs no library.
+// Mesh files: their content goes to the reader of its format, and comes from the writer.
+#include <algorithm>
+#include <array>
+
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
@@ -11,7 +14,8 @@ namespace dpr {
 namespace {
 
 bool is_known(const std::string& extension) {
-  return extension == ".obj" || extension == ".ply" || extension == ".off" || extension == ".stl";
+  constexpr std::array<std::string_view, 6> k_known{".obj", ".ply", ".off", ".stl", ".gltf", ".glb"};
+  return std::ranges::find(k_known, extension) != k_known.end();
 }
 
 void append(std::string& text, const glm::vec3& values) {
@@ -87,6 +91,7 @@ Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& not
   if (extension == ".ply") mesh = read_ply(file, std::move(bytes), notes);
   if (extension == ".off") mesh = read_off(file, bytes);
   if (extension == ".stl") mesh = read_stl(file, bytes, notes);
+  if (extension == ".gltf" || extension == ".glb") mesh = read_gltf(file, bytes, notes);
   validate(mesh, file.string());
   return mesh;
 }
@@ -95,7 +100,7 @@ Mesh read_mesh(const std::filesystem::path& file, Notes& notes) {
   const std::string extension = lower_case_extension(file);
   if (!is_known(extension)) {
     throw IoError(file, "got the extension " + scan::quoted(extension) +
-                            ", expected .obj, .ply, .off or .stl" +
+                            ", expected .obj, .ply, .off, .stl, .gltf or .glb" +
                             (extension == ".json" ? "; a scene is given by --scene" : ""));
   }
   return parse_mesh(file, read_file(file), notes);
@@ -108,12 +113,13 @@ Mesh read_mesh(const std::filesystem::path& file) {
 
 void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
   const std::string extension = lower_case_extension(file);
-  if (extension != ".obj" && extension != ".ply") {
-    throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj or .ply");
+  if (extension != ".obj" && extension != ".ply" && extension != ".glb") {
+    throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj, .ply or .glb");
   }
   validate(mesh, "mesh for " + file.string());
-  const std::string text = extension == ".obj" ? obj_text(file, mesh) : ply_text(mesh);
-  write_whole_file(file, text);
+  if (extension == ".obj") write_whole_file(file, obj_text(file, mesh));
+  if (extension == ".ply") write_whole_file(file, ply_text(mesh));
+  if (extension == ".glb") write_whole_file(file, glb_bytes(file, mesh));
 }
 
 }  // namespace dpr

@@ -1,4 +1,4 @@
-// The readers of mesh files, one for each format: from the bytes of a file to a mesh, in one pass.
+// The formats of mesh files: from the bytes of a file to a mesh, in one pass, and back.
 //
 // PLY is read by OpenMesh. OBJ, OFF and STL are not: its readers of these pass over what they do not
 // understand, so that a vertex line that does not parse shifts every later index, and a check would have to
@@ -21,7 +21,7 @@
 namespace dpr {
 
 /// Reads the content of a file in the format of its extension; the mesh is valid. `file` is what messages
-/// call it, and beside it the material libraries of an OBJ are looked for. Throws as read_mesh() does.
+/// call it, and beside it the files that it names are looked for. Throws as read_mesh() does.
 Mesh parse_mesh(const std::filesystem::path& file, std::string bytes, Notes& notes);
 
 // The formats. What they return may have no face or an index out of range: parse_mesh() checks that for all.
@@ -29,6 +29,10 @@ Mesh read_obj(const std::filesystem::path& file, std::string_view text, Notes& n
 Mesh read_ply(const std::filesystem::path& file, std::string bytes, Notes& notes);
 Mesh read_off(const std::filesystem::path& file, std::string_view text);
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
+Mesh read_gltf(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
+
+/// The bytes of a GLB file of a valid mesh. Throws IoError, which names the file, where they are too many.
+std::string glb_bytes(const std::filesystem::path& file, const Mesh& mesh);
 
 /// Reflection of light by a material of OBJ, as far as the file says.
 struct ObjReflection {

@@ -3,12 +3,12 @@
 // A facet with two equal corners has no area and no attributes, so nothing is lost where it is left out.
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <numeric>
 
 #include "dpr/error.hpp"
+#include "mesh/little_endian.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/scan_text.hpp"
+#include "mesh/weld.hpp"
 
 namespace dpr {
 namespace {
@@ -22,38 +22,16 @@ using Facet = std::array<glm::vec3, 3>;
 bool has_area(const Facet& f) { return f[0] != f[1] && f[1] != f[2] && f[2] != f[0]; }
 
 /// Equal corners become one vertex; the vertices are in the order in which the corners first name them.
-Mesh weld(const std::vector<Facet>& facets) {
-  const auto corner = [&](std::uint32_t i) -> const glm::vec3& { return facets[i / 3][i % 3]; };
-  std::vector<std::uint32_t> sorted(3 * facets.size());
-  std::iota(sorted.begin(), sorted.end(), 0U);
-  std::sort(sorted.begin(), sorted.end(), [&](std::uint32_t i, std::uint32_t j) {
-    const glm::vec3 &a = corner(i), &b = corner(j);
-    if (a.x != b.x) return a.x < b.x;
-    if (a.y != b.y) return a.y < b.y;
-    if (a.z != b.z) return a.z < b.z;
-    return i < j;
-  });
-  std::vector<std::uint32_t> first(sorted.size());  // of the corners at the same position
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    const bool is_equal = i > 0 && corner(sorted[i]) == corner(sorted[i - 1]);
-    first[sorted[i]] = is_equal ? first[sorted[i - 1]] : sorted[i];
-  }
+Mesh mesh_of(const std::vector<Facet>& facets) {
   Mesh mesh;
-  mesh.faces.resize(facets.size());
-  std::vector<std::uint32_t>& vertex = sorted;  // no longer needed as it is
-  for (std::uint32_t i = 0; i < first.size(); ++i) {
-    if (first[i] == i) mesh.positions.push_back(corner(i));
-    vertex[i] = first[i] == i ? static_cast<std::uint32_t>(mesh.positions.size() - 1) : vertex[first[i]];
-    mesh.faces[i / 3][static_cast<int>(i % 3)] = vertex[i];
+  mesh.positions.reserve(3 * facets.size());
+  for (const Facet& facet : facets) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), facet.begin(), facet.end());
+    mesh.faces.emplace_back(first, first + 1, first + 2);
   }
+  weld(mesh);
   return mesh;
-}
-
-template <typename Number>
-Number little_endian(std::string_view bytes, std::size_t offset) {
-  std::uint32_t bits = 0;
-  for (std::size_t i = 4; i-- > 0;) bits = bits << 8U | static_cast<std::uint8_t>(bytes[offset + i]);
-  return std::bit_cast<Number>(bits);
 }
 
 /// Bytes that the number of facets promises.
@@ -172,13 +150,13 @@ class StlTextReader {
 
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes) {
   if (is_binary(bytes)) {
-    Mesh mesh = weld(binary_facets(file, bytes));
+    Mesh mesh = mesh_of(binary_facets(file, bytes));
     note_attributes(file, bytes, notes);
     return mesh;
   }
   StlTextReader reader(file, bytes);
   reader.run();
-  return weld(reader.facets);
+  return mesh_of(reader.facets);
 }
 
 }  // namespace dpr

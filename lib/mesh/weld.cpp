@@ -40,4 +40,19 @@ std::vector<glm::uvec3> weld(std::span<const glm::uvec3> faces, std::span<const 
   return welded;
 }
 
+void weld(Mesh& mesh) {
+  std::vector<std::uint32_t> vertex = weld(mesh.positions);
+  std::uint32_t count = 0;
+  for (std::uint32_t v = 0; v < vertex.size(); ++v) {
+    if (vertex[v] == v) {
+      mesh.positions[count] = mesh.positions[v];
+      vertex[v] = count++;
+    } else {
+      vertex[v] = vertex[vertex[v]];
+    }
+  }
+  mesh.positions.resize(count);
+  mesh.faces = weld(mesh.faces, vertex);
+}
+
 }  // namespace dpr

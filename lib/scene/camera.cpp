@@ -27,16 +27,10 @@ double radial_slope(const Distortion& d, double s) {
 /// Extremes of the slope in [0, most], ascending, with the two ends.
 std::vector<double> slope_extremes(const Distortion& d, double most) {
   const double a = 21.0 * d.k3, b = 10.0 * d.k2, c = 3.0 * d.k1;  // a s^2 + b s + c
-  std::vector<double> extremes{0.0, most};
-  const auto add = [&](double s) {
-    if (s > 0 && s < most) extremes.push_back(s);  // a NaN is none
-  };
   const double discriminant = b * b - 4 * a * c;
-  if (discriminant >= 0) {
-    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
-    add(q / a);
-    add(c / q);
-  }
+  const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));  // a NaN where there are none
+  std::vector<double> extremes{0.0, q / a, c / q, most};
+  std::erase_if(extremes, [&](double s) { return !(s >= 0 && s <= most); });
   std::ranges::sort(extremes);
   return extremes;
 }

@@ -37,7 +37,8 @@ void read_mesh_bytes(std::string_view content) {
   Notes notes;
   parse_mesh(folder() / name, std::string(content), notes);
 }
-constexpr char k_obj[] = "mesh.obj", k_ply[] = "mesh.ply", k_off[] = "mesh.off", k_stl[] = "mesh.stl";
+constexpr char k_obj[] = "mesh.obj", k_ply[] = "mesh.ply", k_off[] = "mesh.off", k_stl[] = "mesh.stl",
+               k_glb[] = "mesh.glb";
 
 void read_materials(std::string_view content) {
   ObjMaterials materials;
@@ -89,10 +90,11 @@ void read_npz_bytes(std::string_view content) {
   if (again.shape != read.shape || again.values != read.values) throw std::logic_error("other values");
 }
 
-constexpr std::array<Target, 10> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
+constexpr std::array<Target, 11> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
                                             {"mesh_ply", read_mesh_bytes<k_ply>},
                                             {"mesh_off", read_mesh_bytes<k_off>},
                                             {"mesh_stl", read_mesh_bytes<k_stl>},
+                                            {"mesh_glb", read_mesh_bytes<k_glb>},
                                             {"materials", read_materials},
                                             {"image", read_image_bytes},
                                             {"scene", read_scene_text},

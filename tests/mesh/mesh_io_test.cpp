@@ -527,7 +527,7 @@ TEST_SUITE("robustness") {
     const TempDir folder;
     DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "no.obj"), "does not exist");
     DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.fbx", "x")),
-                          "expected .obj, .ply, .off or .stl");
+                          "expected .obj, .ply, .off, .stl, .gltf or .glb");
     std::filesystem::create_directory(folder / "folder.obj");
     DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder / "folder.obj"), "folder");
     for (const char* extension : {".ply", ".off", ".stl"}) {
@@ -726,7 +726,7 @@ TEST_SUITE("robustness") {
     const TempDir folder;
     const Mesh cube = make_cube();
     DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "cube.obj", cube), "OBJ has no face colours");
-    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "cube.stl", cube), "expected .obj or .ply");
+    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "cube.stl", cube), "expected .obj, .ply or .glb");
     DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "no" / "cube.ply", cube), "does not exist");
     CHECK_THROWS_AS(write_mesh(folder / "none.ply", Mesh{}), InvalidArgument);
     std::filesystem::create_directory(folder / "cube.ply");
