@@ -118,7 +118,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("ranks: two follow one with the whole batch, in network namespaces where they can be made") {
     if (cannot_run()) return;
     const DataFolder folder;
-    constexpr int k_steps = 50;
+    constexpr int k_steps = 20;
     REQUIRE(run_command(folder, training("one", k_steps, 1000), "OMP_NUM_THREADS=1").status == 0);
     const Network network;
     if (!network.is_made()) MESSAGE("no network namespaces: on the loopback interface");

@@ -331,15 +331,14 @@ TEST_SUITE("unit") {
   TEST_CASE("a polygon of 300,000 corners, and as many equal vertices, take no time") {
     constexpr int k_corners = 300000;
     const TempDir folder;
-    std::string vertices, obj = "f", off;
+    std::string vertices, obj_vertices, obj = "f", off;
     for (int i = 0; i < k_corners; ++i) {
-      vertices += std::to_string(i) + " 0 1\n";
+      const std::string vertex = std::to_string(i) + " 0 1\n";
+      vertices += vertex;
+      obj_vertices += "v " + vertex;
       obj += " " + std::to_string(i + 1);
       off += " " + std::to_string(i);
     }
-    std::string obj_vertices = "v " + vertices;
-    for (std::size_t i = 2; (i = obj_vertices.find('\n', i)) + 1 < obj_vertices.size(); i += 3)
-      obj_vertices.insert(i + 1, "v ");
     const std::string count = std::to_string(k_corners);
     std::string ply = "ply\nformat ascii 1.0\nelement vertex " + count +
                       "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
