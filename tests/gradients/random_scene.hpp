@@ -12,6 +12,7 @@
 #include "dpr/renderer.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
+#include "support/reduced.hpp"
 
 namespace dpr::test::gradients {
 
@@ -173,8 +174,8 @@ inline Trial random_trial(unsigned seed) {
   Draw draw(seed);
   Trial trial;
   Scene& scene = trial.scene;
-  scene.width = 20 + static_cast<int>(draw.below(12));
-  scene.height = 20 + static_cast<int>(draw.below(12));
+  for (int* const side : {&scene.width, &scene.height})
+    *side = test::reduced(20, 8) + static_cast<int>(draw.below(test::is_reduced() ? 4 : 12));
   scene.background = draw.vector(0, 1);
   scene.meshes.push_back({random_mesh(draw, trial), check::placed(draw.between(0, 360))});
   if (draw.chance(0.3F)) {
