@@ -238,7 +238,7 @@ void require_workload(std::string_view name) {
     if (d.name == name) return;
     if (!names.ends_with(d.name)) names += (names.empty() ? "" : ", ") + std::string(d.name);
   }
-  throw InvalidArgument("workload", "'" + std::string(name) + "'", "one of " + names);
+  throw InvalidArgument("--workload (command line)", "\"" + std::string(name) + "\"", "one of " + names);
 }
 
 std::vector<Workload> make_workloads(std::string_view name) {
