@@ -31,7 +31,7 @@ for preset in "${presets[@]}"; do
   fi
   start=$SECONDS
   if cmake --preset "$preset" && cmake --build --preset "$preset" &&
-    ctest --preset "$preset" -j2 --output-on-failure; then
+    ctest --preset "$preset" -j"$(nproc)" --output-on-failure; then
     result=passed
   else
     result=FAILED
