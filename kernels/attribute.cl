@@ -2,6 +2,7 @@
 // loss compares of them.
 #include "face_normal.h"
 #include "shared_types.h"
+#include "world_tangents.h"
 
 /// Puts the sum of the faces' weights into alpha: the red of a group of images that shows 1. One work-item
 /// per pixel of the groups.
@@ -91,6 +92,26 @@ kernel void attribute_vertices_backward(const FrameParams p, const uint shows_de
   grad_world[i] = (float4)(shows_depth ? (float3)(0.0f) : grad, 0.0f);
 }
 
+/// Its tangents. One work-item per (direction, view, vertex).
+/// in   shows_depth, shown_views  as attribute_vertices_forward
+/// in   world_tangents  as transform_tangent leaves them; of positions alone
+/// in   ndc_tangents    float4[direction][view][vertex]  z = view depth
+/// out  color_tangents  float4[direction][view][vertex]
+kernel void attribute_vertices_tangent(const FrameParams p, const TangentParams q, const uint shows_depth,
+                                       const uint shown_views, global const float4* restrict world_tangents,
+                                       global const float4* restrict ndc_tangents,
+                                       global float4* restrict color_tangents) {
+  const uint i = (uint)get_global_id(0), count = p.views * p.vertices;
+  if (i >= q.directions * count) return;
+  const uint direction = i / count, vertex = i % count;
+  float3 moved = 0.0f;
+  if (vertex < shown_views * p.vertices) {
+    moved = shows_depth ? (float3)(ndc_tangents[i].z)
+                        : world_tangents[world_tangents_at(p, direction) + vertex].xyz;
+  }
+  color_tangents[i] = (float4)(moved, 0.0f);
+}
+
 /// 0: a face without area has no normal.
 static inline float inverse_length(float3 v) {
   const float size = length(v);
@@ -145,6 +166,30 @@ kernel void attribute_normals_backward(const FrameParams p, const uint shown_vie
         corner_at(of_view, faces[face], (at + 1) % 3) - corner_at(of_view, faces[face], (at + 2) % 3), g);
   }
   grad_world[i] = (float4)(sum, 0.0f);
+}
+
+/// Its tangents. One work-item per (direction, view, face).
+/// in   shown_views, faces, world  as attribute_normals_forward
+/// in   world_tangents  as transform_tangent leaves them
+/// out  color_tangents  float4[direction][view][face]
+kernel void attribute_normals_tangent(const FrameParams p, const TangentParams q, const uint shown_views,
+                                      global const uint4* restrict faces, global const float4* restrict world,
+                                      global const float4* restrict world_tangents,
+                                      global float4* restrict color_tangents) {
+  const uint i = (uint)get_global_id(0), count = p.views * p.faces;
+  if (i >= q.directions * count) return;
+  const uint direction = i / count, view = i % count / p.faces;
+  const uint4 face = faces[i % p.faces];
+  global const float4* const of_view = world + view * p.vertices;
+  global const float4* const moved = world_tangents + world_tangents_at(p, direction) + view * p.vertices;
+  const float3 along1 = corner_at(of_view, face, 1) - corner_at(of_view, face, 0);
+  const float3 along2 = corner_at(of_view, face, 2) - corner_at(of_view, face, 0);
+  const float3 moved1 = corner_at(moved, face, 1) - corner_at(moved, face, 0);
+  const float3 moved2 = corner_at(moved, face, 2) - corner_at(moved, face, 0);
+  const float3 normal = face_normal(of_view, face);
+  const float scale = inverse_length(normal);
+  const float3 unit = normal * scale, by = scale * (cross(moved1, along2) + cross(along1, moved2));
+  color_tangents[i] = (float4)(view < shown_views ? by - unit * dot(unit, by) : (float3)(0.0f), 0.0f);
 }
 
 /// Rows of numbers as colours of what shows them, three channels a pass; behind the last channel, and in

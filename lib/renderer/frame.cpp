@@ -21,6 +21,13 @@ const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const Scene
   return r.tangents.images;
 }
 
+void show_depths(Renderer& renderer) {
+  Renderer::Impl& r = impl_of(renderer);
+  if (!r.geometry_colors) r.geometry_colors.emplace(impl_of(r.device), Attribute::depth);
+  r.geometry_colors->shown_views = r.views.size();
+  r.frame.color_stride = to_uint(r.geometry->colors);
+}
+
 FrameFragments last_fragments(const Renderer& renderer, const char* caller) {
   Renderer::Impl& r = impl_of(renderer);
   r.require_forward(caller);

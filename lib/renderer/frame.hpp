@@ -37,6 +37,10 @@ Frame last_frame(const Renderer& renderer, const char* caller);
 const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const SceneTangent> directions,
                                        const char* caller);
 
+/// Makes the renderer's next frame, in the scene and the views that it has now, show depths along the view direction in
+/// all three channels in place of colours: vertices need colours of their own. Tangents and gradients follow.
+void show_depths(Renderer& renderer);
+
 /// The fragments of a frame in one band, after its forward pass.
 struct FrameFragments {
   std::size_t pairs, fragments;

@@ -138,7 +138,7 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
   };
   Device::Impl& on = impl_of(device);
   tangents.params.directions = to_uint(count);
-  tangents.params.lit = cl_uint{shade.lit()};
+  tangents.params.lit = cl_uint{shade.lit() || (geometry_colors && geometry_colors->needs_world())};
   tangents.views.upload(on, of_views);
   tangents.models.upload(on, of_models);
   tangents.frames.upload(on, of_frames);
@@ -156,7 +156,6 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
 void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) const {
   if (aggregate.is_sampled() || occupancy.is_sampled())
     throw InvalidArgument("tangent", "Monte Carlo", "the exact estimators");
-  if (geometry_colors) throw InvalidArgument("tangent", "colours by geometry", "colours of the scene");
   const auto moves_camera = [](const ViewGradient& view) {
     return view.camera.view.rotation != dvec3(0) || view.camera.view.translation != dvec3(0);
   };
@@ -206,6 +205,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
     tangents.first = to_uint(first);
     if (pixel_noise) tangents.rasters.resize(impl_of(device), group.size() * samples);
     transform.tangent(frame, device_views, *geometry, tangents);
+    if (geometry_colors) geometry_colors->tangent(frame, *geometry, transform, tangents);
     if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {

@@ -52,6 +52,31 @@ void GeometryColors::backward(const shared::FrameParams& p, const Geometry& geom
   }
 }
 
+void GeometryColors::tangent(const shared::FrameParams& p, const Geometry& geometry,
+                             const Transform& transform, Tangents& tangents) {
+  const std::size_t of_direction = std::size_t{p.views} * (is_of_faces() ? p.faces : p.vertices);
+  const std::size_t count = tangents.params.directions * of_direction;
+  tangents.params.colors = to_uint(of_direction);
+  tangents.colors.resize(device_, count);
+  if (is_of_faces()) {
+    launch_(count, kernel::attribute_normals_tangent{.p = p,
+                                                     .q = tangents.params,
+                                                     .shown_views = to_uint(shown_views),
+                                                     .faces = geometry.face_vertices,
+                                                     .world = transform.world,
+                                                     .world_tangents = tangents.world,
+                                                     .color_tangents = tangents.colors});
+  } else {
+    launch_(count, kernel::attribute_vertices_tangent{.p = p,
+                                                      .q = tangents.params,
+                                                      .shows_depth = shows_depth(),
+                                                      .shown_views = to_uint(shown_views),
+                                                      .world_tangents = tangents.world,
+                                                      .ndc_tangents = tangents.ndc,
+                                                      .color_tangents = tangents.colors});
+  }
+}
+
 RowMap::RowMap(Device::Impl& device, std::span<const cl_uint> row_of_shown, std::size_t row_count)
     : rows(row_count), shown(row_of_shown.size()) {
   std::vector<cl_uint> run_starts(rows + 1, 0), in_order(shown);

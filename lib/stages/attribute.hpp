@@ -5,6 +5,7 @@
 #include "kernels/attribute.hpp"
 #include "stages/exchange.hpp"
 #include "stages/geometry.hpp"
+#include "stages/tangents.hpp"
 #include "stages/transform.hpp"
 
 namespace dpr {
@@ -23,6 +24,10 @@ class GeometryColors {
   void backward(const shared::FrameParams& p, const Geometry& geometry, const Transform& transform,
                 const Buffer<cl_float4>& grad_colors, Buffer<cl_float4>& grad_depth,
                 Buffer<cl_float4>& grad_world);
+  /// Fills the directions' colours, after the transform's tangents; of positions and normals with those of the world.
+  void tangent(const shared::FrameParams& p, const Geometry& geometry, const Transform& transform,
+               Tangents& tangents);
+  bool needs_world() const { return attribute_ != Attribute::depth; }
 
   std::size_t shown_views = 0;  ///< those behind these show 1
 
@@ -33,7 +38,8 @@ class GeometryColors {
   Attribute attribute_;
   Device::Impl& device_;
   Launcher<kernel::attribute_vertices_forward, kernel::attribute_vertices_backward,
-           kernel::attribute_normals_forward, kernel::attribute_normals_backward>
+           kernel::attribute_vertices_tangent, kernel::attribute_normals_forward,
+           kernel::attribute_normals_backward, kernel::attribute_normals_tangent>
       launch_;
 };
 

@@ -66,7 +66,7 @@ void Transform::tangent(const shared::FrameParams& p, const DeviceViews& views, 
   const std::size_t count = std::size_t{p.views} * p.vertices;
   tangents.ndc.resize(device_, tangents.params.directions * count);
   tangents.world.resize(device_, tangents.params.lit != 0
-                                     ? tangents.params.directions * (world.size() + p.views)
+                                     ? tangents.params.directions * p.views * (p.vertices + p.normals + 1)
                                      : 1);  // an argument all the same
   tangents.clip.resize(device_, p.clips != 0 ? tangents.params.directions * count : 1);
   launch_(count, kernel::transform_tangent{.p = p,

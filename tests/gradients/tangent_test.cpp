@@ -8,6 +8,7 @@
 
 #include "check/adjoint.hpp"
 #include "gradients/random_scene.hpp"
+#include "renderer/attribute_images_impl.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
@@ -57,6 +58,38 @@ TEST_SUITE("tangents") {
       }
     }
     CHECK(tried.size() > static_cast<std::size_t>(test::reduced(38, 4)));
+  }
+
+  TEST_CASE("<u, J v> = <J^T u, v> of depths, positions and normals over random scenes") {
+    Renderer renderer(open_device());
+    std::map<std::string, unsigned> tried;
+    const auto trials = static_cast<unsigned>(test::reduced(24, 1));
+    for (const Attribute attribute : {Attribute::depth, Attribute::position, Attribute::normal}) {
+      AttributeImages images(renderer.device(), attribute);
+      for (unsigned seed = 1; seed <= trials; ++seed) {
+        const Trial trial = random_trial(seed);
+        CAPTURE(seed);
+        CAPTURE(to_string(attribute));
+        CAPTURE(trial.description());
+        Random random(seed);
+        renderer.set_scene(trial.scene);
+        renderer.set_views(trial.views);
+        renderer.forward();
+        images.forward(renderer);
+        Renderer& shown = impl_of(images).renderer;
+        const std::vector<Image> weights = random_images(shown, random);
+        SceneGradient gradient = shown.backward(weights);
+        std::vector<Way> ways = random_ways(gradient, trial.has("noise of triangles"), random);
+        std::erase_if(ways, [](const Way& way) { return way.name == "background"; });  // has none
+        const std::vector<double> errors = errors_of(shown, weights, ways);
+        for (std::size_t k = 0; k < ways.size(); ++k) {
+          CAPTURE(ways[k].name);
+          CHECK(errors[k] < tolerance_of(ways[k]));
+          ++tried[std::string(to_string(attribute)) + ": " + ways[k].name];
+        }
+      }
+    }
+    CHECK(tried.size() > static_cast<std::size_t>(test::reduced(18, 6)));
   }
 
   TEST_CASE("directions in groups, frames in bands: the same tangents") {
