@@ -11,11 +11,13 @@
 /// in   side    of a cell, pixels
 /// in   cells   of the image, row by row
 /// in   units   float[direction]  inverse squares
+/// in   kinds   of what is measured, DPR_MEASURED_KINDS or 0; its residuals are in the scores alone
 /// out  sums    float[directions + DPR_CELL_SUMS][cell]
 kernel void normal_cells(const uint directions, const uint pixels, const uint width, const uint side,
-                         const uint cells, global const float* restrict units,
+                         const uint cells, const uint kinds, global const float* restrict units,
                          global const float* restrict weights, global const float* restrict residuals,
-                         global const float* restrict left, global float* restrict sums) {
+                         global const float* restrict measured, global const float* restrict left,
+                         global const float* restrict moved, global float* restrict sums) {
   const uint i = (uint)get_global_id(0), part = i / cells, cell = i % cells;
   if (part >= directions + DPR_CELL_SUMS) return;
   const uint columns = (width + side - 1) / side;
@@ -28,6 +30,8 @@ kernel void normal_cells(const uint directions, const uint pixels, const uint wi
       const float weight = residuals[3 * (size_t)pixels + pixel];
       float product = 0.0f;
       if (part < directions) {
+        for (uint c = 0; c < kinds; ++c)
+          sum += measured[c * (size_t)pixels + pixel] * moved[(kinds * part + c) * (size_t)pixels + pixel];
         for (uint c = 0; c < 3; ++c)
           product += residuals[c * (size_t)pixels + pixel] * left[(3 * part + c) * (size_t)pixels + pixel];
       } else if (part >= directions + 5) {

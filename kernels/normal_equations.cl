@@ -143,8 +143,6 @@ kernel void normal_light(const uint pixels, const uint views, const uint slots, 
 }
 #endif
 
-#define DPR_THRESHOLDS 16 /* a pass of the search for a median tells so many parts apart */
-
 /// Number of residuals, of all channels where the object shows, whose size is below thresholds. One part.
 /// in   thresholds  float[view][DPR_THRESHOLDS]
 kernel void normal_counts(const uint pixels, const uint views, const uint slots,
@@ -170,21 +168,6 @@ kernel void normal_counts(const uint pixels, const uint views, const uint slots,
   }
   DPR_UNROLL_ON_GPU
   for (uint k = 0; k < DPR_THRESHOLDS; ++k) store_sum(sum[k], k, s, views, slots, sums);
-}
-
-/// A vector of pixels of a view moved in a direction.
-typedef struct {
-  uint first, view;
-  size_t image;  // direction * views + view
-} Moved;
-
-static inline Moved make_moved(uint pixels, uint views) {
-  const uint i = (uint)get_global_id(0), vectors = (pixels + DPR_WIDTH - 1) / DPR_WIDTH;
-  Moved m;
-  m.first = i % vectors * DPR_WIDTH;
-  m.image = i / vectors;
-  m.view = i / vectors % views;
-  return m;
 }
 
 /// Derivatives in the light. One work-item per vector of pixels, view and direction.
@@ -285,11 +268,13 @@ kernel void normal_left(const uint pixels, const uint views, global const float*
 #endif
 
 /// The normal equations. With a pixel's residual r they sum w J^T r, then the lower triangles of w J^T P, made
-/// symmetric, and of the products of w P^T r with itself. Parts are the elements of a lower triangle on a GPU,
-/// else all are one.
+/// symmetric, and of the products of w P^T r with itself, r and J being those of all kinds of residuals. Parts
+/// are the elements of a lower triangle on a GPU, else all are one.
+/// in   measured, moved  as normal_measured.cl leaves them; not read unless DPR_MEASURED is set
 kernel void normal_equations(const uint pixels, const uint views, const uint slots,
-                             global const float* restrict residuals, global const float* restrict lit,
-                             global const float* restrict left, global float* restrict sums) {
+                             global const float* restrict residuals, global const float* restrict measured,
+                             global const float* restrict lit, global const float* restrict left,
+                             global const float* restrict moved, global float* restrict sums) {
   const Slots s = make_slots(pixels, views, slots);
   uint first_row = 0, first_column = s.part;
   while (first_column > first_row) first_column -= ++first_row;
@@ -301,40 +286,44 @@ kernel void normal_equations(const uint pixels, const uint views, const uint slo
     DPR_UNROLL_ON_GPU
     for (uint column = 0; column < DPR_SIDE; ++column) hessian[row][column] = scatter[row][column] = 0.0f;
   }
-  const size_t plane = 3 * (size_t)pixels, view = s.view;
+  const size_t view = s.view;
   for (uint i = s.first; i < s.last; i += s.step) {
-    const intn in_run = lanes_before(s.last, i);
-    Vec3n tangents[DPR_SIDE], rests[DPR_SIDE];
+    ResidualsN tangents[DPR_SIDE], rests[DPR_SIDE];
     realn largest = 0.0f;
     DPR_UNROLL_ON_GPU
     for (uint row = 0; row < DPR_SIDE; ++row) {
-      const size_t place = ((first_row + row) * views + view) * plane;
-      tangents[row] = load_planes(i, s.last, pixels, lit + place);
-      rests[row] = load_planes(i, s.last, pixels, left + place);
-      largest += dot3n(tangents[row], tangents[row]) + dot3n(rests[row], rests[row]);
+      const size_t place = ((first_row + row) * views + view) * pixels;
+      global const float* of_measured = moved + DPR_MEASURED_KINDS * place;
+      tangents[row] = load_residuals(i, s.last, pixels, lit + 3 * place, of_measured);
+      rests[row] = load_residuals(i, s.last, pixels, left + 3 * place, of_measured);
+      largest = add_product(largest, tangents[row], tangents[row], 1.0f);
+      largest = add_product(largest, rests[row], rests[row], 1.0f);
     }
     if (!any_lane(largest > 0.0f)) continue;  // most pixels show no edge: nothing there depends on the pose
-    const Vec3n residual = load_planes(i, s.last, pixels, residuals + 4 * view * pixels);
-    const realn weight = load_run(in_run, i, residuals + (4 * view + 3) * pixels);
+    const ResidualsN residual = load_residuals(i, s.last, pixels, residuals + 4 * view * pixels,
+                                               measured + 2 * DPR_MEASURED_KINDS * view * pixels);
+    const realn weight = load_run(lanes_before(s.last, i), i, residuals + (4 * view + 3) * pixels);
     realn scores[DPR_SIDE];
     DPR_UNROLL_ON_GPU
     for (uint row = 0; row < DPR_SIDE; ++row) {
-      gradient[row] += weight * dot3n(residual, tangents[row]);
-      scores[row] = weight * dot3n(residual, rests[row]);
+      gradient[row] = add_product(gradient[row], residual, tangents[row], weight);
+      scores[row] = add_product(0.0f, residual, rests[row], weight);
     }
     DPR_UNROLL_ON_GPU
     for (uint column = 0; column < DPR_SIDE; ++column) {
-      Vec3n tangent = tangents[column], rest = rests[column];
+      ResidualsN tangent = tangents[column], rest = rests[column];
       realn score = scores[column];
 #if DPR_SIDE == 1
-      const size_t place = (first_column * views + view) * plane;
-      tangent = load_planes(i, s.last, pixels, lit + place);
-      rest = load_planes(i, s.last, pixels, left + place);
-      score = weight * dot3n(residual, rest);
+      const size_t place = (first_column * views + view) * pixels;
+      global const float* of_measured = moved + DPR_MEASURED_KINDS * place;
+      tangent = load_residuals(i, s.last, pixels, lit + 3 * place, of_measured);
+      rest = load_residuals(i, s.last, pixels, left + 3 * place, of_measured);
+      score = add_product(0.0f, residual, rest, weight);
 #endif
       DPR_UNROLL_ON_GPU
       for (uint row = column; row < DPR_SIDE; ++row) {
-        hessian[row][column] += 0.5f * weight * (dot3n(tangents[row], rest) + dot3n(rests[row], tangent));
+        hessian[row][column] =
+            add_symmetric_product(hessian[row][column], tangents[row], rests[row], tangent, rest, weight);
         scatter[row][column] += scores[row] * score;
       }
     }

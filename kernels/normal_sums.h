@@ -1,5 +1,5 @@
-// What the sums of normal_equations.cl share: vectors of an image's pixels, the slots that add them up, and the
-// light that multiplies an object's colours.
+// What the sums of normal_equations.cl and normal_measured.cl share: vectors of an image's pixels, the slots that add
+// them up, residuals of all kinds, and the light that multiplies an object's colours.
 #include "tile_lanes.h"
 
 #include "harmonics.h"
@@ -9,6 +9,10 @@
 #endif
 #ifndef DPR_DIRECTIONS
 #define DPR_DIRECTIONS 6 /* in which hypotheses move */
+#endif
+
+#ifndef DPR_MEASURED
+#define DPR_MEASURED 0 /* 1: images of coverage and depth are compared beside colours (normal_measured.cl) */
 #endif
 
 #define DPR_FACTORS (DPR_TERMS - 1) /* terms that the colour multiplies */
@@ -62,6 +66,50 @@ static inline realn channel_of(Vec3n v, uint channel) {
   return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
 }
 
+#define DPR_THRESHOLDS 16    /* a pass of the search for a median tells so many parts apart */
+#define DPR_MEASURED_KINDS 2 /* coverage and depth */
+
+/// Residuals of a vector of pixels, or their derivatives.
+typedef struct {
+  Vec3n color;
+#if DPR_MEASURED
+  realn coverage, depth;  // times the roots of their weights
+#endif
+} ResidualsN;
+
+/// From planes [pixel] of colours and of what is measured; lanes from `last` on are 0.
+static inline ResidualsN load_residuals(uint first, uint last, uint pixels, global const float* colors,
+                                        global const float* measured) {
+  ResidualsN r;
+  r.color = load_planes(first, last, pixels, colors);
+#if DPR_MEASURED
+  r.coverage = load_run(lanes_before(last, first), first, measured);
+  r.depth = load_run(lanes_before(last, first), first, measured + pixels);
+#else
+  (void)measured;
+#endif
+  return r;
+}
+
+/// Adds the products of channels, colours' times a weight.
+static inline realn add_product(realn sum, const ResidualsN a, const ResidualsN b, realn weight) {
+  sum += weight * dot3n(a.color, b.color);
+#if DPR_MEASURED
+  sum += a.coverage * b.coverage + a.depth * b.depth;
+#endif
+  return sum;
+}
+
+/// Adds half of a * rest_of_b + rest_of_a * b: the light takes nothing of what is measured.
+static inline realn add_symmetric_product(realn sum, const ResidualsN a, const ResidualsN rest_of_a,
+                                          const ResidualsN b, const ResidualsN rest_of_b, realn weight) {
+  sum += 0.5f * weight * (dot3n(a.color, rest_of_b.color) + dot3n(rest_of_a.color, b.color));
+#if DPR_MEASURED
+  sum += a.coverage * b.coverage + a.depth * b.depth;
+#endif
+  return sum;
+}
+
 /// A vector of slots, and the pixels that it sums.
 typedef struct {
   uint slot, view, part;
@@ -85,6 +133,21 @@ static inline Slots make_slots(uint pixels, uint views, uint slots) {
   s.step = DPR_WIDTH;
 #endif
   return s;
+}
+
+/// A vector of pixels of a view moved in a direction.
+typedef struct {
+  uint first, view;
+  size_t image;  // direction * views + view
+} Moved;
+
+static inline Moved make_moved(uint pixels, uint views) {
+  const uint i = (uint)get_global_id(0), vectors = (pixels + DPR_WIDTH - 1) / DPR_WIDTH;
+  Moved m;
+  m.first = i % vectors * DPR_WIDTH;
+  m.image = i / vectors;
+  m.view = i / vectors % views;
+  return m;
 }
 
 static inline void store_sum(realn sum, uint number, const Slots s, uint views, uint slots,

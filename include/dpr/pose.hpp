@@ -38,6 +38,12 @@ enum class PoseLight {
              ///< channel
 };
 
+/// An image beside the target's colours with which hypotheses are compared, of the target's size; empty: none.
+struct PoseObservation {
+  Image image;
+  float weight = 1;  ///< >= 0: factor on the weight that is found from the residuals
+};
+
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with exact Jacobians (forward mode). The default: it finds poses from
 /// anywhere. It brings a smoothing of its own, the exact joint composition with a blur that follows the pixels;
@@ -66,6 +72,19 @@ struct LeastSquares {
   PoseLight light = PoseLight::harmonics;
   /// Weight of every pixel, in [0, 1], in its first channel; of the target's size. Empty: 1.
   Image mask;
+
+  // Observations, any of which will do without the others, and without colours. Their squared residuals, and the
+  // colours', count by the inverse variance of each kind, from the medians that the best hypotheses leave as a level
+  // begins, 1 for the colours or else the first of these that there is; but deviations count for no less than 0.05 of
+  // coverage, and a quarter of a pixel's side at the object of depth.
+
+  /// Coverage of a pixel by the object, in [0, 1], in the first channel: unlike `mask` a thing to match.
+  PoseObservation silhouette;
+  /// Distance along the camera's axis, world units, in the first channel, as AuxiliaryOutputs::depths has it. Pixels
+  /// with an alpha of 0, or whose depth is 0 or not finite, have none. Depths are compared where both are, by a robust
+  /// loss whose scale is four standard deviations. Alone they also say where the object is: it should cover the pixels
+  /// whose depth lies within its radius (with a translation to look for, its diameter) of where it begins.
+  PoseObservation depth;
 };
 
 /// One hypothesis, by an optimizer on the exact gradients of the scene's own smoothing.
@@ -142,14 +161,15 @@ struct PoseResult : PoseHypothesis {
   std::vector<PoseIteration> history;
 };
 
-/// Finds the pose of the scene's only mesh from one image.
+/// Finds the pose of the scene's only mesh from one view.
 class DPR_API PoseSolver {
  public:
   /// Called once an iteration; false stops the solver, which then returns the best so far.
   using Callback = std::function<bool(const PoseIteration&)>;
 
-  /// Throws InvalidArgument if the scene has not exactly one mesh, its transform is singular, the sizes of
-  /// target or mask differ from the scene's, or an option is out of its range.
+  /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has not
+  /// exactly one mesh, its transform is singular, the sizes of target, mask, silhouette or depth differ from the
+  /// scene's, one of these says nothing, or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.

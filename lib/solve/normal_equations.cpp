@@ -12,7 +12,7 @@ namespace dpr {
 namespace {
 
 constexpr std::size_t k_channels = 3;
-constexpr std::size_t k_thresholds = 16, k_cell_sums = 6;  // as the kernel has them
+constexpr std::size_t k_cell_sums = 6;  // as the kernel has them
 
 // Weighing and solving in turn: until the loss falls by no more than a part, but no more often than that. The
 // loss of a hypothesis must be at its least for its derivatives to hold.
@@ -29,12 +29,8 @@ std::size_t terms_of(PoseLight light) {
   return (light == PoseLight::gain ? 1 : k_harmonics) + 1;
 }
 
-/// Few enough pixels a slot for plain sums, in whole vectors.
-std::size_t slots_of(std::size_t pixels) {
-  constexpr std::size_t k_pixels_of_slot = 64;
-  const std::size_t slots = (pixels + k_pixels_of_slot - 1) / k_pixels_of_slot;
-  return (slots + k_widest_vector - 1) / k_widest_vector * k_widest_vector;
-}
+// A normal distribution's standard deviation over the median of the sizes.
+constexpr float k_normal = 1.4826F;
 
 constexpr std::size_t triangle(std::size_t n) { return n * (n + 1) / 2; }
 
@@ -45,44 +41,33 @@ NormalSums::NormalSums(const Device& device, const WeighedTarget& target, PoseLi
     : pixels_(target.colors.size()),
       terms_(terms_of(light)),
       directions_(directions),
-      slots_(slots_of(pixels_)),
-      width_(std::min<std::size_t>(impl_of(device).info.lanes, DPR_TILE)),
       background_{{target.background.x, target.background.y, target.background.z, 0}},
       device_(device),
-      launch_(impl_of(device), options()),
-      reduce_(impl_of(device)),
+      launch_(impl_of(device), options(!target.measured.empty())),
+      sums_(impl_of(device_), pixels_),
       target_(impl_of(device), target.colors),
       weights_(impl_of(device), target.weights) {
-  if (terms_ > 0) launch_light_.emplace(impl_of(device), options());
-  for (const float w : target.weights) weight_ += static_cast<double>(w);
-}
-
-std::size_t NormalSums::moved_items(std::size_t views) const {
-  return directions_ * views * ((pixels_ + width_ - 1) / width_);
+  if (terms_ > 0) launch_light_.emplace(impl_of(device), options(false));
+  if (!target.measured.empty()) measured_.emplace(device, target.measured, options(true));
+  double colors = 0, coverages = 0, depths = 0;
+  for (const float w : target.weights) colors += static_cast<double>(w);
+  for (const cl_float4& m : target.measured) {
+    coverages += static_cast<double>(m.s[1]);
+    depths += static_cast<double>(m.s[3]);
+  }
+  counts_colors_ = colors > 0;
+  total_ = counts_colors_ ? static_cast<double>(k_channels) * colors : coverages > 0 ? coverages : depths;
 }
 
 std::size_t NormalSums::light_sums() const { return terms_ > 0 ? triangle(terms_) + 2 * terms_ : 0; }
 
-std::string NormalSums::options() const {
-  return " -DDPR_TERMS=" + std::to_string(terms_) + " -DDPR_DIRECTIONS=" + std::to_string(directions_);
+std::string NormalSums::options(bool has_measured) const {
+  return " -DDPR_TERMS=" + std::to_string(terms_) + " -DDPR_DIRECTIONS=" + std::to_string(directions_) +
+         (has_measured ? " -DDPR_MEASURED=1" : "");
 }
 
-template <typename Launch>
-NormalSums::Sums NormalSums::sum(std::size_t count, std::size_t parts, std::size_t views,
-                                 const Launch& launch) {
-  Device::Impl& d = impl_of(device_);
-  slot_sums_.resize(d, count * views * slots_);
-  if (starts_.length().count < views + 1) {
-    std::vector<cl_uint> starts;
-    for (std::size_t view = 0; view <= views; ++view) starts.push_back(to_uint(view * slots_));
-    starts_.upload(d, starts);
-  }
-  launch(parts * views * slots_ / width_);
-  return {reduce_.read({{views * slots_, count, views, 1, starts_, slot_sums_}}).front(), views};
-}
-
-NormalSums::Sums NormalSums::weigh(const HypothesisImages& images, std::span<const float> scales,
-                                   const std::vector<cl_uint>& active) {
+ViewSums NormalSums::weigh(const HypothesisImages& images, std::span<const float> scales,
+                           const std::vector<cl_uint>& active) {
   Device::Impl& d = impl_of(device_);
   std::vector<float> fits;
   for (std::size_t view = 0; view < images.views; ++view) {
@@ -95,11 +80,10 @@ NormalSums::Sums NormalSums::weigh(const HypothesisImages& images, std::span<con
   active_.upload(d, active);
   residuals_.resize(d, 4 * images.views * pixels_);
   const std::size_t count = 1 + k_channels * light_sums();
-  const bool is_gpu = width_ == 1;
-  return sum(count, 1, active.size(), [&](std::size_t items) {
+  return sums_.sum(count, 1, active.size(), [&](std::size_t items, Buffer<float>& into) {
     launch_(items, kernel::normal_loss{.pixels = to_uint(pixels_),
                                        .views = to_uint(active.size()),
-                                       .slots = to_uint(slots_),
+                                       .slots = to_uint(sums_.slots()),
                                        .background = background_,
                                        .active = active_,
                                        .fits = fits_,
@@ -108,23 +92,23 @@ NormalSums::Sums NormalSums::weigh(const HypothesisImages& images, std::span<con
                                        .target = target_,
                                        .weights = weights_,
                                        .residuals = residuals_,
-                                       .sums = slot_sums_});
+                                       .sums = into});
     if (terms_ == 0) return;
-    (*launch_light_)((is_gpu ? 2 * k_channels : 1) * items,
+    (*launch_light_)((sums_.is_gpu() ? 2 * k_channels : 1) * items,
                      kernel::normal_light{.pixels = to_uint(pixels_),
                                           .views = to_uint(active.size()),
-                                          .slots = to_uint(slots_),
+                                          .slots = to_uint(sums_.slots()),
                                           .background = background_,
                                           .active = active_,
                                           .colors = images.colors,
                                           .normals = images.normals,
                                           .target = target_,
                                           .residuals = residuals_,
-                                          .sums = slot_sums_});
+                                          .sums = into});
   });
 }
 
-void NormalSums::solve(const Sums& sums, std::size_t place, Lights& lights) const {
+void NormalSums::solve(const ViewSums& sums, std::size_t place, Lights& lights) const {
   const auto terms = static_cast<Eigen::Index>(terms_);
   std::size_t number = 1;  // behind the loss
   for (ChannelLight& channel : lights) {
@@ -150,7 +134,7 @@ std::vector<double> NormalSums::fit(const HypothesisImages& images, std::span<co
   const std::vector<float> squares(images.views);  // have the first light
   std::vector<double> losses(images.views, std::numeric_limits<double>::infinity());
   for (int step = terms_ > 0 ? 0 : 1; !active.empty(); ++step) {
-    const Sums sums = weigh(images, step == 0 ? squares : scales, active);
+    const ViewSums sums = weigh(images, step == 0 ? squares : scales, active);
     std::vector<cl_uint> falling;
     for (std::size_t i = 0; i < active.size(); ++i) {
       const cl_uint view = active[i];
@@ -169,25 +153,31 @@ std::vector<double> NormalSums::fit(const HypothesisImages& images, std::span<co
   return losses;
 }
 
-std::vector<double> NormalSums::losses(const HypothesisImages& images, float scale) {
-  std::vector<double> losses = fit(images, std::vector<float>(images.views, scale));
-  for (double& loss : losses) loss /= static_cast<double>(k_channels) * weight_;
+std::vector<double> NormalSums::losses(const HypothesisImages& images, const LossScales& scales) {
+  std::vector<double> losses = fit(images, std::vector<float>(images.views, scales.color));
+  if (measured_) {
+    const std::vector<double> others =
+        measured_->losses(images.colors, images.depths, images.views, scales.measured);
+    for (std::size_t view = 0; view < images.views; ++view) losses[view] += others[view];
+  }
+  for (double& loss : losses) loss /= total_;
   return losses;
 }
 
 void NormalSums::project(const HypothesisImages& images) {
   Device::Impl& d = impl_of(device_);
   const std::size_t size = k_channels * terms_;
-  const Sums sums = sum(directions_ * size, directions_, images.views, [&](std::size_t items) {
-    (*launch_light_)(items, kernel::normal_cross{.pixels = to_uint(pixels_),
-                                                 .views = to_uint(images.views),
-                                                 .slots = to_uint(slots_),
-                                                 .colors = images.colors,
-                                                 .normals = images.normals,
-                                                 .residuals = residuals_,
-                                                 .lit = lit_,
-                                                 .sums = slot_sums_});
-  });
+  const ViewSums sums =
+      sums_.sum(directions_ * size, directions_, images.views, [&](std::size_t items, Buffer<float>& into) {
+        (*launch_light_)(items, kernel::normal_cross{.pixels = to_uint(pixels_),
+                                                     .views = to_uint(images.views),
+                                                     .slots = to_uint(sums_.slots()),
+                                                     .colors = images.colors,
+                                                     .normals = images.normals,
+                                                     .residuals = residuals_,
+                                                     .lit = lit_,
+                                                     .sums = into});
+      });
   std::vector<float> taken;  // [direction][view][channel][term]
   Eigen::VectorXd right(static_cast<Eigen::Index>(terms_));
   for (std::size_t direction = 0; direction < directions_; ++direction) {
@@ -202,41 +192,47 @@ void NormalSums::project(const HypothesisImages& images) {
   }
   taken_.upload(d, taken);
   left_.resize(d, directions_ * images.views * k_channels * pixels_);
-  (*launch_light_)(moved_items(images.views), kernel::normal_left{.pixels = to_uint(pixels_),
-                                                                  .views = to_uint(images.views),
-                                                                  .taken = taken_,
-                                                                  .colors = images.colors,
-                                                                  .normals = images.normals,
-                                                                  .lit = lit_,
-                                                                  .left = left_});
+  (*launch_light_)(sums_.vectors(directions_ * images.views),
+                   kernel::normal_left{.pixels = to_uint(pixels_),
+                                       .views = to_uint(images.views),
+                                       .taken = taken_,
+                                       .colors = images.colors,
+                                       .normals = images.normals,
+                                       .lit = lit_,
+                                       .left = left_});
 }
 
 std::vector<NormalEquations> NormalSums::linearize(const HypothesisImages& images,
-                                                   const HypothesisTangents& tangents, float scale) {
-  const std::vector<double> losses = this->losses(images, scale);
+                                                   const HypothesisTangents& tangents,
+                                                   const LossScales& scales) {
+  const std::vector<double> losses = this->losses(images, scales);
   lit_.resize(impl_of(device_), directions_ * images.views * k_channels * pixels_);
-  launch_(moved_items(images.views), kernel::normal_lit{.pixels = to_uint(pixels_),
-                                                        .views = to_uint(images.views),
-                                                        .background = background_,
-                                                        .fits = fits_,
-                                                        .colors = images.colors,
-                                                        .normals = images.normals,
-                                                        .tangents = tangents.colors,
-                                                        .normal_tangents = tangents.normals,
-                                                        .lit = lit_});
+  launch_(sums_.vectors(directions_ * images.views), kernel::normal_lit{.pixels = to_uint(pixels_),
+                                                                        .views = to_uint(images.views),
+                                                                        .background = background_,
+                                                                        .fits = fits_,
+                                                                        .colors = images.colors,
+                                                                        .normals = images.normals,
+                                                                        .tangents = tangents.colors,
+                                                                        .normal_tangents = tangents.normals,
+                                                                        .lit = lit_});
   if (terms_ > 0) project(images);
+  if (measured_) measured_->move(tangents.colors, tangents.depths, directions_, images.views);
   const std::size_t n = directions_, products = triangle(n);
-  const std::size_t parts = width_ == 1 ? products : 1;
-  const Sums sums = sum(n + 2 * products, parts, images.views, [&](std::size_t items) {
-    launch_(items, kernel::normal_equations{.pixels = to_uint(pixels_),
-                                            .views = to_uint(images.views),
-                                            .slots = to_uint(slots_),
-                                            .residuals = residuals_,
-                                            .lit = lit_,
-                                            .left = terms_ > 0 ? left_ : lit_,
-                                            .sums = slot_sums_});
-  });
-  const double part = 1 / (static_cast<double>(k_channels) * weight_);
+  const std::size_t parts = sums_.is_gpu() ? products : 1;
+  const ViewSums sums =
+      sums_.sum(n + 2 * products, parts, images.views, [&](std::size_t items, Buffer<float>& into) {
+        launch_(items, kernel::normal_equations{.pixels = to_uint(pixels_),
+                                                .views = to_uint(images.views),
+                                                .slots = to_uint(sums_.slots()),
+                                                .residuals = residuals_,
+                                                .measured = measured_ ? measured_->residuals() : residuals_,
+                                                .lit = lit_,
+                                                .left = terms_ > 0 ? left_ : lit_,
+                                                .moved = measured_ ? measured_->derivatives() : lit_,
+                                                .sums = into});
+      });
+  const double part = 1 / total_;
   std::vector<NormalEquations> result(images.views);
   for (std::size_t view = 0; view < images.views; ++view) {
     NormalEquations& e = result[view];
@@ -254,13 +250,13 @@ std::vector<NormalEquations> NormalSums::linearize(const HypothesisImages& image
 }
 
 ScoreCells NormalSums::score_cells(const HypothesisImages& images, const HypothesisTangents& tangents,
-                                   float scale, std::size_t width) {
+                                   const LossScales& scales, std::size_t width) {
   constexpr std::size_t k_least_side = 4, k_most_cells = 64;  // pixels; along an axis
   Device::Impl& d = impl_of(device_);
   const std::size_t height = pixels_ / width, n = directions_;
   ScoreCells result;
-  result.equations = linearize(images, tangents, scale).front();
-  result.weight = 1 / (static_cast<double>(k_channels) * weight_);
+  result.equations = linearize(images, tangents, scales).front();
+  result.weight = 1 / total_;
   result.side = std::max(k_least_side, (std::max(width, height) + k_most_cells - 1) / k_most_cells);
   result.columns = (width + result.side - 1) / result.side;
   const std::size_t cells = result.columns * ((height + result.side - 1) / result.side);
@@ -270,19 +266,23 @@ ScoreCells NormalSums::score_cells(const HypothesisImages& images, const Hypothe
     units.push_back(h > 0 ? static_cast<float>(result.weight / h) : 0.0F);
   }
   units_.upload(d, units);
-  slot_sums_.resize(d, (n + k_cell_sums) * cells);
+  cells_.resize(d, (n + k_cell_sums) * cells);
   if (!launch_cells_) launch_cells_.emplace(d);
-  (*launch_cells_)(slot_sums_.size(), kernel::normal_cells{.directions = to_uint(n),
-                                                           .pixels = to_uint(pixels_),
-                                                           .width = to_uint(width),
-                                                           .side = to_uint(result.side),
-                                                           .cells = to_uint(cells),
-                                                           .units = units_,
-                                                           .weights = weights_,
-                                                           .residuals = residuals_,
-                                                           .left = terms_ > 0 ? left_ : lit_,
-                                                           .sums = slot_sums_});
-  const std::vector<float> sums = slot_sums_.download();
+  (*launch_cells_)(cells_.size(),
+                   kernel::normal_cells{.directions = to_uint(n),
+                                        .pixels = to_uint(pixels_),
+                                        .width = to_uint(width),
+                                        .side = to_uint(result.side),
+                                        .cells = to_uint(cells),
+                                        .kinds = to_uint(measured_ ? MeasuredSums::k_kinds : 0),
+                                        .units = units_,
+                                        .weights = weights_,
+                                        .residuals = residuals_,
+                                        .measured = measured_ ? measured_->residuals() : residuals_,
+                                        .left = terms_ > 0 ? left_ : lit_,
+                                        .moved = measured_ ? measured_->derivatives() : lit_,
+                                        .sums = cells_});
+  const std::vector<float> sums = cells_.download();
   const auto of = [&](std::size_t number) {
     return sums.begin() + static_cast<std::ptrdiff_t>(number * cells);
   };
@@ -292,49 +292,29 @@ ScoreCells NormalSums::score_cells(const HypothesisImages& images, const Hypothe
   if (whole > 0) result.kept = std::accumulate(of(n), of(n + 1), 0.0) / whole;
   result.residuals.assign(of(n + 2), of(n + 5));
   result.squares = std::accumulate(of(n + 5), of(n + 6), 0.0);
-  result.median = medians(images).front().value_or(0.0F);
-  return result;
-}
-
-std::vector<std::optional<float>> NormalSums::medians(const HypothesisImages& images) {
-  // Bits of numbers that are not negative are in the numbers' order: they are found from the first on, four a
-  // pass. Those that are left are below 1e-4 of the number.
-  constexpr unsigned k_bits = 4, k_first_shift = 27, k_last_shift = 7;
-  static_assert(1U << k_bits == k_thresholds);
-  constexpr auto k_infinity = std::bit_cast<cl_uint>(std::numeric_limits<float>::infinity());
-  std::vector<cl_uint> bits(images.views);
-  std::vector<double> middle(images.views);  // number of sizes below the median
-  std::vector<std::optional<float>> result(images.views);
-  for (unsigned shift = k_first_shift; shift >= k_last_shift; shift -= k_bits) {
-    std::vector<float> thresholds;
-    for (const cl_uint first : bits) {
-      for (cl_uint k = 1; k <= k_thresholds; ++k)
-        thresholds.push_back(std::bit_cast<float>(std::min(first + (k << shift), k_infinity)));
-    }
-    thresholds_.upload(impl_of(device_), thresholds);
-    const Sums sums = sum(k_thresholds, 1, images.views, [&](std::size_t items) {
-      launch_(items, kernel::normal_counts{.pixels = to_uint(pixels_),
-                                           .views = to_uint(images.views),
-                                           .slots = to_uint(slots_),
-                                           .thresholds = thresholds_,
-                                           .colors = images.colors,
-                                           .residuals = residuals_,
-                                           .sums = slot_sums_});
-    });
-    for (std::size_t view = 0; view < images.views; ++view) {
-      if (shift == k_first_shift) middle[view] = std::floor(sums.at(k_thresholds - 1, view) / 2);
-      cl_uint k = 0;
-      while (k + 1 < k_thresholds && sums.at(k, view) <= middle[view]) ++k;
-      bits[view] += k << shift;
-      if (sums.at(k_thresholds - 1, view) > 0) result[view] = std::bit_cast<float>(bits[view]);
-    }
+  if (counts_colors_) {
+    result.median = medians(images).front().value_or(0.0F);
+  } else {
+    const std::vector<std::optional<float>> of_kinds = measured_->medians(1);
+    result.median = of_kinds[0] ? *of_kinds[0] : of_kinds[1].value_or(0.0F);
   }
   return result;
 }
 
+std::vector<std::optional<float>> NormalSums::medians(const HypothesisImages& images) {
+  return sums_.medians(images.views, 1,
+                       [&](std::size_t items, Buffer<float>& into, const Buffer<float>& thresholds) {
+                         launch_(items, kernel::normal_counts{.pixels = to_uint(pixels_),
+                                                              .views = to_uint(images.views),
+                                                              .slots = to_uint(sums_.slots()),
+                                                              .thresholds = thresholds,
+                                                              .colors = images.colors,
+                                                              .residuals = residuals_,
+                                                              .sums = into});
+                       });
+}
+
 std::vector<float> NormalSums::scales(const HypothesisImages& images) {
-  constexpr float k_normal =
-      1.4826F;  // a normal distribution's standard deviation over the median of the sizes
   std::vector<float> scales(images.views);
   for (int i = 0; i < k_scale_iterations; ++i) {
     fit(images, scales);
@@ -343,6 +323,16 @@ std::vector<float> NormalSums::scales(const HypothesisImages& images) {
       scales[view] = medians[view] ? std::max(k_scale * k_normal * *medians[view], k_least_scale) : 0;
   }
   return scales;
+}
+
+std::vector<MeasuredDeviations> NormalSums::deviations(const HypothesisImages& images) {
+  std::vector<MeasuredDeviations> result(images.views);
+  measured_->losses(images.colors, images.depths, images.views, {});
+  const std::vector<std::optional<float>> medians = measured_->medians(images.views);
+  for (std::size_t i = 0; i < medians.size(); ++i) {
+    if (medians[i]) result[i / MeasuredSums::k_kinds][i % MeasuredSums::k_kinds] = k_normal * *medians[i];
+  }
+  return result;
 }
 
 void NormalSums::average(const Buffer<cl_float4>& images, std::size_t width, std::size_t samples,

@@ -11,9 +11,10 @@
 
 #include "kernels/normal_cells.hpp"
 #include "kernels/normal_equations.hpp"
+#include "solve/measured_sums.hpp"
 #include "solve/pose_light.hpp"
 #include "solve/pose_space.hpp"
-#include "stages/reduce.hpp"
+#include "solve/slot_sums.hpp"
 
 namespace dpr {
 
@@ -30,19 +31,31 @@ struct HypothesisImages {
   std::size_t views;
   const Buffer<cl_float4>& colors;   ///< [view][pixel] RGBA; where light is found, unlit over black
   const Buffer<cl_float4>& normals;  ///< [view][pixel] object space, over black; where harmonics are found
+  const Buffer<cl_float4>& depths;   ///< [view][pixel] along the camera's axis, over black; where some count
 };
 
 /// Derivatives of hypotheses' images by their parameters.
 struct HypothesisTangents {
-  const Buffer<cl_float4>&colors, &normals;  ///< [direction][view][pixel]
+  const Buffer<cl_float4>&colors, &normals, &depths;  ///< [direction][view][pixel]
 };
 
-/// Colours and weights of a target's pixels.
+/// Colours and weights of a target's pixels, and what else was measured there.
 struct WeighedTarget {
   std::vector<cl_float4> colors;
-  std::vector<float> weights;  ///< in [0, 1]
+  std::vector<float> weights;  ///< of colours, in [0, 1]; all 0: colours do not count
   glm::vec3 background{0.0F};
+  /// Coverage, its weight, depth, its weight, these in [0, 1]; empty: neither.
+  std::vector<cl_float4> measured{};
 };
+
+/// Scale of the robust loss of colours, a colour difference, 0: squares; and how coverage and depth count beside them.
+struct LossScales {
+  float color = 0;
+  MeasuredWeights measured{};
+};
+
+/// Standard deviations of residuals by their medians; none where there are no residuals.
+using MeasuredDeviations = std::array<std::optional<float>, MeasuredSums::k_kinds>;
 
 /// What the uncertainty of a hypothesis is judged from.
 struct ScoreCells {
@@ -59,25 +72,31 @@ struct ScoreCells {
 };
 
 /// The loss is the mean over colour channels and pixels of squares, or of their robust version (Geman and McClure
-/// 1985), the light being the best one (pose_light.hpp).
+/// 1985), the light being the best one (pose_light.hpp); to which coverage and depth add theirs, summed over pixels
+/// and divided by the same number. Where colours do not count, it is the mean over the pixels whose coverage counts,
+/// or else those whose depth does.
 class NormalSums {
  public:
   /// `directions`: number of parameters of a hypothesis.
   NormalSums(const Device& device, const WeighedTarget& target, PoseLight light, std::size_t directions);
 
-  /// Losses of every view. `scale`: of the robust loss, a colour difference; 0: squares.
-  std::vector<double> losses(const HypothesisImages& images, float scale);
+  /// Losses of every view.
+  std::vector<double> losses(const HypothesisImages& images, const LossScales& scales);
   std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,
-                                         float scale);
+                                         const LossScales& scales);
   /// Of a single view, in images of that width. 4 n + 24 bytes a cell come back; there are at most 64 x 64.
-  ScoreCells score_cells(const HypothesisImages& images, const HypothesisTangents& tangents, float scale,
-                         std::size_t width);
+  ScoreCells score_cells(const HypothesisImages& images, const HypothesisTangents& tangents,
+                         const LossScales& scales, std::size_t width);
   /// Scales for the robust loss, one a view, from the residuals that it leaves where it shows the object; 0 of a
   /// view that shows nothing.
   std::vector<float> scales(const HypothesisImages& images);
+  /// Of coverages that differ from the silhouette, and of depths where the object shows, one a view.
+  std::vector<MeasuredDeviations> deviations(const HypothesisImages& images);
 
   /// [view][channel] of the last losses() or linearize().
   std::span<const std::array<ChannelLight, 3>> lights() const { return lights_; }
+  /// What sums over pixels are divided by.
+  double total() const { return total_; }
 
   /// Means of blocks of samples x samples, in images of a width of so many blocks.
   void average(const Buffer<cl_float4>& images, std::size_t width, std::size_t samples,
@@ -85,38 +104,24 @@ class NormalSums {
 
  private:
   using Lights = std::array<ChannelLight, 3>;
-  struct Sums {
-    double at(std::size_t number, std::size_t view) const {
-      return static_cast<double>(values[number * views + view]);
-    }
-
-    std::vector<float> values;  // [number][view]
-    std::size_t views;
-  };
-
-  std::string options() const;
-  /// Work-items of kernels that have one for each vector of pixels of the tangents.
-  std::size_t moved_items(std::size_t views) const;
-  /// Adds up what a kernel sums, whose launch with so many work-items is given: so many numbers of every view,
-  /// by so many parts.
-  template <typename Launch>
-  Sums sum(std::size_t count, std::size_t parts, std::size_t views, const Launch& launch);
+  std::string options(bool has_measured) const;
   /// Finds the views' lights, and leaves their residuals on the device; returns the losses, summed.
   std::vector<double> fit(const HypothesisImages& images, std::span<const float> scales);
   /// Residuals and their weights, of the active views in their lights; sums the loss and, for each channel, what
   /// its next light is found from.
-  Sums weigh(const HypothesisImages& images, std::span<const float> scales,
-             const std::vector<cl_uint>& active);
+  ViewSums weigh(const HypothesisImages& images, std::span<const float> scales,
+                 const std::vector<cl_uint>& active);
   std::size_t light_sums() const;  ///< of a channel
   /// Lights of the active view at that place.
-  void solve(const Sums& sums, std::size_t place, Lights& lights) const;
+  void solve(const ViewSums& sums, std::size_t place, Lights& lights) const;
   /// Finds `left_` from `lit_`.
   void project(const HypothesisImages& images);
   /// Medians of the residuals' sizes where a view shows the object.
   std::vector<std::optional<float>> medians(const HypothesisImages& images);
 
-  std::size_t pixels_, terms_, directions_, slots_, width_;
-  double weight_ = 0;  // of all pixels
+  std::size_t pixels_, terms_, directions_;
+  double total_ = 0;
+  bool counts_colors_ = false;
   cl_float4 background_;
   Device device_;
   Launcher<kernel::normal_loss, kernel::normal_counts, kernel::normal_lit, kernel::normal_equations,
@@ -124,11 +129,12 @@ class NormalSums {
       launch_;
   std::optional<Launcher<kernel::normal_cells>> launch_cells_;  // made when first asked for
   std::optional<Launcher<kernel::normal_light, kernel::normal_cross, kernel::normal_left>> launch_light_;
-  Reduce reduce_;
+  std::optional<MeasuredSums> measured_;
+  SlotSums sums_;
   std::vector<Lights> lights_;  // [view]
   Buffer<cl_float4> target_;
-  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, thresholds_, slot_sums_, units_;
-  Buffer<cl_uint> active_, starts_;
+  Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, cells_, units_;
+  Buffer<cl_uint> active_;
 };
 
 }  // namespace dpr

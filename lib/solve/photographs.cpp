@@ -233,7 +233,7 @@ std::optional<ColorGain> find_gain(const Device& device, Scene scene, const Shap
   }
   const Buffer<cl_float4>& image = last_frame(renderer, "find_gain").image;
   NormalSums sums(device, target, PoseLight::gain, 1);
-  static_cast<void>(sums.losses({1, image, image}, robust_scale));
+  static_cast<void>(sums.losses({1, image, image, image}, {robust_scale}));
   ColorGain found;
   for (int c = 0; c < 3; ++c) {
     const ChannelLight& light = sums.lights().front()[static_cast<std::size_t>(c)];

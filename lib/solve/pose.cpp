@@ -47,11 +47,11 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
     : device_(std::move(device)), scene_(std::move(scene)), target_(target), options_(std::move(options)) {
   require(scene_.meshes.size() == 1, "number of meshes (pose)", scene_.meshes.size(), "1");
   validate(scene_);
-  if (target_.width != scene_.width || target_.height != scene_.height) {
-    throw InvalidArgument("size of the target (pose)", checks::size(target_.width, target_.height),
-                          checks::size(scene_.width, scene_.height) + ", the scene's");
+  const auto* least_squares = std::get_if<LeastSquares>(&options_.method);
+  if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares)) {
+    require_size(target_, scene_, "target");
+    checks::require_pixels(target_, "target (pose)");
   }
-  checks::require_pixels(target_, "target (pose)");
   require(options_.explained > 0 && options_.explained < 1, "explained (pose)", options_.explained,
           "a number in (0, 1)");
   if (options_.solve_focal) require_least_squares(options_, "focal length (pose)");

@@ -9,6 +9,7 @@
 #include "renderer/frame.hpp"
 #include "solve/level_scene.hpp"
 #include "solve/polar.hpp"
+#include "solve/pose_pyramid.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr {
@@ -19,6 +20,29 @@ constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
 constexpr double k_color_channels = 3;
+constexpr std::size_t k_coverage = 0, k_depth = 1;  // kinds of MeasuredWeights
+
+/// The object without colours and light, its vertices with room for depths in place of colours.
+Scene shape_alone(Scene scene) {
+  Mesh& mesh = scene.meshes.front().mesh;
+  Mesh shape;
+  shape.positions = std::move(mesh.positions);
+  shape.faces = std::move(mesh.faces);
+  shape.vertex_colors.resize(shape.positions.size());
+  mesh = std::move(shape);
+  scene.lights.reset();
+  scene.background = glm::vec3(0);
+  return scene;
+}
+
+/// That of one of sixteen is less: the very best may fit by luck. Empty: 0.
+float best_of(std::vector<float> numbers) {
+  constexpr std::ptrdiff_t k_best = 16;
+  if (numbers.empty()) return 0;
+  const auto best = numbers.begin() + std::ssize(numbers) / k_best;
+  std::ranges::nth_element(numbers, best);
+  return *best;
+}
 
 std::size_t pixels_of(const Scene& scene) {
   return static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
@@ -31,9 +55,17 @@ glm::vec3 rgb(const cl_float4& color) { return {color.s[0], color.s[1], color.s[
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
                      const LeastSquares& options, const PoseSpace& space, const LevelShape& shape,
                      PoseLight light, CornerNormals normals)
-    : space_(space), samples_(shape.samples), colors_{Renderer(device)} {
+    : space_(space),
+      samples_(shape.samples),
+      colors_{Renderer(device)},
+      counts_colors_(!target.pixels.empty()),
+      trusts_coverage_(!options.robust && (counts_colors_ || !options.silhouette.image.pixels.empty())),
+      factors_{options.silhouette.weight, options.depth.weight} {
   const Scene whole = level_scene(scene, space, options, shape, light);
   const std::vector<View> lenses = space.seen_through_lenses(whole.camera);
+  const auto show = [&](Images& images, const Scene& shown) {
+    images.renderer.set_scene(subdivide_for_lens(shown, {}, lenses).scene);
+  };
   scene_ = subdivide_for_lens(whole, {}, lenses).scene;
   colors_.renderer.set_scene(scene_);
   if (light == PoseLight::harmonics) {
@@ -41,20 +73,47 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
     Instance& object = colored.meshes.front();
     const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
     object.mesh = colored_by_normals(object.mesh, stretch, normals);
-    normals_.emplace(Images{Renderer(device)})
-        .renderer.set_scene(subdivide_for_lens(colored, {}, lenses).scene);
+    show(normals_.emplace(Images{Renderer(device)}), colored);
   }
+  if (!options.depth.image.pixels.empty())
+    show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shape_alone(whole));
   target_.background = scene.background;
-  for (const glm::vec4& p : resample(target, width(), height()).pixels) {
-    target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+  const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
+                                                 : resample(options.mask, width(), height());
+  if (counts_colors_) {
+    for (const glm::vec4& p : resample(target, width(), height()).pixels)
+      target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+    for (const glm::vec4& p : mask.pixels) target_.weights.push_back(p.x);
+  } else {
+    target_.colors.resize(mask.pixels.size());
+    target_.weights.resize(mask.pixels.size());
   }
-  target_.weights.assign(target_.colors.size(), 1.0F);
-  if (!options.mask.pixels.empty()) {
-    const Image mask = resample(options.mask, width(), height());
-    std::ranges::transform(mask.pixels, target_.weights.begin(), [](const glm::vec4& p) { return p.x; });
-  }
-  for (const float w : target_.weights) weight_ += static_cast<double>(w);
+  if (dpr::has_observations(options)) target_.measured = measured(options, mask);
   sums_.emplace(device, target_, light, space.size());
+}
+
+std::vector<cl_float4> PoseLevel::measured(const LeastSquares& options, const Image& mask) const {
+  std::vector<cl_float4> result(mask.pixels.size());
+  const auto add = [&](const Image& known, std::size_t kind) {
+    const Image image = resample_weighted(known, width(), height());
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      result[i].s[2 * kind] = image.pixels[i].x;
+      result[i].s[2 * kind + 1] = image.pixels[i].w * mask.pixels[i].x;
+    }
+  };
+  Image silhouette = options.silhouette.image, depth = options.depth.image;
+  for (glm::vec4& p : silhouette.pixels) p.w = 1;
+  for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
+  if (silhouette.pixels.empty() && !counts_colors_) {
+    silhouette = depth;
+    for (glm::vec4& p : silhouette.pixels) {
+      const bool is_near = std::abs(static_cast<double>(p.x) - space_.distance()) <= space_.reach();
+      p = glm::vec4(1, 0, 0, p.w > 0 && is_near ? 1 : 0);
+    }
+  }
+  if (!silhouette.pixels.empty()) add(silhouette, k_coverage);
+  if (!depth.pixels.empty()) add(depth, k_depth);
+  return result;
 }
 
 double PoseLevel::pixel_ndc() const { return 2.0 / std::min(width(), height()); }
@@ -77,6 +136,7 @@ std::vector<View> PoseLevel::views_of(std::span<const Hypothesis> hypotheses) co
 
 const Buffer<cl_float4>& PoseLevel::render(Images& images, std::span<const View> views) {
   images.renderer.set_views(views);
+  if (images.shows_depths) show_depths(images.renderer);
   images.renderer.forward();
   const Buffer<cl_float4>& samples = last_frame(images.renderer, "PoseLevel").image;
   return samples_ == 1 ? samples : averaged(samples, images.means);
@@ -89,8 +149,11 @@ const Buffer<cl_float4>& PoseLevel::averaged(const Buffer<cl_float4>& samples, B
 
 HypothesisImages PoseLevel::render(std::span<const Hypothesis> hypotheses) {
   const std::vector<View> views = views_of(hypotheses);
-  const Buffer<cl_float4>& colors = render(colors_, views);
-  return {views.size(), colors, normals_ ? render(*normals_, views) : colors};
+  const Buffer<cl_float4>* const depths = depths_ ? &render(*depths_, views) : nullptr;
+  // Of depths alone the coverage will do.
+  const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : render(colors_, views);
+  return {views.size(), colors, normals_ ? render(*normals_, views) : colors,
+          depths != nullptr ? *depths : colors};
 }
 
 std::pair<HypothesisImages, HypothesisTangents> PoseLevel::render_tangents(
@@ -105,28 +168,56 @@ std::pair<HypothesisImages, HypothesisTangents> PoseLevel::render_tangents(
     const Buffer<cl_float4>& samples = last_tangents(of.renderer, directions, "PoseLevel");
     return samples_ == 1 ? samples : averaged(samples, of.tangents);
   };
-  const Buffer<cl_float4>& colors = tangents_of(colors_);
-  return {images, {colors, normals_ ? tangents_of(*normals_) : colors}};
+  const Buffer<cl_float4>* const depths = depths_ ? &tangents_of(*depths_) : nullptr;
+  const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : tangents_of(colors_);
+  return {images, {colors, normals_ ? tangents_of(*normals_) : colors, depths != nullptr ? *depths : colors}};
 }
 
 void PoseLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
-  constexpr std::ptrdiff_t k_best = 16;  // one of so many: the very best may fit by luck
+  scales_.color = best_color_scale(hypotheses);
+}
+
+float PoseLevel::best_color_scale(std::span<const Hypothesis> hypotheses) {
   std::vector<float> scales;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
     std::ranges::copy_if(sums_->scales(render(batch)), std::back_inserter(scales),
                          [](float scale) { return scale > 0; });
   });
-  scale_ = 0;
-  if (scales.empty()) return;
-  const auto best = scales.begin() + std::ssize(scales) / k_best;
-  std::ranges::nth_element(scales, best);
-  scale_ = *best;
+  return best_of(std::move(scales));
+}
+
+void PoseLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
+  constexpr float k_scale = 4;  // deviations, of robust losses
+  // What pixels leave of coverage anywhere; parts of a pixel's side, of depth.
+  constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
+  constexpr float k_coverage_scale = 0.5F;
+  if (!has_observations()) return;
+  std::array<std::vector<float>, MeasuredSums::k_kinds> found;
+  in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
+    for (const MeasuredDeviations& deviations : sums_->deviations(render(batch))) {
+      for (std::size_t kind = 0; kind < found.size(); ++kind)
+        if (deviations[kind]) found[kind].push_back(*deviations[kind]);
+    }
+  });
+  const auto pixel = static_cast<float>(space_.radius() / space_.radius_ndc() * pixel_ndc());
+  const std::array<float, 2> deviations{std::max(best_of(found[k_coverage]), k_least_coverage),
+                                        std::max(best_of(found[k_depth]), k_least_of_pixel * pixel)};
+  const float of_colors = counts_colors_ ? best_color_scale(hypotheses) / k_scale : 0;
+  const auto counts = [&](const cl_float4& m) { return m.s[1] > 0; };
+  const bool counts_coverage = std::ranges::any_of(target_.measured, counts);
+  const float unit = of_colors > 0 ? of_colors : deviations[counts_coverage ? k_coverage : k_depth];
+  for (std::size_t kind = 0; kind < deviations.size(); ++kind) {
+    const float ratio = unit / deviations[kind];
+    scales_.measured[kind].weight = factors_[kind] * ratio * ratio;
+  }
+  scales_.measured[k_coverage].scale = trusts_coverage_ ? 0 : k_coverage_scale;
+  scales_.measured[k_depth].scale = k_scale * deviations[k_depth];
 }
 
 std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {
   std::vector<double> result;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
-    std::ranges::copy(sums_->losses(render(batch), scale_), std::back_inserter(result));
+    std::ranges::copy(sums_->losses(render(batch), scales_), std::back_inserter(result));
   });
   return result;
 }
@@ -135,32 +226,40 @@ std::vector<NormalEquations> PoseLevel::linearize(std::span<const Hypothesis> hy
   std::vector<NormalEquations> result;
   in_batches(hypotheses, space_.size() + 1, [&](std::span<const Hypothesis> batch) {
     const auto [images, tangents] = render_tangents(batch);
-    std::ranges::copy(sums_->linearize(images, tangents, scale_), std::back_inserter(result));
+    std::ranges::copy(sums_->linearize(images, tangents, scales_), std::back_inserter(result));
   });
   return result;
 }
 
 ScoreCells PoseLevel::score_cells(const Hypothesis& hypothesis) {
   const auto [images, tangents] = render_tangents({&hypothesis, 1});
-  return sums_->score_cells(images, tangents, scale_, static_cast<std::size_t>(width()));
+  return sums_->score_cells(images, tangents, scales_, static_cast<std::size_t>(width()));
 }
 
 double PoseLevel::blank_loss() const {
   const std::size_t pixels = target_.colors.size();
+  const auto robust = [](double squared, float scale) {
+    return squared / (1 + (scale > 0 ? squared / std::pow(static_cast<double>(scale), 2) : 0));
+  };
+  double observed = 0;  // nothing is covered
+  const ResidualWeight& coverage = scales_.measured[k_coverage];
+  for (const cl_float4& m : target_.measured) {
+    const auto wanted = static_cast<double>(m.s[0]), counts = static_cast<double>(m.s[1]);
+    observed += counts * static_cast<double>(coverage.weight) * robust(wanted * wanted, coverage.scale);
+  }
+  const double weight = sums_->total() / k_color_channels;
   glm::dvec3 mean(0.0);
   for (std::size_t i = 0; i < pixels; ++i)
-    mean += glm::dvec3(rgb(target_.colors[i]) * target_.weights[i]) / weight_;
-  const double inverse = scale_ > 0 ? 1 / std::pow(static_cast<double>(scale_), 2) : 0;
+    mean += glm::dvec3(rgb(target_.colors[i]) * target_.weights[i]) / weight;
   const auto loss_of = [&](const glm::dvec3& color) {
     double sum = 0;
     for (std::size_t i = 0; i < pixels; ++i) {
       const glm::dvec3 residual = color - glm::dvec3(rgb(target_.colors[i]));
-      const double squared = glm::dot(residual, residual);
-      sum += static_cast<double>(target_.weights[i]) * squared / (1 + squared * inverse);
+      sum += static_cast<double>(target_.weights[i]) * robust(glm::dot(residual, residual), scales_.color);
     }
-    return sum / (k_color_channels * weight_);
+    return sum;
   };
-  return std::min(loss_of(target_.background), loss_of(mean));
+  return (std::min(loss_of(target_.background), loss_of(mean)) + observed) / sums_->total();
 }
 
 }  // namespace dpr

@@ -1,7 +1,8 @@
 // One level of the pose solver's pyramid: renders hypotheses at its resolution and compares them with the
-// target.
+// target and with what else was observed.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -19,10 +20,11 @@ namespace dpr {
 
 class PoseLevel {
  public:
+  /// An empty target: colours do not count.
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
             const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals);
 
-  /// The mean squared error over colour channels and pixels, or its robust version, of every hypothesis.
+  /// The loss of every hypothesis (NormalSums).
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
   /// The same with derivatives.
   std::vector<NormalEquations> linearize(std::span<const Hypothesis> hypotheses);
@@ -34,9 +36,14 @@ class PoseLevel {
   /// hypotheses leave at the object, beyond which a pixel hardly counts. Without any hypothesis that shows
   /// the object, squares stay.
   void estimate_scale(std::span<const Hypothesis> hypotheses);
-  /// Sets the scale of the robust loss, a colour difference; 0: squared differences.
-  void set_scale(float scale) { scale_ = scale; }
-  float scale() const { return scale_; }
+  /// Weighs coverage and depth beside colours, each kind by the inverse variance that the best of the hypotheses leave,
+  /// from medians. Does nothing without either.
+  void weigh_observations(std::span<const Hypothesis> hypotheses);
+  bool has_observations() const { return !target_.measured.empty(); }
+  /// Scales of the losses; those of colours 0: squared differences.
+  void set_scales(const LossScales& scales) { scales_ = scales; }
+  void set_color_scale(float scale) { scales_.color = scale; }
+  const LossScales& scales() const { return scales_; }
   /// The loss of the better of two pictures without an object: the scene's background, and the target's mean
   /// colour.
   double blank_loss() const;
@@ -50,6 +57,7 @@ class PoseLevel {
   /// A renderer of a level, and what becomes of its images.
   struct Images {
     Renderer renderer;
+    bool shows_depths = false;
     Buffer<cl_float4> means{}, tangents{};
   };
 
@@ -61,6 +69,9 @@ class PoseLevel {
   /// Images of views, pixels being means over their samples.
   const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
   const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
+  float best_color_scale(std::span<const Hypothesis> hypotheses);
+  /// What was observed beside colours, at the level's size.
+  std::vector<cl_float4> measured(const LeastSquares& options, const Image& mask) const;
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
   /// The same beside their tangents.
   std::pair<HypothesisImages, HypothesisTangents> render_tangents(std::span<const Hypothesis> hypotheses);
@@ -69,11 +80,12 @@ class PoseLevel {
   int samples_;
   Scene scene_;  // of the samples' size
   Images colors_;
-  std::optional<Images> normals_;
+  std::optional<Images> normals_, depths_;
+  bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
+  std::array<float, 2> factors_;          // on the weights of coverage and depth
   WeighedTarget target_;
   std::optional<NormalSums> sums_;
-  double weight_ = 0;
-  float scale_ = 0;
+  LossScales scales_;
 };
 
 }  // namespace dpr

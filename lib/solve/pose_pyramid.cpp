@@ -9,6 +9,38 @@
 
 namespace dpr {
 
+namespace {
+
+bool is_empty(const Image& image) { return image.pixels.empty(); }
+
+void validate_depth(const Image& depth) {
+  if (std::ranges::none_of(depth.pixels, has_depth)) {
+    throw InvalidArgument(
+        "depth (pose)", "no pixel that has one",
+        "distances along the camera's axis in the first channel; 0 or NaN where there is none");
+  }
+  for (const glm::vec4& pixel : depth.pixels) {
+    if (has_depth(pixel))
+      require(pixel.x > 0, "depth (pose)", pixel.x, "a distance along the camera's axis, or 0 for none");
+  }
+}
+
+}  // namespace
+
+bool has_observations(const LeastSquares& options) {
+  return !is_empty(options.silhouette.image) || !is_empty(options.depth.image);
+}
+
+bool has_depth(const glm::vec4& pixel) {
+  return pixel.w > 0 && pixel.x != 0 && std::isfinite(pixel.x) && std::isfinite(pixel.w);
+}
+
+void require_size(const Image& image, const Scene& scene, const std::string& name) {
+  if (image.width == scene.width && image.height == scene.height) return;
+  throw InvalidArgument("size of the " + name + " (pose)", checks::size(image.width, image.height),
+                        checks::size(scene.width, scene.height) + ", the scene's");
+}
+
 void validate(const LeastSquares& options, const Scene& scene) {
   constexpr unsigned k_most_rotations = 1U << 24;
   require(options.rotations <= k_most_rotations, "rotations (pose)", options.rotations, "at most 2^24");
@@ -20,13 +52,21 @@ void validate(const LeastSquares& options, const Scene& scene) {
           "a finite number above 0");
   require(options.robust_scale >= 0 && std::isfinite(options.robust_scale), "robust_scale (pose)",
           options.robust_scale, "a finite number, at least 0");
-  const Image& mask = options.mask;
-  if (mask.pixels.empty()) return;
-  if (mask.width != scene.width || mask.height != scene.height) {
-    throw InvalidArgument("size of the mask (pose)", checks::size(mask.width, mask.height),
-                          checks::size(scene.width, scene.height) + ", the scene's");
+  const auto validate_weights = [&](const Image& image, const char* name, const char* expected) {
+    if (is_empty(image)) return;
+    require_size(image, scene, name);
+    checks::require_weights(image, checks::in(name, "pose"), 1, expected);
+  };
+  validate_weights(options.mask, "mask", "a number in [0, 1]");
+  validate_weights(options.silhouette.image, "silhouette", "a coverage in [0, 1]");
+  if (!is_empty(options.depth.image)) {
+    require_size(options.depth.image, scene, "depth");
+    validate_depth(options.depth.image);
   }
-  checks::require_weights(mask, "mask (pose)", 1, "a number in [0, 1]");
+  for (const PoseObservation* observation : {&options.silhouette, &options.depth}) {
+    require(observation->weight >= 0 && std::isfinite(observation->weight), "weight (pose)",
+            observation->weight, "a finite number, at least 0");
+  }
 }
 
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {

@@ -1,6 +1,7 @@
 // The levels of the search for a pose, as its options have them.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "dpr/pose.hpp"
@@ -8,8 +9,15 @@
 
 namespace dpr {
 
-/// Throws InvalidArgument for options out of range; the mask must have the scene's size.
+/// Throws InvalidArgument for options out of range; images must have the scene's size.
 void validate(const LeastSquares& options, const Scene& scene);
+/// Throws InvalidArgument for an image of another size than the scene's.
+void require_size(const Image& image, const Scene& scene, const std::string& name);
+
+/// True if there is a silhouette or a depth.
+bool has_observations(const LeastSquares& options);
+/// True if a pixel of a depth image has one.
+bool has_depth(const glm::vec4& pixel);
 
 /// From coarse to fine: the resolution doubles; the last level is the finest once more, with the final blur.
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options);

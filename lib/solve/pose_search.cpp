@@ -47,6 +47,7 @@ class Fit {
         target_(target),
         options_(options),
         method_(std::get<LeastSquares>(options.method)),
+        light_wanted_(target.pixels.empty() ? PoseLight::fixed : method_.light),
         callback_(callback),
         beam_(method_.robust ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
@@ -71,7 +72,8 @@ class Fit {
   LevelShape final_shape(LevelShape shape) const;
   bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
   float light_gain(PoseLevel& level, const LevelShape& shape) const;
-  void make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
+  void rescale(PoseLevel& level);
+  void set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
   std::vector<Hypothesis> hypotheses() const { return hypotheses_of(candidates_); }
   std::vector<Hypothesis> grid(std::size_t rotations) const;
   /// Refines all candidates at a level and keeps the best distinct ones.
@@ -91,6 +93,7 @@ class Fit {
   const Image& target_;
   const PoseOptions& options_;
   const LeastSquares& method_;
+  PoseLight light_wanted_;  // fixed of a target without colours
   const PoseSolver::Callback& callback_;
   const Beam& beam_;
   std::vector<Pose> initial_;
@@ -100,7 +103,7 @@ class Fit {
   CornerNormals normals_ = CornerNormals::parted;
   bool goes_on_ = true;
   std::vector<Candidate> candidates_;
-  double wrong_ = 0;  // loss of a pose that explains nothing, at the coarsest or the finest level
+  double wrong_ = 0;  // loss of a pose that explains nothing
   PoseResult result_;
 };
 
@@ -108,18 +111,18 @@ PoseResult Fit::run(bool anywhere) {
   result_.start = initial_.front();
   const std::vector<LevelShape> shapes = level_shapes(scene_, method_);
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
-    light_ = method_.light;
+    light_ = light_wanted_;
     descend(shapes, *found);
     choose_normals(shapes[shapes.size() - 2]);
   }
   PoseLevel level = make_level(final_shape(shapes.back()), light_);
-  make_robust(level, hypotheses());
+  rescale(level);
   drop_hopeless_at(level, 0, k_last_hope);
   work(level, beam_.back());
   if (anywhere) try_half_turns(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
-  sampled.set_scale(level.scale());
+  sampled.set_scales(level.scales());
   wrong_ = wrong_loss(sampled);
   const bool is_doubted = anywhere && is_doubtful(candidates_, space_, enough_to_equal());
   finish(level, anywhere);
@@ -141,10 +144,10 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
     const bool is_known = light_ == PoseLight::fixed || i > 0 || is_finest;
     PoseLevel level = make_level(shapes[i], is_known ? light_ : PoseLight::gain);
     if (i == 0) start(level);
-    if (i > 0) make_robust(level, hypotheses());
+    if (i > 0) rescale(level);
     if (i > 0 && light_ != PoseLight::fixed) add_others(level, i == found.level ? found.candidates : none);
     work(level, beam_[std::min(i + 1, beam_.size() - 1)]);
-    if (!goes_on_ || light_ != PoseLight::fixed || method_.light == PoseLight::fixed) continue;
+    if (!goes_on_ || light_ != PoseLight::fixed || light_wanted_ == PoseLight::fixed) continue;
     constexpr float k_better = 0.7F;
     if (is_finest ? light_gain(level, shapes[i]) < k_better : i > 0 && is_unexplained(level, shapes[i]))
       return Found{std::move(candidates_), i};
@@ -190,16 +193,18 @@ bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape) const {
   constexpr double k_unexplained = 0.2, k_doubtful = 0.1;  // of what a wrong pose leaves
   constexpr float k_much_better = 0.5F;
   if (method_.robust) return false;
+  // Losses of levels whose observations differ in weight do not compare.
+  if (level.has_observations()) return light_gain(level, shape) < k_much_better;
   const double part = candidates_.front().equations.loss / wrong_;
   return part > k_unexplained || (part > k_doubtful && light_gain(level, shape) < k_much_better);
 }
 
 /// Residual of most of the object in a light of its own, relative to the residual in the scene's light.
 float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
-  PoseLevel lit = make_level(shape, method_.light);
+  PoseLevel lit = make_level(shape, light_wanted_);
   level.estimate_scale(hypotheses());
   lit.estimate_scale(hypotheses());
-  return level.scale() > 0 ? lit.scale() / level.scale() : 1;
+  return level.scales().color > 0 ? lit.scales().color / level.scales().color : 1;
 }
 
 /// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
@@ -208,11 +213,11 @@ void Fit::choose_normals(const LevelShape& shape) {
   const bool are_given = !scene_.meshes.front().mesh.face_normals.empty();
   if (light_ != PoseLight::harmonics || are_given) return;
   PoseLevel parted = make_level(shape, light_);
-  make_robust(parted, hypotheses());
+  set_scales(parted, hypotheses());
   const double loss = std::ranges::min(parted.losses(hypotheses()));
   normals_ = CornerNormals::smooth;
   PoseLevel smooth = make_level(shape, light_);
-  smooth.set_scale(parted.scale());
+  smooth.set_scales(parted.scales());
   if (std::ranges::min(smooth.losses(hypotheses())) < loss) {
     work(smooth, beam_.back());
   } else {
@@ -224,9 +229,9 @@ void Fit::choose_normals(const LevelShape& shape) {
 /// explains the target better.
 LevelShape Fit::final_shape(LevelShape shape) const {
   PoseLevel sampled = make_level(shape, light_);
-  make_robust(sampled, hypotheses());
+  set_scales(sampled, hypotheses());
   const auto least_loss = [&](PoseLevel& level) {
-    level.set_scale(sampled.scale());
+    level.set_scales(sampled.scales());
     return std::ranges::min(level.losses(hypotheses()));
   };
   const double loss = least_loss(sampled);
@@ -240,18 +245,25 @@ LevelShape Fit::final_shape(LevelShape shape) const {
   return shape;
 }
 
-void Fit::make_robust(PoseLevel& level, std::span<const Hypothesis> hypotheses) const {
-  if (!method_.robust) return;
+void Fit::set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const {
+  level.weigh_observations(hypotheses);
+  if (!method_.robust || target_.pixels.empty()) return;
   if (method_.robust_scale > 0) {
-    level.set_scale(method_.robust_scale);
+    level.set_color_scale(method_.robust_scale);
   } else {
     // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
     // residuals of wrong hypotheses have it, clutter would count.
     constexpr float k_least_robust_scale = 0.1F, k_most_robust_scale = 0.12F;
     level.estimate_scale(hypotheses);
-    if (level.scale() > 0)
-      level.set_scale(std::clamp(level.scale(), k_least_robust_scale, k_most_robust_scale));
+    const float scale = level.scales().color;
+    if (scale > 0) level.set_color_scale(std::clamp(scale, k_least_robust_scale, k_most_robust_scale));
   }
+}
+
+/// By the candidates. Losses in which observations have other weights are others.
+void Fit::rescale(PoseLevel& level) {
+  set_scales(level, hypotheses());
+  if (level.has_observations()) wrong_ = wrong_loss(level);
 }
 
 /// At the initial translation.
@@ -268,7 +280,7 @@ void Fit::start(PoseLevel& level) {
   constexpr std::size_t k_enough = 144;  // to know the scale
   std::vector<Hypothesis> some = grid(std::min<std::size_t>(method_.rotations, k_enough));
   for (const Pose& pose : initial_) some.push_back({pose});
-  make_robust(level, some);
+  set_scales(level, some);
   wrong_ = wrong_loss(level);
   const std::vector<Hypothesis> grid = this->grid(method_.rotations);
   const std::vector<double> losses = level.losses(grid);
@@ -323,7 +335,7 @@ void Fit::finish(PoseLevel& level, bool anywhere) {
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   const ScoreCells cells = level.score_cells(candidates_.front().hypothesis);
   NormalEquations equations = cells.equations;
-  equations.scatter = score_scatter(cells, space_.size(), level.scale());
+  equations.scatter = score_scatter(cells, space_.size(), level.scales().color);
   result_.covariance = covariance(equations, space_.size());
   if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
   result_.light = light_;

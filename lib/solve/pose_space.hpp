@@ -46,7 +46,10 @@ class PoseSpace {
   /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
   std::vector<double> to_world(std::span<const double> covariance) const;
 
-  double radius() const { return radius_; }  ///< of the object about its origin, world
+  double radius() const { return radius_; }      ///< of the object about its origin, world
+  double distance() const { return distance_; }  ///< of the initial place along the camera's axis
+  /// How far from there along the axis a point of the object may be.
+  double reach() const { return translation_ ? 2 * radius_ : radius_; }
   double radius_ndc() const { return radius_ndc_; }
 
  private:

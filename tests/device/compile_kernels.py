@@ -39,9 +39,10 @@ def option_sets(kernels):
     of_exact, of_sampled = ([f"-DDPR_PRIOR={name}" for name in names] for names in (exact, sampled))
     joint = [[f"-DDPR_OCCUPANCY_PRIOR={occupancy}", f"-DDPR_DEPTH_PRIOR={depth}"] for occupancy in sampled for depth in sampled]
     fits = [[f"-DDPR_TERMS={terms}", f"-DDPR_DIRECTIONS={directions}"] for terms in [0, 2, 10] for directions in [3, 6, 9]]
+    measured = [[*fit, "-DDPR_MEASURED=1"] for fit in fits]
     return {"aggregate.cl": [[prior] for prior in of_exact], "aggregate_joint.cl": [[prior] for prior in of_exact],
             "aggregate_sampled.cl": [[prior] for prior in of_sampled], "aggregate_joint_sampled.cl": joint,
-            "normal_equations.cl": fits, "occupancy.cl": [list(pair) for pair in itertools.product(of_exact, WIDTHS)],
+            "normal_equations.cl": fits + measured, "normal_measured.cl": measured, "occupancy.cl": [list(pair) for pair in itertools.product(of_exact, WIDTHS)],
             "occupancy_sampled.cl": [list(pair) for pair in itertools.product(of_sampled, WIDTHS)], "shade_lit.cl": SHADING,
             "shade_lit_tangent.cl": SHADING}
 

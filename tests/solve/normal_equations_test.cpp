@@ -242,7 +242,7 @@ struct Run {
         normals(impl_of(device), c.normals),
         tangents(impl_of(device), c.tangents),
         normal_tangents(impl_of(device), c.normal_tangents),
-        images{c.views, colors, normals} {}
+        images{c.views, colors, normals, colors} {}
 
   NormalSums sums;
   Buffer<cl_float4> colors, normals, tangents, normal_tangents;
@@ -282,8 +282,8 @@ TEST_SUITE("unit") {
             const Case c(test::is_reduced() ? 77 : 1337, directions, light, scale);
             Run run(c, device);
             const std::vector<NormalEquations> found =
-                run.sums.linearize(run.images, {run.tangents, run.normal_tangents}, scale);
-            CHECK(run.sums.losses(run.images, scale)[1] == found[1].loss);
+                run.sums.linearize(run.images, {run.tangents, run.normal_tangents, run.tangents}, {scale});
+            CHECK(run.sums.losses(run.images, {scale})[1] == found[1].loss);
             for (std::size_t view = 0; view < c.views; ++view) {
               const NormalEquations expected = Reference(c, view, static_cast<double>(scale)).equations();
               CHECK(found[view].loss == doctest::Approx(expected.loss).epsilon(1e-6));
