@@ -25,9 +25,10 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, mask, loss = "mse", optimizer = "adam", schedule = "anneal",
-                                                     light = "harmonics", output, report;
+  std::string scene, target, initial_rotation, mask, silhouette, depth,
+      loss = "mse", optimizer = "adam", schedule = "anneal", light = "harmonics", output, report;
   std::optional<std::string> method;
+  std::optional<float> depth_scale;
   bool search = false;
   PoseOptions solver;
   LeastSquares least_squares;
@@ -121,6 +122,25 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   }
 }
 
+/// Reads what is compared beside colours; returns the image of these, empty without one.
+Image read_observations(PoseCommandOptions& options, const CommonOptions& common, const Scene& scene) {
+  if (options.depth_scale && options.depth.empty())
+    throw InvalidArgument("--depth-scale (command line)", "no --depth", "the file whose unit it is");
+  if (auto* method = std::get_if<LeastSquares>(&options.solver.method)) {
+    if (!options.silhouette.empty()) method->silhouette.image = read_silhouette(options.silhouette, scene);
+    if (!options.depth.empty()) method->depth.image = read_depth(options.depth, options.depth_scale, scene);
+  }
+  if (!options.target.empty())
+    return read_target(options.target, options.descent.loss, common.encoding(), scene);
+  if (options.silhouette.empty() && options.depth.empty()) {
+    throw InvalidArgument("--target (command line)", "none",
+                          "an image that shows the pose, or --silhouette, or --depth");
+  }
+  if (!options.report.empty())
+    throw InvalidArgument("--report (command line)", "no --target", "one, which it shows beside the result");
+  return {};
+}
+
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // The outputs are checked before the work.
   require_writable(options.output);
@@ -131,7 +151,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   }
   choose_method(command, options);
   const Scene scene = read_scene(options.scene, common);
-  const Image target = read_target(options.target, options.descent.loss, common.encoding(), scene);
+  const Image target = read_observations(options, common, scene);
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
@@ -175,8 +195,27 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
           "look")
       ->group(k_least_squares_group)
       ->type_name("harmonics|gain|fixed");
-  add("--mask", options.mask, "Image whose first channel is the weight of every pixel, in [0, 1]",
+  add("--mask", options.mask,
+      "Image whose first channel is the weight of every pixel, in [0, 1], in all comparisons: what lies "
+      "outside is not looked at",
       "MASK.png");
+  add("--silhouette", options.silhouette,
+      "Image of where the object is, 1, and where it is not, 0, which the render's coverage should match: in "
+      "its alpha, if that is below 1 anywhere, or else in its first channel. Beside --target, or without",
+      "IMAGE");
+  add("--silhouette-weight", method.silhouette.weight,
+      "Factor on the weight that the residuals give it, their inverse variance; 1 by default", "FLOAT");
+  add("--depth", options.depth,
+      "Image whose first channel is the distance along the camera's axis, as --aov depth of dpr render "
+      "writes it; 0 or NaN where it is not known. Beside --target, or without",
+      "DEPTH.exr");
+  add("--depth-scale", options.depth_scale,
+      "Length of a 1 of that file, in the scene's units: 0.001 for a 16-bit PNG of millimetres and a scene "
+      "of "
+      "metres; files of whole numbers need one",
+      "FLOAT");
+  add("--depth-weight", method.depth.weight, "Factor on the weight that the residuals give it; 1 by default",
+      "FLOAT");
   command
       .add_flag("--focal", options.solver.solve_focal, "Look for a factor on the camera's focal length too")
       ->group(k_least_squares_group);
@@ -206,12 +245,13 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
 }  // namespace
 
 void add_pose_command(CLI::App& application, CommonOptions& common) {
-  CLI::App* command =
-      application.add_subcommand("pose", "Finds the pose of a scene's only mesh from one image");
+  CLI::App* command = application.add_subcommand(
+      "pose", "Finds the pose of a scene's only mesh from one image, a silhouette or depths");
   const auto options = std::make_shared<PoseCommandOptions>();
   command->add_option("--scene", options->scene, "Scene file")->required()->type_name("S.json");
-  command->add_option("--target", options->target, "Image that shows the pose")
-      ->required()
+  command
+      ->add_option("--target", options->target,
+                   "Image that shows the pose; may be left out with --silhouette or --depth")
       ->type_name("T.exr");
   CLI::Option* initial =
       command

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -149,7 +150,10 @@ Image read(const std::string& file, std::span<const unsigned char> content, Pixe
   }
   // A JPEG file that ends too soon is read to its end, grey below, and is an error by its message alone.
   if (input->has_error()) throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
-  facts = {source[3] >= 0, spec.format.is_floating_point()};
+  const bool floats = spec.format.is_floating_point();
+  constexpr int k_bits = 8;  // of a byte
+  const float largest = floats ? 1.0F : std::exp2(static_cast<float>(k_bits * spec.format.size())) - 1;
+  facts = {source[3] >= 0, floats, largest};
   return upright(std::move(image), spec.get_int_attribute("Orientation", 1));
 }
 

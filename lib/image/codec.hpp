@@ -26,6 +26,7 @@ struct PixelFormat {
 struct PixelFacts {
   bool has_alpha = false;
   bool floats = false;  ///< or else whole numbers, as parts of the largest one
+  float largest = 1;    ///< what that is; 1 of floats
 };
 
 /// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module
@@ -50,6 +51,9 @@ Texture decode_texture(const std::string& name, std::string_view content);
 
 /// The content of a PNG file of the texture, as write_texture() writes it; an IoError names that file.
 std::string encode_texture(const std::filesystem::path& file, const Texture& texture);
+
+/// The pixels as they are stored, finite or not. Throws IoError.
+Image read_pixels(const std::filesystem::path& file, PixelFacts& facts);
 
 /// Throws IoError unless the extension is of a format that write_image() knows: to be called before the work.
 void require_image_format(const std::filesystem::path& file);

@@ -84,14 +84,19 @@ const ImageCodec& png() {
 }
 
 /// As ImageCodec::read. Messages call the file `name`.
-Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
-           Encoding encoding, PixelFacts& facts) {
-  Image image;
+Image read_stored(const std::filesystem::path& name, const std::string& file,
+                  std::span<const unsigned char> content, PixelFacts& facts) {
   try {
-    image = openimageio().read(file, content, facts);
+    return openimageio().read(file, content, facts);
   } catch (const std::runtime_error& error) {
     throw IoError(name, error.what());
   }
+}
+
+/// The same, finite and linear.
+Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
+           Encoding encoding, PixelFacts& facts) {
+  Image image = read_stored(name, file, content, facts);
   require_finite(name, image);
   if (encoding == Encoding::srgb && !facts.floats) {
     for (glm::vec4& pixel : image.pixels) pixel = transferred(pixel, decode_srgb);
@@ -114,6 +119,11 @@ Image image_of(const Texture& texture) {
 }
 
 }  // namespace
+
+Image read_pixels(const std::filesystem::path& file, PixelFacts& facts) {
+  require_file(file);
+  return read_stored(file, file.string(), {}, facts);
+}
 
 Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts) {
   require_file(file);

@@ -49,15 +49,15 @@ void MeasuredSums::move(const Buffer<cl_float4>& tangents, const Buffer<cl_float
 }
 
 std::vector<std::optional<float>> MeasuredSums::medians(std::size_t views) {
-  return sums_.medians(views, k_kinds,
-                       [&](std::size_t items, Buffer<float>& into, const Buffer<float>& thresholds) {
-                         launch_(items, kernel::normal_measured_counts{.pixels = to_uint(sums_.pixels()),
-                                                                       .views = to_uint(views),
-                                                                       .slots = to_uint(sums_.slots()),
-                                                                       .thresholds = thresholds,
-                                                                       .measured = measured_,
-                                                                       .sums = into});
-                       });
+  return sums_.quantiles(0.5, views, k_kinds,
+                         [&](std::size_t items, Buffer<float>& into, const Buffer<float>& thresholds) {
+                           launch_(items, kernel::normal_measured_counts{.pixels = to_uint(sums_.pixels()),
+                                                                         .views = to_uint(views),
+                                                                         .slots = to_uint(sums_.slots()),
+                                                                         .thresholds = thresholds,
+                                                                         .measured = measured_,
+                                                                         .sums = into});
+                         });
 }
 
 }  // namespace dpr

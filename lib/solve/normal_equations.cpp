@@ -31,6 +31,10 @@ std::size_t terms_of(PoseLight light) {
 
 // A normal distribution's standard deviation over the median of the sizes.
 constexpr float k_normal = 1.4826F;
+constexpr double k_half = 0.5;
+// Colours are compared by squares, to which large residuals matter: most are below so many standard deviations.
+constexpr double k_most = 0.9;
+constexpr float k_most_deviations = 1.645F;
 
 constexpr std::size_t triangle(std::size_t n) { return n * (n + 1) / 2; }
 
@@ -293,7 +297,7 @@ ScoreCells NormalSums::score_cells(const HypothesisImages& images, const Hypothe
   result.residuals.assign(of(n + 2), of(n + 5));
   result.squares = std::accumulate(of(n + 5), of(n + 6), 0.0);
   if (counts_colors_) {
-    result.median = medians(images).front().value_or(0.0F);
+    result.median = quantiles(k_half, images).front().value_or(0.0F);
   } else {
     const std::vector<std::optional<float>> of_kinds = measured_->medians(1);
     result.median = of_kinds[0] ? *of_kinds[0] : of_kinds[1].value_or(0.0F);
@@ -301,36 +305,43 @@ ScoreCells NormalSums::score_cells(const HypothesisImages& images, const Hypothe
   return result;
 }
 
-std::vector<std::optional<float>> NormalSums::medians(const HypothesisImages& images) {
-  return sums_.medians(images.views, 1,
-                       [&](std::size_t items, Buffer<float>& into, const Buffer<float>& thresholds) {
-                         launch_(items, kernel::normal_counts{.pixels = to_uint(pixels_),
-                                                              .views = to_uint(images.views),
-                                                              .slots = to_uint(sums_.slots()),
-                                                              .thresholds = thresholds,
-                                                              .colors = images.colors,
-                                                              .residuals = residuals_,
-                                                              .sums = into});
-                       });
+std::vector<std::optional<float>> NormalSums::quantiles(double part, const HypothesisImages& images) {
+  return sums_.quantiles(part, images.views, 1,
+                         [&](std::size_t items, Buffer<float>& into, const Buffer<float>& thresholds) {
+                           launch_(items, kernel::normal_counts{.pixels = to_uint(pixels_),
+                                                                .views = to_uint(images.views),
+                                                                .slots = to_uint(sums_.slots()),
+                                                                .thresholds = thresholds,
+                                                                .colors = images.colors,
+                                                                .residuals = residuals_,
+                                                                .sums = into});
+                         });
 }
 
 std::vector<float> NormalSums::scales(const HypothesisImages& images) {
   std::vector<float> scales(images.views);
   for (int i = 0; i < k_scale_iterations; ++i) {
     fit(images, scales);
-    const std::vector<std::optional<float>> medians = this->medians(images);
+    const std::vector<std::optional<float>> medians = quantiles(k_half, images);
     for (std::size_t view = 0; view < images.views; ++view)
       scales[view] = medians[view] ? std::max(k_scale * k_normal * *medians[view], k_least_scale) : 0;
   }
   return scales;
 }
 
-std::vector<MeasuredDeviations> NormalSums::deviations(const HypothesisImages& images) {
-  std::vector<MeasuredDeviations> result(images.views);
+std::vector<Deviations> NormalSums::deviations(const HypothesisImages& images) {
+  std::vector<Deviations> result(images.views);
+  if (counts_colors_) {
+    fit(images, std::vector<float>(images.views));
+    const std::vector<std::optional<float>> most = quantiles(k_most, images);
+    for (std::size_t view = 0; view < images.views; ++view) {
+      if (most[view]) result[view][0] = std::max(*most[view] / k_most_deviations, k_least_scale / k_scale);
+    }
+  }
   measured_->losses(images.colors, images.depths, images.views, {});
   const std::vector<std::optional<float>> medians = measured_->medians(images.views);
   for (std::size_t i = 0; i < medians.size(); ++i) {
-    if (medians[i]) result[i / MeasuredSums::k_kinds][i % MeasuredSums::k_kinds] = k_normal * *medians[i];
+    if (medians[i]) result[i / MeasuredSums::k_kinds][1 + i % MeasuredSums::k_kinds] = k_normal * *medians[i];
   }
   return result;
 }

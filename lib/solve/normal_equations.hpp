@@ -54,8 +54,8 @@ struct LossScales {
   MeasuredWeights measured{};
 };
 
-/// Standard deviations of residuals by their medians; none where there are no residuals.
-using MeasuredDeviations = std::array<std::optional<float>, MeasuredSums::k_kinds>;
+/// Standard deviations of residuals of colours, coverage and depth; none where there are no residuals.
+using Deviations = std::array<std::optional<float>, 1 + MeasuredSums::k_kinds>;
 
 /// What the uncertainty of a hypothesis is judged from.
 struct ScoreCells {
@@ -90,8 +90,9 @@ class NormalSums {
   /// Scales for the robust loss, one a view, from the residuals that it leaves where it shows the object; 0 of a
   /// view that shows nothing.
   std::vector<float> scales(const HypothesisImages& images);
-  /// Of coverages that differ from the silhouette, and of depths where the object shows, one a view.
-  std::vector<MeasuredDeviations> deviations(const HypothesisImages& images);
+  /// Of what squares leave, one a view: of colours where the object shows, from what nine of ten are below; of
+  /// coverages that differ from the silhouette, and of depths where the object shows, from medians.
+  std::vector<Deviations> deviations(const HypothesisImages& images);
 
   /// [view][channel] of the last losses() or linearize().
   std::span<const std::array<ChannelLight, 3>> lights() const { return lights_; }
@@ -116,8 +117,8 @@ class NormalSums {
   void solve(const ViewSums& sums, std::size_t place, Lights& lights) const;
   /// Finds `left_` from `lit_`.
   void project(const HypothesisImages& images);
-  /// Medians of the residuals' sizes where a view shows the object.
-  std::vector<std::optional<float>> medians(const HypothesisImages& images);
+  /// Quantiles of the residuals' sizes where a view shows the object.
+  std::vector<std::optional<float>> quantiles(double part, const HypothesisImages& images);
 
   std::size_t pixels_, terms_, directions_;
   double total_ = 0;

@@ -57,6 +57,7 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
                      PoseLight light, CornerNormals normals)
     : space_(space),
       samples_(shape.samples),
+      is_finest_(shape.short_side == std::min(scene.width, scene.height)),
       colors_{Renderer(device)},
       counts_colors_(!target.pixels.empty()),
       trusts_coverage_(!options.robust && (counts_colors_ || !options.silhouette.image.pixels.empty())),
@@ -174,44 +175,45 @@ std::pair<HypothesisImages, HypothesisTangents> PoseLevel::render_tangents(
 }
 
 void PoseLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
-  scales_.color = best_color_scale(hypotheses);
-}
-
-float PoseLevel::best_color_scale(std::span<const Hypothesis> hypotheses) {
   std::vector<float> scales;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
     std::ranges::copy_if(sums_->scales(render(batch)), std::back_inserter(scales),
                          [](float scale) { return scale > 0; });
   });
-  return best_of(std::move(scales));
+  scales_.color = best_of(std::move(scales));
 }
 
 void PoseLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   constexpr float k_scale = 4;  // deviations, of robust losses
-  // What pixels leave of coverage anywhere; parts of a pixel's side, of depth.
-  constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
   constexpr float k_coverage_scale = 0.5F;
+  // What pixels leave of coverage anywhere; and in parts of a pixel's side, of depth.
+  constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
+  // What residuals say beyond this, before the finest level, is how wrong the poses are.
+  constexpr float k_most_coverage = 0.25F, k_most_of_pixel = 1;
   if (!has_observations()) return;
-  std::array<std::vector<float>, MeasuredSums::k_kinds> found;
+  std::array<std::vector<float>, std::tuple_size_v<Deviations>> found;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
-    for (const MeasuredDeviations& deviations : sums_->deviations(render(batch))) {
+    for (const Deviations& deviations : sums_->deviations(render(batch))) {
       for (std::size_t kind = 0; kind < found.size(); ++kind)
         if (deviations[kind]) found[kind].push_back(*deviations[kind]);
     }
   });
   const auto pixel = static_cast<float>(space_.radius() / space_.radius_ndc() * pixel_ndc());
-  const std::array<float, 2> deviations{std::max(best_of(found[k_coverage]), k_least_coverage),
-                                        std::max(best_of(found[k_depth]), k_least_of_pixel * pixel)};
-  const float of_colors = counts_colors_ ? best_color_scale(hypotheses) / k_scale : 0;
-  const auto counts = [&](const cl_float4& m) { return m.s[1] > 0; };
-  const bool counts_coverage = std::ranges::any_of(target_.measured, counts);
-  const float unit = of_colors > 0 ? of_colors : deviations[counts_coverage ? k_coverage : k_depth];
-  for (std::size_t kind = 0; kind < deviations.size(); ++kind) {
-    const float ratio = unit / deviations[kind];
-    scales_.measured[kind].weight = factors_[kind] * ratio * ratio;
-  }
+  const float of_colors = best_of(found[0]);
+  float of_coverage = std::max(best_of(found[1]), k_least_coverage);
+  float of_depth = std::max(best_of(found[2]), k_least_of_pixel * pixel);
   scales_.measured[k_coverage].scale = trusts_coverage_ ? 0 : k_coverage_scale;
-  scales_.measured[k_depth].scale = k_scale * deviations[k_depth];
+  scales_.measured[k_depth].scale = k_scale * of_depth;
+  if (!is_finest_) {
+    of_coverage = std::min(of_coverage, k_most_coverage);
+    of_depth = std::min(of_depth, k_most_of_pixel * pixel);
+  }
+  const bool counts_coverage =
+      std::ranges::any_of(target_.measured, [](const cl_float4& m) { return m.s[1] > 0; });
+  const float unit = of_colors > 0 ? of_colors : counts_coverage ? of_coverage : of_depth;
+               hypotheses.size(), double(of_colors), double(of_coverage), double(of_depth));
+  scales_.measured[k_coverage].weight = factors_[k_coverage] * std::pow(unit / of_coverage, 2.0F);
+  scales_.measured[k_depth].weight = factors_[k_depth] * std::pow(unit / of_depth, 2.0F);
 }
 
 std::vector<double> PoseLevel::losses(std::span<const Hypothesis> hypotheses) {

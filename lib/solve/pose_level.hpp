@@ -69,7 +69,6 @@ class PoseLevel {
   /// Images of views, pixels being means over their samples.
   const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
   const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
-  float best_color_scale(std::span<const Hypothesis> hypotheses);
   /// What was observed beside colours, at the level's size.
   std::vector<cl_float4> measured(const LeastSquares& options, const Image& mask) const;
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
@@ -78,6 +77,7 @@ class PoseLevel {
 
   const PoseSpace& space_;
   int samples_;
+  bool is_finest_;
   Scene scene_;  // of the samples' size
   Images colors_;
   std::optional<Images> normals_, depths_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/checks.hpp"
 #include "solve/levenberg_marquardt.hpp"
@@ -13,15 +14,26 @@ namespace {
 
 bool is_empty(const Image& image) { return image.pixels.empty(); }
 
-void validate_depth(const Image& depth) {
-  if (std::ranges::none_of(depth.pixels, has_depth)) {
+/// Some depth lies in the camera's range: a wrong unit shows here.
+void validate_depth(const Image& depth, const Camera& camera) {
+  float nearest = std::numeric_limits<float>::infinity(), furthest = -nearest;
+  bool is_in_range = false;
+  for (const glm::vec4& pixel : depth.pixels) {
+    if (!has_depth(pixel)) continue;
+    nearest = std::min(nearest, pixel.x);
+    furthest = std::max(furthest, pixel.x);
+    is_in_range = is_in_range || (pixel.x >= camera.znear && pixel.x <= camera.zfar);
+  }
+  if (nearest > furthest) {
     throw InvalidArgument(
         "depth (pose)", "no pixel that has one",
         "distances along the camera's axis in the first channel; 0 or NaN where there is none");
   }
-  for (const glm::vec4& pixel : depth.pixels) {
-    if (has_depth(pixel))
-      require(pixel.x > 0, "depth (pose)", pixel.x, "a distance along the camera's axis, or 0 for none");
+  require(nearest > 0, "depth (pose)", nearest, "a distance along the camera's axis, or 0 for none");
+  if (!is_in_range) {
+    throw InvalidArgument("depth (pose)", checks::text(nearest) + " to " + checks::text(furthest),
+                          "some from znear to zfar, " + checks::text(camera.znear) + " to " +
+                              checks::text(camera.zfar) + ", in the scene's units");
   }
 }
 
@@ -61,12 +73,13 @@ void validate(const LeastSquares& options, const Scene& scene) {
   validate_weights(options.silhouette.image, "silhouette", "a coverage in [0, 1]");
   if (!is_empty(options.depth.image)) {
     require_size(options.depth.image, scene, "depth");
-    validate_depth(options.depth.image);
+    validate_depth(options.depth.image, scene.camera);
   }
-  for (const PoseObservation* observation : {&options.silhouette, &options.depth}) {
-    require(observation->weight >= 0 && std::isfinite(observation->weight), "weight (pose)",
-            observation->weight, "a finite number, at least 0");
-  }
+  const auto validate_factor = [](float weight, const char* name) {
+    require(weight >= 0 && std::isfinite(weight), name, weight, "a finite number, at least 0");
+  };
+  validate_factor(options.silhouette.weight, "silhouette_weight (pose)");
+  validate_factor(options.depth.weight, "depth_weight (pose)");
 }
 
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {

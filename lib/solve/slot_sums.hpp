@@ -1,4 +1,4 @@
-// Sums of kernels over images' pixels, by slots that reduce.cl adds up, and medians found from counts.
+// Sums of kernels over images' pixels, by slots that reduce.cl adds up, and quantiles found from counts.
 #pragma once
 
 #include <algorithm>
@@ -44,17 +44,18 @@ class SlotSums {
     return {reduce_.read({{views * slots_, count, views, 1, starts_, values_}}).front(), views};
   }
 
-  /// Medians of sizes, [view][kind]; none where there are none. `launch` is that of a kernel which counts, in
-  /// [kind][threshold], sizes below thresholds[view][kind][threshold], with these as its third argument.
+  /// Sizes that so large a part of all are below, [view][kind]; none where there are none. `launch` is that of a
+  /// kernel which counts, in [kind][threshold], sizes below thresholds[view][kind][threshold], its third argument.
   template <typename Launch>
-  std::vector<std::optional<float>> medians(std::size_t views, std::size_t kinds, const Launch& launch) {
+  std::vector<std::optional<float>> quantiles(double part, std::size_t views, std::size_t kinds,
+                                              const Launch& launch) {
     // Bits of numbers that are not negative are in the numbers' order: they are found from the first on, four a
     // pass. Those that are left are below 1e-4 of the number.
     constexpr unsigned k_bits = 4, k_first_shift = 27, k_last_shift = 7;
     static_assert(1U << k_bits == k_thresholds);
     constexpr auto k_infinity = std::bit_cast<cl_uint>(std::numeric_limits<float>::infinity());
     std::vector<cl_uint> bits(views * kinds);
-    std::vector<double> middle(bits.size());  // number of sizes below the median
+    std::vector<double> middle(bits.size());  // number of sizes below the quantile
     std::vector<std::optional<float>> result(bits.size());
     for (unsigned shift = k_first_shift; shift >= k_last_shift; shift -= k_bits) {
       std::vector<float> thresholds;
@@ -67,7 +68,7 @@ class SlotSums {
                                 [&](std::size_t items, auto& into) { launch(items, into, thresholds_); });
       for (std::size_t i = 0; i < bits.size(); ++i) {
         const auto below = [&](cl_uint k) { return sums.at(i % kinds * k_thresholds + k, i / kinds); };
-        if (shift == k_first_shift) middle[i] = std::floor(below(k_thresholds - 1) / 2);
+        if (shift == k_first_shift) middle[i] = std::floor(part * below(k_thresholds - 1));
         cl_uint k = 0;
         while (k + 1 < k_thresholds && below(k) <= middle[i]) ++k;
         bits[i] += k << shift;
