@@ -211,7 +211,6 @@ void PoseLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   const bool counts_coverage =
       std::ranges::any_of(target_.measured, [](const cl_float4& m) { return m.s[1] > 0; });
   const float unit = of_colors > 0 ? of_colors : counts_coverage ? of_coverage : of_depth;
-               hypotheses.size(), double(of_colors), double(of_coverage), double(of_depth));
   scales_.measured[k_coverage].weight = factors_[k_coverage] * std::pow(unit / of_coverage, 2.0F);
   scales_.measured[k_depth].weight = factors_[k_depth] * std::pow(unit / of_depth, 2.0F);
 }

@@ -39,7 +39,8 @@ struct Case {
     const auto random = [&](float low, float high) { return number(engine, low, high); };
     for (std::size_t i = 0; i < pixels; ++i) {
       target.colors.push_back({{random(0, 1), random(0, 1), random(0, 1), 1}});
-      target.weights.push_back(counts_colors && i % 7 != 0 ? random(0.2F, 1) : 0);
+      const float weight = random(0.2F, 1);
+      target.weights.push_back(counts_colors && i % 7 != 0 ? weight : 0);
       const float has_coverage = i % 5 == 0 ? 0 : random(0.2F, 1),
                   has_depth = i % 4 == 0 ? 0 : random(0.2F, 1);
       target.measured.push_back({{random(0, 1), has_coverage, random(2, 3), has_depth}});
