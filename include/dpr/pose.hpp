@@ -73,17 +73,21 @@ struct LeastSquares {
   /// Weight of every pixel, in [0, 1], in its first channel; of the target's size. Empty: 1.
   Image mask;
 
-  // Observations, any of which will do without the others, and without colours. Their squared residuals, and the
-  // colours', count by the inverse variance of each kind, from the medians that the best hypotheses leave as a level
-  // begins, 1 for the colours or else the first of these that there is; but deviations count for no less than 0.05 of
-  // coverage, and a quarter of a pixel's side at the object of depth.
+  // Observations, any of which will do without the others, and without colours. The squared residuals of each kind
+  // count by their inverse variance, 1 for colours or else the first of these that there is, from the residuals that
+  // the best hypotheses leave as a level begins: of colours from what nine of ten are below, of coverages that differ
+  // and of depths from medians. Deviations count for no less than 0.05 of coverage, and a quarter of a pixel's side at
+  // the object of depth; and before the finest level for no more than 0.25, and that side, since residuals say how
+  // wrong poses are there. Scores of each kind are in the covariance.
 
   /// Coverage of a pixel by the object, in [0, 1], in the first channel: unlike `mask` a thing to match.
   PoseObservation silhouette;
   /// Distance along the camera's axis, world units, in the first channel, as AuxiliaryOutputs::depths has it. Pixels
   /// with an alpha of 0, or whose depth is 0 or not finite, have none. Depths are compared where both are, by a robust
-  /// loss whose scale is four standard deviations. Alone they also say where the object is: it should cover the pixels
-  /// whose depth lies within its radius (with a translation to look for, its diameter) of where it begins.
+  /// loss whose scale is four standard deviations. Without colours and silhouette depths of the object alone (no more
+  /// pixels have one than the object could cover where it begins, nor further from there along the axis than its
+  /// radius or, with a translation to look for, its diameter) also say where it is: it should cover them. Depths of
+  /// a whole scene need a start that is about right, or a silhouette.
   PoseObservation depth;
 };
 

@@ -105,12 +105,9 @@ std::vector<cl_float4> PoseLevel::measured(const LeastSquares& options, const Im
   Image silhouette = options.silhouette.image, depth = options.depth.image;
   for (glm::vec4& p : silhouette.pixels) p.w = 1;
   for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
-  if (silhouette.pixels.empty() && !counts_colors_) {
+  if (silhouette.pixels.empty() && !counts_colors_ && space_.may_cover(depth)) {
     silhouette = depth;
-    for (glm::vec4& p : silhouette.pixels) {
-      const bool is_near = std::abs(static_cast<double>(p.x) - space_.distance()) <= space_.reach();
-      p = glm::vec4(1, 0, 0, p.w > 0 && is_near ? 1 : 0);
-    }
+    for (glm::vec4& p : silhouette.pixels) p.x = 1;
   }
   if (!silhouette.pixels.empty()) add(silhouette, k_coverage);
   if (!depth.pixels.empty()) add(depth, k_depth);

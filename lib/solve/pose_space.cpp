@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
@@ -130,6 +131,18 @@ ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera&
     tangent.camera.distortion[parameter - radial_index_] = 1;
   }
   return tangent;
+}
+
+bool PoseSpace::may_cover(const Image& depths) const {
+  const double reach = translation_ ? 2 * radius_ : radius_;
+  const double radius = radius_ndc_ * std::min(depths.width, depths.height) / 2;
+  double count = 0;
+  for (const glm::vec4& p : depths.pixels) {
+    if (!(p.w > 0)) continue;
+    if (std::abs(static_cast<double>(p.x) - distance_) > reach) return false;
+    ++count;
+  }
+  return count <= std::numbers::pi * radius * radius;
 }
 
 std::vector<View> PoseSpace::seen_through_lenses(const Camera& camera) const {

@@ -46,10 +46,11 @@ class PoseSpace {
   /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
   std::vector<double> to_world(std::span<const double> covariance) const;
 
-  double radius() const { return radius_; }      ///< of the object about its origin, world
-  double distance() const { return distance_; }  ///< of the initial place along the camera's axis
-  /// How far from there along the axis a point of the object may be.
-  double reach() const { return translation_ ? 2 * radius_ : radius_; }
+  double radius() const { return radius_; }  ///< of the object about its origin, world
+  /// True if the pixels that have a depth, in the first channel where alpha is not 0, may be those of the object alone:
+  /// they are no more than its sphere could cover about where it begins, and none is further from there along the axis
+  /// than its radius, or where a translation is looked for its diameter.
+  bool may_cover(const Image& depths) const;
   double radius_ndc() const { return radius_ndc_; }
 
  private:
