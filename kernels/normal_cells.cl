@@ -1,4 +1,5 @@
-// Sums over cells of an image from which the uncertainty of a pose is judged. Arrays are as normal_equations.cl has them.
+// Sums over cells of an image from which the uncertainty of a pose is judged. Arrays are as normal_equations.cl has
+// them.
 
 /// Sums of a cell beside those of directions.
 #define DPR_CELL_SUMS 6

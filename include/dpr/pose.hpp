@@ -86,8 +86,8 @@ struct LeastSquares {
   /// with an alpha of 0, or whose depth is 0 or not finite, have none. Depths are compared where both are, by a robust
   /// loss whose scale is four standard deviations. Without colours and silhouette depths of the object alone (no more
   /// pixels have one than the object could cover where it begins, nor further from there along the axis than its
-  /// radius or, with a translation to look for, its diameter) also say where it is: it should cover them. Depths of
-  /// a whole scene need a start that is about right, or a silhouette.
+  /// radius or, with a translation to look for, its diameter) are a silhouette too, robustly compared. Depths of a
+  /// whole scene, in which objects may shrink to fit anywhere, need colours or a silhouette beside them.
   PoseObservation depth;
 };
 
@@ -115,8 +115,8 @@ struct PoseOptions {
   /// In (0, 1): the target counts as explained once the loss is below that part of what is left without the
   /// pose, at the finest level: in descents by the initial pose; in least squares by the median over
   /// rotations, by the background alone, or by one colour everywhere, whichever is least; below the square
-  /// root of that part if the loss is robust. A search also needs every other pose to leave a quarter more, but
-  /// for those that leave the same.
+  /// root of that part if the loss is robust, as that of depths without colours is. A search also needs every
+  /// other pose to leave a quarter more, but for those that leave the same.
   float explained = 0.1F;
 };
 

@@ -18,9 +18,9 @@ Image read_target(const std::string& file, const LossWeights& weights, Encoding 
 /// its first channel. Throws IoError, and InvalidArgument where its size is not the scene's.
 Image read_silhouette(const std::string& file, const Scene& scene);
 
-/// Distances along the camera's axis in the first channel, in the scene's units, of a file's first channel. `scale`: what
-/// a 1 of the file is, whose whole numbers are taken as they are, not as parts of the largest. Throws as above, and where
-/// a file of whole numbers has no scale.
+/// Distances along the camera's axis in the first channel, in the scene's units, of a file's first channel.
+/// `scale`: what a 1 of the file is, whose whole numbers are taken as they are, not as parts of the largest.
+/// Throws as above, and where a file of whole numbers has no scale.
 Image read_depth(const std::string& file, std::optional<float> scale, const Scene& scene);
 
 }  // namespace dpr::cli

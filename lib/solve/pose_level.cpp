@@ -95,22 +95,21 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
 
 std::vector<cl_float4> PoseLevel::measured(const LeastSquares& options, const Image& mask) const {
   std::vector<cl_float4> result(mask.pixels.size());
-  const auto add = [&](const Image& known, std::size_t kind) {
-    const Image image = resample_weighted(known, width(), height());
+  const auto add = [&](const Image& image, std::size_t kind) {
     for (std::size_t i = 0; i < result.size(); ++i) {
       result[i].s[2 * kind] = image.pixels[i].x;
       result[i].s[2 * kind + 1] = image.pixels[i].w * mask.pixels[i].x;
     }
   };
   Image silhouette = options.silhouette.image, depth = options.depth.image;
-  for (glm::vec4& p : silhouette.pixels) p.w = 1;
   for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
   if (silhouette.pixels.empty() && !counts_colors_ && space_.may_cover(depth)) {
     silhouette = depth;
-    for (glm::vec4& p : silhouette.pixels) p.x = 1;
+    for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
-  if (!silhouette.pixels.empty()) add(silhouette, k_coverage);
-  if (!depth.pixels.empty()) add(depth, k_depth);
+  for (glm::vec4& p : silhouette.pixels) p.w = 1;
+  if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
+  if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
   return result;
 }
 

@@ -92,6 +92,15 @@ std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& opt
   return shapes;
 }
 
+int most_samples(const Scene& scene) {
+  // Less than a quarter of a pixel matters little, and large images show the pose without.
+  constexpr int k_samples = 4, k_most_image_samples = 1 << 18;
+  const double pixels = static_cast<double>(scene.width) * scene.height;
+  int side = k_samples;
+  while (side > 1 && pixels * side * side > k_most_image_samples) --side;
+  return side;
+}
+
 unsigned most_iterations(const LeastSquares& options, const Scene& scene) {
   const auto levels = static_cast<unsigned>(level_shapes(scene, options).size());
   const unsigned again = options.light == PoseLight::fixed ? 0 : levels - 1;  // in another light

@@ -22,6 +22,9 @@ bool has_depth(const glm::vec4& pixel);
 /// From coarse to fine: the resolution doubles; the last level is the finest once more, with the final blur.
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options);
 
+/// Samples of a pixel whose mean may be compared, on its side.
+int most_samples(const Scene& scene);
+
 /// Through all levels.
 unsigned most_iterations(const LeastSquares& options, const Scene& scene);
 

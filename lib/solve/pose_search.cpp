@@ -29,11 +29,6 @@ constexpr double k_equal_losses = 1e-3;
 // The last level changes little.
 constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
 
-// Samples of a pixel whose mean is compared, on its side: less than a quarter of a pixel matters little, and
-// large images show the pose without. So many, or fewer where an image has too many of them.
-constexpr int k_samples = 4;
-constexpr std::size_t k_most_image_samples = std::size_t{1} << 18;
-
 // Number of the best hypotheses, each in a light of its own, that are tried after half a turn too.
 constexpr std::size_t k_turned = 4;
 
@@ -128,7 +123,8 @@ PoseResult Fit::run(bool anywhere) {
   finish(level, anywhere);
   const double unexplained = std::min(wrong_, sampled.blank_loss());
   // A robust loss of what is wrong grows with its area alone, no longer with its size.
-  const auto part = static_cast<double>(method_.robust ? std::sqrt(options_.explained) : options_.explained);
+  const bool is_robust = method_.robust || (target_.pixels.empty() && !method_.depth.image.pixels.empty());
+  const auto part = static_cast<double>(is_robust ? std::sqrt(options_.explained) : options_.explained);
   result_.explained = result_.loss < part * unexplained && !is_doubted;
   return result_;
 }
@@ -235,10 +231,7 @@ LevelShape Fit::final_shape(LevelShape shape) const {
     return std::ranges::min(level.losses(hypotheses()));
   };
   const double loss = least_loss(sampled);
-  const std::size_t pixels = target_.pixels.size();
-  for (int side = k_samples; side > 1 && shape.samples == 1; --side) {
-    if (pixels * static_cast<std::size_t>(side * side) <= k_most_image_samples) shape.samples = side;
-  }
+  shape.samples = most_samples(scene_);
   if (shape.samples == 1) return shape;
   PoseLevel averaged = make_level(shape, light_);
   if (least_loss(averaged) >= loss) shape.samples = 1;

@@ -61,6 +61,31 @@ Image resample_weighted(Image image, int width, int height) {
   return result;
 }
 
+Image resample_medians(const Image& image, int width, int height) {
+  Image result(width, height);
+  std::vector<float> numbers;
+  for (int row = 0; row < height; ++row) {
+    const std::vector<Tap> rows = taps(row, image.height, height);
+    for (int column = 0; column < width; ++column) {
+      numbers.clear();
+      float part = 0;
+      for (const Tap& x : taps(column, image.width, width)) {
+        for (const Tap& y : rows) {
+          const glm::vec4& p = image.at(x.pixel, y.pixel);
+          if (!(p.w > 0)) continue;
+          numbers.push_back(p.x);
+          part += x.weight * y.weight;
+        }
+      }
+      if (numbers.empty()) continue;
+      const auto middle = numbers.begin() + std::ssize(numbers) / 2;
+      std::ranges::nth_element(numbers, middle);
+      result.at(column, row) = glm::vec4(glm::vec3(*middle), part);
+    }
+  }
+  return result;
+}
+
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height) {
   if ((width == new_width && height == new_height) || camera.orthographic_height) return camera;
   // In pixels, whatever the camera was given by: the ratio of the sides may change by rounding.

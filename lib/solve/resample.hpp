@@ -13,6 +13,10 @@ Image resample(const Image& image, int width, int height);
 /// The same of numbers that count by their alpha: the means of what counts, and of how much it does.
 Image resample_weighted(Image image, int width, int height);
 
+/// Medians of the first channel over the areas of new pixels, among those that have an alpha above 0; alpha is
+/// the part of the area that has. Means would mix what lies before an edge with what lies behind it.
+Image resample_medians(const Image& image, int width, int height);
+
 /// The camera that sees the same picture in images of another size. An orthographic one keeps its height:
 /// where rounding changes the ratio of the sides, it sees a little more or less at the left and right.
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);

@@ -180,6 +180,36 @@ TEST_SUITE("pipeline") {
     CHECK(lens["covariance"].size() == 5);
   }
 
+  TEST_CASE("dpr pose: a silhouette, depths in floats or whole numbers, or both will do without a target") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    REQUIRE(run(folder, "render --scene truth.json --preset rigid -o seen.exr --aov depth --quiet").status ==
+            0);
+    const dpr::Image depth = dpr::read_image(folder / "seen.depth.exr");
+    std::string whole = "P5 64 48 65535\n";  // millimetres, most significant byte first
+    for (const glm::vec4& pixel : depth.pixels) {
+      const auto length = static_cast<unsigned>(std::lround(1000 * pixel.x));
+      whole.push_back(static_cast<char>(length / 256));
+      whole.push_back(static_cast<char>(length % 256));
+    }
+    folder.write("depth.pgm", whole);
+    for (const char* options :
+         {"--silhouette target.exr", "--depth seen.depth.exr", "--depth depth.pgm --depth-scale 0.001",
+          "--silhouette target.exr --silhouette-weight 2 --depth depth.pgm --depth-scale 0.001 "
+          "--depth-weight 0.5",
+          "--target target.exr --silhouette target.exr --depth seen.depth.exr"}) {
+      CAPTURE(options);
+      REQUIRE(
+          run(folder,
+              std::string(
+                  "pose --scene scene.json --initial-rotation 0,0.7,0 --rotations 0 -o pose.json --quiet ") +
+                  options)
+              .status == 0);
+      check_is_truth(json::parse(folder.read("pose.json")));
+    }
+  }
+
   TEST_CASE("dpr pose: an option of the descent's, or of the smoothing's, implies it") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -214,5 +244,35 @@ TEST_SUITE("robustness") {
       CHECK(dpr::test::is_error_line(outcome.err));
       CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));
     }
+  }
+
+  TEST_CASE("dpr pose: silhouettes and depths that cannot be compared are errors of one line that say why") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    dpr::write_image(folder / "small.png", dpr::Image(3, 2, glm::vec4(1)));
+    dpr::write_image(folder / "black.png", dpr::Image(64, 48, glm::vec4(0, 0, 0, 1)));
+    dpr::write_image(folder / "black.exr", dpr::Image(64, 48, glm::vec4(0, 0, 0, 1)));
+    dpr::write_image(folder / "far.exr", dpr::Image(64, 48, glm::vec4(1e6F)));
+    const auto check = [&](const std::string& options, const char* says) {
+      CAPTURE(options);
+      const Outcome outcome = run(folder, "pose --scene scene.json -o pose.json " + options);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, says));
+      CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));
+    };
+    check("", "--target (command line): got none");
+    check("--silhouette missing.png", "missing.png: the file does not exist");
+    check("--silhouette small.png", "size of --silhouette small.png (command line): got 3x2, expected 64x48");
+    check("--silhouette black.png", "sum of the silhouette (pose): got 0");
+    check("--depth small.png --depth-scale 1", "size of --depth small.png (command line): got 3x2");
+    check("--depth black.png", "--depth black.png (command line): got whole numbers, expected --depth-scale");
+    check("--depth black.exr", "--depth (command line): got no pixel that has one");
+    check("--depth far.exr", "expected some from znear to zfar");
+    check("--target target.exr --depth-scale 1", "--depth-scale (command line): got no --depth");
+    check("--silhouette target.exr --report report", "--report (command line): got no --target");
+    check("--silhouette target.exr --iterations 4", "those of least squares with those of the descent");
   }
 }

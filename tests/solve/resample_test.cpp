@@ -35,6 +35,19 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("medians are of what counts, and do not mix what lies before an edge with what lies behind") {
+    dpr::Image image(4, 2);
+    const float numbers[] = {1, 1, 9, 7, 1, 5, 0, 0};
+    for (std::size_t i = 0; i < 8; ++i) image.pixels[i] = glm::vec4(numbers[i], 0, 0, numbers[i] > 0 ? 1 : 0);
+    const dpr::Image half = dpr::resample_medians(image, 2, 1);
+    CHECK(half.at(0, 0).x == 1);
+    CHECK(half.at(0, 0).w == doctest::Approx(1));
+    CHECK(half.at(1, 0).x == 9);
+    CHECK(half.at(1, 0).w == doctest::Approx(0.5));
+    CHECK(dpr::resample_medians(dpr::Image(4, 2), 2, 1).at(0, 0) == glm::vec4(0));
+    CHECK(dpr::resample_medians(image, 4, 2).at(3, 0) == glm::vec4(7, 7, 7, 1));
+  }
+
   TEST_CASE("half the resolution is the mean of two by two pixels") {
     const dpr::Image image = random_image(6, 4), half = dpr::resample(image, 3, 2);
     for (int row = 0; row < 2; ++row) {
