@@ -220,7 +220,7 @@ typedef struct TangentParams {
   uint directions;
   uint planes; /* of a direction's fragments; what is the same for all follows the last direction's */
   uint positions, colors; /* how many there are of a direction; 0: none changes, and none is read */
-  uint lit;               /* tangents of world positions, normals and eyes are found, for light or attributes */
+  uint lit;               /* tangents of the world are found, for light and attributes */
   uint base_plane;        /* of base colours where light falls on them, else of colours */
   uint channel;           /* of the colour */
   uint first;             /* of the directions, among the images' */
