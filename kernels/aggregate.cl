@@ -251,7 +251,7 @@ kernel void aggregate_backward(const AggregateParams p, global const ViewParams*
     const float total = run.count > 1 ? weigh_gradients(run, &sums) : weigh_only_slot(run, &sums);
     const float scale = 1.0f / total;
     background_weight = sums.background_weight * scale;
-    global const ViewParams* view = views + pixel / p.pixels_per_view;
+    global const ViewParams* view = views + (pixel + p.first_pixel) / p.pixels_per_view;
     const float depth_scale = view->inverse_range / p.gamma, inverse_alpha = 1.0f / p.alpha;
     const float background_depth = view->zfar - p.background_depth / view->inverse_range;
     const float depth_origin = slot_depth(run.slot[0], f, background_depth),
@@ -308,7 +308,7 @@ kernel void aggregate_rows(const AggregateParams p, const TangentParams q,
     add_row(run.slot[0].fragment, 1.0f, 0.0f, &out);
   }
   const float scale = 1.0f / total;
-  global const ViewParams* view = views + pixel / p.pixels_per_view;
+  global const ViewParams* view = views + (pixel + p.first_pixel) / p.pixels_per_view;
   const float depth_scale = view->inverse_range / p.gamma, inverse_alpha = 1.0f / p.alpha;
   const float background_depth = view->zfar - p.background_depth / view->inverse_range;
   const float depth_origin = slot_depth(run.slot[0], f, background_depth),

@@ -81,7 +81,7 @@ kernel void aggregate_joint_forward(const AggregateParams p, global const ViewPa
                             1.0f - transparency);
     return;
   }
-  const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
+  const float depth_scale = views[(pixel + p.first_pixel) / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
   const uint count = gather_slots(f, starts[pixel], starts[pixel + 1], pixel_slots);
   float transparency = 1.0f;
@@ -154,7 +154,7 @@ kernel void aggregate_joint_backward(const AggregateParams p, global const ViewP
     write_channels(p, pixel, 0.0f, 0.0f, fragment_transparency(f, k), grad, channels);
     return;
   }
-  const float depth_scale = views[pixel / p.pixels_per_view].inverse_range / p.gamma;
+  const float depth_scale = views[(pixel + p.first_pixel) / p.pixels_per_view].inverse_range / p.gamma;
   global Slot* pixel_slots = slots + starts[pixel];
   const uint seen = slot_counts[pixel];
   for (uint i = starts[pixel]; i < starts[pixel + 1]; ++i) {
@@ -236,7 +236,7 @@ kernel void aggregate_joint_rows(const AggregateParams p, const TangentParams q,
     store_frame_tangents(p, q, pixel, transparency, 0.0f, 0.0f, frames, image_tangents);
     return;
   }
-  const float inverse_range = views[pixel / p.pixels_per_view].inverse_range;
+  const float inverse_range = views[(pixel + p.first_pixel) / p.pixels_per_view].inverse_range;
   const float depth_scale = inverse_range / p.gamma;
   global Slot* pixel_slots = slots + first;
   const uint seen = slot_counts[pixel];

@@ -48,7 +48,7 @@ kernel void antialias_forward(const FrameParams p, global const uint* restrict t
                               global const float4* restrict raster, global float4* restrict blended) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !may_be_crossed(p, rows.tile, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
@@ -126,7 +126,7 @@ kernel void antialias_backward(const FrameParams p, global const uint* restrict 
                                global float4* restrict grad_raster) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     for (uint touched = touched_in_row(p, steps, r, 2); touched != 0; touched &= touched - 1)

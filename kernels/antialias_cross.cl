@@ -19,7 +19,7 @@
 #include "visibility.h"
 
 /// The front-most fragment of samples near contours, its depth INFINITY where there is none. One work-item
-/// per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), last_tile). Deterministic.
+/// per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), p.last_tile). Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   starts       uint[pixel + 1]        runs of `list`
 /// in   list         uint[...]              fragments, by pixel
@@ -27,15 +27,14 @@
 /// in   fragment_pair, pair_face            uint[fragment], uint[pair]
 /// out  front        float[pixel]           not written in tiles further than one from a contour
 /// out  front_face   uint[pixel]            the same; view * faces + face, DPR_NO_FACE where there is none
-kernel void antialias_front(const FrameParams p, const uint last_tile,
-                            global const uint* restrict tile_starts, global const uint* restrict starts,
+kernel void antialias_front(const FrameParams p, global const uint* restrict tile_starts, global const uint* restrict starts,
                             global const uint* restrict list, global const float* restrict depth,
                             global const uint* restrict fragment_pair, global const uint* restrict pair_face,
                             global float* restrict front, global uint* restrict front_face) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
-  if (rows.tile >= last_tile || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   for (uint row = rows.first; row < rows.last; ++row) {
-    const uint first = (rows.view * p.height + row) * p.width + rows.first_column;
+    const uint first = place_of_sample(p, rows.view, rows.first_column, row);
     for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
       const uint fragment = nearest_fragment(pixel, starts, list, depth);
       front[pixel] = fragment == DPR_NO_FACE ? INFINITY : depth[fragment];
@@ -56,24 +55,24 @@ static inline float depth_on_line(const FrameParams p, const TileContour c, int 
   return mix_depths(p, c.depths, along_edge(p, raster_edge(c.a, c.b, by_rows), line));
 }
 
-static inline void clear_in_row(int first, int last, global uint* restrict winner) {
-  if (last - first == DPR_TILE) {
-    vstore8((uint8)(DPR_NO_CROSSING), 0, winner + first);
+static inline void clear_in_row(int count, global uint* restrict steps) {
+  if (count == DPR_TILE) {
+    vstore8((uint8)(DPR_NO_CROSSING), 0, steps);
     return;
   }
-  for (int column = first; column < last; ++column) winner[column] = DPR_NO_CROSSING;
+  for (int k = 0; k < count; ++k) steps[k] = DPR_NO_CROSSING;
 }
 
-static inline void clear_steps(const FrameParams p, const TileSamples s, const TileLines own,
-                               uint first_pixel, global uint* restrict winner) {
+static inline void clear_steps(const FrameParams p, const TileSamples s, const TileLines own, uint view,
+                               global uint* restrict winner) {
   const int first_row = s.first_row + own.first, first_column = s.first_column + own.first,
             last_column = min(s.first_column + own.last, s.last_column);
-  global uint* right = winner + first_pixel;
-  global uint* down = right + p.views * p.width * p.height;
   for (int row = first_row; row < min(s.first_row + own.last, s.last_row); ++row)
-    clear_in_row(s.first_column, s.last_column, right + (uint)row * p.width);
+    clear_in_row(s.last_column - s.first_column,
+                 winner + place_of_sample(p, view, (uint)s.first_column, (uint)row));
   for (int row = s.first_row; row < s.last_row; ++row)
-    clear_in_row(first_column, last_column, down + (uint)row * p.width);
+    clear_in_row(last_column - first_column, winner + samples_of_window(p) +
+                                                 place_of_sample(p, view, (uint)first_column, (uint)row));
 }
 
 /// Finds what crosses the steps of a tile. One work-item per DPR_ROWS rows, and as many columns, of a tile.
@@ -99,11 +98,11 @@ kernel void antialias_cross(const FrameParams p, global const ViewParams* restri
                             global float2* restrict cut, global uchar* restrict crowded) {
   const TileLines own = tile_lines((uint)get_global_id(0));
   const uint tile = own.tile, view = tile / (p.tiles_x * p.tiles_y);
-  if (view >= p.views || !is_near_contour(p, tile, 2, tile_starts)) return;
-  const uint first_pixel = view * p.width * p.height;
+  if (tile >= p.last_tile || !is_near_contour(p, tile, 2, tile_starts)) return;
   const TileSamples s = tile_samples(p, tile);
-  clear_steps(p, s, own, first_pixel, winner);
-  const CrossingScene v = {faces, ndc, front + first_pixel, p.depth_reach / views[view].inverse_range};
+  clear_steps(p, s, own, view, winner);
+  const CrossingScene v = {faces, ndc, front, place_of_sample(p, view, 0, 0),
+                           p.depth_reach / views[view].inverse_range};
   ulong several_right = 0, several_down = 0;  // steps, a bit each
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
@@ -142,7 +141,7 @@ kernel void antialias_cross(const FrameParams p, global const ViewParams* restri
       }
     }
   }
-  global uchar* bytes = crowded + DPR_TILE_BYTES * tile;
+  global uchar* bytes = crowded + DPR_TILE_BYTES * (tile - p.first_tile);
   for (int line = own.first; line < own.last; ++line) {
     bytes[line] = (uchar)(several_right >> DPR_TILE * line);
     bytes[DPR_TILE + line] = (uchar)(several_down >> DPR_TILE * line);
@@ -164,7 +163,8 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint list, global con
 }
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps
-/// that it won, or crosses as a second. One work-item per pair. Deterministic.
+/// that it won, or crosses as a second. One work-item per pair; pairs of tiles that are not of the launch are left
+/// out. Deterministic.
 /// in   edges, faces, ndc, clipped, winner  as antialias_cross
 /// in   pairs          uint[1]          how many there are
 /// in   pair_contour   uint[pair]
@@ -181,7 +181,7 @@ kernel void antialias_cross_backward(
     global const SecondCrossing* restrict seconds, global const float2* restrict grad_seconds,
     global float4* restrict grad_ends) {
   const uint pair = (uint)get_global_id(0);
-  if (pair >= pairs[0]) return;
+  if (pair >= pairs[0] || pair_tile[pair] < p.begin_tile || pair_tile[pair] >= p.last_tile) return;
   const uint contour = pair_contour[pair];
   const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
   const TileSamples s = tile_samples(p, pair_tile[pair]);
@@ -194,7 +194,7 @@ kernel void antialias_cross_backward(
     for (int line = lines.x; line < lines.y; ++line) {
       const Crossing x = cross_line(p, e, line);
       if (!is_step_of(p, e, x, s)) continue;
-      const uint list = pair_tile[pair] * DPR_TILE_ITEMS + (uint)(line % DPR_TILE) / DPR_ROWS;
+      const uint list = list_of_line(p, pair_tile[pair], line);
       const Cut grad_of = gradient_of_cut(contour, step_of(p, c.view, e, x), list, winner, grad_cut,
                                           second_counts, seconds, grad_seconds);
       const float grad = grad_of.x;

@@ -19,7 +19,7 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
                            global float4* restrict faded_raster, global float2* restrict shares) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     if (touched_in_row(p, steps, r, 3) == 0) continue;
@@ -98,7 +98,7 @@ kernel void antialias_fade_backward(const FrameParams p, global const uint* rest
                                     global float2* restrict grad_cut, global float4* restrict grad_raster) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     for (uint touched = touched_in_row(p, steps, r, 3); touched != 0; touched &= touched - 1)

@@ -37,7 +37,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
             inner_first = first_is_inner(c, e);
   if (c.flags & DPR_CONTOUR_CREASE) {
     const int column = x.column + (e.is_by_rows && !is_first), row = x.row + (!e.is_by_rows && !is_first);
-    const float front = v.front[row * (int)p.width + column], slack = v.reach + DPR_DEPTH_SLACK * depth;
+    const float front = v.front[v.first + (uint)row * p.width + (uint)column], slack = v.reach + DPR_DEPTH_SLACK * depth;
     return hides_crease(p, c, v.faces, v.ndc, inner_first == is_first, pixel_centre(p, column, row), front,
                         depth, slack);
   }
@@ -79,14 +79,15 @@ kernel void antialias_second_find(const FrameParams p, global const ViewParams* 
                                   global const float* restrict front, global const uint* restrict front_face,
                                   global const uint* restrict winner, global const uchar* restrict crowded,
                                   global uint* restrict counts, global SecondCrossing* restrict seconds) {
-  const uint list = (uint)get_global_id(0);
-  const TileLines own = tile_lines(list);
+  const uint item = (uint)get_global_id(0);
+  const TileLines own = tile_lines(item);
   const uint tile = own.tile, view = tile / (p.tiles_x * p.tiles_y);
-  if (view >= p.views) return;
+  if (tile >= p.last_tile) return;
+  const uint list = item - p.first_tile * DPR_TILE_ITEMS;
   counts[list] = 0;
   if (tile_starts[tile + 1] - tile_starts[tile] < 2) return;
   const TileSamples s = tile_samples(p, tile);
-  const CrossingScene v = {faces, ndc, front + view * p.width * p.height,
+  const CrossingScene v = {faces, ndc, front, place_of_sample(p, view, 0, 0),
                            p.depth_reach / views[view].inverse_range};
   uint count = 0;
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
@@ -116,7 +117,7 @@ kernel void antialias_second_find(const FrameParams p, global const ViewParams* 
     for (uint k = count; k < found; ++k) {
       SecondCrossing second = seconds[DPR_SECOND_ROOM * list + k];
       const TileContour again = load_contour(p, second.contour, edges, faces, ndc, clipped);
-      const int by_rows = second.step < p.views * p.width * p.height;
+      const int by_rows = second.step < samples_of_window(p);
       const int2 at = sample_at(p, ends_of_step(p, second.step).x).at;
       const RasterEdge e = raster_edge(again.a, again.b, by_rows);
       const Crossing x = cross_line(p, e, by_rows ? at.y : at.x);
@@ -156,7 +157,7 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
                                      global const float4* restrict raster, global float4* restrict blended) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
   for (uint i = 0; i < near_lists(tiles); ++i) {
     const uint list = near_list(p, tiles, i);
@@ -202,7 +203,7 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
                                       global float2* restrict grad_seconds) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
   for (uint i = 0; i < near_lists(tiles); ++i) {
     const uint list = near_list(p, tiles, i);

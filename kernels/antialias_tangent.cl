@@ -65,11 +65,11 @@ kernel void antialias_cross_tangent(
         cut_tangents[step] = moved;
         continue;
       }
-      const uint list = pair_tile[pair] * DPR_TILE_ITEMS + (uint)(line % DPR_TILE) / DPR_ROWS;
+      const uint list = list_of_line(p, pair_tile[pair], line);
       const uint first = DPR_SECOND_ROOM * list, last = first + second_counts[list];
       for (uint k = first; k < last; ++k) {
         if (seconds[k].step == step && seconds[k].contour == contour)
-          cut_tangents[2 * p.views * p.width * p.height + k] = moved;
+          cut_tangents[2 * samples_of_window(p) + k] = moved;
       }
     }
   }
@@ -104,7 +104,7 @@ kernel void antialias_fade_tangent(const FrameParams p, global const uint* restr
                                    global float4* restrict faded_tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     if (touched_in_row(p, steps, r, 3) == 0) continue;
@@ -162,7 +162,7 @@ kernel void antialias_blend_tangent(const FrameParams p, global const uint* rest
                                     global float4* restrict tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !may_be_crossed(p, rows.tile, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   for (uint row = rows.first; row < rows.last; ++row) {
     const TileRow r = row_of(p, rows, row);
     for (uint touched = touched_in_row(p, steps, r, 1); touched != 0; touched &= touched - 1) {
@@ -200,7 +200,7 @@ kernel void antialias_second_tangent(const FrameParams p, global const uint* res
                                      global float4* restrict tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
-  const Steps steps = {winner, cut, p.views * p.width * p.height};
+  const Steps steps = {winner, cut, samples_of_window(p)};
   const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
   for (uint i = 0; i < near_lists(tiles); ++i) {
     const uint list = near_list(p, tiles, i);

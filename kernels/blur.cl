@@ -53,8 +53,8 @@ static inline BlurPlace column_place(const BlurPass p, uint i) {
   BlurPlace place;
   place.image = image;
   place.at = (int)(i / vectors % blocks * DPR_BLUR_BLOCK);
-  place.in = (size_t)image * p.in_length * p.width + x;
-  place.out = ((size_t)image * p.out_length + (size_t)place.at) * p.width + x;
+  place.in = (size_t)image * p.in_length * p.width + x - p.in_shift;
+  place.out = ((size_t)image * p.out_length + (size_t)place.at) * p.width + x - p.out_shift;
   place.steps = min((int)p.out_length - place.at, DPR_BLUR_BLOCK);
   place.count = min((int)(p.width - x), DPR_BLUR_PIXELS);
   return place;
@@ -106,7 +106,7 @@ static inline int is_outside_columns(const BlurPass p, const BlurPlace place,
                                      global const uint2* restrict extents) {
   if (p.tile_rows == 0 || !has_all_taps(p, place.at, place.steps)) return 0;
   const BlurTaps t = block_taps(p, place.at, place.steps);
-  const int x = (int)(place.in - (size_t)place.image * p.in_length * p.width);
+  const int x = (int)(place.in + p.in_shift - (size_t)place.image * p.in_length * p.width);
   return is_outside(p, extents, place.image, samples_along(p, (int2)(t.from, t.to)),
                     samples_across(p, (int2)(x, x + place.count)));
 }
@@ -136,13 +136,22 @@ static inline void add_to_sums(global const float* weights, int step, pixels_n v
   for (int k = 0; k < DPR_BLUR_BLOCK; ++k) sums[k] += weights[k * step] * value;
 }
 
-/// Sums of a block of rows. Lanes from the place's count on hold nothing of use, as do rows from its steps
-/// on.
-static inline void column_sums(const BlurPass p, const BlurPlace place, global const float* restrict weights,
-                               global const float4* restrict in, pixels_n* sums) {
-  const BlurTaps t = block_taps(p, place.at, DPR_BLUR_BLOCK);
-  fill_sums((pixels_n)(0.0f), sums);
-  for (int k = t.from; k < t.to; ++k) {
+/// Sums of a block of rows that lie as the block's outputs do.
+static inline void load_sums(const BlurPass p, const BlurPlace place, global const float4* from,
+                             pixels_n* sums) {
+#pragma unroll
+  for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {
+    if (row >= place.steps) break;
+    sums[row] = load_pixels(from + place.out + (size_t)row * p.width);
+  }
+}
+
+/// Adds a block's rows of inputs to its sums, in order. Lanes from the place's count on hold nothing of use, as do
+/// rows from its steps on.
+static inline void add_columns(const BlurPass p, const BlurPlace place, const BlurTaps t,
+                               global const float* restrict weights, global const float4* restrict in,
+                               pixels_n* sums) {
+  for (int k = max(t.from, p.first_row); k < min(t.to, p.last_row); ++k) {
     add_to_sums(weights + (t.last - k * p.in_step), p.out_step,
                 load_pixels(in + place.in + (size_t)k * p.width), sums);
   }
@@ -242,23 +251,30 @@ kernel void blur_extents(const FrameParams p, global const uint* restrict tile_s
   extents[row].y = is_empty ? 0 : (last + 2) * DPR_TILE;
 }
 
-/// Along columns. NDRange: one work-item per (image, block of output rows, vector of pixels).
+/// Along columns. Where several launches add the rows of inputs, in order, outputs hold the sums so far. NDRange:
+/// one work-item per (image, block of output rows, vector of pixels), up to p.items.
 /// in   extents  as blur_extents leaves them, where p.tile_rows says so: blocks outside are not summed up
 /// in   weights  float[tap], between zeros (BlurTaps)
 /// in   in       float4[image][in_length][width]
-/// out  out      float4[image][out_length][width]
+/// in out  out   float4[image][out_length][width]
 kernel void blur_columns(const BlurPass p, global const uint2* restrict extents,
                          global const float* restrict weights, global const float4* restrict in,
                          global float4* restrict out) {
   const uint i = (uint)get_global_id(0);
-  if (i >= p.lines * column_items_per_image(p)) return;
+  if (i >= p.items) return;
   const BlurPlace place = column_place(p, i);
+  const BlurTaps t = block_taps(p, place.at, DPR_BLUR_BLOCK);
+  const int is_before = t.to <= p.first_row && p.first_row > 0,
+            is_after = t.from >= p.last_row && p.last_row < (int)p.in_length;
+  if (is_before || is_after) return;
   pixels_n sums[DPR_BLUR_BLOCK];
+  fill_sums((pixels_n)(0.0f), sums);
   if (is_outside_columns(p, place, extents)) {
-    const int from = block_taps(p, place.at, place.steps).from;
-    fill_sums(load_pixels(in + place.in + (size_t)from * p.width), sums);
+    if (t.from < p.first_row) return;
+    fill_sums(load_pixels(in + place.in + (size_t)t.from * p.width), sums);
   } else {
-    column_sums(p, place, weights, in, sums);
+    if (t.from < p.first_row) load_sums(p, place, out, sums);
+    add_columns(p, place, t, weights, in, sums);
   }
 #pragma unroll
   for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {
@@ -336,14 +352,14 @@ kernel void blur_rows_strided(const BlurPass p, global const uint2* restrict ext
 /// gradient of the output. NDRange as blur_columns.
 /// in   extents  as blur_columns: outside the weights' derivative sums to 0
 /// in   weights  float[tap]  derivative, between zeros
-/// in   in, grad            as in and out of blur_columns
+/// in   in, grad            as in and out of blur_columns; or in is what that has added up, if p.has_sums says so
 /// out  products  float      that of work-item i of image v: [v * stride + first + i]
 kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint first,
                                global const uint2* restrict extents, global const float* restrict weights,
                                global const float4* restrict in, global const float4* restrict grad,
                                global float* restrict products) {
   const uint i = (uint)get_global_id(0), items = column_items_per_image(p);
-  if (i >= p.lines * items) return;
+  if (i >= p.items) return;
   const BlurPlace place = column_place(p, i);
   global float* to = products + (i / items * stride + first + i % items);
   if (is_outside_columns(p, place, extents)) {
@@ -351,7 +367,12 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
     return;
   }
   pixels_n sums[DPR_BLUR_BLOCK];
-  column_sums(p, place, weights, in, sums);
+  fill_sums((pixels_n)(0.0f), sums);
+  if (p.has_sums) {
+    load_sums(p, place, in, sums);
+  } else {
+    add_columns(p, place, block_taps(p, place.at, DPR_BLUR_BLOCK), weights, in, sums);
+  }
   float4 product = 0.0f;
 #pragma unroll
   for (int row = 0; row < DPR_BLUR_BLOCK; ++row) {

@@ -107,7 +107,7 @@ typedef struct {
 DPR_ALWAYS_INLINE void load_barrier_run(const AggregateParams p, uint pixel, uint length,
                                         global const ViewParams* views, global const uint* starts,
                                         const Fragments f, BarrierPixel* out) {
-  global const ViewParams* view = views + pixel / p.pixels_per_view;
+  global const ViewParams* view = views + (pixel + p.first_pixel) / p.pixels_per_view;
   BarrierPixel q;
   q.first = starts[pixel];
   q.last = q.first + length;

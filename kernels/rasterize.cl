@@ -2,6 +2,7 @@
 // that a triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel
 // has the list of its own.
 #include "rasterize.h"
+#include "window.h"
 
 /// Pixels of a tile that a work-item of the listing kernels has to itself: on a CPU all of them, so that it
 /// reads the pairs of the tile once.
@@ -34,7 +35,7 @@ static inline int is_in_image(const FrameParams p, const TileShare s, uint bit) 
   return s.row + bit / DPR_TILE < p.height && s.column + bit % DPR_TILE < p.width;
 }
 static inline uint pixel_of(const FrameParams p, const TileShare s, uint bit) {
-  return (s.view * p.height + s.row + bit / DPR_TILE) * p.width + s.column + bit % DPR_TILE;
+  return place_of_sample(p, s.view, s.column + bit % DPR_TILE, s.row + bit / DPR_TILE);
 }
 
 static inline uint lowest_bit_of(ulong mask) { return 63 - (uint)clz(mask & -mask); }
@@ -58,14 +59,14 @@ kernel void rasterize_cover(const FrameParams p, global const uint* restrict pai
   }
 }
 
-/// Counts the fragments of every pixel. One work-item per share of a tile.
+/// Counts the fragments of every pixel of the window. One work-item per share of a tile, up to p.last_tile.
 /// in   tile_starts  uint[view * tile + 1]  runs of pairs
 /// in   masks        as rasterize_cover leaves them
-/// out  counts       uint[view][height][width]
+/// out  counts       uint[pixel of the window]
 kernel void rasterize_count(const FrameParams p, global const uint* restrict tile_starts,
                             global const uint2* restrict masks, global uint* restrict counts) {
   const TileShare s = tile_share(p, (uint)get_global_id(0));
-  if (s.view >= p.views) return;
+  if (s.tile >= p.last_tile) return;
   uintn sums[DPR_TILE_SHARE / DPR_WIDTH];
   for (uint v = 0; v < DPR_TILE_SHARE / DPR_WIDTH; ++v) sums[v] = 0;
   for (uint pair = tile_starts[s.tile]; pair < tile_starts[s.tile + 1]; ++pair) {

@@ -5,23 +5,25 @@
 
 DPR_COMPENSATED_ADD(compensated_add, realn)
 
-/// A vector whose lanes from `last` on are zero.
-static inline realn load_until(uint first, uint last, global const float* values) {
-  if (last - first >= DPR_WIDTH) return load_n(first, values);
+/// The elements from k on, zero where they are not in [held.x, held.y). The first held one is values[0].
+static inline realn load_held(uint k, uint2 held, global const float* values) {
+  if (k >= held.x && held.y - k >= DPR_WIDTH) return load_n(k - held.x, values);
   float lanes[DPR_WIDTH];
   for (uint lane = 0; lane < DPR_WIDTH; ++lane)
-    lanes[lane] = first + lane < last ? values[first + lane] : 0.0f;
+    lanes[lane] = k + lane >= held.x && k + lane < held.y ? values[k + lane - held.x] : 0.0f;
   return load_n(0, lanes);
 }
 
 /// Every slot sums its elements of its segment: on a GPU, where neighbours' loads go together, slot k those
 /// at k, k + slots, k + 2 slots ...; a vector of slots those of a run of its own, which a CPU's caches
 /// follow. One work-item per (channel, segment, vector of slots); `slots` is a multiple of the widest vector.
+/// in   held     elements [x, y), which there are. Other launches add the others, in order
 /// in   starts   uint[segment * stride + 1]  segment s is [starts[s * stride], starts[(s + 1) * stride])
-/// in   values   float[channel][count], of so many `channels` from `first_channel` on, and `segments`
-/// out  partial  float[channel][segment][2][slot]  sums, and their compensations
-kernel void reduce_partial(const uint count, const uint first_channel, const uint channels,
-                           const uint segments, const uint stride, const uint slots,
+/// in   values   float[channel][count], of so many `channels` from `first_channel` on, and `segments`; element
+///               held.x lies at `shift`
+/// in out  partial  float[channel][segment][2][slot]  sums, and their compensations
+kernel void reduce_partial(const uint count, const uint2 held, const uint shift, const uint first_channel,
+                           const uint channels, const uint segments, const uint stride, const uint slots,
                            global const uint* restrict starts, global const float* restrict values,
                            global float* restrict partial) {
   const uint i = (uint)get_global_id(0);
@@ -36,10 +38,17 @@ kernel void reduce_partial(const uint count, const uint first_channel, const uin
   const uint run = (end - begin + slots - 1) / slots;  // vectors
   const uint first = begin + slot * run, last = min(end, first + DPR_WIDTH * run), step = DPR_WIDTH;
 #endif
-  global const float* of_channel = values + (size_t)(first_channel + channel) * count;
-  realn sum = 0.0f, error = 0.0f;
-  for (uint k = first; k < last; k += step) compensated_add(&sum, &error, load_until(k, last, of_channel));
+  global const float* of_channel = values + (size_t)(first_channel + channel) * count + shift;
   global float* out = partial + (size_t)2 * slots * (channel * segments + segment) + slot;
+  realn sum = 0.0f, error = 0.0f;
+  if (held.x > begin) {
+    sum = load_n(0, out);
+    error = load_n(slots, out);
+  }
+  const uint2 own = (uint2)(held.x, min(last, held.y));
+  const uint before = first < held.x ? (held.x - first) / step * step : 0;
+  for (uint k = first + before; k < own.y; k += step)
+    compensated_add(&sum, &error, load_held(k, own, of_channel));
   store_n(sum, 0, out);
   store_n(error, slots, out);
 }

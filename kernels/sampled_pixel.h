@@ -26,8 +26,8 @@ static inline SampledRun locate_run(const AggregateParams p, uint pixel, global 
   SampledRun run;
   run.first = starts[pixel];
   run.last = starts[pixel + 1];
-  run.view = pixel / p.pixels_per_view;
-  run.in_view = pixel - run.view * p.pixels_per_view;
+  run.view = (pixel + p.first_pixel) / p.pixels_per_view;
+  run.in_view = pixel + p.first_pixel - run.view * p.pixels_per_view;
   run.rigid = -1;
   return run;
 }

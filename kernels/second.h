@@ -16,8 +16,8 @@ static inline uint2 reference_samples(const FrameParams p, const SecondCrossing 
 }
 
 static inline int is_in_rows(const FrameParams p, const TileRows rows, uint sample) {
-  const uint line = sample / p.width, row = line % p.height;
-  return tile_of_sample(p, line / p.height, sample % p.width, row) == rows.tile && row >= rows.first &&
+  const uint line = line_of_place(p, sample), row = line % p.height;
+  return tile_of_sample(p, line / p.height, (sample + p.first_sample) % p.width, row) == rows.tile && row >= rows.first &&
          row < rows.last;
 }
 
@@ -25,7 +25,7 @@ static inline int is_in_rows(const FrameParams p, const TileRows rows, uint samp
 static inline uint near_list(const FrameParams p, const NearTiles tiles, uint k) {
   const uint in_tiles = k / DPR_TILE_ITEMS;
   const uint tile = tiles.first + in_tiles / tiles.columns * p.tiles_x + in_tiles % tiles.columns;
-  return tile * DPR_TILE_ITEMS + k % DPR_TILE_ITEMS;
+  return (tile - p.first_tile) * DPR_TILE_ITEMS + k % DPR_TILE_ITEMS;
 }
 
 static inline uint near_lists(const NearTiles tiles) { return tiles.columns * tiles.rows * DPR_TILE_ITEMS; }

@@ -23,7 +23,7 @@ static inline int lies_on_raster(const FrameParams p, const RasterEdge e, const 
 
 /// The samples at both ends of a step.
 static inline uint2 ends_of_step(const FrameParams p, uint step) {
-  const uint pixels = p.views * p.width * p.height;
+  const uint pixels = samples_of_window(p);
   return step < pixels ? (uint2)(step, step + 1) : (uint2)(step - pixels, step - pixels + p.width);
 }
 
@@ -41,7 +41,7 @@ static inline uint own_step(const FrameParams p, uint view, uint contour, const 
   if (!lies_on_raster(p, e, x)) return DPR_NO_CROSSING;
   const uint step = step_of(p, view, e, x);
   const uint tile = tile_of_sample(p, view, (uint)x.column, (uint)x.row);
-  if (winner[step] != contour || has_bit(crowded + DPR_TILE_BYTES * tile, e, x)) return DPR_NO_CROSSING;
+  if (winner[step] != contour || has_bit(crowded + DPR_TILE_BYTES * (tile - p.first_tile), e, x)) return DPR_NO_CROSSING;
   return first_is_inner(c, e) == first_is_within ? step : step | DPR_TURNED;
 }
 
@@ -65,7 +65,7 @@ static inline uint find_samples(const FrameParams p, uint view, uint before, uin
     const int column = x.column - DPR_FACE_REACH + (int)(k % DPR_FACE_SPAN),
               row = x.row - DPR_FACE_REACH + (int)(k / DPR_FACE_SPAN);
     if (column < 0 || row < 0 || column >= (int)p.width || row >= (int)p.height) continue;
-    const uint face = front_face[(view * p.height + (uint)row) * p.width + (uint)column];
+    const uint face = front_face[place_of_sample(p, view, (uint)column, (uint)row)];
     const float2 away = (float2)((float)column, (float)row) - at;
     const float distance2 = dot(away, away);
     if (face == before && distance2 < least_before) {

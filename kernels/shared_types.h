@@ -41,6 +41,10 @@ typedef struct FrameParams {
   uint mesh_edges, edges;         /* of the scene; of a view: cuts of clipped faces are edges too */
   uint shading;                   /* DPR_UNLIT, DPR_FLAT, ...: whose creases are contours */
   float depth_reach; /* normalised depth: surfaces that much behind the nearest may still be seen */
+  /* The window of samples that buffers hold (window.h): where it begins, how many of the frame's are not in
+     it, and its first tile. All 0: the whole frame. */
+  uint first_sample, absent_samples, first_tile;
+  uint begin_tile, last_tile; /* of a launch by tiles: [begin_tile, last_tile) */
 } FrameParams;
 
 /// A mesh or an instance of it in the frame. Each has vertices and given normals of its own in the
@@ -159,13 +163,13 @@ typedef struct AggregateParams {
   float sigma, gamma, alpha, background_depth;
   Sampling sampling;
   uint pixels_per_view;
-  uint pixels;                    /* of all views */
+  uint first_pixel, pixels;       /* of the window: its first, of all views', and how many it has */
   uint faces;                     /* of one view */
   uint first_view;                /* of the batch that names the noise */
   uint last_pixel;                /* where those of the launch end */
   uint channels;                  /* DPR_PIXEL_CHANNELS, or those before alpha's; or 0: none are written */
   uint fragments, grad_fragments; /* as in FrameParams */
-  uint unused0, unused1;
+  uint unused;
 } AggregateParams;
 
 /// One term of a pixel's perturbed arg-max, which exact aggregation's forward pass leaves for its backward
@@ -246,6 +250,12 @@ typedef struct BlurPass {
   uint image_lines; /* the rest is read where they are. Along rows: rows of an image */
   /* Input i along the pass, and across it, is made of samples i * step + first to i * step + end - 1. */
   int along_step, along_first, along_end, across_step, across_first, across_end;
+  /* Along columns: where the launch's work-items end; the rows of inputs that there are, the others are added
+     by other launches; and how many pixels lie before those that the buffers hold. */
+  uint items;
+  int first_row, last_row;
+  uint in_shift, out_shift;
+  uint has_sums; /* of blur_columns_scale: its input are the sums */
 } BlurPass;
 
 /// The blur by samples of the noise.

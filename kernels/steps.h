@@ -9,6 +9,7 @@
 #define DPR_STEPS_H
 
 #include "crossing.h"
+#include "window.h"
 
 /// Mark of a step that a contour passes without counting: a flat one, which counts by columns, or one that
 /// only one of the samples shows.
@@ -19,7 +20,7 @@
 #define DPR_STEPS 4
 #define DPR_OPPOSITE(step) ((step) ^ 2)
 
-/// A sample of a view: its index among those of all views, its column and row.
+/// A sample of a view: its place in the window (window.h), its column and row.
 typedef struct {
   uint index;
   int2 at;
@@ -36,7 +37,7 @@ static inline int is_on_raster(const FrameParams p, Sample s) {
   return s.at.x >= 0 && s.at.y >= 0 && s.at.x < (int)p.width && s.at.y < (int)p.height;
 }
 
-/// Contours that cross the steps: planes [2][view][height][width], to the right and down.
+/// Contours that cross the steps: planes [2][sample of the window], to the right and down.
 typedef struct {
   global const uint* winner;
   global const float2* cut;
@@ -54,8 +55,8 @@ static inline Cut cut_at(const FrameParams p, const Steps steps, Sample s, int s
 }
 
 static inline Sample sample_at(const FrameParams p, uint index) {
-  const uint line = index / p.width;
-  const Sample s = {index, (int2)((int)(index % p.width), (int)(line % p.height))};
+  const int2 at = {(int)((index + p.first_sample) % p.width), (int)(line_of_place(p, index) % p.height)};
+  const Sample s = {index, at};
   return s;
 }
 

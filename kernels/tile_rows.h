@@ -28,7 +28,7 @@ typedef struct {
   uint first_column, columns, first, last;
 } TileRows;
 
-/// None beyond the last tile.
+/// None from p.last_tile on.
 static inline TileRows tile_rows(const FrameParams p, uint item) {
   TileRows r;
   r.tile = item / DPR_TILE_ITEMS;
@@ -37,8 +37,13 @@ static inline TileRows tile_rows(const FrameParams p, uint item) {
   r.first_column = (uint)s.first_column;
   r.columns = (uint)(s.last_column - s.first_column);
   r.first = (uint)s.first_row + item % DPR_TILE_ITEMS * DPR_ROWS;
-  r.last = r.view < p.views ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
+  r.last = r.tile < p.last_tile ? min(r.first + DPR_ROWS, (uint)s.last_row) : r.first;
   return r;
+}
+
+/// The list of a work-item that has a line of a tile: one of those of the window's tiles.
+static inline uint list_of_line(const FrameParams p, uint tile, int line) {
+  return (tile - p.first_tile) * DPR_TILE_ITEMS + (uint)(line % DPR_TILE) / DPR_ROWS;
 }
 
 /// The lines of a tile that are a work-item's, [first, last) of those of its tile: its rows where contours

@@ -12,7 +12,7 @@ typedef struct {
 } TileRow;
 
 static inline TileRow row_of(const FrameParams p, const TileRows rows, uint row) {
-  const TileRow r = {(rows.view * p.height + row) * p.width + rows.first_column, rows.columns,
+  const TileRow r = {place_of_sample(p, rows.view, rows.first_column, row), rows.columns,
                      (uint2)(rows.first_column, row)};
   return r;
 }

@@ -98,14 +98,15 @@ static inline float depth_at_crossing(float front, float beyond, float distance)
 typedef struct {
   global const uint4* faces;
   global const float4* ndc;
-  global const float* front;  // of the view
+  global const float* front;
+  uint first;                 // place of the view's first sample in the window, modulo 2^32
   float reach;                // view depth behind the nearest that may still be seen
 } CrossingScene;
 
 /// From how many of the samples of the step that it crosses something hides a contour.
 static inline int hidden_from(const FrameParams p, const CrossingScene v, const TileContour c,
                               const RasterEdge e, const Crossing x, int is_crease, float depth) {
-  const int to_next = e.is_by_rows ? 1 : (int)p.width, first = x.row * (int)p.width + x.column;
+  const uint to_next = e.is_by_rows ? 1 : p.width, first = v.first + (uint)x.row * p.width + (uint)x.column;
   const int inner_first = first_is_inner(c, e);
   const float slack = v.reach + DPR_DEPTH_SLACK * depth;
   if (is_crease) {
@@ -114,7 +115,7 @@ static inline int hidden_from(const FrameParams p, const CrossingScene v, const 
     return hides_crease(p, c, v.faces, v.ndc, inner_first, here, v.front[first], depth, slack) +
            hides_crease(p, c, v.faces, v.ndc, !inner_first, next, v.front[first + to_next], depth, slack);
   }
-  const int outer = inner_first ? first + to_next : first, outwards = inner_first ? to_next : -to_next;
+  const uint outer = inner_first ? first + to_next : first, outwards = inner_first ? to_next : 0 - to_next;
   const int place = (e.is_by_rows ? x.column : x.row) + (inner_first ? 2 : -1);
   const int is_inside = place >= 0 && place < (int)(e.is_by_rows ? p.width : p.height);
   const float beyond = is_inside ? v.front[outer + outwards] : INFINITY;
@@ -124,8 +125,7 @@ static inline int hidden_from(const FrameParams p, const CrossingScene v, const 
 
 /// The place of a crossing's step in the planes of steps, of which each has `pixels`.
 static inline uint step_of(const FrameParams p, uint view, const RasterEdge e, const Crossing x) {
-  const uint pixels = p.views * p.width * p.height;
-  return (e.is_by_rows ? 0 : pixels) + (view * p.height + (uint)x.row) * p.width + (uint)x.column;
+  return (e.is_by_rows ? 0 : samples_of_window(p)) + place_of_sample(p, view, (uint)x.column, (uint)x.row);
 }
 
 /// Bytes that hold a bit for every step of a tile: one a row, for the steps along it, then one a column.

@@ -47,6 +47,7 @@ std::shared_ptr<CornerTexcoords> Renderer::Impl::corner_texcoords_in_force() {
 
 void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
+  require_whole();
   if (!aov) aov.emplace(impl_of(device));
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own

@@ -45,6 +45,7 @@ FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_
 
 void Renderer::Impl::require_samples(const char* caller) {
   require_forward(caller);
+  require_whole();
   const char* const got = !pixel_noise      ? "noise of the triangles"
                           : scene.lights    ? "a scene with lights"
                           : geometry_colors ? "colours by geometry"

@@ -37,6 +37,51 @@ float depth_reach(const Smoothing& smoothing) {
 PixelNoise::PixelNoise(Device::Impl& device)
     : contour(device), antialias(device), blur(device), device_(device) {}
 
+namespace {
+
+Blur::Lines lines_of_band(const shared::FrameParams& p, const Range& rows) {
+  return {lines_of(p, rows), p.first_sample / p.width};
+}
+
+}  // namespace
+
+void PixelNoise::start(const ContourInputs& in, const Buffer<cl_uint>& tile_starts) {
+  blur.find_extents(in.p, tile_starts);
+}
+
+void PixelNoise::add(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
+                     const Range& rows) {
+  antialias.cross(in, contour, rows);
+  antialias.forward(in.p, contour, raster, kept_, rows);
+  blur.add(size, raster, lines_of_band(in.p, rows));
+}
+
+void PixelNoise::finish(const Blur::Size& size) {
+  image.resize(device_, size.views * size.width * size.height);
+  blur.finish(size, image);
+  blur_holds_image_ = true;
+}
+
+void PixelNoise::start_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image,
+                                bool by_scale) {
+  blur.start_backward(size, grad_image, by_scale);
+  blur_holds_image_ = by_scale;
+}
+
+void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
+                          const Range& rows, bool by_scale) {
+  antialias.cross(in, contour, rows);
+  antialias.forward(in.p, contour, raster, kept_, rows);
+  if (by_scale) blur.add_scale(size, raster, lines_of_band(in.p, rows));
+  blur.backward_part(size, lines_of(in.p, window_of(in.p)), grad_raster_, by_scale);
+  antialias.backward(in, contour, kept_, grad_raster_, rows);
+}
+
+void PixelNoise::finish_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image,
+                                 bool by_scale) {
+  if (by_scale) blur.backward_scale(size, grad_image);
+}
+
 void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                          const Buffer<cl_uint>& tile_starts) {
   if (!sampled) blur.find_extents(in.p, tile_starts);

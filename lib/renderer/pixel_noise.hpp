@@ -43,6 +43,17 @@ class PixelNoise {
   /// bands. `tile_starts` are the runs of the frame's pairs.
   void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
                const Buffer<cl_uint>& tile_starts);
+  /// forward() of a frame in bands of samples: at first; of each, in order, whose samples the raster holds, with
+  /// those around it (Antialias::k_rows_around); at last. `rows` are the band's, of tiles.
+  void start(const ContourInputs& in, const Buffer<cl_uint>& tile_starts);
+  void add(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, const Range& rows);
+  void finish(const Blur::Size& size);
+  /// backward() of such a frame in the same way, of bands that have been rendered again.
+  void start_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image, bool by_scale);
+  void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, const Range& rows,
+                bool by_scale);
+  void finish_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image, bool by_scale);
+
   /// The raster holds samples as they were before forward(): bands have been rendered again.
   void unblend() { is_blended_ = raster_is_gradient_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale. `is_whole`: the raster is not
@@ -55,6 +66,11 @@ class PixelNoise {
   bool lacks_raster(bool by_scale) const {
     return by_scale && raster_is_gradient_ && (blur.scale_reads_raster() || !blur_holds_image_);
   }
+  /// The same of a frame in bands of samples, of which it is the blur that holds what is needed.
+  bool lacks_image(bool by_scale) const { return by_scale && !blur_holds_image_; }
+
+  /// Bytes a sample, of which the gradient's are a raster's that is not held where the frame is whole.
+  static constexpr std::size_t k_sample_bytes = Antialias::k_sample_bytes + KeptSamples::k_sample_bytes;
 
   /// Samples other than those of forward() the same way, to [view][height][width].
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,

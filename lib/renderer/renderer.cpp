@@ -140,6 +140,7 @@ std::size_t Renderer::Impl::fragment_budget() const {
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts && !reserved) return std::nullopt;
   const FrameCounts counts = larger(last_counts.value_or(FrameCounts()), reserved.value_or(FrameCounts()));
+  if (!cut_samples().empty()) return std::nullopt;
   const FrameCounts expected{std::min(with_headroom(counts.pairs), k_most_pairs),
                              with_headroom(counts.fragments), with_headroom(counts.contours)};
   if (with_headroom(expected.fragments) * fragment_bytes() >= fragment_budget()) return std::nullopt;
@@ -194,16 +195,19 @@ void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes size
   rasterize.forward_within(expected, likely.fragments, frame, setup.triangles, bin, contours,
                            sizes == FrameSizes::read);
   bands = {*rasterize.band};
+  sample_bands.clear();
   shade_and_aggregate();
   finish_image();
 }
 
-void Renderer::Impl::forward_measured() {
+void Renderer::Impl::forward_measured(bool is_whole) {
   last_counts.reset();
+  sample_bands = is_whole ? std::vector<Range>() : cut_samples();
   find_contours(std::nullopt);
   bin.forward(frame, setup);
-  rasterize.cover(frame, setup.triangles, bin);
-  bands = rasterize.cut(frame, bin, fragment_budget(), fragment_bytes());
+  rasterize.cover(frame, setup.triangles, bin, sample_bands.empty());
+  if (!sample_bands.empty()) return forward_in_bands();
+  bands = rasterize.cut(frame, bin, tile_rows_of(frame), fragment_budget(), fragment_bytes());
   Rasterize::require_fits(bands, fragment_budget(), fragment_bytes());
   for (const Band& band : bands) render(band);
   finish_image();
@@ -255,12 +259,16 @@ void Renderer::Impl::settle() {
   aov_frame = 0;
 }
 
+void Renderer::Impl::require_whole() {
+  if (!sample_bands.empty()) render_again(/*is_whole*/ true);
+}
+
 /// The same frame, whatever its buffers hold.
-void Renderer::Impl::render_again() {
+void Renderer::Impl::render_again(bool is_whole) {
   capacity.reset();
   rendered = false;
   set_up();  // what did not fit has been emptied, runs of pairs among it
-  forward_measured();
+  forward_measured(is_whole);
   rendered = true;
 }
 
@@ -279,7 +287,7 @@ void Renderer::Impl::shade_and_aggregate() {
 }
 
 Buffer<cl_float4>& Renderer::Impl::room_for_grad_images(std::size_t pixels) {
-  if (pixel_noise) return pixel_noise->antialias.scratch(frame, pixels);
+  if (pixel_noise && sample_bands.empty()) return pixel_noise->antialias.scratch(frame, pixels);
   grad_images_.resize(impl_of(device), pixels);
   return grad_images_;
 }
@@ -307,18 +315,24 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
                           "a lit scene, with view matrices from a buffer",
                           "Renderer::set_views(): the eye's part of it needs their inverses");
   }
-  if (pixel_noise) {
+  if (!sample_bands.empty()) {
+    if (pixel_noise->lacks_image(wanted.smoothing)) render_again();
+  } else if (pixel_noise) {
     if (pixel_noise->lacks_raster(wanted.smoothing)) render_again();
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
                           bands.size() == 1);
   }
   const bool textured = !geometry->textures.empty();
   if (wanted.texture && textured) texels->start(geometry->textures);
-  const BufferRef<cl_float4> grad_raster =
-      pixel_noise ? pixel_noise->grad_raster(aggregate.image) : grad_images;
-  for (const Band& band : bands) {
-    if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
-    differentiate(grad_raster);
+  if (sample_bands.empty()) {
+    const BufferRef<cl_float4> grad_raster =
+        pixel_noise ? pixel_noise->grad_raster(aggregate.image) : grad_images;
+    for (const Band& band : bands) {
+      if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
+      differentiate(grad_raster);
+    }
+  } else {
+    differentiate_in_bands(grad_images);
   }
   if (is_geometric(wanted)) {
     gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
@@ -386,7 +400,7 @@ std::size_t Renderer::Impl::bytes() const {
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
          (gradient_map ? gradient_map->bytes() : 0) + aov_surface.capacity_bytes() +
          aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
-         all_views_.starts.capacity_bytes() + (corner_texcoords ? corner_texcoords->bytes() : 0);
+         all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() + (corner_texcoords ? corner_texcoords->bytes() : 0);
 }
 
 void Renderer::forward() { impl_->forward(); }

@@ -237,9 +237,20 @@ void Renderer::Impl::sum_gradients() {
       aggregate.perturbs_distances()
           ? Summation{pixels, sigmas, 1, 1, all_pixels, aggregate.grad_sigma}
           : Summation{bin.pairs, sigmas, 1, faces, bin.pair_starts, occupancy.grad_sigma, pairs};
+  const std::size_t pixel_channels = channels(sums_pixels(), aggregate.channel_count());
+  const Summation of_pixels = sample_bands.empty()
+                                  ? Summation{pixels, pixel_channels, 1, 1, all_pixels, aggregate.channels}
+                                  : Summation{pixels,
+                                              pixel_channels,
+                                              1,
+                                              1,
+                                              all_pixels,
+                                              pixel_parts_,
+                                              pixels,
+                                              0,
+                                              Reduce::part_slots(pixels)};
   std::vector<std::pair<SumOf, Summation>> all{
-      {SumOf::pixels,
-       {pixels, channels(sums_pixels(), aggregate.channel_count()), 1, 1, all_pixels, aggregate.channels}},
+      {SumOf::pixels, of_pixels},
       {SumOf::sigma, sigma},
       {SumOf::poses,
        {vertices, channels(poses, frame.distorts != 0 ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS),

@@ -149,6 +149,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void require_scene(const char* caller) const;
   void require_rendered(const char* caller) const;
   void require_forward(const char* caller);
+  /// Renders the last frame again if its samples are in bands, so that they are whole: whatever the budget.
+  void require_whole();
   /// Image of the last frame: [view][height][width] RGBA.
   const Buffer<cl_float4>& image() const { return pixel_noise ? pixel_noise->image : aggregate.image; }
   /// Held in buffers.
@@ -166,7 +168,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   float hidden_reach = 0;  // normalised depth behind a triangle from where on nothing is seen; or infinite
 
   std::optional<Geometry> geometry;
-  std::vector<Band> bands;  // of the last forward()
+  std::vector<Band> bands;          // of the last forward()
+  std::vector<Range> sample_bands;  // of its samples, rows of tiles; none: they are whole
 
   Transform transform;
   Setup setup;
@@ -240,9 +243,15 @@ struct Renderer::Impl : OnDevice, ViewSet {
   FrameCounts likely_counts(const FrameCounts& room) const;
   FrameNote learn();
   void forward_within(const FrameCounts& expected, FrameSizes sizes);
-  void forward_measured();
+  void forward_measured(bool is_whole = false);
   void settle();
-  void render_again();
+  void render_again(bool is_whole = false);
+  /// Bands of samples of the next frame; none where the budget holds all of them.
+  std::vector<Range> cut_samples() const;
+  std::size_t sample_bytes() const;
+  std::size_t fragments_of_band() const;
+  void forward_in_bands();
+  void render_samples(const Range& rows);
 
   /// The stages from the fragments on: of a band, and backward of the one rendered last.
   void render(const Band& band);
@@ -250,6 +259,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void finish_image();
   void shade_and_aggregate();
   void differentiate(const BufferRef<cl_float4>& grad_images);
+  void differentiate_in_bands(const BufferRef<cl_float4>& grad_images);
+  void add_pixel_channels(const Range& rows);
 
   SceneGradient finish_geometric_gradient();
   void upload_directions(std::span<const SceneTangent> directions);
@@ -280,6 +291,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
     std::size_t count = 0;
   };
   Segment all_pixels_, all_views_;
+  Buffer<float> pixel_parts_;  // of bands of samples: what their pixels' channels add up to
 
   // Buffers in which the next setter prepares its values.
   ViewSet spare_views_;

@@ -189,11 +189,12 @@ void Renderer::Impl::cut_for_tangents(std::size_t directions) {
   for (const Band& band : bands) largest = std::max(largest, band.fragments.count);
   if (largest * bytes <= budget) return;
   if (bands.size() == 1) rasterize.read_rows(frame);
-  bands = rasterize.cut(frame, bin, budget, std::max(bytes, fragment_bytes()));
+  bands = rasterize.cut(frame, bin, tile_rows_of(frame), budget, std::max(bytes, fragment_bytes()));
 }
 
 void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   constexpr std::size_t k_most = 16;  // at a time
+  require_whole();
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(impl_of(device), directions.size() * image().size());
   const std::size_t fitting = std::max<std::size_t>(device.memory_budget() / 2 / tangent_bytes(), 1);

@@ -40,7 +40,8 @@ shared::AggregateParams Aggregate::params(const shared::FrameParams& p, const gl
   a.background_depth = now_.smoothing.background_depth;
   a.sampling = sampling_params(now_.smoothing);
   a.pixels_per_view = p.width * p.height;
-  a.pixels = p.views * a.pixels_per_view;
+  a.first_pixel = p.first_sample;
+  a.pixels = to_uint(pixels_of(p));
   a.faces = p.faces;
   a.first_view = p.first_view;
   a.channels = with_channels ? to_uint(channel_count()) : 0;
@@ -105,7 +106,7 @@ void Aggregate::launch(const AggregateInputs& in, const glm::vec3& background,
 }
 
 void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) {
-  const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
+  const std::size_t pixels = pixels_of(in.p);
   image.resize(device_, pixels);
   if (now_.kernels->barrier || now_.kernels->joint) {
     const bool has_background_slots = now_.kernels->barrier.has_value();
@@ -118,7 +119,7 @@ void Aggregate::forward(const AggregateInputs& in, const glm::vec3& background) 
 
 void Aggregate::backward(const AggregateInputs& in, const glm::vec3& background,
                          const BufferRef<cl_float4>& grad_image, bool with_channels) {
-  const std::size_t pixels = std::size_t{in.p.views} * in.p.width * in.p.height;
+  const std::size_t pixels = pixels_of(in.p);
   in.rasterize.start_gradients(in.p);
   channels.resize(device_, with_channels ? channel_count() * pixels : 1);  // an argument all the same
   if (perturbs_distances()) grad_sigma.resize(device_, pixels);

@@ -59,8 +59,8 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
 
   /// From the tangents of the band's fragments to those of the images, of the group's directions from `first`
   /// on. Uses the fragments' gradients as scratch. Only with the exact estimator.
-  void tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents,
-               std::size_t first, Buffer<cl_float4>& images);
+  void tangent(const AggregateInputs& in, const glm::vec3& background, Tangents& tangents, std::size_t first,
+               Buffer<cl_float4>& images);
 
   /// Number of `channels`: the joint composition has none of alpha.
   std::size_t channel_count() const {
@@ -72,13 +72,19 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   /// Bytes a fragment of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = sizeof(shared::Slot);
 
-  Buffer<cl_float4> image;  ///< [view][height][width] RGBA
-  Buffer<float> channels;   ///< [channel_count()][view][height][width]
+  /// Bytes a pixel of the buffers below and the slots.
+  std::size_t pixel_bytes(bool with_channels) const {
+    return sizeof(cl_float4) + sizeof(cl_uint) + (now_.kernels->barrier ? sizeof(shared::Slot) : 0) +
+           (with_channels ? channel_count() * sizeof(float) : 0);
+  }
+
+  Buffer<cl_float4> image;  ///< [pixels_of(p)] RGBA
+  Buffer<float> channels;   ///< [channel_count()][pixels_of(p)]
 
   /// True if distances are perturbed here, in the sampled joint composition. Then the gradients of distances
   /// take the place of those of occupancies, and this one is written.
   bool perturbs_distances() const { return now_.kernels->joint_sampled.has_value(); }
-  Buffer<float> grad_sigma;  ///< [view][height][width]
+  Buffer<float> grad_sigma;  ///< [pixels_of(p)]
 
   std::size_t bytes() const;
 

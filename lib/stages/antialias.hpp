@@ -11,12 +11,13 @@
 
 namespace dpr {
 
-/// Samples near contours, [view][height][width]: as they were before they were blended, and faded
+/// Samples near contours: as they were before they were blended, and faded
 /// (kernels/antialias_fade.cl), by how much.
 struct KeptSamples {
   Buffer<cl_float4> samples, faded;
   Buffer<cl_float2> shares;
 
+  static constexpr std::size_t k_sample_bytes = 2 * sizeof(cl_float4) + sizeof(cl_float2);
   std::size_t bytes() const {
     return samples.capacity_bytes() + faded.capacity_bytes() + shares.capacity_bytes();
   }
@@ -29,16 +30,17 @@ class Antialias {
   /// The front-most depths of the samples near contours of the rasterizer's band.
   void find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
                   const Contour& contour);
-  /// Finds what crosses the steps between samples; after find_front() of all bands. Surfaces p.depth_reach
-  /// (normalised depth) behind the nearest count as seen.
-  void cross(const ContourInputs& in, const Contour& contour);
-  /// Blends the samples of [view][height][width] in place.
+  /// Finds what crosses the steps between samples; after find_front() of the window. Surfaces p.depth_reach
+  /// (normalised depth) behind the nearest count as seen. `wanted`, here and below: the rows of tiles whose results
+  /// are, k_rows_around less than the window where the view goes on; or all of the window.
+  void cross(const ContourInputs& in, const Contour& contour, const std::optional<Range>& wanted = {});
+  /// Blends the samples in place.
   void forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
-               KeptSamples& kept);
-  /// From the gradients of the blended samples to those of the samples, in place, and to `grad_ends`. `kept`
-  /// as forward() leaves it.
+               KeptSamples& kept, const std::optional<Range>& wanted = {});
+  /// From the gradients of the blended samples to those of the samples, in place, and to `grad_ends` of the
+  /// wanted tiles. `kept` as forward() leaves it.
   void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-                Buffer<cl_float4>& grad);
+                Buffer<cl_float4>& grad, const std::optional<Range>& wanted = {});
   /// From the tangents of the samples to those of the blended ones, in place, along one of the directions. `kept`
   /// as forward() leaves it.
   void tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
@@ -46,19 +48,27 @@ class Antialias {
   /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
   Buffer<cl_float4>& scratch(const shared::FrameParams& p, std::size_t count);
 
-  Buffer<float> front;            ///< [view][height][width] view depth, infinite where nothing is; only near
-                                  ///< contours
-  Buffer<cl_uint> front_face;     ///< [view][height][width] view * faces + face of what is there
-  Buffer<cl_uint> winner;         ///< [2][view][height][width] what crosses the steps to the right, and down;
-                                  ///< only near contours
-  Buffer<cl_float2> cut;          ///< [2][view][height][width] what it cuts: Cut of kernels/crossing.h
-  Buffer<cl_uint> second_counts;  ///< [tile][DPR_TILE_ITEMS] of `seconds`
+  /// Rows of tiles around those that are wanted in which samples have to be there.
+  static constexpr std::size_t k_rows_around = 6;
+  /// Bytes a sample of the buffers below.
+  static constexpr std::size_t k_sample_bytes =
+      sizeof(float) + 3 * sizeof(cl_uint) + 4 * sizeof(cl_float2) + sizeof(cl_float4) +
+      DPR_SECOND_CROSSINGS * (sizeof(shared::SecondCrossing) + sizeof(cl_float2)) / (2 * DPR_TILE) + 1;
+
+  Buffer<float> front;         ///< [sample] view depth, infinite where nothing is; only near contours
+  Buffer<cl_uint> front_face;  ///< [sample] view * faces + face of what is there
+  Buffer<cl_uint> winner;  ///< [2][sample] what crosses the steps to the right, and down; only near contours
+  Buffer<cl_float2> cut;   ///< [2][sample] what it cuts: Cut of kernels/crossing.h
+  Buffer<cl_uint> second_counts;           ///< [tile][DPR_TILE_ITEMS] of `seconds`
   Buffer<shared::SecondCrossing> seconds;  ///< [tile][DPR_TILE_ITEMS][DPR_SECOND_ROOM] beside the winners
   Buffer<cl_float4> grad_ends;             ///< [pair] of the contour's two ends, NDC
 
   std::size_t bytes() const;
 
  private:
+  TileLaunch launch_around(const shared::FrameParams& p, const std::optional<Range>& wanted,
+                           std::size_t around) const;
+
   Device::Impl& device_;
   Launcher<kernel::antialias_front, kernel::antialias_cross, kernel::antialias_second_find,
            kernel::antialias_fade, kernel::antialias_keep, kernel::antialias_forward,
@@ -69,9 +79,9 @@ class Antialias {
                          kernel::antialias_blend_tangent, kernel::antialias_second_tangent>>
       tangent_;                     // made when first asked for
   Buffer<cl_uchar> crowded_;        // [tile][DPR_TILE_BYTES]
-  Buffer<cl_float2> grad_cut_;      // [2][view][height][width]
+  Buffer<cl_float2> grad_cut_;      // [2][sample]
   Buffer<cl_float2> grad_seconds_;  // as `seconds`
-  Buffer<cl_float4> kept_grad_;     // [view][height][width] near contours; see scratch()
+  Buffer<cl_float4> kept_grad_;     // [sample] near contours; see scratch()
 };
 
 }  // namespace dpr

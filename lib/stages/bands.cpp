@@ -8,11 +8,9 @@ namespace dpr {
 
 namespace {
 
-/// The pixels of a stretch of tiles: of whole rows, or of a part of one.
+/// The pixels of a stretch of the window's tiles: of whole rows, or of a part of one.
 PixelBlock pixel_block(const shared::FrameParams& p, const Range& tiles) {
-  const auto first_pixel = [&](std::size_t row) {
-    return (row / p.tiles_y * p.height + row % p.tiles_y * DPR_TILE) * p.width;
-  };
+  const auto first_pixel = [&](std::size_t row) { return lines_before(p, row) * p.width - p.first_sample; };
   const std::size_t row = tiles.first / p.tiles_x, column = tiles.first % p.tiles_x * DPR_TILE;
   if (tiles.count % p.tiles_x == 0) {
     return {first_pixel(row), first_pixel(row + tiles.count / p.tiles_x) - first_pixel(row)};
@@ -55,16 +53,16 @@ std::vector<Rasterize::TileStart> Rasterize::tile_starts(const shared::FramePara
   return starts;
 }
 
-std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
-                                 std::size_t fragment_bytes) const {
+std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, const Range& rows,
+                                 std::size_t budget, std::size_t fragment_bytes) const {
   const auto bytes_of = [&](std::size_t number) { return bytes_of_band(number, fragment_bytes); };
   std::vector<TileStart> cuts;
-  for (std::size_t row = 0; row + 1 < row_starts_.size(); ++row) {
+  for (std::size_t row = rows.first; row < rows.last(); ++row) {
     const bool fits = bytes_of(row_starts_[row + 1].fragment - row_starts_[row].fragment) <= budget;
     const std::vector<TileStart> tiles = fits ? std::vector{row_starts_[row]} : tile_starts(p, bin, row);
     cuts.insert(cuts.end(), tiles.begin(), tiles.end());
   }
-  cuts.push_back(row_starts_.back());
+  cuts.push_back(row_starts_[rows.last()]);
   const auto count = [&](std::size_t first, std::size_t last) {
     return cuts[last].fragment - cuts[first].fragment;
   };
@@ -77,7 +75,7 @@ std::vector<Band> Rasterize::cut(const shared::FrameParams& p, const Bin& bin, s
   };
   // The bands have equal size rather than the largest; none is larger than the first, so that buffers do
   // not grow.
-  const std::size_t total = cuts.back().fragment, least_bands = bytes_of(total) / budget + 1;
+  const std::size_t total = count(0, cuts.size() - 1), least_bands = bytes_of(total) / budget + 1;
   std::size_t most = least_bands == 1 ? total : std::max(total / least_bands, largest);
   std::vector<Band> bands;
   for (std::size_t first = 0, last = 0; last + 1 < cuts.size(); first = last) {

@@ -103,8 +103,10 @@ shared::BlurPass Blur::expansion(const Axis& axis) const {
 }
 
 std::size_t Blur::column_items(const Pass& pass, std::size_t width) const {
-  return groups(pass.out_length, block_of(device_)) * groups(width, pixels_of_vector(device_));
+  return groups(pass.out_length, block_of(device_)) * vectors_of_row(width);
 }
+
+std::size_t Blur::vectors_of_row(std::size_t width) const { return groups(width, pixels_of_vector(device_)); }
 
 std::size_t Blur::row_items(const Pass& pass) const {
   return groups(pass.out_length, k_row_block * pixels_of_vector(device_));
@@ -140,13 +142,64 @@ Blur::Pass Blur::within_extents(Pass pass, const Footprint& along, const Footpri
   return pass;
 }
 
-void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
-                   const BufferRef<cl_float4>& in, Buffer<cl_float4>& out) {
+Range Blur::set_columns(Pass& pass, std::size_t views, std::size_t width) const {
   pass.lines = static_cast<cl_uint>(views);
   pass.width = static_cast<cl_uint>(width);
+  pass.last_row = to_int(pass.in_length);
+  pass.items = static_cast<cl_uint>(views * column_items(pass, width));
+  return std::size_t{pass.items};
+}
+
+void Blur::columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                   const BufferRef<cl_float4>& in, Buffer<cl_float4>& out) {
+  const Range items = set_columns(pass, views, width);
   out.resize(device_, views * pass.out_length * width);
-  launch_(views * column_items(pass, width),
+  launch_(items,
           kernel::blur_columns{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
+}
+
+namespace {
+
+/// The lines of an image among those of all, counted from its first.
+Range lines_of_image(const Range& lines, std::size_t image, std::size_t length) {
+  const std::size_t begin = image * length, first = std::max(lines.first, begin),
+                    last = std::min<std::size_t>(lines.last(), begin + length);
+  return {first - begin, last - first};
+}
+
+}  // namespace
+
+void Blur::add_columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                       const Buffer<cl_float4>& in, const Lines& lines, Buffer<cl_float4>& out) {
+  set_columns(pass, views, width);
+  out.resize(device_, views * pass.out_length * width);
+  pass.in_shift = static_cast<cl_uint>(lines.first_held * width);
+  const std::size_t items = column_items(pass, width), length = pass.in_length;
+  for (std::size_t view = lines.of.first / length; view * length < lines.of.last(); ++view) {
+    const Range rows = lines_of_image(lines.of, view, length);
+    pass.first_row = to_int(rows.first);
+    pass.last_row = to_int(rows.last());
+    pass.items = static_cast<cl_uint>((view + 1) * items);
+    launch_(Range(view * items, items),
+            kernel::blur_columns{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
+  }
+}
+
+void Blur::part_of_columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                           const BufferRef<cl_float4>& in, const Range& lines, Buffer<cl_float4>& out) {
+  set_columns(pass, views, width);
+  out.resize(device_, lines.count * width);
+  pass.out_shift = static_cast<cl_uint>(lines.first * width);
+  const std::size_t length = pass.out_length, block = block_of(device_), vectors = vectors_of_row(width);
+  const std::size_t blocks_of_image = groups(length, block);
+  for (std::size_t view = lines.first / length; view * length < lines.last(); ++view) {
+    const Range rows = lines_of_image(lines, view, length);
+    const Range items((view * blocks_of_image + rows.first / block) * vectors,
+                      groups(rows.count, block) * vectors);
+    pass.items = items.last();
+    launch_(items,
+            kernel::blur_columns{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});
+  }
 }
 
 void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
@@ -164,17 +217,30 @@ void Blur::rows(Pass pass, std::size_t lines, const Buffer<float>& weights, cons
   }
 }
 
+Blur::Pass Blur::first_pass(const Axis& y) const {
+  return within_extents(is_coarse() ? reduction(y) : convolution(y), {}, {});
+}
+
 void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
   const Axis x = axis(size.width), y = axis(size.height);
+  columns(first_pass(y), size.views, x.samples, is_coarse() ? now_.reduce : now_.weights, raster,
+          is_coarse() ? scratch_ : between_);
+  finish(size, image);
+}
+
+void Blur::add(const Size& size, const Buffer<cl_float4>& raster, const Lines& lines) {
+  add_columns(first_pass(axis(size.height)), size.views, axis(size.width).samples,
+              is_coarse() ? now_.reduce : now_.weights, raster, lines, is_coarse() ? scratch_ : between_);
+}
+
+void Blur::finish(const Size& size, Buffer<cl_float4>& image) {
+  const Axis x = axis(size.width), y = axis(size.height);
   const Footprint sample, in_x = input_footprint(x), in_y = input_footprint(y);
-  if (is_coarse()) {
-    columns(within_extents(reduction(y), sample, sample), size.views, x.samples, now_.reduce, raster,
-            scratch_);
-    rows(within_extents(reduction(x), sample, in_y, y.in), size.views * y.in, now_.reduce, scratch_, in_);
-  }
   const Footprint out_x = in_x.through(convolution(x)), out_y = in_y.through(convolution(y));
-  columns(within_extents(convolution(y), in_y, in_x), size.views, x.in, now_.weights,
-          is_coarse() ? in_ : raster, between_);
+  if (is_coarse()) {
+    rows(within_extents(reduction(x), sample, in_y, y.in), size.views * y.in, now_.reduce, scratch_, in_);
+    columns(within_extents(convolution(y), in_y, in_x), size.views, x.in, now_.weights, in_, between_);
+  }
   rows(within_extents(convolution(x), in_x, out_y, y.out), size.views * y.out, now_.weights, between_,
        is_coarse() ? out_ : image);
   if (is_coarse()) {
@@ -186,6 +252,28 @@ void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_
 
 void Blur::backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster,
                     bool keeps_forward) {
+  start_backward(size, grad_image, keeps_forward);
+  const Axis x = axis(size.width), y = axis(size.height);
+  columns(last_pass(y), size.views, x.samples, is_coarse() ? now_.reduce : now_.weights,
+          last_input(keeps_forward), grad_raster);
+}
+
+void Blur::backward_part(const Size& size, const Range& lines, Buffer<cl_float4>& grad_raster,
+                         bool keeps_forward) {
+  part_of_columns(last_pass(axis(size.height)), size.views, axis(size.width).samples,
+                  is_coarse() ? now_.reduce : now_.weights, last_input(keeps_forward), lines, grad_raster);
+}
+
+Blur::Pass Blur::last_pass(const Axis& y) const {
+  return transposed(is_coarse() ? reduction(y) : convolution(y));
+}
+
+const Buffer<cl_float4>& Blur::last_input(bool keeps_forward) const {
+  if (is_coarse()) return scratch_;
+  return keeps_forward ? grad_between_ : between_;
+}
+
+void Blur::start_backward(const Size& size, const BufferRef<cl_float4>& grad_image, bool keeps_forward) {
   const Axis x = axis(size.width), y = axis(size.height);
   Buffer<cl_float4>& grad_in = keeps_forward ? grad_in_ : in_;
   Buffer<cl_float4>& grad_between = keeps_forward ? grad_between_ : between_;
@@ -196,11 +284,9 @@ void Blur::backward(const Size& size, const BufferRef<cl_float4>& grad_image, Bu
   }
   rows(transposed(convolution(x)), size.views * y.out, now_.weights, is_coarse() ? grad_out : grad_image,
        grad_between);
-  columns(transposed(convolution(y)), size.views, x.in, now_.weights, grad_between,
-          is_coarse() ? grad_in : grad_raster);
   if (is_coarse()) {
+    columns(transposed(convolution(y)), size.views, x.in, now_.weights, grad_between, grad_in);
     rows(transposed(reduction(x)), size.views * y.in, now_.reduce, grad_in, scratch_);
-    columns(transposed(reduction(y)), size.views, x.samples, now_.reduce, scratch_, grad_raster);
   }
 }
 
@@ -214,16 +300,31 @@ void Blur::upload_starts(std::size_t views, std::size_t stride) {
   starts_stride_ = stride;
 }
 
+void Blur::add_scale(const Size& size, const Buffer<cl_float4>& raster, const Lines& lines) {
+  const Axis x = axis(size.width), y = axis(size.height);
+  if (!is_coarse())
+    add_columns(first_pass(y), size.views, x.samples, now_.weights_by_scale, raster, lines, by_scale_);
+}
+
+void Blur::backward_scale(const Size& size, const BufferRef<cl_float4>& grad_image) {
+  backward_scale(size, by_scale_, grad_image, !is_coarse());
+}
+
 void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                           const BufferRef<cl_float4>& grad_image) {
+  backward_scale(size, raster, grad_image, false);
+}
+
+void Blur::backward_scale(const Size& size, const Buffer<cl_float4>& raster,
+                          const BufferRef<cl_float4>& grad_image, bool has_sums) {
   const Axis x = axis(size.width), y = axis(size.height);
   Pass along_columns = within_extents(convolution(y), input_footprint(y), input_footprint(x)),
        along_rows = convolution(x);
   const std::size_t of_columns = column_items(along_columns, x.in), of_rows = y.out * row_items(along_rows);
   const std::size_t stride = of_columns + of_rows;
   products_.resize(device_, size.views * stride);
-  along_columns.lines = static_cast<cl_uint>(size.views);
-  along_columns.width = static_cast<cl_uint>(x.in);
+  set_columns(along_columns, size.views, x.in);
+  along_columns.has_sums = cl_uint{has_sums};
   along_rows.lines = static_cast<cl_uint>(size.views * y.out);
   launch_(size.views * of_columns, kernel::blur_columns_scale{.p = along_columns,
                                                               .stride = static_cast<cl_uint>(stride),
@@ -251,7 +352,7 @@ std::size_t Blur::bytes() const {
   for (const Buffer<float>* buffer : {&now_.weights, &now_.weights_by_scale, &now_.reduce, &now_.expand})
     bytes += buffer->capacity_bytes();
   for (const Buffer<cl_float4>* buffer :
-       {&in_, &between_, &out_, &grad_in_, &grad_between_, &grad_out_, &scratch_})
+       {&in_, &between_, &out_, &grad_in_, &grad_between_, &grad_out_, &scratch_, &by_scale_})
     bytes += buffer->capacity_bytes();
   return bytes;
 }

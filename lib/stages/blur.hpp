@@ -33,14 +33,30 @@ class Blur {
   void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
+  /// Lines of samples, of all views one after the other, and the first of those that a raster holds.
+  struct Lines {
+    Range of;
+    std::size_t first_held;
+  };
+  /// The same as forward(), to the same bits, of rasters of which lines are there at a time: those of all lines, in
+  /// order; then the image.
+  void add(const Size& size, const Buffer<cl_float4>& raster, const Lines& lines);
+  void finish(const Size& size, Buffer<cl_float4>& image);
   /// The transpose of forward(). Takes the memory of what forward() has left for backward_scale(), unless that
   /// is kept.
   void backward(const Size& size, const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_raster,
                 bool keeps_forward);
+  /// The same, of lines of rasters at a time, which begin and end with tiles: all but these; then lines.
+  void start_backward(const Size& size, const BufferRef<cl_float4>& grad_image, bool keeps_forward);
+  void backward_part(const Size& size, const Range& lines, Buffer<cl_float4>& grad_raster,
+                     bool keeps_forward);
   /// The derivative by the scale of sum grad_image . image, in `grad_scale`. After forward() and backward()
   /// of the same raster and gradient, which has kept what forward() left.
   void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
                       const BufferRef<cl_float4>& grad_image);
+  /// The same as that, of lines at a time; then the derivative.
+  void add_scale(const Size& size, const Buffer<cl_float4>& raster, const Lines& lines);
+  void backward_scale(const Size& size, const BufferRef<cl_float4>& grad_image);
 
   /// True if backward_scale() reads the raster itself, not what forward() has kept of it.
   bool scale_reads_raster() const { return !is_coarse(); }
@@ -66,6 +82,19 @@ class Blur {
   Pass reduction(const Axis& axis) const;
   Pass convolution(const Axis& axis) const;
   Pass expansion(const Axis& axis) const;
+  /// The pass that reads the raster, and its transpose with its input.
+  Pass first_pass(const Axis& y) const;
+  Pass last_pass(const Axis& y) const;
+  const Buffer<cl_float4>& last_input(bool keeps_forward) const;
+  /// Completes a pass along the columns of so many images. Returns its work-items.
+  Range set_columns(Pass& pass, std::size_t views, std::size_t width) const;
+  /// What lines of the input add to all outputs; and lines of the output.
+  void add_columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                   const Buffer<cl_float4>& in, const Lines& lines, Buffer<cl_float4>& out);
+  void part_of_columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
+                       const BufferRef<cl_float4>& in, const Range& lines, Buffer<cl_float4>& out);
+  void backward_scale(const Size& size, const Buffer<cl_float4>& raster,
+                      const BufferRef<cl_float4>& grad_image, bool has_sums);
   void columns(Pass pass, std::size_t views, std::size_t width, const Buffer<float>& weights,
                const BufferRef<cl_float4>& in, Buffer<cl_float4>& out);
   void rows(Pass pass, std::size_t lines, const Buffer<float>& weights, const BufferRef<cl_float4>& in,
@@ -84,6 +113,7 @@ class Blur {
   void upload_starts(std::size_t views, std::size_t stride);
   /// Work-items of a pass of one image's columns, and of one row.
   std::size_t column_items(const Pass& pass, std::size_t width) const;
+  std::size_t vectors_of_row(std::size_t width) const;
   std::size_t row_items(const Pass& pass) const;
 
   Device::Impl& device_;
@@ -97,6 +127,7 @@ class Blur {
   Buffer<cl_float4> in_, between_, out_;
   Buffer<cl_float4> grad_in_, grad_between_, grad_out_;
   Buffer<cl_float4> scratch_;
+  Buffer<cl_float4> by_scale_;  // what add_scale() has added up, as between_
   Buffer<float> products_;
   Buffer<cl_uint2> extents_;   ///< [view][row of tiles], in samples
   std::size_t tile_rows_ = 0;  ///< 0 while the extents are not known

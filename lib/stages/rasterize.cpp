@@ -37,9 +37,9 @@ PairGroups::PairGroups(const Device::Impl& device, const Range& of, std::size_t 
 }
 
 void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
-                      const ContourCount& contours) {
+                      const ContourCount& contours, bool counts_pixels) {
   const auto pairs = static_cast<cl_uint>(bin.pairs);
-  const std::size_t pixels = pixels_of(p);
+  in_bands_ = false;
   masks.resize(device_, length(pairs));
   fragment_starts.resize(device_, length(std::size_t{pairs} + 1));
   launch_(bin.launched, kernel::rasterize_cover{.p = p,
@@ -63,11 +63,7 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
                                                           .face_pairs = bin.face_pairs});
   }
   scan_(pairs, bin.pair_count, fragment_starts);
-  pixel_starts.resize(device_, pixels + 1);
-  launch_(tiles_of(p) * shares_of_tile(device_),
-          kernel::rasterize_count{
-              .p = p, .tile_starts = bin.tile_starts, .masks = masks, .counts = pixel_starts});
-  scan_(pixels, pixel_starts);
+  if (counts_pixels) count_pixels(p, bin);
 
   const std::size_t rows = std::size_t{p.views} * p.tiles_y;
   device_rows_.resize(device_, rows + 1);
@@ -78,12 +74,21 @@ void Rasterize::count(const shared::FrameParams& p, const Buffer<shared::Triangl
                                            .fragment_starts = fragment_starts,
                                            .contour_starts = contours.starts,
                                            .rows = device_rows_});
-  in_bands_ = false;
 }
 
-void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin) {
+void Rasterize::count_pixels(const shared::FrameParams& p, const Bin& bin) {
+  Buffer<cl_uint>& starts = in_bands_ ? frame_pixel_starts_ : pixel_starts;
+  const TileLaunch tiles(p, window_of(p), shares_of_tile(device_));
+  starts.resize(device_, pixels_of(p) + 1);
+  launch_(tiles.items, kernel::rasterize_count{
+                           .p = tiles.p, .tile_starts = bin.tile_starts, .masks = masks, .counts = starts});
+  scan_(pixels_of(p), starts);
+}
+
+void Rasterize::cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
+                      bool counts_pixels) {
   counted_ = true;
-  count(p, triangles, bin, no_contours(bin));
+  count(p, triangles, bin, no_contours(bin), counts_pixels);
   read_rows(p);
   check_total(row_starts_.back().fragment, "fragments (frame)");
   frame_fragments = likely_fragments_ = row_starts_.back().fragment;
@@ -93,7 +98,7 @@ FrameCounts Rasterize::counted() const { return {row_starts_.back().pair, row_st
 
 void Rasterize::forward(shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                         const Band& next) {
-  if (next.tiles.count < tiles_of(p)) rebase(next);
+  if (in_bands_ || next.tiles.count < tiles_of(p)) rebase(next);
   band = next;
   fragments = next.fragments.count;
   p.fragments = p.grad_fragments = plane_size(fragments);
@@ -137,7 +142,7 @@ void Rasterize::forward_within(const FrameCounts& capacity, std::size_t likely_f
   const ContourCount contour_count = contours ? *contours : no_contours(bin);
   counted_ = false;
   likely_fragments_ = likely_fragments;
-  count(p, triangles, bin, contour_count);
+  count(p, triangles, bin, contour_count, true);
   const std::size_t last_row = device_rows_.size() - 1;
   const cl_uint4 limits{{to_uint(bin.pairs), to_uint(capacity.fragments), to_uint(capacity.contours), 0}};
   const cl_uint4 sizes{

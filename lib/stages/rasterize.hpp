@@ -13,16 +13,9 @@
 #include "stages/bin.hpp"
 #include "stages/clip.hpp"
 #include "stages/scan.hpp"
+#include "stages/window.hpp"
 
 namespace dpr {
-
-/// Of all views.
-inline std::size_t pixels_of(const shared::FrameParams& p) {
-  return std::size_t{p.views} * p.width * p.height;
-}
-inline std::size_t tiles_of(const shared::FrameParams& p) {
-  return std::size_t{p.views} * p.tiles_x * p.tiles_y;
-}
 
 /// Pairs and fragments that a frame holds, or its buffers can hold; and, with noise on the pixel, pairs
 /// of tiles and contours.
@@ -57,7 +50,7 @@ struct Hiding {
   const Buffer<shared::ViewParams>& cameras;
 };
 
-/// Rows of as many pixels of the frame.
+/// Rows of as many pixels of the window.
 struct PixelBlock {
   Range row(std::size_t r) const { return {first + r * stride, columns}; }
 
@@ -86,7 +79,11 @@ class Rasterize {
   explicit Rasterize(Device::Impl& device) : device_(device), launch_(device), scan_(device) {}
 
   /// Finds what every pair covers and counts the fragments. Blocks to read where each row of tiles begins.
-  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin);
+  /// Counts those of pixels, if the frame is not in bands of samples.
+  void cover(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
+             bool counts_pixels = true);
+  /// Counts the fragments of the window's pixels; after cover().
+  void count_pixels(const shared::FrameParams& p, const Bin& bin);
   /// The same and forward() of the whole frame without waiting to learn how many fragments there are. If
   /// anything exceeds the capacity the frame is emptied, with the lists of faces' and contours' pairs;
   /// read_counts() returns the true counts, so that the caller can retry. `reads`: they are on their way to
@@ -113,10 +110,10 @@ class Rasterize {
   FrameCounts counted() const;
   /// Reads where each row of tiles begins, of a frame that forward_within() rendered. Blocks.
   void read_rows(const shared::FrameParams& p);
-  /// Cuts the frame into bands whose fragments, of so many bytes each, fit the budget; after cover() or
-  /// read_rows(). Blocks where a row of tiles has to be cut. A band is no less than a tile, even if that does
-  /// not fit.
-  std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, std::size_t budget,
+  /// Cuts rows of tiles of the window into bands whose fragments, of so many bytes each, fit the budget; after
+  /// cover() or read_rows(). Blocks where a row of tiles has to be cut. A band is no less than a tile, even if that
+  /// does not fit.
+  std::vector<Band> cut(const shared::FrameParams& p, const Bin& bin, const Range& rows, std::size_t budget,
                         std::size_t fragment_bytes) const;
   /// Throws InvalidArgument if a band does not fit.
   static void require_fits(std::span<const Band> bands, std::size_t budget, std::size_t fragment_bytes);
@@ -169,7 +166,7 @@ class Rasterize {
   std::size_t frame_fragments = 0;  ///< of all bands
   Buffer<cl_uint2> masks;           ///< [pair] pixels of its tile that a pair covers
   Buffer<cl_uint> fragment_starts;  ///< [pair + 1]
-  Buffer<cl_uint> pixel_starts;     ///< [view * height * width + 1] runs of `list`
+  Buffer<cl_uint> pixel_starts;     ///< [pixels_of(p) + 1] runs of `list`
   Buffer<cl_uint> list;             ///< [fragment] fragments by pixel
   Buffer<cl_uint> fragment_pair;    ///< [fragment]
   Buffer<cl_uint> fragment_pixel;   ///< [fragment] x | y << 16
@@ -194,7 +191,7 @@ class Rasterize {
     return counted_ ? Length::varying(count) : Length::at_most(count);
   }
   void count(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, Bin& bin,
-             const ContourCount& contours);
+             const ContourCount& contours, bool counts_pixels);
 
   Device::Impl& device_;
   Launcher<kernel::rasterize_cover, kernel::rasterize_hide, kernel::rasterize_count, kernel::rasterize_rows,
@@ -210,7 +207,7 @@ class Rasterize {
   std::size_t likely_fragments_ = std::numeric_limits<std::size_t>::max();
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
   bool counted_ = true;                // the counts are the frame's, not the capacity
-  bool in_bands_ = false;              // the starts above are a band's, those below the frame's
+  bool in_bands_ = false;              // the starts above are a band's, those below the frame's, or the window's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };
 

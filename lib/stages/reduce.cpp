@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 namespace dpr {
 
@@ -21,10 +22,22 @@ void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_s
                                         .sums = sums});
     return;
   }
+  start(what, {{0, std::numeric_limits<cl_uint>::max()}}, 0, partial_);
+  launch_(count, kernel::reduce_final{.count = static_cast<cl_uint>(count),
+                                      .slots = to_uint(slots_of_segments(what.expected / what.segments)),
+                                      .first = static_cast<cl_uint>(first_sum),
+                                      .partial = partial_,
+                                      .sums = sums});
+}
+
+void Reduce::start(const Summation& what, const cl_uint2& held, std::size_t shift, Buffer<float>& partial) {
+  const std::size_t count = what.channels * what.segments;
   const auto slots = static_cast<cl_uint>(slots_of_segments(what.expected / what.segments));
-  partial_.resize(device_, 2 * count * slots);
+  partial.resize(device_, 2 * count * slots);
   const std::size_t width = std::min<std::size_t>(device_.info.lanes, DPR_TILE);
   launch_(count * slots / width, kernel::reduce_partial{.count = static_cast<cl_uint>(what.count),
+                                                        .held = held,
+                                                        .shift = to_uint(shift),
                                                         .first_channel = to_uint(what.first_channel),
                                                         .channels = static_cast<cl_uint>(what.channels),
                                                         .segments = static_cast<cl_uint>(what.segments),
@@ -32,12 +45,11 @@ void Reduce::add(const Summation& what, Buffer<float>& sums, std::size_t first_s
                                                         .slots = slots,
                                                         .starts = what.starts,
                                                         .values = what.values,
-                                                        .partial = partial_});
-  launch_(count, kernel::reduce_final{.count = static_cast<cl_uint>(count),
-                                      .slots = slots,
-                                      .first = static_cast<cl_uint>(first_sum),
-                                      .partial = partial_,
-                                      .sums = sums});
+                                                        .partial = partial});
+}
+
+void Reduce::add_part(const Summation& what, const Range& held, std::size_t shift, Buffer<float>& partial) {
+  if (what.channels > 0) start(what, {{to_uint(held.first), held.last()}}, shift, partial);
 }
 
 void Reduce::operator()(const Summation& what, Buffer<float>& sums) {
