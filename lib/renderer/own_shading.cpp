@@ -120,7 +120,8 @@ ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples,
     const FloatVectors group = group_of(own_samples_, first, channels);
     made_exchange().give(group, sample_count, vectors_of(own_group_, 0, 4));
     made_exchange().give(group_of(own_pixels_, first, channels), pixel_count, vectors_of(own_image_, 0, 4));
-    pixel_noise->smooth_backward(contour_inputs(), own_group_, image_size(), own_image_, grad_group_);
+    pixel_noise->smooth_backward(contour_inputs(), own_group_, image_size(), own_image_, grad_group_,
+                                 aggregate.scratch(frame));
     made_exchange().give(vectors_of(grad_group_, 0, 4), sample_count, group);
     grad_vertices.resize(on, vertices);
     grad_vertices.fill({});

@@ -69,12 +69,12 @@ void PixelNoise::start_backward(const Blur::Size& size, const BufferRef<cl_float
 }
 
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                          const Range& rows, bool by_scale) {
+                          const Range& rows, bool by_scale, Buffer<float>& scratch) {
   antialias.cross(in, contour, rows);
   antialias.forward(in.p, contour, raster, kept_, rows);
   if (by_scale) blur.add_scale(size, raster, lines_of_band(in.p, rows));
   blur.backward_part(size, lines_of(in.p, window_of(in.p)), grad_raster_, by_scale);
-  antialias.backward(in, contour, kept_, grad_raster_, rows);
+  antialias.backward(in, contour, kept_, grad_raster_, {raster, scratch}, rows);  // the raster has been read
 }
 
 void PixelNoise::finish_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image,
@@ -111,7 +111,8 @@ void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, con
 }
 
 void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
-                                 const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples) {
+                                 const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
+                                 Buffer<float>& scratch) {
   antialias.forward(in.p, contour, samples, other_kept_);
   if (sampled) {
     sampled->backward(grad_image, grad_samples);
@@ -119,11 +120,12 @@ void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& sam
     blur.backward(size, grad_image, grad_samples, false);
   }
   blur_holds_image_ = false;
-  antialias.backward(in, contour, other_kept_, grad_samples);
+  antialias.backward(in, contour, other_kept_, grad_samples, {kept_grad_, scratch});
 }
 
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                          const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole) {
+                          const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole,
+                          Buffer<float>& scratch) {
   if (by_scale && !raster_is_gradient_) {
     if (!is_blended_) antialias.forward(in.p, contour, raster, kept_);
     is_blended_ = true;
@@ -140,16 +142,17 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
     if (by_scale) blur.backward_scale(size, raster, grad_image);
     blur_holds_image_ = by_scale;
   }
-  antialias.backward(in, contour, kept_, grad_raster);
+  antialias.backward(in, contour, kept_, grad_raster, {kept_grad_, scratch});
 }
 
-void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents) {
+void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents,
+                         Buffer<float>& scratch) {
   const std::size_t samples = std::size_t{in.p.views} * in.p.width * in.p.height;
   const std::size_t pixels = size.views * size.width * size.height;
   moved_raster_.resize(device_, samples);
   for (std::size_t d = 0; d < tangents.params.directions; ++d) {
     tangents.rasters.copy_to(moved_raster_, d * samples, samples, 0);
-    antialias.tangent(in, contour, kept_, d, tangents, moved_raster_);
+    antialias.tangent(in, contour, kept_, d, tangents, moved_raster_, {kept_grad_, scratch});
     blur_forward(size, moved_raster_, moved_image_);
     moved_image_.copy_to(tangents.images, (tangents.first + d) * pixels);
   }
@@ -159,7 +162,8 @@ void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangen
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
          (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
-         grad_raster_.capacity_bytes() + moved_raster_.capacity_bytes() + moved_image_.capacity_bytes();
+         grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes() + moved_raster_.capacity_bytes() +
+         moved_image_.capacity_bytes();
 }
 
 }  // namespace dpr

@@ -51,16 +51,16 @@ class PixelNoise {
   /// backward() of such a frame in the same way, of bands that have been rendered again.
   void start_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image, bool by_scale);
   void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, const Range& rows,
-                bool by_scale);
+                bool by_scale, Buffer<float>& scratch);
   void finish_backward(const Blur::Size& size, const BufferRef<cl_float4>& grad_image, bool by_scale);
 
   /// The raster holds samples as they were before forward(): bands have been rendered again.
   void unblend() { is_blended_ = raster_is_gradient_ = false; }
   /// To `grad_raster` and the contours' ends; and, if asked for, to the scale. `is_whole`: the raster is not
   /// rendered again, by bands, before the gradient is read. That takes its place then, unless the scale's
-  /// gradient is asked for and found by the raster itself.
+  /// gradient is asked for and found by the raster itself. `scratch`, here and below: see Aggregate::scratch().
   void backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole);
+                const BufferRef<cl_float4>& grad_image, bool by_scale, bool is_whole, Buffer<float>& scratch);
   /// True if backward() lacks the raster, whose place a gradient has taken, and the blur does not hold all
   /// that the scale's gradient needs of it.
   bool lacks_raster(bool by_scale) const {
@@ -79,10 +79,16 @@ class PixelNoise {
   /// From the gradient of what smooth() made of samples to theirs, and to the contours' ends. `samples` are as smooth()
   /// took them, and are blended again.
   void smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
-                       const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples);
+                       const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
+                       Buffer<float>& scratch);
 
   /// From the tangents of the samples, `tangents.rasters`, to those of the image, along a group's directions.
-  void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents);
+  void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents, Buffer<float>& scratch);
+  /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
+  Buffer<cl_float4>& room(const shared::FrameParams& p, std::size_t count) {
+    kept_grad_.resize(device_, std::max(pixels_of(p), count));
+    return kept_grad_;
+  }
 
   const Buffer<float>& grad_scale() const { return sampled ? sampled->grad_scale : blur.grad_scale; }
 
@@ -99,6 +105,7 @@ class PixelNoise {
 
   KeptSamples kept_, other_kept_;
   Buffer<cl_float4> grad_raster_;                 // where it has not taken the raster's place
+  Buffer<cl_float4> kept_grad_;                   // of a whole frame's samples; see room()
   Buffer<cl_float4> moved_raster_, moved_image_;  // tangents along one direction
   bool is_blended_ = false;                       // the raster is
   bool raster_is_gradient_ = false;

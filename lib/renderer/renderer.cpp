@@ -287,7 +287,7 @@ void Renderer::Impl::shade_and_aggregate() {
 }
 
 Buffer<cl_float4>& Renderer::Impl::room_for_grad_images(std::size_t pixels) {
-  if (pixel_noise && sample_bands.empty()) return pixel_noise->antialias.scratch(frame, pixels);
+  if (pixel_noise && sample_bands.empty()) return pixel_noise->room(frame, pixels);
   grad_images_.resize(impl_of(device), pixels);
   return grad_images_;
 }
@@ -320,7 +320,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
   } else if (pixel_noise) {
     if (pixel_noise->lacks_raster(wanted.smoothing)) render_again();
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
-                          bands.size() == 1);
+                          bands.size() == 1, aggregate.scratch(frame));
   }
   const bool textured = !geometry->textures.empty();
   if (wanted.texture && textured) texels->start(geometry->textures);
@@ -392,15 +392,17 @@ std::size_t Renderer::Impl::bytes() const {
          (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
          (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
          own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_group_.capacity_bytes() +
-         own_image_.capacity_bytes() + grad_group_.capacity_bytes() + (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() +
-         hidden_.capacity_bytes() + spare_views_.bytes() + spare_values_.capacity_bytes() +
-         spare_view_positions_.capacity_bytes() + spare_view_colors_.capacity_bytes() +
-         grad_images_.capacity_bytes() + grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() +
-         grad_colors.capacity_bytes() + grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
+         own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
+         (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
+         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + grad_images_.capacity_bytes() +
+         grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
+         grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
          (gradient_map ? gradient_map->bytes() : 0) + aov_surface.capacity_bytes() +
          aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
-         all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() + (corner_texcoords ? corner_texcoords->bytes() : 0);
+         all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() +
+         (corner_texcoords ? corner_texcoords->bytes() : 0);
 }
 
 void Renderer::forward() { impl_->forward(); }

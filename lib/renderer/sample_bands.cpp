@@ -8,7 +8,7 @@ namespace {
 
 /// Rows of tiles of a band at the least: with those around it, which are rendered with each band they are around,
 /// more bands would take more time than they save memory.
-constexpr std::size_t k_least_rows = 8;
+constexpr std::size_t k_least_rows = 6;
 
 constexpr std::size_t k_around = Antialias::k_rows_around;
 
@@ -41,7 +41,7 @@ Range window_around(const shared::FrameParams& p, const Range& rows, std::size_t
 /// Device memory of a sample, forward and backward.
 std::size_t Renderer::Impl::sample_bytes() const {
   const std::size_t starts = 2 * sizeof(cl_uint), gradient = sizeof(cl_float4);
-  return starts + gradient + PixelNoise::k_sample_bytes + aggregate.pixel_bytes(sums_pixels());
+  return starts + gradient + PixelNoise::k_sample_bytes + aggregate.pixel_bytes();
 }
 
 std::vector<Range> Renderer::Impl::cut_samples() const {
@@ -99,7 +99,8 @@ void Renderer::Impl::differentiate_in_bands(const BufferRef<cl_float4>& grad_ima
   pixel_noise->start_backward(image_size(), grad_images, by_scale);
   for (const Range& rows : sample_bands) {
     render_samples(rows);
-    pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), rows, by_scale);
+    pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), rows, by_scale,
+                          aggregate.scratch(frame));
     const BufferRef<cl_float4> grad_raster = pixel_noise->grad_raster(aggregate.image);
     for (const Band& band : rasterize.cut(frame, bin, rows, fragments_of_band(), fragment_bytes())) {
       render(band);

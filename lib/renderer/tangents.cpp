@@ -217,7 +217,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
       aggregate.tangent(aggregate_inputs(), scene.background, tangents, pixel_noise ? 0 : first,
                         pixel_noise ? tangents.rasters : tangents.images);
     }
-    if (pixel_noise) pixel_noise->tangent(contour_inputs(), image_size(), tangents);
+    if (pixel_noise) pixel_noise->tangent(contour_inputs(), image_size(), tangents, aggregate.scratch(frame));
   }
 }
 

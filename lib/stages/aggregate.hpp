@@ -72,10 +72,16 @@ class Aggregate : public SmoothedStage<AggregateKernels> {
   /// Bytes a fragment of the buffers below and the slots.
   static constexpr std::size_t k_fragment_bytes = sizeof(shared::Slot);
 
+  /// Memory of four floats a pixel at the least, until backward() writes to it: that of the channels.
+  Buffer<float>& scratch(const shared::FrameParams& p) {
+    channels.resize(device_, std::max<std::size_t>(4, channel_count()) * pixels_of(p));
+    return channels;
+  }
+
   /// Bytes a pixel of the buffers below and the slots.
-  std::size_t pixel_bytes(bool with_channels) const {
+  std::size_t pixel_bytes() const {
     return sizeof(cl_float4) + sizeof(cl_uint) + (now_.kernels->barrier ? sizeof(shared::Slot) : 0) +
-           (with_channels ? channel_count() * sizeof(float) : 0);
+           std::max<std::size_t>(4, channel_count()) * sizeof(float);
   }
 
   Buffer<cl_float4> image;  ///< [pixels_of(p)] RGBA

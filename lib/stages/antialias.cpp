@@ -113,30 +113,37 @@ void Antialias::forward(const shared::FrameParams& p, const Contour& contour, Bu
                                                           .blended = samples});
 }
 
-Buffer<cl_float4>& Antialias::scratch(const shared::FrameParams& p, std::size_t count) {
-  kept_grad_.resize(device_, std::max(pixels_of(p), count));
-  return kept_grad_;
+namespace {
+
+/// Gradients or tangents of cuts, in memory of others.
+BufferRef<cl_float2> cuts_in(Device::Impl& device, const AntialiasScratch& scratch, std::size_t cuts) {
+  scratch.cuts.resize(device, 2 * cuts);
+  return BufferRef<cl_float2>(scratch.cuts.cl_buffer()());
 }
 
+}  // namespace
+
 void Antialias::backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-                         Buffer<cl_float4>& grad, const std::optional<Range>& wanted) {
+                         Buffer<cl_float4>& grad, const AntialiasScratch& scratch,
+                         const std::optional<Range>& wanted) {
   const std::size_t samples = pixels_of(in.p);
   const TileLaunch read = launch_around(in.p, wanted, k_read_around),
                    blended = launch_around(in.p, wanted, k_blended_around),
                    own = launch_around(in.p, wanted, 0);
-  grad_cut_.resize(device_, 2 * samples);
+  const BufferRef<cl_float2> grad_cut = cuts_in(device_, scratch, 2 * samples);
   grad_seconds_.resize(device_, seconds.size());
-  kept_grad_.resize(device_, samples);
+  Buffer<cl_float4>& kept_grad = scratch.samples;
+  kept_grad.resize(device_, samples);
   grad_ends.resize(device_, contour.pairs);
   launch_(read.items, kernel::antialias_keep{
-                          .p = read.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad_});
+                          .p = read.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad});
   launch_(blended.items, kernel::antialias_backward{.p = blended.p,
                                                     .tile_starts = contour.tile_starts,
                                                     .winner = winner,
                                                     .cut = cut,
                                                     .raster = kept.faded,
-                                                    .grad_blended = kept_grad_,
-                                                    .grad_cut = grad_cut_,
+                                                    .grad_blended = kept_grad,
+                                                    .grad_cut = grad_cut,
                                                     .grad_raster = grad});
   launch_(blended.items, kernel::antialias_second_backward{.p = blended.p,
                                                            .tile_starts = contour.tile_starts,
@@ -145,21 +152,21 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                                                            .winner = winner,
                                                            .cut = cut,
                                                            .raster = kept.faded,
-                                                           .grad_blended = kept_grad_,
-                                                           .grad_cut = grad_cut_,
+                                                           .grad_blended = kept_grad,
+                                                           .grad_cut = grad_cut,
                                                            .grad_raster = grad,
                                                            .grad_seconds = grad_seconds_});
   launch_(blended.items,
           kernel::antialias_keep{
-              .p = blended.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad_});
+              .p = blended.p, .tile_starts = contour.tile_starts, .from = grad, .kept = kept_grad});
   launch_(own.items, kernel::antialias_fade_backward{.p = own.p,
                                                      .tile_starts = contour.tile_starts,
                                                      .winner = winner,
                                                      .cut = cut,
                                                      .raster = kept.samples,
                                                      .shares = kept.shares,
-                                                     .grad_faded = kept_grad_,
-                                                     .grad_cut = grad_cut_,
+                                                     .grad_faded = kept_grad,
+                                                     .grad_cut = grad_cut,
                                                      .grad_raster = grad});
   launch_(contour.pairs, kernel::antialias_cross_backward{.p = own.p,
                                                           .pairs = contour.pair_count,
@@ -170,7 +177,7 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
                                                           .pair_contour = contour.pair_contour,
                                                           .pair_tile = contour.pair_tile,
                                                           .winner = winner,
-                                                          .grad_cut = grad_cut_,
+                                                          .grad_cut = grad_cut,
                                                           .second_counts = second_counts,
                                                           .seconds = seconds,
                                                           .grad_seconds = grad_seconds_,
@@ -178,12 +185,14 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
 }
 
 void Antialias::tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-                        std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples) {
+                        std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples,
+                        const AntialiasScratch& scratch) {
   if (!tangent_) tangent_.emplace(device_);
   // What the backward pass has of cuts and samples holds their tangents; seconds follow the cuts.
   const TileLaunch all = launch_around(in.p, {}, 0);
-  grad_cut_.resize(device_, 2 * pixels_of(in.p) + seconds.size());
-  kept_grad_.resize(device_, pixels_of(in.p));
+  const BufferRef<cl_float2> cut_tangents = cuts_in(device_, scratch, 2 * pixels_of(in.p) + seconds.size());
+  Buffer<cl_float4>& faded_tangents = scratch.samples;
+  faded_tangents.resize(device_, pixels_of(in.p));
   (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{
                                  .p = in.p,
                                  .direction_pairs = cl_uint2{{to_uint(direction), to_uint(contour.pairs)}},
@@ -198,22 +207,22 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                  .seconds = seconds,
                                  .vertices = tangents.ndc,
                                  .outlines = tangents.outlines,
-                                 .cut_tangents = grad_cut_});
+                                 .cut_tangents = cut_tangents});
   (*tangent_)(all.items, kernel::antialias_fade_tangent{.p = all.p,
                                                         .tile_starts = contour.tile_starts,
                                                         .winner = winner,
                                                         .cut = cut,
                                                         .raster = kept.samples,
-                                                        .cut_tangents = grad_cut_,
+                                                        .cut_tangents = cut_tangents,
                                                         .raster_tangents = samples,
-                                                        .faded_tangents = kept_grad_});
+                                                        .faded_tangents = faded_tangents});
   (*tangent_)(all.items, kernel::antialias_blend_tangent{.p = all.p,
                                                          .tile_starts = contour.tile_starts,
                                                          .winner = winner,
                                                          .cut = cut,
                                                          .raster = kept.faded,
-                                                         .cut_tangents = grad_cut_,
-                                                         .faded_tangents = kept_grad_,
+                                                         .cut_tangents = cut_tangents,
+                                                         .faded_tangents = faded_tangents,
                                                          .tangents = samples});
   (*tangent_)(all.items, kernel::antialias_second_tangent{.p = all.p,
                                                           .tile_starts = contour.tile_starts,
@@ -222,17 +231,16 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                                           .winner = winner,
                                                           .cut = cut,
                                                           .raster = kept.faded,
-                                                          .cut_tangents = grad_cut_,
-                                                          .faded_tangents = kept_grad_,
+                                                          .cut_tangents = cut_tangents,
+                                                          .faded_tangents = faded_tangents,
                                                           .tangents = samples});
 }
 
 std::size_t Antialias::bytes() const {
-  std::size_t bytes = kept_grad_.capacity_bytes() + winner.capacity_bytes() + crowded_.capacity_bytes() +
-                      second_counts.capacity_bytes() + seconds.capacity_bytes() + grad_ends.capacity_bytes() +
-                      front.capacity_bytes() + front_face.capacity_bytes();
-  for (const Buffer<cl_float2>* buffer : {&cut, &grad_cut_, &grad_seconds_})
-    bytes += buffer->capacity_bytes();
+  std::size_t bytes = winner.capacity_bytes() + crowded_.capacity_bytes() + second_counts.capacity_bytes() +
+                      seconds.capacity_bytes() + grad_ends.capacity_bytes() + front.capacity_bytes() +
+                      front_face.capacity_bytes();
+  for (const Buffer<cl_float2>* buffer : {&cut, &grad_seconds_}) bytes += buffer->capacity_bytes();
   return bytes;
 }
 

@@ -23,6 +23,13 @@ struct KeptSamples {
   }
 };
 
+/// Memory of others that backward() and tangent() may write to: of samples, and of four floats a sample at the
+/// least.
+struct AntialiasScratch {
+  Buffer<cl_float4>& samples;
+  Buffer<float>& cuts;
+};
+
 class Antialias {
  public:
   explicit Antialias(Device::Impl& device) : device_(device), launch_(device) {}
@@ -40,19 +47,19 @@ class Antialias {
   /// From the gradients of the blended samples to those of the samples, in place, and to `grad_ends` of the
   /// wanted tiles. `kept` as forward() leaves it.
   void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-                Buffer<cl_float4>& grad, const std::optional<Range>& wanted = {});
+                Buffer<cl_float4>& grad, const AntialiasScratch& scratch,
+                const std::optional<Range>& wanted = {});
   /// From the tangents of the samples to those of the blended ones, in place, along one of the directions. `kept`
   /// as forward() leaves it.
   void tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-               std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples);
-  /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
-  Buffer<cl_float4>& scratch(const shared::FrameParams& p, std::size_t count);
+               std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples,
+               const AntialiasScratch& scratch);
 
   /// Rows of tiles around those that are wanted in which samples have to be there.
   static constexpr std::size_t k_rows_around = 6;
   /// Bytes a sample of the buffers below.
   static constexpr std::size_t k_sample_bytes =
-      sizeof(float) + 3 * sizeof(cl_uint) + 4 * sizeof(cl_float2) + sizeof(cl_float4) +
+      sizeof(float) + 3 * sizeof(cl_uint) + 2 * sizeof(cl_float2) +
       DPR_SECOND_CROSSINGS * (sizeof(shared::SecondCrossing) + sizeof(cl_float2)) / (2 * DPR_TILE) + 1;
 
   Buffer<float> front;         ///< [sample] view depth, infinite where nothing is; only near contours
@@ -79,9 +86,7 @@ class Antialias {
                          kernel::antialias_blend_tangent, kernel::antialias_second_tangent>>
       tangent_;                     // made when first asked for
   Buffer<cl_uchar> crowded_;        // [tile][DPR_TILE_BYTES]
-  Buffer<cl_float2> grad_cut_;      // [2][sample]
   Buffer<cl_float2> grad_seconds_;  // as `seconds`
-  Buffer<cl_float4> kept_grad_;     // [sample] near contours; see scratch()
 };
 
 }  // namespace dpr

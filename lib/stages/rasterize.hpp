@@ -207,7 +207,7 @@ class Rasterize {
   std::size_t likely_fragments_ = std::numeric_limits<std::size_t>::max();
   std::vector<TileStart> row_starts_;  // [view * tiles_y + 1]
   bool counted_ = true;                // the counts are the frame's, not the capacity
-  bool in_bands_ = false;              // the starts above are a band's, those below the frame's, or the window's
+  bool in_bands_ = false;  // the starts above are a band's, those below the frame's, or the window's
   Buffer<cl_uint> frame_fragment_starts_, frame_pixel_starts_;
 };
 

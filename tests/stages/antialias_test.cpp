@@ -78,6 +78,12 @@ Blended blend_and_keep(ContourFrame& frame, const SampleGrid& samples, cl_uint u
   return {raster.download(), std::move(kept)};
 }
 
+void backward(ContourFrame& frame, const KeptSamples& kept, Buffer<cl_float4>& grad) {
+  Buffer<cl_float4> samples;
+  Buffer<float> cuts;
+  frame.antialias.backward(frame.inputs(), frame.contour, kept, grad, {samples, cuts});
+}
+
 std::vector<cl_float4> blend(ContourFrame& frame, const SampleGrid& samples) {
   return blend_and_keep(frame, samples).image;
 }
@@ -348,7 +354,7 @@ TEST_SUITE("unit") {
         const Blended blended = blend_and_keep(frame, samples, unknown);
         std::vector<std::vector<cl_float4>> results{blended.image};
         Buffer<cl_float4> grad(device_impl(), smooth_values(frame, 1));
-        frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad);
+        backward(frame, blended.kept, grad);
         results.push_back(grad.download());
         results.push_back(frame.antialias.grad_ends.download());
         return results;
@@ -383,7 +389,7 @@ TEST_SUITE("gradient") {
     const Blended blended = blend_and_keep(frame, samples);
     const std::vector<cl_float4> grad = smooth_values(frame, 1);
     Buffer<cl_float4> grad_raster(device_impl(), grad);
-    frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad_raster);
+    backward(frame, blended.kept, grad_raster);
     const double sum = dot(grad, blended.image);
     CHECK(sum == doctest::Approx(dot(grad_raster.download(), samples.colors)).epsilon(1e-5));
     CHECK(sum != doctest::Approx(dot(grad, samples.colors)).epsilon(1e-4));
@@ -398,7 +404,7 @@ TEST_SUITE("gradient") {
     const Blended blended = blend_and_keep(frame, samples);
     Buffer<cl_float4> grad_raster(device_impl(), grad), grad_ndc, no_clip;
     test::poison(grad_ndc, mesh.positions.size(), cl_float4{});
-    frame.antialias.backward(frame.inputs(), frame.contour, blended.kept, grad_raster);
+    backward(frame, blended.kept, grad_raster);
     frame.contour.gather(frame.inputs(), frame.antialias.grad_ends, grad_ndc, no_clip);
     const std::vector<cl_float4> found = grad_ndc.download();
     const float step = 1e-4F;
