@@ -27,10 +27,11 @@
 /// in   fragment_pair, pair_face            uint[fragment], uint[pair]
 /// out  front        float[pixel]           not written in tiles further than one from a contour
 /// out  front_face   uint[pixel]            the same; view * faces + face, DPR_NO_FACE where there is none
-kernel void antialias_front(const FrameParams p, global const uint* restrict tile_starts, global const uint* restrict starts,
-                            global const uint* restrict list, global const float* restrict depth,
-                            global const uint* restrict fragment_pair, global const uint* restrict pair_face,
-                            global float* restrict front, global uint* restrict front_face) {
+kernel void antialias_front(const FrameParams p, global const uint* restrict tile_starts,
+                            global const uint* restrict starts, global const uint* restrict list,
+                            global const float* restrict depth, global const uint* restrict fragment_pair,
+                            global const uint* restrict pair_face, global float* restrict front,
+                            global uint* restrict front_face) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
   if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   for (uint row = rows.first; row < rows.last; ++row) {
@@ -71,8 +72,8 @@ static inline void clear_steps(const FrameParams p, const TileSamples s, const T
     clear_in_row(s.last_column - s.first_column,
                  winner + place_of_sample(p, view, (uint)s.first_column, (uint)row));
   for (int row = s.first_row; row < s.last_row; ++row)
-    clear_in_row(last_column - first_column, winner + samples_of_window(p) +
-                                                 place_of_sample(p, view, (uint)first_column, (uint)row));
+    clear_in_row(last_column - first_column,
+                 winner + samples_of_window(p) + place_of_sample(p, view, (uint)first_column, (uint)row));
 }
 
 /// Finds what crosses the steps of a tile. One work-item per DPR_ROWS rows, and as many columns, of a tile.

@@ -37,7 +37,8 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
             inner_first = first_is_inner(c, e);
   if (c.flags & DPR_CONTOUR_CREASE) {
     const int column = x.column + (e.is_by_rows && !is_first), row = x.row + (!e.is_by_rows && !is_first);
-    const float front = v.front[v.first + (uint)row * p.width + (uint)column], slack = v.reach + DPR_DEPTH_SLACK * depth;
+    const float front = v.front[v.first + (uint)row * p.width + (uint)column],
+                slack = v.reach + DPR_DEPTH_SLACK * depth;
     return hides_crease(p, c, v.faces, v.ndc, inner_first == is_first, pixel_centre(p, column, row), front,
                         depth, slack);
   }

@@ -17,8 +17,8 @@ static inline uint2 reference_samples(const FrameParams p, const SecondCrossing 
 
 static inline int is_in_rows(const FrameParams p, const TileRows rows, uint sample) {
   const uint line = line_of_place(p, sample), row = line % p.height;
-  return tile_of_sample(p, line / p.height, (sample + p.first_sample) % p.width, row) == rows.tile && row >= rows.first &&
-         row < rows.last;
+  return tile_of_sample(p, line / p.height, (sample + p.first_sample) % p.width, row) == rows.tile &&
+         row >= rows.first && row < rows.last;
 }
 
 /// The lists of the tiles near one, in a fixed order.

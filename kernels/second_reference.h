@@ -41,7 +41,8 @@ static inline uint own_step(const FrameParams p, uint view, uint contour, const 
   if (!lies_on_raster(p, e, x)) return DPR_NO_CROSSING;
   const uint step = step_of(p, view, e, x);
   const uint tile = tile_of_sample(p, view, (uint)x.column, (uint)x.row);
-  if (winner[step] != contour || has_bit(crowded + DPR_TILE_BYTES * (tile - p.first_tile), e, x)) return DPR_NO_CROSSING;
+  if (winner[step] != contour || has_bit(crowded + DPR_TILE_BYTES * (tile - p.first_tile), e, x))
+    return DPR_NO_CROSSING;
   return first_is_inner(c, e) == first_is_within ? step : step | DPR_TURNED;
 }
 

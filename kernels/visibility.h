@@ -99,8 +99,8 @@ typedef struct {
   global const uint4* faces;
   global const float4* ndc;
   global const float* front;
-  uint first;                 // place of the view's first sample in the window, modulo 2^32
-  float reach;                // view depth behind the nearest that may still be seen
+  uint first;   // place of the view's first sample in the window, modulo 2^32
+  float reach;  // view depth behind the nearest that may still be seen
 } CrossingScene;
 
 /// From how many of the samples of the step that it crosses something hides a contour.

@@ -48,10 +48,13 @@ class DPR_API Device {
   std::size_t allocated_bytes() const;
   std::size_t peak_allocated_bytes() const;
 
-  /// Memory for the fragments of a frame, bytes. Unless set: a quarter of the device's; of a CPU's, which is
-  /// the whole machine's, an eighth and at most 1 GiB. A frame with more fragments is rendered in bands of
-  /// tile rows, or of parts of one, forward and backward, with the same results bit by bit. What grows with
-  /// the scene, the image and the number of triangles in each tile comes on top.
+  /// Memory for the fragments of a frame and, with noise on the pixel, for its samples, bytes. Unless set: a quarter
+  /// of the device's; of a CPU's, which is the whole machine's, an eighth and at most 1 GiB. A frame with more of
+  /// either is rendered in bands of tile rows, or of parts of one, forward and backward, with the same results bit by
+  /// bit. In bands of samples each have half of the budget; samples no less than 144 lines of the raster take, at 147
+  /// to 167 bytes a sample: so 512x512 pixels of 4x4 samples fit less than 100 MB. All samples are held, whatever the
+  /// budget, for auxiliary outputs, tangents, Renderer::samples() and resolve(), and Monte Carlo noise of the pixel.
+  /// What grows with the scene, the image and the number of triangles in each tile comes on top.
   std::size_t memory_budget() const;
   /// Sets the budget of all renderers on the device. Their next forward() throws InvalidArgument if one tile
   /// of 8x8 pixels does not fit. Throws InvalidArgument for 0.

@@ -81,7 +81,7 @@ void add_device_options(CLI::App& command, CommonOptions& options) {
       ->type_name("cpu|gpu|INDEX|SUBSTRING");
   command
       .add_option("--memory-budget", options.memory_budget,
-                  "Device memory for fragments; larger frames are rendered in bands "
+                  "Device memory for fragments and samples; larger frames are rendered in bands "
                   "(default: a quarter; of a CPU's an eighth, at most 1024)")
       ->check(CLI::Range(1, 1 << 30))
       ->type_name("MiB");
