@@ -146,8 +146,7 @@ static inline void load_sums(const BlurPass p, const BlurPlace place, global con
   }
 }
 
-/// Adds a block's rows of inputs to its sums, in order. Lanes from the place's count on hold nothing of use, as do
-/// rows from its steps on.
+/// Adds inputs to a block's sums, in order. Lanes from its count on, and rows from its steps on, are of no use.
 static inline void add_columns(const BlurPass p, const BlurPlace place, const BlurTaps t,
                                global const float* restrict weights, global const float4* restrict in,
                                pixels_n* sums) {

@@ -125,17 +125,6 @@ void Renderer::Impl::set_up() {
   bin.start();
 }
 
-/// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
-std::size_t Renderer::Impl::fragment_bytes() const {
-  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
-  return k_always + (geometry->textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
-}
-
-/// Memory for fragments: no more of them than kernels can index.
-std::size_t Renderer::Impl::fragment_budget() const {
-  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes());
-}
-
 /// None where the frame may have to be cut into bands: for that its sizes must be known.
 std::optional<FrameCounts> Renderer::Impl::expected_capacity() const {
   if (!last_counts && !reserved) return std::nullopt;

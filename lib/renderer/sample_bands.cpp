@@ -1,4 +1,5 @@
-// Frames in bands of samples: where the memory budget does not hold all samples of a frame with noise on the pixel.
+// What the memory budget holds of a frame; and frames in bands of samples, where it does not hold all samples of
+// noise on the pixel.
 #include <algorithm>
 
 #include "renderer/renderer_impl.hpp"
@@ -37,6 +38,17 @@ Range window_around(const shared::FrameParams& p, const Range& rows, std::size_t
 }
 
 }  // namespace
+
+/// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
+std::size_t Renderer::Impl::fragment_bytes() const {
+  constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
+  return k_always + (geometry->textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
+}
+
+/// Memory for fragments: no more of them than kernels can index.
+std::size_t Renderer::Impl::fragment_budget() const {
+  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes());
+}
 
 /// Device memory of a sample, forward and backward.
 std::size_t Renderer::Impl::sample_bytes() const {

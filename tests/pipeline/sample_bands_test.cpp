@@ -108,14 +108,14 @@ TEST_SUITE("pipeline") {
     for (const std::uint32_t supersampling : {1U, 2U, 4U}) {
       for (const float sigma : {2e-3F, k_least_sigma}) {
         for (const Composition composition : {Composition::barrier, Composition::joint}) {
-          if (is_reduced() && (supersampling != 4 || sigma != k_least_sigma)) continue;
+          if (is_reduced() && (supersampling != 1 || sigma != k_least_sigma)) continue;
           if (is_reduced() && composition == Composition::joint) continue;
           CAPTURE(supersampling);
           CAPTURE(sigma);
           CAPTURE(to_string(composition));
           Scene scene = tall_scene(supersampling, sigma);
           scene.smoothing.composition = composition;
-          scene.lights = two_lights(Shading::phong);
+          if (!is_reduced()) scene.lights = two_lights(Shading::phong);
           check_same(scene, views_of(scene, 1));
         }
       }
@@ -123,12 +123,12 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("sample bands: the same bits for batches of views, whose bands are of several") {
+    if (is_reduced()) return;
     for (const int height : {9, 44}) {
-      if (is_reduced() && height != 9) continue;
       CAPTURE(height);
       Scene scene = tall_scene(4, k_least_sigma);
       scene.height = height;
-      scene.width = reduced(31, 5);
+      scene.width = 31;
       scene.lights = every_light(Shading::gouraud);
       scene.meshes.push_back({make_cube(), placed(70.0F, 0.4F, {0.9F, 0.4F, 0.2F})});
       check_same(scene, views_of(scene, height == 9 ? 6 : 3));
